@@ -1,0 +1,16 @@
+"""The two errors that reach people: what they gave is not usable, or a part of the software is not installed."""
+
+
+class InputError(Exception):
+    """What somebody gave is not what is wanted: names the place (file and key), what was got and what is wanted.
+
+    >>> str(InputError("case.toml: effect[0].mu", '"1 mm"', "a pressure"))
+    'case.toml: effect[0].mu: got "1 mm", want a pressure'
+    """
+
+    def __init__(self, place: object, got: object, want: str) -> None:
+        super().__init__(f"{place}: got {got}, want {want}")
+
+
+class MissingSoftware(Exception):  # noqa: N818 - it is a state of the machine, not a mistake of the caller
+    """A package or program that this job needs is not installed; the message says how to get it."""

@@ -1,0 +1,72 @@
+"""What is measured: one file per metric, named as in scene files and JSON. A metric cannot tell who made a run.
+
+Contract (tests/test_metrics.py): zero against itself, a known change gives a known value, NaN stays NaN, units stated.
+"""
+
+import importlib
+import pkgutil
+from dataclasses import dataclass
+
+import numpy as np
+
+from fem_reference.geometry.extension import Extension
+from fem_reference.mesh import Floats, Polylines, vertex_areas
+from fem_reference.runs import Run
+
+
+@dataclass(frozen=True, eq=False)
+class Measure:
+    """One statistic of one metric: ``values`` per frame (f,) in ``unit``; ``where`` (f,) says in words where each is worst."""
+
+    metric: str
+    statistic: str
+    unit: str
+    values: Floats
+    where: tuple[str, ...] = ()
+
+    @property
+    def worst(self) -> int:
+        """Index of the frame with the greatest magnitude; a frame that is not a number counts as worst of all."""
+        magnitudes = np.abs(self.values)
+        return int(np.argmax(np.where(np.isnan(magnitudes), np.inf, magnitudes)))
+
+
+@dataclass(frozen=True, eq=False)
+class Yardstick:
+    """What every run of a scene is measured with, the same for all: ``areas`` (n,) [mm2] around the surface's vertices at rest,
+    the ``fibres`` at rest and the ``extension`` that carries a surface's displacement to their points, and ``travel`` [mm], the
+    greatest displacement of the reference's surface over its frames."""
+
+    areas: Floats
+    fibres: Polylines
+    extension: Extension
+    travel: float
+
+    @classmethod
+    def of(cls, reference: Run, fibres: Polylines) -> "Yardstick":
+        """The yardstick of a reference run."""
+        rest = reference.surface
+        return cls(
+            areas=vertex_areas(rest.points, rest.triangles),
+            fibres=fibres,
+            extension=Extension.to(fibres.points, rest),
+            travel=float(np.linalg.norm(reference.positions - rest.points, axis=2).max()),
+        )
+
+
+def names() -> list[str]:
+    """The metrics there are."""
+    return sorted(module.name for module in pkgutil.iter_modules(__path__))
+
+
+def measure(run: Run, reference: Run, yardstick: Yardstick) -> tuple[Measure, ...]:
+    """Every statistic of every metric of ``run`` against ``reference``, frame by frame; both must have the same frames."""
+    modules = (importlib.import_module(f"{__name__}.{name}") for name in names())
+    return tuple(statistic for module in modules for statistic in module.measure(run, reference, yardstick))
+
+
+def at_rest(run: Run) -> Run:
+    """The rest state of ``run`` repeated over its frames: measured against it, a run tells its change from rest."""
+    frames = len(run.numbers)
+    still = np.broadcast_to(run.surface.points, (frames, *run.surface.points.shape))
+    return Run("rest", "rest", run.outcome, run.numbers, run.surface, still)

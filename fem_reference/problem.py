@@ -1,0 +1,157 @@
+"""Scene -> everything a solver needs, as arrays: bodies, what is held, effects, fibres, frames. It knows no solver."""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from fem_reference import files
+from fem_reference.effects import Effect
+from fem_reference.errors import InputError
+from fem_reference.geometry.attachments import facets_under, pick
+from fem_reference.geometry.fibres import trace
+from fem_reference.geometry.tetrahedra import tetrahedralise
+from fem_reference.mesh import (
+    Floats,
+    Ints,
+    Polylines,
+    Surface,
+    TetMesh,
+    check_closed,
+    check_finite,
+    tet_qualities,
+    tet_volumes,
+    triangle_areas,
+    vertex_areas,
+)
+from fem_reference.motion import Rotation
+from fem_reference.records import join
+from fem_reference.scene import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A rigid bone: its ``surface`` at rest and its ``motion``, None where it rests."""
+
+    name: str
+    surface: Surface
+    motion: Rotation | None
+
+    def pose(self, frame: float) -> Floats:
+        """The 4 x 4 matrix that takes rest positions to positions at ``frame``."""
+        return np.eye(4) if self.motion is None else self.motion.pose(frame)
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """An attachment: the ``vertices`` (k,) of the muscle surface that ``bone`` holds."""
+
+    attachment: str
+    bone: Body
+    vertices: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """What a surface solver needs: the muscle ``surface`` at rest, the bones, what they hold, and the frames wanted."""
+
+    surface: Surface
+    bones: tuple[Body, ...]
+    held: tuple[Held, ...]
+    frames: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Problem(Setup):
+    """A setup filled with tetrahedra (``mesh.facets`` by attachment), with its effects and fibres; ``mesh_facts`` are what the
+    mesh is like, ``seconds`` how long it took to make."""
+
+    mesh: TetMesh
+    effects: tuple[Effect, ...]
+    fibres: Polylines
+    mesh_facts: dict[str, float]
+    seconds: float
+
+
+def setup(scene: Scene) -> Setup:
+    """Read and check the surfaces of a scene and choose its attachments; InputError names what is not usable."""
+    place = join(scene.place, "muscle.surface")
+    surface = files.read_surface(scene.file(scene.muscle.surface, "muscle.surface"), scene.muscle.unit)
+    surface = check_closed(Surface(surface.points, surface.triangles, f"{place}: {surface.place}"))
+    bones = tuple(_body(scene, i) for i in range(len(scene.bone)))
+    return Setup(surface, bones, _held(scene, surface, bones), scene.frames.numbers)
+
+
+def build(scene: Scene) -> Problem:
+    """The whole problem of a scene: its setup, tetrahedra and fibres."""
+    begin = time.perf_counter()
+    rest = setup(scene)
+    bare = tetrahedralise(rest.surface, scene.muscle.tet_size)
+    facets = {held.attachment: facets_under(bare, rest.surface, held.vertices) for held in rest.held}
+    for i, held in enumerate(rest.held):
+        if len(facets[held.attachment]) == 0:
+            place = join(scene.place, f"attachment[{i}]")
+            raise InputError(place, "an area smaller than the tetrahedra resolve", "a smaller muscle.tet_size")
+    mesh = TetMesh(bare.points, bare.tets, facets)
+    return Problem(
+        rest.surface,
+        rest.bones,
+        rest.held,
+        rest.frames,
+        mesh=mesh,
+        effects=scene.effects,
+        fibres=_fibres(scene, mesh),
+        mesh_facts=_mesh_facts(rest, mesh),
+        seconds=time.perf_counter() - begin,
+    )
+
+
+def _body(scene: Scene, i: int) -> Body:
+    bone = scene.bone[i]
+    surface = files.read_surface(scene.file(bone.surface, f"bone[{i}].surface"), bone.unit)
+    check_finite(surface)
+    return Body(bone.name, surface, bone.motion.rotation() if bone.motion else None)
+
+
+def _held(scene: Scene, surface: Surface, bones: tuple[Body, ...]) -> tuple[Held, ...]:
+    by_name = {bone.name: bone for bone in bones}
+    taken = np.zeros(len(surface.points), bool)
+    held = []
+    for i, attachment in enumerate(scene.attachment):
+        place = join(scene.place, f"attachment[{i}]")
+        vertices = pick(scene, i, surface, by_name[attachment.bone].surface)
+        if len(vertices) == 0:
+            raise InputError(place, "no vertex of the muscle", "an attachment that selects some")
+        if taken[vertices].any():
+            raise InputError(place, f"vertex {vertices[taken[vertices]][0]}, which another attachment holds", "each vertex once")
+        taken[vertices] = True
+        held.append(Held(attachment.name, by_name[attachment.bone], vertices))
+    return tuple(held)
+
+
+def _fibres(scene: Scene, mesh: TetMesh) -> Polylines:
+    if scene.fibres.polylines is not None:
+        given = scene.fibres.polylines
+        return files.read_polylines(scene.file(given.file, "fibres.polylines.file"), given.unit)
+    traced = scene.fibres.traced
+    assert traced is not None  # a Fibres record has one of the two
+    return trace(mesh, traced.start, traced.end, traced.count)
+
+
+def _mesh_facts(rest: Setup, mesh: TetMesh) -> dict[str, float]:
+    """Tets, their quality, the volume against the surface's, and for each attachment the area held on both."""
+    qualities = tet_qualities(mesh.points, mesh.tets)
+    facts = {
+        "tets": float(len(mesh.tets)),
+        "points": float(len(mesh.points)),
+        "quality_min": float(qualities.min()),
+        "quality_5_percent": float(np.percentile(qualities, 5)),
+        "volume_mm3": float(tet_volumes(mesh.points, mesh.tets).sum()),
+    }
+    areas = vertex_areas(rest.surface.points, rest.surface.triangles)
+    for held in rest.held:
+        facts[f"{held.attachment}_area_mm2"] = float(areas[held.vertices].sum())
+        facts[f"{held.attachment}_area_on_tets_mm2"] = float(
+            triangle_areas(mesh.points, mesh.facets[held.attachment]).sum()
+        )
+    return facts

@@ -1,0 +1,179 @@
+"""Run and the run store: what a solver produced, one folder a run, written as it goes.
+
+    <store>/<case>/<solver>-<key>/run.json        status, cost, origin, numbers per frame
+                                 /surface.pvd     the user's surface over the frames, for ParaView; surface/frame_0010.vtp
+                                 /fibres.pvd      fibre polylines, where the solver has an interior
+                                 /tets.pvd        tetrahedra, where the solver has them
+
+A file appears whole or not at all; ``run.json`` is written after the frame files that it names. A run whose status is
+``running`` was cut off; it is not read as a result.
+"""
+
+import json
+import logging
+import shutil
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from fem_reference import files
+from fem_reference.errors import InputError
+from fem_reference.mesh import Floats, Polylines, Surface, TetMesh
+
+log = logging.getLogger(__name__)
+
+Status = Literal["converged", "diverged", "inverted", "out of steps", "timed out", "crashed"]
+FORMAT = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One requested frame: positions [mm] of the surface (n, 3), and where the solver has them of the fibre points (m, 3) and
+    tet points (k, 3); ``scalars`` by name."""
+
+    number: int
+    surface: Floats
+    fibres: Floats | None = None
+    tets: Floats | None = None
+    scalars: dict[str, float] = field(default_factory=dict)
+
+
+Sink = Callable[[Frame], None]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a solve ended: a status, a sentence for people, and what it cost (seconds by phase ``seconds_...``, counts)."""
+
+    status: Status
+    message: str
+    cost: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Frames that somebody's solver produced for a scene.
+
+    ``numbers`` (f,), ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (its rest state), ``fibre_positions``
+    (f, m, 3) [mm] of the points of ``fibres`` or None for a surface-only solver, ``scalars`` by name (f,).
+    """
+
+    name: str
+    solver: str
+    outcome: Outcome
+    numbers: tuple[int, ...]
+    surface: Surface
+    positions: Floats
+    fibres: Polylines | None = None
+    fibre_positions: Floats | None = None
+    scalars: dict[str, Floats] = field(default_factory=dict)
+    origin: dict[str, Any] = field(default_factory=dict)
+    folder: Path | None = None
+
+
+class Writer:
+    """Writes one run into ``folder``, which it empties first; ``add`` each frame, then ``close``."""
+
+    def __init__(
+        self, folder: Path, identity: dict[str, Any], surface: Surface, fibres: Polylines | None, mesh: TetMesh | None
+    ) -> None:
+        """``identity``: ``name``, ``solver``, ``origin`` and ``frames`` (the numbers wanted), as they go into run.json."""
+        self.folder, self.surface, self.fibres, self.mesh = folder, surface, fibres, mesh
+        self.state: dict[str, Any] = {"format": FORMAT, **identity, "status": "running", "message": "", "numbers": []}
+        self.state |= {"scalars": {}, "cost": {}, "parts": []}
+        self.begin = time.perf_counter()
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        self._write_state()
+
+    def add(self, frame: Frame) -> None:
+        """Store a frame: its files first, then the index files and run.json."""
+        parts: dict[str, Callable[[Path], None]] = {
+            "surface": lambda path: files.write_surface(path, self.surface, frame.surface)
+        }
+        if self.fibres is not None and (fibres := frame.fibres) is not None:
+            lines = self.fibres
+            parts["fibres"] = lambda path: files.write_polylines(path, lines, fibres)
+        if self.mesh is not None and (tets := frame.tets) is not None:
+            mesh = self.mesh
+            parts["tets"] = lambda path: files.write_tets(path, mesh, tets)
+        self.state["numbers"].append(frame.number)
+        self.state["parts"] = sorted(parts)
+        for part, write in parts.items():
+            suffix = ".vtu" if part == "tets" else ".vtp"
+            (self.folder / part).mkdir(exist_ok=True)
+            write(self.folder / part / f"frame_{frame.number:04d}{suffix}")
+            names = [(number, f"{part}/frame_{number:04d}{suffix}") for number in self.state["numbers"]]
+            files.write_pvd(self.folder / f"{part}.pvd", names)
+        for name, value in frame.scalars.items():
+            self.state["scalars"].setdefault(name, []).append(value)
+        self._write_state()
+        self._log_progress(frame)
+
+    def close(self, outcome: Outcome) -> None:
+        """Store how it ended."""
+        cost = {"seconds": time.perf_counter() - self.begin} | outcome.cost
+        self.state |= {"status": outcome.status, "message": outcome.message, "cost": cost}
+        self._write_state()
+
+    def _write_state(self) -> None:
+        files.write_text(self.folder / "run.json", json.dumps(self.state, indent=1, allow_nan=True))
+
+    def _log_progress(self, frame: Frame) -> None:
+        done, wanted = len(self.state["numbers"]), len(self.state["frames"])
+        passed = time.perf_counter() - self.begin
+        left = f", about {passed / (done - 1) * (wanted - done):.0f} s left" if 1 < done < wanted else ""
+        told = "".join(f", {name.replace('_', ' ')} {value:.4g}" for name, value in frame.scalars.items())
+        solver = self.state["solver"]
+        log.info("%s: frame %d (%d of %d)%s, %.0f s%s", solver, frame.number, done, wanted, told, passed, left)
+
+
+def load(folder: Path) -> Run:
+    """The run in ``folder``; InputError where there is none, it was cut off, or one of its files is damaged."""
+    place = folder / "run.json"
+    try:
+        state = json.loads(place.read_text(encoding="utf-8"))
+        if state["format"] != FORMAT:
+            raise InputError(f"{place}: format", state["format"], str(FORMAT))
+        if state["status"] not in get_args(Status):
+            raise InputError(f"{place}: status", f'"{state["status"]}"', "a run that came to its end")
+        outcome = Outcome(state["status"], state["message"], state["cost"])
+        numbers = tuple(state["numbers"])
+        scalars = {name: np.asarray(values, float) for name, values in state["scalars"].items()}
+        name, solver, origin, parts = state["name"], state["solver"], state["origin"], state["parts"]
+    except (OSError, json.JSONDecodeError, KeyError, TypeError) as error:
+        raise InputError(place, repr(error), "the run.json of a stored run") from error
+    paths = [folder / "surface" / f"frame_{number:04d}.vtp" for number in numbers]
+    surfaces = [files.read_surface(path, 1.0) for path in paths]
+    if not surfaces:
+        raise InputError(place, "a run without frames", "at least the rest frame")
+    fibres, fibre_positions = None, None
+    if "fibres" in parts:
+        lines = [files.read_polylines(folder / "fibres" / path.name, 1.0) for path in paths]
+        fibres, fibre_positions = lines[0], np.stack([line.points for line in lines])
+    return Run(
+        name=name,
+        solver=solver,
+        outcome=outcome,
+        numbers=numbers,
+        surface=surfaces[0],
+        positions=np.stack([surface.points for surface in surfaces]),
+        fibres=fibres,
+        fibre_positions=fibre_positions,
+        scalars=scalars,
+        origin=origin,
+        folder=folder,
+    )
+
+
+def finished(folder: Path) -> Run | None:
+    """The stored run in ``folder`` if it is there and converged, else None."""
+    try:
+        run = load(folder)
+    except InputError:
+        return None
+    return run if run.outcome.status == "converged" else None

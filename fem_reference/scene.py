@@ -1,0 +1,258 @@
+"""A case as frozen records: what moves what, which effects act, which frames are wanted, and what is expected.
+
+``Scene.key`` names a scene by what determines its solution, the content of its files included.
+"""
+
+import hashlib
+import json
+import os
+from pathlib import Path
+from typing import Any, Literal, Self
+
+from pydantic import ConfigDict, Field, model_validator
+
+from fem_reference.effects import Effect
+from fem_reference.errors import InputError
+from fem_reference.motion import Rotation
+from fem_reference.records import Record, join
+from fem_reference.units import Angle, LengthUnit, Point, PositiveLength, Time
+
+DATA_SETTING = "FEM_REFERENCE_DATA"
+_PACKAGE = Path(__file__).resolve().parent
+# In a checkout cases/ and meshes/ stand beside the package, in an installed copy inside it.
+HOME = _PACKAGE.parent if (_PACKAGE.parent / "cases").is_dir() else _PACKAGE
+
+
+class Muscle(Record):
+    """The deformable body: a closed triangle surface and the size of the tetrahedra it is filled with."""
+
+    surface: str
+    unit: LengthUnit
+    tet_size: PositiveLength
+
+
+class Keyframe(Record):
+    """Where the motion is at a frame number."""
+
+    frame: float
+    angle: Angle
+
+
+class Motion(Record):
+    """A rotation about a fixed axis, linear between keyframes."""
+
+    axis: tuple[float, float, float]
+    centre: Point
+    keyframes: tuple[Keyframe, ...] = Field(min_length=2)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        frames = [keyframe.frame for keyframe in self.keyframes]
+        if any(late <= early for early, late in zip(frames, frames[1:], strict=False)):
+            raise ValueError("keyframes in the order of their frames")
+        if not any(self.axis):
+            raise ValueError("an axis that is not zero")
+        return self
+
+    def rotation(self) -> Rotation:
+        """The motion as poses over frame numbers."""
+        frames, angles = zip(*((key.frame, key.angle) for key in self.keyframes), strict=True)
+        return Rotation(self.axis, self.centre, frames, angles)
+
+
+class Bone(Record):
+    """A rigid body; without ``motion`` it rests."""
+
+    name: str
+    surface: str
+    unit: LengthUnit
+    motion: Motion | None = None
+
+
+class VertexList(Record):
+    """Vertices of the muscle surface from a CSV of ``vertex[,value]`` lines; with ``value`` only the lines that carry it."""
+
+    file: str
+    value: int | None = None
+
+
+class Outline(Record):
+    """Landmarks around an attachment: vertices within ``reach`` of the patch that the ordered points of each cloud span."""
+
+    file: str
+    unit: LengthUnit
+    clouds: tuple[str, ...] = Field(min_length=1)
+    reach: PositiveLength
+
+
+class Attachment(Record):
+    """Which part of the muscle surface is held by a bone: exactly one of ``vertices``, ``within`` (of the bone), ``outline``."""
+
+    name: str
+    bone: str
+    vertices: VertexList | None = None
+    within: PositiveLength | None = None
+    outline: Outline | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if sum(way is not None for way in (self.vertices, self.within, self.outline)) != 1:
+            raise ValueError('exactly one of "vertices", "within", "outline"')
+        return self
+
+
+class Polylines(Record):
+    """Fibres given as polylines in a file."""
+
+    file: str
+    unit: LengthUnit
+
+
+class Traced(Record):
+    """Fibres traced along the gradient of a Laplace field that is 0 on the attachment ``start`` and 1 on ``end``."""
+
+    count: int = Field(gt=0)
+    start: str
+    end: str
+
+
+class Fibres(Record):
+    """The fibres whose lengths are measured: exactly one of ``polylines`` and ``traced``."""
+
+    polylines: Polylines | None = None
+    traced: Traced | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if (self.polylines is None) == (self.traced is None):
+            raise ValueError('exactly one of "polylines", "traced"')
+        return self
+
+
+class Frames(Record):
+    """The frame numbers wanted: ``first``, ``first + every``, ... up to ``last``; ``interval`` is the time from a number to the
+    next, needed only where a recorded sequence states times."""
+
+    first: int = Field(ge=0)
+    last: int
+    every: int = Field(gt=0)
+    interval: Time | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.last <= self.first or (self.last - self.first) % self.every:
+            raise ValueError("last = first + a multiple of every")
+        return self
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """Every frame number wanted."""
+        return tuple(range(self.first, self.last + 1, self.every))
+
+
+class SolverChoice(Record):
+    """A solver by name with its own settings, which the solver checks."""
+
+    model_config = ConfigDict(frozen=True, extra="allow")
+    solver: str
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Every key but those that choose the solver."""
+        return dict(self.model_extra or {})
+
+
+class Candidate(SolverChoice):
+    """A run to compare with the reference."""
+
+    name: str = Field(pattern=r"^[\w.-]+$")
+
+
+class Expectation(Record):
+    """A number that a measure of this case must have; ``of`` is ``"reference"`` or a candidate, ``frame`` a number or ``"any"``."""
+
+    of: str
+    metric: str
+    statistic: str
+    frame: int | Literal["any"]
+    truth: str
+    within: str
+    kind: Literal["closed form", "manufactured", "published", "property", "reference run", "pinned"]
+    because: str
+
+
+class Spoil(Record):
+    """One change of this scene that must turn its verdict to fail: the ``key`` to change and its ``value``."""
+
+    key: str
+    value: str | float
+    because: str
+
+
+class Scene(Record):
+    """A case, read and checked."""
+
+    name: str
+    folder: Path
+    title: str
+    proves: str
+    muscle: Muscle
+    bone: tuple[Bone, ...] = Field(min_length=1)
+    attachment: tuple[Attachment, ...] = Field(min_length=1)
+    effect: tuple[Any, ...] = Field(min_length=1)
+    fibres: Fibres
+    frames: Frames
+    reference: SolverChoice
+    candidate: tuple[Candidate, ...]
+    expect: tuple[Expectation, ...] = Field(min_length=1)
+    spoil: Spoil
+
+    @property
+    def place(self) -> str:
+        """The scene file, for messages."""
+        return str(self.folder / "case.toml")
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """The effects, in the order of the file."""
+        return self.effect
+
+    def file(self, text: str, key: str) -> Path:
+        """The file a key names: below the data folder (``data:``), below meshes (``mesh:``), or relative to the scene file."""
+        place = join(self.place, key)
+        if text.startswith("data:"):
+            root = os.environ.get(DATA_SETTING)
+            if not root:
+                raise InputError(place, f'"{text}" while {DATA_SETTING} is not set', f"the setting {DATA_SETTING}=FOLDER")
+            path = Path(root) / text.removeprefix("data:")
+        elif text.startswith("mesh:"):
+            path = HOME / "meshes" / text.removeprefix("mesh:")
+        else:
+            path = self.folder / text
+        if not path.exists():
+            raise InputError(place, f'"{text}", which is not at {path}', "a file that exists")
+        return path
+
+    @property
+    def key(self) -> str:
+        """A hash over everything that determines the solution: body, motion, effects, frames, and the content of their files."""
+        tables = self.model_dump(
+            mode="json",
+            include={"muscle", "bone", "attachment", "fibres", "frames"},
+        )
+        tables["effect"] = [[type(effect).__name__, effect.model_dump(mode="json")] for effect in self.effects]
+        digest = hashlib.sha256(json.dumps(tables, sort_keys=True).encode())
+        for key, text in _files(tables):
+            digest.update(self.file(text, key).read_bytes())
+        return digest.hexdigest()
+
+
+def _files(tables: Any, key: str = "") -> list[tuple[str, str]]:
+    """Every (key, text) below ``tables`` that names a file."""
+    if isinstance(tables, dict):
+        found = [(f"{key}.{name}".lstrip("."), value) for name, value in tables.items() if name in ("surface", "file")]
+        below = [(f"{key}.{name}".lstrip("."), value) for name, value in tables.items()]
+    else:
+        found, below = [], [(f"{key}[{i}]", value) for i, value in enumerate(tables)] if isinstance(tables, list) else []
+    named = [(where, text) for where, text in found if isinstance(text, str)]
+    return named + [entry for where, value in below for entry in _files(value, where)]
