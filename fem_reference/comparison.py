@@ -2,8 +2,10 @@
 
 from dataclasses import dataclass
 
+from fem_reference.errors import InputError
 from fem_reference.judge import Verdict, Word, overall, verdict
 from fem_reference.metrics import Measure, Yardstick, at_rest, measure
+from fem_reference.metrics.fibre_length import extension_error
 from fem_reference.problem import Setup
 from fem_reference.runs import Run
 from fem_reference.scene import Scene
@@ -29,3 +31,20 @@ class Comparison:
     def word(self) -> Word:
         """The verdict of the case."""
         return overall(verdict.word for verdict in self.verdicts)
+
+
+def compare(scene: Scene, setup: Setup, reference: Run, candidates: tuple[Run, ...]) -> Comparison:
+    """Measure and judge runs that all have the frames of the scene (``not a number`` where a run did not reach one)."""
+    if reference.fibres is None:
+        raise InputError(f"{reference.name}: fibres", "a run without an interior", "a reference that carries the fibres")
+    yardstick = Yardstick.of(reference, reference.fibres)
+    deviations = {run.name: measure(run, reference, yardstick) for run in candidates}
+    changes = {run.name: measure(run, at_rest(run), yardstick) for run in (reference, *candidates)}
+    of = {"reference": changes["reference"]} | deviations
+    verdicts = tuple(
+        verdict(scene, i, of[expectation.of], reference.numbers)
+        for i, expectation in enumerate(scene.expect)
+        if expectation.of in of
+    )
+    error = extension_error(reference, yardstick)
+    return Comparison(scene, setup, reference, candidates, yardstick, deviations, changes, error, verdicts)

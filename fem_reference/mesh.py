@@ -21,7 +21,7 @@ TET_FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 
 def read_only(values: Any, dtype: type) -> NDArray[Any]:
     """A copy of ``values`` that nobody can write to."""
-    array = np.array(values, dtype=dtype, order="C")
+    array: NDArray[Any] = np.array(values, dtype=dtype, order="C")
     array.setflags(write=False)
     return array
 

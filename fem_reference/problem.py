@@ -53,12 +53,14 @@ class Held:
 
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """What a surface solver needs: the muscle ``surface`` at rest, the bones, what they hold, and the frames wanted."""
+    """What a surface solver needs: the muscle ``surface`` at rest, the bones, what they hold, and the frames wanted;
+    ``interval`` [s] from a frame number to the next where the scene says it."""
 
     surface: Surface
     bones: tuple[Body, ...]
     held: tuple[Held, ...]
     frames: tuple[int, ...]
+    interval: float | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +81,7 @@ def setup(scene: Scene) -> Setup:
     surface = files.read_surface(scene.file(scene.muscle.surface, "muscle.surface"), scene.muscle.unit)
     surface = check_closed(Surface(surface.points, surface.triangles, f"{place}: {surface.place}"))
     bones = tuple(_body(scene, i) for i in range(len(scene.bone)))
-    return Setup(surface, bones, _held(scene, surface, bones), scene.frames.numbers)
+    return Setup(surface, bones, _held(scene, surface, bones), scene.frames.numbers, scene.frames.interval)
 
 
 def build(scene: Scene) -> Problem:
@@ -98,6 +100,7 @@ def build(scene: Scene) -> Problem:
         rest.bones,
         rest.held,
         rest.frames,
+        rest.interval,
         mesh=mesh,
         effects=scene.effects,
         fibres=_fibres(scene, mesh),

@@ -50,7 +50,7 @@ class Yardstick:
             areas=vertex_areas(rest.points, rest.triangles),
             fibres=fibres,
             extension=Extension.to(fibres.points, rest),
-            travel=float(np.linalg.norm(reference.positions - rest.points, axis=2).max()),
+            travel=float(np.nanmax(np.linalg.norm(reference.positions - rest.points, axis=2))),
         )
 
 
@@ -66,7 +66,8 @@ def measure(run: Run, reference: Run, yardstick: Yardstick) -> tuple[Measure, ..
 
 
 def at_rest(run: Run) -> Run:
-    """The rest state of ``run`` repeated over its frames: measured against it, a run tells its change from rest."""
+    """The rest state of ``run``, fibres too, repeated over its frames: against it, a run tells its change from rest."""
     frames = len(run.numbers)
     still = np.broadcast_to(run.surface.points, (frames, *run.surface.points.shape))
-    return Run("rest", "rest", run.outcome, run.numbers, run.surface, still)
+    fibres = None if run.fibres is None else np.broadcast_to(run.fibres.points, (frames, *run.fibres.points.shape))
+    return Run("rest", "rest", run.outcome, run.numbers, run.surface, still, run.fibres, fibres)

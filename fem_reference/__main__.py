@@ -1,0 +1,6 @@
+"""``python -m fem_reference``: the same as the command ``fem-reference``."""
+
+from fem_reference.cli import entry
+
+if __name__ == "__main__":
+    entry()

@@ -1,0 +1,232 @@
+"""The command line: the only place that prints, shows progress and exits."""
+
+import argparse
+import json
+import logging
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from fem_reference import __version__, casefile, files, metrics, problem, report, solvers
+from fem_reference.comparison import Comparison, compare
+from fem_reference.errors import InputError, MissingSoftware
+from fem_reference.execution import Bench, complete
+from fem_reference.mesh import enclosed_volume, vertex_areas
+from fem_reference.runs import Run
+from fem_reference.scene import Candidate, Scene, SolverChoice, cases
+
+DONE, VERDICT_FAIL, BAD_INPUT, SOLVER_FAILED = range(4)
+MAIN_JOB = "hip_flexion"
+
+
+def entry() -> None:
+    """The installed command."""
+    sys.exit(main(sys.argv[1:]))
+
+
+def main(arguments: list[str]) -> int:
+    """Carry out a command line; returns the exit status."""
+    options = _parser().parse_args(arguments)
+    logging.basicConfig(level=logging.WARNING if options.quiet else logging.INFO, format="%(message)s", force=True)
+    try:
+        status: int = options.verb(options)
+    except InputError as error:
+        print(f"fem-reference: {error}", file=sys.stderr)
+        return BAD_INPUT
+    except MissingSoftware as error:
+        print(f"fem-reference: {error}", file=sys.stderr)
+        return SOLVER_FAILED
+    return status
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="fem-reference", description="Finite element reference and validation for muscle deformation.")
+    parser.add_argument("--version", action="version", version=f"fem-reference {__version__}")
+    verbs = parser.add_subparsers(metavar="VERB", required=True)
+
+    def add(name: str, verb: Callable[[argparse.Namespace], int], text: str, *, case: bool = True) -> argparse.ArgumentParser:
+        sub = verbs.add_parser(name, help=text, description=text)
+        if case:
+            sub.add_argument("case", metavar="CASE", help="a shipped case (see list), a case folder or a case.toml")
+        sub.add_argument("--out", type=Path, metavar="DIR", help="where pages and stored runs go (default: reports)")
+        sub.add_argument("--json", type=Path, metavar="FILE", help="write what is printed as JSON")
+        sub.add_argument("--ranks", type=int, metavar="N", help="MPI processes of the reference (default: 2 where there are)")
+        sub.add_argument("--quiet", action="store_true", help="show no progress")
+        sub.set_defaults(verb=verb)
+        return sub
+
+    add("demo", _demo, f"the main job: the case {MAIN_JOB}, its reference against its candidates", case=False)
+    run = add("run", _run, "solve a case and judge what it expects of the reference")
+    run.add_argument("--solver", metavar="NAME", help="another solver than the case's own reference")
+    comparison = add("compare", _compare, "measure candidates against the reference and write the page")
+    comparison.add_argument(
+        "--candidate", action="append", metavar="NAME|DIR", help="a candidate of the case or a folder of frames; may be repeated"
+    )
+    comparison.add_argument("--unit", default="mm", help="unit of length of the frames in DIR (default: mm)")
+    add("list", _list, "what there is: cases, solvers, metrics, stored runs", case=False)
+    add("show", _show, "what a case is made of; with --out also its meshes for ParaView")
+    return parser
+
+
+def _demo(options: argparse.Namespace) -> int:
+    scene = casefile.read(MAIN_JOB)
+    return _judge(scene, options, [(candidate, f"candidate[{i}]") for i, candidate in enumerate(scene.candidate)])
+
+
+def _compare(options: argparse.Namespace) -> int:
+    scene = casefile.read(options.case)
+    wanted = options.candidate or [candidate.name for candidate in scene.candidate]
+    return _judge(scene, options, [_candidate(scene, text, options.unit) for text in wanted])
+
+
+def _candidate(scene: Scene, text: str, unit: str) -> tuple[Candidate, str]:
+    """The candidate of the scene with this name, else the recorded frames in this folder; and the place that chooses it."""
+    names = [candidate.name for candidate in scene.candidate]
+    if text in names:
+        return scene.candidate[names.index(text)], f"candidate[{names.index(text)}]"
+    path = Path(text)
+    if not path.exists():
+        raise InputError("--candidate", f'"{text}"', f"a folder of frames, or one of {', '.join(names)}")
+    folder = path.resolve()
+    return Candidate.model_validate({"name": folder.stem, "solver": "recorded", "folder": str(folder), "unit": unit}), "--candidate"
+
+
+def _run(options: argparse.Namespace) -> int:
+    scene = casefile.read(options.case)
+    if options.solver is None or options.solver == scene.reference.solver:
+        return _judge(scene, options, [])
+    bench = Bench(scene, _out(options) / "runs", options.ranks)
+    run = bench.obtain(options.solver, _choice(scene, options.solver), f"--solver {options.solver}")
+    _tell(_run_facts(scene, run), _run_text(run), options)
+    return DONE if run.outcome.status == "converged" else SOLVER_FAILED
+
+
+def _choice(scene: Scene, solver: str) -> SolverChoice:
+    """How the scene chooses ``solver``: its settings as a candidate, else no settings."""
+    return next((entry for entry in scene.candidate if entry.solver == solver), SolverChoice(solver=solver))
+
+
+def _judge(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
+    """Reference and candidates -> page, JSON and exit status. What is bad in the input shows before anything is solved."""
+    bench = Bench(scene, _out(options) / "runs", options.ranks)
+    for candidate, place in [(scene.reference, "reference"), *chosen]:
+        bench.settings(candidate, place)
+    read = {entry.name: bench.read(entry.name, entry, place) for entry, place in chosen if entry.solver == "recorded"}
+    reference = bench.obtain("reference", scene.reference, "reference")
+    solved = {entry.name: bench.obtain(entry.name, entry, place) for entry, place in chosen if entry.solver != "recorded"}
+    numbers = scene.frames.numbers
+    candidates = tuple(complete((read | solved)[entry.name], numbers) for entry, _ in chosen)
+    result = compare(scene, bench.setup(), complete(reference, numbers), candidates)
+    page = report.write(result, _out(options) / scene.name)
+    _tell(report.summary(result), _comparison_text(result, page), options)
+    if any(run.outcome.status != "converged" for run in (reference, *candidates)):
+        return SOLVER_FAILED
+    return VERDICT_FAIL if result.word == "fail" else DONE
+
+
+def _comparison_text(result: Comparison, page: Path) -> str:
+    runs = [f"{run.name}: {run.outcome.status}, {run.outcome.message}" for run in (result.reference, *result.candidates)]
+    judged = [
+        f"{verdict.word}: {verdict.expectation.of} {verdict.expectation.metric} {verdict.expectation.statistic} at frame "
+        f"{verdict.frame} is {verdict.value:.4g} {verdict.unit}, expected {verdict.truth:.4g} within {verdict.within:.4g}"
+        for verdict in result.verdicts
+    ]
+    worst = [
+        f"{name}: {measure.metric} {measure.statistic} up to {measure.values[measure.worst]:.4g} {measure.unit}"
+        f" at frame {result.reference.numbers[measure.worst]}"
+        for name, measures in result.deviations.items()
+        for measure in measures
+    ]
+    return "\n".join([*runs, *worst, *judged, f"verdict: {result.word}", f"page: {page}"])
+
+
+def _run_facts(scene: Scene, run: Run) -> dict[str, Any]:
+    return {
+        "case": scene.name,
+        "solver": run.solver,
+        "status": run.outcome.status,
+        "message": run.outcome.message,
+        "verdict": "not judged",
+        "cost": {run.name: run.outcome.cost},
+        "measures": [],
+        "folder": str(run.folder),
+    }
+
+
+def _run_text(run: Run) -> str:
+    return f"{run.name}: {run.outcome.status}, {run.outcome.message}\nstored in {run.folder}"
+
+
+def _list(options: argparse.Namespace) -> int:
+    scenes = {name: casefile.read(name).title for name in cases()}
+    stored = sorted(str(path.parent) for path in (_out(options) / "runs").glob("*/*/run.json"))
+    facts = {"cases": scenes, "solvers": solvers.names(), "metrics": metrics.names(), "runs": stored}
+    width = max(map(len, scenes))
+    lines = ["cases:", *(f"  {name:{width}}  {title}" for name, title in scenes.items())]
+    lines += [f"solvers: {', '.join(facts['solvers'])}", f"metrics: {', '.join(facts['metrics'])}"]
+    lines += ["stored runs:", *(f"  {path}" for path in stored)] if stored else []
+    _tell(facts, "\n".join(lines), options)
+    return DONE
+
+
+def _show(options: argparse.Namespace) -> int:
+    scene = casefile.read(options.case)
+    facts = _scene_facts(scene, problem.setup(scene))
+    if options.out is not None:
+        built, folder = problem.build(scene), options.out / scene.name
+        folder.mkdir(parents=True, exist_ok=True)
+        files.write_surface(folder / "surface.vtp", built.surface, built.surface.points)
+        files.write_polylines(folder / "fibres.vtp", built.fibres, built.fibres.points)
+        files.write_tets(folder / "tets.vtu", built.mesh, built.mesh.points)
+        facts |= {"mesh": built.mesh_facts, "folder": str(folder)}
+    _tell(facts, "\n".join(_lines(facts)), options)
+    return DONE
+
+
+def _scene_facts(scene: Scene, setup: problem.Setup) -> dict[str, Any]:
+    surface = setup.surface
+    areas = vertex_areas(surface.points, surface.triangles)
+    return {
+        "case": scene.name,
+        "title": scene.title,
+        "proves": scene.proves,
+        "muscle": {
+            "triangles": len(surface.triangles),
+            "volume_mm3": enclosed_volume(surface.points, surface.triangles),
+            "tet_size_mm": scene.muscle.tet_size,
+        },
+        "bones": {bone.name: f"{len(bone.surface.triangles)} triangles, {'moves' if bone.motion else 'rests'}" for bone in setup.bones},
+        "attachments": {
+            held.attachment: f"{len(held.vertices)} vertices, {areas[held.vertices].sum():.0f} mm2, held by {held.bone.name}"
+            for held in setup.held
+        },
+        "effects": {type(effect).__name__: effect.model_dump(mode="json") for effect in scene.effects},
+        "frames": f"{scene.frames.first} to {scene.frames.last}, every {scene.frames.every}",
+        "reference": scene.reference.solver,
+        "candidates": {candidate.name: candidate.solver for candidate in scene.candidate},
+        "expects": [f"{e.of} {e.metric} {e.statistic} at frame {e.frame}: {e.truth} within {e.within} ({e.kind})" for e in scene.expect],
+    }
+
+
+def _lines(facts: dict[str, Any], indent: str = "") -> list[str]:
+    lines = []
+    for key, value in facts.items():
+        if isinstance(value, dict):
+            lines += [f"{indent}{key}:", *_lines(value, indent + "  ")]
+        elif isinstance(value, list):
+            lines += [f"{indent}{key}:", *(f"{indent}  {entry}" for entry in value)]
+        else:
+            lines.append(f"{indent}{key}: {value:.6g}" if isinstance(value, float) else f"{indent}{key}: {value}")
+    return lines
+
+
+def _out(options: argparse.Namespace) -> Path:
+    return options.out if options.out is not None else Path("reports")
+
+
+def _tell(facts: dict[str, Any], text: str, options: argparse.Namespace) -> None:
+    print(text)
+    if options.json is not None:
+        options.json.parent.mkdir(parents=True, exist_ok=True)
+        files.write_text(options.json, json.dumps(facts, indent=1, allow_nan=False))

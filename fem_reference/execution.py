@@ -1,0 +1,145 @@
+"""A scene and a choice of solver -> a run: from the store where it was solved before, else solved now and stored."""
+
+import hashlib
+import importlib.metadata
+import json
+import logging
+import os
+import platform
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fem_reference import __version__, problem, runs, solvers
+from fem_reference.problem import Problem, Setup
+from fem_reference.records import Record
+from fem_reference.runs import Frame, Run
+from fem_reference.scene import Scene, SolverChoice
+
+log = logging.getLogger(__name__)
+
+# What happens after a run is solved does not change the run.
+_AFTER_THE_RUN = ("metrics", "report", "judge.py", "comparison.py", "cli.py", "__main__.py", "execution.py")
+_MACHINE_ONLY = {"ranks", "time_limit"}  # settings that change the time and not the answer
+
+
+class Bench:
+    """A scene with what is made from it once and only when needed: its setup, its problem, and where its runs are stored."""
+
+    def __init__(self, scene: Scene, store: Path, ranks: int | None = None) -> None:
+        self.scene, self.store, self.ranks = scene, store / scene.name, ranks
+        self.setup: Callable[[], Setup] = cache(lambda: problem.setup(scene))
+        self.problem: Callable[[], Problem] = cache(lambda: _build(scene))
+
+    def settings(self, choice: SolverChoice, place: str) -> Record:
+        """The settings of ``choice``, checked; a folder among them is found as files of the scene are."""
+        if isinstance(folder := choice.settings.get("folder"), str):
+            choice = choice.model_copy(update={"folder": str(self.scene.file(folder, f"{place}.folder"))})
+        if self.ranks is not None and choice.solver == "fenicsx":
+            choice = choice.model_copy(update={"ranks": self.ranks})
+        return solvers.settings(choice, f"{self.scene.place}: {place}")
+
+    def obtain(self, name: str, choice: SolverChoice, place: str) -> Run:
+        """The run of a solver of our own, by the name that pages give it; ``place`` is where the scene chooses it."""
+        settings = self.settings(choice, place)
+        folder = self.store / f"{choice.solver}-{self.key(choice.solver, settings)[:16]}"
+        stored = runs.finished(folder)
+        if stored is not None:
+            log.info("%s: solved before, taken from %s", name, folder)
+            return _named(stored, name)
+        built = self.problem()
+        origin = self.origin(choice.solver, settings) | {"mesh": built.mesh_facts}
+        identity = {"name": name, "solver": choice.solver, "origin": origin, "frames": built.frames}
+        writer = runs.Writer(folder, identity, built.surface, built.fibres, built.mesh)
+        writer.close(solvers.find(choice.solver, place).solve(built, settings, writer.add))
+        return runs.load(folder)
+
+    def read(self, name: str, choice: SolverChoice, place: str) -> Run:
+        """The run that somebody recorded, checked against the setup of the scene; it is read each time and not stored."""
+        settings, frames, rest = self.settings(choice, place), list[Frame](), self.setup()
+        outcome = solvers.find(choice.solver, place).solve(rest, settings, frames.append)  # type: ignore[arg-type]
+        positions = np.stack([frame.surface for frame in frames])
+        numbers = tuple(frame.number for frame in frames)
+        origin = self.origin(choice.solver, settings)
+        return Run(name, choice.solver, outcome, numbers, rest.surface, positions, origin=origin)
+
+    def key(self, solver: str, settings: Record) -> str:
+        """A hash over all that determines a run: the scene, the solver's settings, and the code that makes runs."""
+        numerics = {key: value for key, value in settings.model_dump(mode="json").items() if key not in _MACHINE_ONLY}
+        parts = [self.scene.key, solver, json.dumps(numerics, sort_keys=True), code_hash()]
+        return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+    def origin(self, solver: str, settings: Record) -> dict[str, Any]:
+        """Where a run comes from, for people and for doubt."""
+        return {
+            "case": self.scene.name,
+            "scene": self.scene.key,
+            "solver": solver,
+            "settings": settings.model_dump(mode="json"),
+            "effects": {type(effect).__name__: effect.model_dump(mode="json") for effect in self.scene.effects},
+            "fem_reference": __version__,
+            "code": code_hash(),
+            "versions": _versions(),
+            "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
+        }
+
+
+def _build(scene: Scene) -> Problem:
+    log.info("%s: filling the muscle with tetrahedra of %g mm", scene.name, scene.muscle.tet_size)
+    built = problem.build(scene)
+    facts = built.mesh_facts
+    log.info("%s: %d tetrahedra, quality at least %.2f", scene.name, facts["tets"], facts["quality_min"])
+    return built
+
+
+def _named(run: Run, name: str) -> Run:
+    return Run(**{**vars(run), "name": name})
+
+
+@cache
+def code_hash() -> str:
+    """A hash over the source files that determine runs."""
+    root = Path(__file__).parent
+    digest = hashlib.sha256()
+    for path in sorted(root.rglob("*.py")):
+        if path.relative_to(root).parts[0] not in _AFTER_THE_RUN:
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _versions() -> dict[str, str]:
+    """The versions of the packages that a run may depend on, and of Python."""
+    wanted = ("numpy", "scipy", "gmsh", "libigl", "pytetwild", "scikit-fem", "numba", "dolfinx-solver-real", "fenics-dolfinx")
+    found = {"python": platform.python_version()}
+    for package in wanted:
+        try:
+            found[package] = importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return found
+
+
+def complete(run: Run, numbers: tuple[int, ...]) -> Run:
+    """The run over exactly the frames ``numbers``; frames that it did not reach are not-a-number, so they never pass."""
+    if run.numbers == numbers:
+        return run
+    rows = [run.numbers.index(number) if number in run.numbers else None for number in numbers]
+
+    def pick(values: Any) -> Any:
+        if values is None:
+            return None
+        blank = np.full(values.shape[1:], np.nan)
+        return np.stack([blank if row is None else values[row] for row in rows])
+
+    return Run(
+        **{
+            **vars(run),
+            "numbers": numbers,
+            "positions": pick(run.positions),
+            "fibre_positions": pick(run.fibre_positions),
+            "scalars": {name: pick(values) for name, values in run.scalars.items()},
+        }
+    )

@@ -1,0 +1,93 @@
+"""PLY, OBJ and STL with numpy alone: points and triangles as the file has them; ValueError where it is not whole."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+Soup = tuple[Any, Any]
+_PLY_TYPES = {
+    name: code
+    for code, names in (("i1", "char int8"), ("i2", "short int16"), ("i4", "int int32"), ("f4", "float float32"))
+    + (("u1", "uchar uint8"), ("u2", "ushort uint16"), ("u4", "uint uint32"), ("f8", "double float64"))
+    for name in names.split()
+}
+_STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+
+
+def only_triangles(corners: set[int]) -> None:
+    """ValueError where polygons have another number of corners than three."""
+    if other := corners - {3}:
+        raise ValueError(f"a polygon of {min(other)} corners")
+
+
+def read_ply(path: Path) -> Soup:
+    """PLY, text or binary of either byte order; a list must be equally long in the whole element."""
+    parts = re.match(rb"ply\s(.*?)end_header\r?\n(.*)", path.read_bytes(), re.DOTALL)
+    if parts is None:
+        raise ValueError("no PLY header")
+    words = [line.split() for line in parts[1].decode("ascii").splitlines()]
+    kind = next(line[1] for line in words if line[:1] == ["format"])
+    order = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}[kind]
+    types, body = {name: order + code for name, code in _PLY_TYPES.items()}, parts[2]
+    if kind == "ascii":
+        types, body = dict.fromkeys(_PLY_TYPES, "=f8"), np.array(body.split()).astype(np.float64).tobytes()
+    tables = {}
+    starts = [i for i, line in enumerate(words) if line[:1] == ["element"]]
+    for start, stop in zip(starts, [*starts[1:], len(words)], strict=True):
+        _, name, count = words[start]
+        properties = [line[1:] for line in words[start:stop] if line[:1] == ["property"]]
+        tables[name], body = _ply_element(body, int(count), properties, types)
+    if not {"vertex", "face"} <= tables.keys():
+        raise ValueError(f"elements {', '.join(tables) or 'none'}")
+    vertex, face = tables["vertex"], tables["face"]
+    corners = "vertex_index" if "vertex_index" in face.dtype.names else "vertex_indices"
+    only_triangles({face[corners].shape[1]})
+    return np.column_stack([vertex[axis] for axis in "xyz"]), face[corners]
+
+
+def _ply_element(body: bytes, count: int, properties: list[list[str]], types: dict[str, str]) -> tuple[Any, bytes]:
+    """The table of an element and what follows it; the first row tells how long its lists are."""
+    fields: list[tuple[Any, ...]] = []
+    for *kind, name in properties:
+        if kind[0] == "list":
+            sizes = np.frombuffer(body, types[kind[1]], min(count, 1), np.dtype(fields).itemsize)
+            fields += [(f"{name} size", types[kind[1]]), (name, types[kind[2]], (int(sizes.max(initial=3)),))]
+        else:
+            fields.append((name, types[kind[0]]))
+    table = np.frombuffer(body, np.dtype(fields), count)
+    for name in (name for *kind, name in properties if kind[0] == "list"):
+        if (table[f"{name} size"] != table[name].shape[1]).any():
+            raise ValueError("polygons of different sizes")
+    return table, body[table.nbytes :]
+
+
+def read_obj(path: Path) -> Soup:
+    """Wavefront OBJ: the positions and faces, corners counted from 1, or back from the last."""
+    points: list[list[float]] = []
+    triangles = []
+    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+        word, *values = line.split() or [""]
+        if word == "v":
+            x, y, z = values[:3]
+            points.append([float(x), float(y), float(z)])
+        elif word == "f":
+            only_triangles({len(values)})
+            corners = (int(value.split("/")[0]) for value in values)
+            triangles.append([corner - 1 if corner > 0 else len(points) + corner for corner in corners])
+    return points, triangles
+
+
+def read_stl(path: Path) -> Soup:
+    """STL, text or binary: three points a triangle, in the order of the file."""
+    data = path.read_bytes()
+    count = int.from_bytes(data[80:84], "little")
+    if len(data) >= 84 and len(data) == 84 + 50 * count:
+        points = np.frombuffer(data, _STL_FACET, count, 84)["corners"].reshape(-1, 3)
+    elif re.match(rb"\s*solid\b.*\bendsolid\b[^\n]*\s*$", data, re.DOTALL):
+        lines = [line.split()[1:] for line in data.splitlines() if line.lstrip().startswith(b"vertex")]
+        points = np.array(lines).astype(np.float64)
+    else:
+        raise ValueError(f"{len(data)} bytes that are no complete STL file")
+    return points, np.arange(len(points)).reshape(-1, 3)

@@ -1,0 +1,1 @@
+"""What is pure geometry: distances, intersections, tetrahedra, attachments, embedding, fibres and the extension inward."""

@@ -1,0 +1,116 @@
+"""Which part of a muscle a bone holds: vertices of its surface, and the boundary triangles of its tetrahedra below them."""
+
+from pathlib import Path
+
+import numpy as np
+
+from fem_reference import files
+from fem_reference.errors import InputError
+from fem_reference.geometry.distance import distances
+from fem_reference.mesh import Floats, Ints, Surface, TetMesh, boundary
+from fem_reference.records import join
+from fem_reference.scene import Outline, Scene, VertexList
+
+# Where a triangle is sampled: its middle, near its corners, near the middles of its sides.
+_SAMPLES = np.array(
+    [
+        [1 / 3, 1 / 3, 1 / 3],
+        [0.6, 0.2, 0.2],
+        [0.2, 0.6, 0.2],
+        [0.2, 0.2, 0.6],
+        [0.45, 0.45, 0.1],
+        [0.45, 0.1, 0.45],
+        [0.1, 0.45, 0.45],
+    ]
+)
+
+
+def pick(scene: Scene, i: int, surface: Surface, bone_surface: Surface) -> Ints:
+    """The vertices (k,) of the muscle ``surface`` that ``scene.attachment[i]`` selects, sorted; ``bone_surface`` is its bone's.
+
+    InputError names the key of the scene, or the file and row, that is not usable.
+    """
+    attachment = scene.attachment[i]
+    key = f"attachment[{i}]"
+    if attachment.vertices is not None:
+        path = scene.file(attachment.vertices.file, f"{key}.vertices.file")
+        return _listed(path, attachment.vertices, len(surface.points))
+    if attachment.within is not None:
+        return np.flatnonzero(distances(surface.points, bone_surface).distance <= attachment.within)
+    outline = attachment.outline
+    assert outline is not None  # an Attachment record has one of the three
+    path = scene.file(outline.file, f"{key}.outline.file")
+    patches = _patches(path, outline, join(scene.place, f"{key}.outline.clouds"))
+    return np.flatnonzero(distances(surface.points, patches).distance <= outline.reach)
+
+
+def facets_under(mesh: TetMesh, surface: Surface, vertices: Ints) -> Ints:
+    """The boundary triangles (m, 3) of ``mesh``, outward, more than half of which lies under attached ``vertices`` (k,) of
+    ``surface``: the mean over seven samples of the attached share at the closest point of the surface."""
+    triangles, _ = boundary(mesh.tets)
+    attached = np.zeros(len(surface.points))
+    attached[vertices] = 1.0
+    samples = np.einsum("qk,mkd->mqd", _SAMPLES, mesh.points[triangles])
+    under = distances(samples.reshape(-1, 3), surface)
+    shares = np.sum(attached[surface.triangles[under.triangle]] * under.barycentric, axis=1)
+    return triangles[shares.reshape(len(triangles), -1).mean(axis=1) > 1 / 2]
+
+
+def _listed(path: Path, chosen: VertexList, count: int) -> Ints:
+    """The vertices of a file of ``vertex[,value]`` rows, of which there are ``count`` on the surface."""
+    vertices = []
+    for number, row in enumerate(files.read_rows(path), start=1):
+        if number == 1 and not _is_integer(row[0]):
+            continue
+        place = f"{path}: row {number}"
+        if not _is_integer(row[0]) or not 0 <= int(row[0]) < count:
+            raise InputError(place, f'"{row[0]}"', f"a vertex from 0 to {count - 1}")
+        if chosen.value is not None and (len(row) < 2 or not _is_integer(row[1])):
+            raise InputError(place, f'"{",".join(row)}"', "a vertex and its value, an integer")
+        if chosen.value is None or int(row[1]) == chosen.value:
+            vertices.append(int(row[0]))
+    return np.unique(np.array(vertices, np.int64))
+
+
+def _is_integer(text: str) -> bool:
+    return text.removeprefix("-").isdecimal()
+
+
+def _patches(path: Path, outline: Outline, place: str) -> Surface:
+    """The patches that the clouds of an outline span, as one surface [mm]; ``place`` is the key that names the clouds."""
+    clouds = _clouds(path, outline.unit)
+    points, triangles = np.zeros((0, 3)), np.zeros((0, 3), np.int64)
+    for name in outline.clouds:
+        if name not in clouds:
+            raise InputError(place, f'"{name}", which {path} does not have', f"some of {', '.join(sorted(clouds))}")
+        if len(clouds[name]) < 3:
+            raise InputError(f'{path}: cloud "{name}"', f"{len(clouds[name])} landmarks", "at least three")
+        fan = _fan(np.array(clouds[name]))
+        triangles = np.concatenate([triangles, fan.triangles + len(points)])
+        points = np.concatenate([points, fan.points])
+    return Surface(points, triangles, str(path))
+
+
+def _clouds(path: Path, unit: float) -> dict[str, list[list[float]]]:
+    """Landmarks [mm] by cloud from rows ``cloud,landmark,x,y,z`` below a header row."""
+    clouds: dict[str, list[list[float]]] = {}
+    for number, row in enumerate(files.read_rows(path)[1:], start=2):
+        try:
+            cloud, _, *coordinates = row
+            x, y, z = (float(text) * unit for text in coordinates)
+        except ValueError:
+            x = y = z = np.nan
+        if not np.isfinite([x, y, z]).all():
+            raise InputError(f"{path}: row {number}", f'"{",".join(row)}"', "cloud, landmark and three coordinates")
+        clouds.setdefault(cloud, []).append([x, y, z])
+    return clouds
+
+
+def _fan(points: Floats) -> Surface:
+    """Triangles from the centroid of ``points`` (n, 3) to each two that follow each other by angle in their best-fit plane."""
+    centre = points.mean(axis=0)
+    _, _, axes = np.linalg.svd(points - centre)
+    x, y, _ = axes @ (points - centre).T
+    ring = np.argsort(np.arctan2(y, x), kind="stable")
+    triangles = np.stack([np.full(len(ring), len(points)), ring, np.roll(ring, -1)], axis=1)
+    return Surface(np.concatenate([points, centre[None]]), triangles)

@@ -1,0 +1,171 @@
+"""A coarser surface of well-shaped triangles that lies on a fine one."""
+
+from dataclasses import dataclass
+
+import igl
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_reference.geometry.distance import distances
+from fem_reference.mesh import Floats, Ints, Surface, enclosed_volume, triangle_areas
+
+# Chosen on four hip muscles and a box. More rounds gain nothing.
+_ROUNDS = 6
+# A direction is free at a vertex when the normals around it have less than this share of their squares along it: moving along
+# a free direction keeps the vertex on its plane or its sharp edge. Above 0.05 a thin rim shrinks, below 0.02 slivers stay.
+_FREE = 0.03
+# How far the pole of the inversion is from the body, in its diagonals: nearer, sharp edges move; farther, flat parts stay flat.
+_POLE = 6.0
+_NEARLY_FLAT = np.cos(np.radians(30))
+_TINY = np.finfo(float).tiny
+
+
+def coarsen(surface: Surface, count: int) -> Surface:
+    """A closed surface of about ``count`` triangles on the closed ``surface``: sharp edges kept, the same volume enclosed.
+
+    Edges collapse by quadric error (Garland and Heckbert 1997, doi 10.1145/258734.258849), then edges flip towards Delaunay and
+    vertices slide to the middle of their neighbours, back on ``surface`` after each round.
+    """
+    points, triangles = _collapse(surface, count)
+    for _ in range(_ROUNDS):
+        triangles = flip_edges(points, triangles)
+        points = distances(slide(points, triangles), surface).closest
+    points = inflate(points, triangles, enclosed_volume(surface.points, surface.triangles))
+    return Surface(points, triangles, surface.place)
+
+
+def _collapse(surface: Surface, count: int) -> tuple[Floats, Ints]:
+    """Points and triangles after quadric edge collapses to ``count``.
+
+    Quadrics leave flat parts undetermined, so the collapses happen in the image of a sphere inversion, which keeps angles and
+    bends planes to spheres.
+    """
+    low, high = surface.points.min(axis=0), surface.points.max(axis=0)
+    radius = _POLE * float(np.linalg.norm(high - low))
+    pole = (low + high) / 2 + radius * np.array([0.48, 0.6, 0.64])
+    points, triangles, *_ = igl.qslim(_invert(surface.points, pole, radius), surface.triangles, count)
+    return distances(_invert(points, pole, radius), surface).closest, np.ascontiguousarray(triangles)
+
+
+def _invert(points: Floats, pole: Floats, radius: float) -> Floats:
+    """``points`` (n, 3) inverted in the sphere of ``radius`` about ``pole``; its own inverse."""
+    away = points - pole
+    return np.asarray(pole + away * radius**2 / np.sum(away**2, axis=1, keepdims=True))
+
+
+def slide(points: Floats, triangles: Ints) -> Floats:
+    """``points`` (n, 3) moved to the mean of the triangles around them, weighted by area, along their free directions only."""
+    areas = triangle_areas(points, triangles)
+    total = _around(areas, triangles, len(points))[:, None]
+    pulled = _around(areas[:, None] * points[triangles].mean(axis=1), triangles, len(points))
+    step = np.where(total > 0, pulled / np.maximum(total, _TINY) - points, 0.0)
+    shares, directions = np.linalg.eigh(_normal_tensors(points, triangles))
+    free = shares < _FREE * shares.sum(axis=1, keepdims=True)
+    along = np.einsum("nij,ni->nj", directions, step) * free
+    return np.asarray(points + np.einsum("nij,nj->ni", directions, along))
+
+
+def _normal_tensors(points: Floats, triangles: Ints) -> Floats:
+    """Sum over the triangles around each point of ``angle n n^T``, with n the unit normal and their angle there, (n, 3, 3)."""
+    normals = _normals(points, triangles)
+    normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _TINY)
+    squares = normals[:, :, None] * normals[:, None, :]
+    tensors = np.zeros((len(points), 3, 3))
+    for here, left, right in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        at = points[triangles[:, here]]
+        angles = _angle(points[triangles[:, left]] - at, points[triangles[:, right]] - at)
+        np.add.at(tensors, triangles[:, here], angles[:, None, None] * squares)
+    return tensors
+
+
+def inflate(points: Floats, triangles: Ints, volume: float) -> Floats:
+    """``points`` (n, 3) shifted by one distance along their normals, so that they enclose ``volume`` [mm3]."""
+    for _ in range(3):
+        normals = _around(_normals(points, triangles), triangles, len(points))
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _TINY)
+        missing = volume - enclosed_volume(points, triangles)
+        points = points + normals * missing / triangle_areas(points, triangles).sum()
+    return points
+
+
+def flip_edges(points: Floats, triangles: Ints) -> Ints:
+    """The closed surface's ``triangles`` (m, 3) after flips towards Delaunay, until none is left to flip (at most 20 passes)."""
+    for _ in range(20):
+        flipped = _flip_once(points, triangles)
+        if flipped is triangles:
+            break
+        triangles = flipped
+    return triangles
+
+
+@dataclass(frozen=True, eq=False)
+class _Hinges:
+    """Each edge from ``a`` to ``b`` with the triangles ``left`` (a, b, c) and ``right`` (b, a, d) of it; all (e,)."""
+
+    a: Ints
+    b: Ints
+    c: Ints
+    d: Ints
+    left: Ints
+    right: Ints
+
+    @classmethod
+    def of(cls, triangles: Ints) -> "_Hinges":
+        sides = triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
+        order = np.lexsort(np.sort(sides, axis=1).T)
+        one, other = order[::2], order[1::2]
+        a, b = sides[one].T
+        return cls(a, b, triangles.ravel()[one], triangles.ravel()[other], one // 3, other // 3)
+
+
+def _flip_once(points: Floats, triangles: Ints) -> Ints:
+    """Every edge worth a flip flipped, the most worthwhile first, each triangle at most once; the same array where none is."""
+    hinge = _Hinges.of(triangles)
+    gain = _flip_gain(points, hinge)
+    there = set(zip(np.minimum(hinge.a, hinge.b).tolist(), np.maximum(hinge.a, hinge.b).tolist(), strict=True))
+    touched, flipped = np.zeros(len(triangles), bool), triangles.copy()
+    order = np.argsort(-gain, kind="stable")
+    for i in order[: np.count_nonzero(gain > 0)]:
+        pair = [hinge.left[i], hinge.right[i]]
+        a, b, c, d = (int(corner[i]) for corner in (hinge.a, hinge.b, hinge.c, hinge.d))
+        edge = (min(c, d), max(c, d))
+        if touched[pair].any() or edge in there:
+            continue
+        flipped[pair] = (c, a, d), (d, b, c)
+        touched[pair] = True
+        there.add(edge)
+    return flipped if touched.any() else triangles
+
+
+def _flip_gain(points: Floats, hinge: _Hinges) -> Floats:
+    """By how much the angles opposite to each edge exceed a straight one [rad], (e,); 0 where a flip would not be worth it or the
+    two triangles are not nearly in one plane before and after."""
+    a, b, c, d = (points[corner] for corner in (hinge.a, hinge.b, hinge.c, hinge.d))
+    excess = _angle(a - c, b - c) + _angle(a - d, b - d) - np.pi
+    before = _cosine(np.cross(b - a, c - a), np.cross(a - b, d - b))
+    after = _cosine(np.cross(a - c, d - c), np.cross(b - d, c - d))
+    allowed = (excess > 1e-3) & (before > _NEARLY_FLAT) & (after > _NEARLY_FLAT)
+    return np.where(allowed, excess, 0.0)
+
+
+def _normals(points: Floats, triangles: Ints) -> Floats:
+    """Normals (m, 3) of length twice the area."""
+    a, b, c = (points[triangles[:, corner]] for corner in range(3))
+    return np.cross(b - a, c - a)
+
+
+def _around(values: NDArray[np.float64], triangles: Ints, count: int) -> Floats:
+    """Sum of the ``values`` (m, ...) of the triangles around each of ``count`` points, (count, ...)."""
+    total = np.zeros((count, *values.shape[1:]))
+    for corner in triangles.T:
+        np.add.at(total, corner, values)
+    return total
+
+
+def _angle(one: Floats, other: Floats) -> Floats:
+    return np.arctan2(np.linalg.norm(np.cross(one, other), axis=1), np.einsum("ij,ij->i", one, other))
+
+
+def _cosine(one: Floats, other: Floats) -> Floats:
+    lengths = np.linalg.norm(one, axis=1) * np.linalg.norm(other, axis=1)
+    return np.asarray(np.einsum("ij,ij->i", one, other) / np.maximum(lengths, _TINY))

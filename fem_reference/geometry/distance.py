@@ -1,0 +1,40 @@
+"""Exact unsigned distance from points to a triangle surface."""
+
+from typing import NamedTuple
+
+import igl
+import numpy as np
+
+from fem_reference.mesh import Floats, Ints, Surface
+
+
+class Distances(NamedTuple):
+    """For each of n points: ``distance`` (n,) [mm] to the surface, its closest ``triangle`` (n,), the ``closest`` point (n, 3)
+    [mm] on it and that point's ``barycentric`` coordinates (n, 3) there."""
+
+    distance: Floats
+    triangle: Ints
+    closest: Floats
+    barycentric: Floats
+
+
+def distances(points: Floats, surface: Surface) -> Distances:
+    """The closest point of ``surface`` for each of ``points`` (n, 3) [mm]."""
+    points = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
+    if len(points) == 0:
+        return Distances(np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)))
+    squares, triangle, closest = igl.point_mesh_squared_distance(points, surface.points, surface.triangles)
+    corners = surface.points[surface.triangles[triangle]]
+    return Distances(
+        np.sqrt(np.maximum(squares, 0)), np.asarray(triangle, np.int64), closest, _barycentric(closest, corners)
+    )
+
+
+def _barycentric(points: Floats, corners: Floats) -> Floats:
+    """Weights (n, 3), at least 0 and of sum 1, of ``corners`` (n, 3, 3) at ``points`` (n, 3) that lie in their triangles."""
+    opposite = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
+    normal = np.cross(opposite[:, 0], opposite[:, 1])
+    to_point = points[:, None] - corners[:, [1, 2, 0]]
+    weights = np.maximum(np.einsum("nkd,nd->nk", np.cross(opposite, to_point), normal), 0.0)
+    total = weights.sum(axis=1, keepdims=True)
+    return np.where(total > 0, weights / np.where(total > 0, total, 1.0), 1 / 3)

@@ -1,0 +1,221 @@
+"""Filling a closed surface with tetrahedra made for quality: the mesh does not keep the vertices of a finer surface.
+
+``python -m fem_reference.geometry.tetrahedra JOB.npz RESULT.npz`` runs one mesher in a process of its own, where it may crash,
+hang or keep its global state.
+"""
+
+import logging
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from fem_reference.errors import InputError
+from fem_reference.geometry.coarsening import coarsen
+from fem_reference.geometry.distance import distances
+from fem_reference.geometry.intersections import self_intersections
+from fem_reference.mesh import (
+    Floats,
+    Ints,
+    Surface,
+    TetMesh,
+    boundary,
+    check_closed,
+    enclosed_volume,
+    tet_volumes,
+    triangle_areas,
+)
+
+log = logging.getLogger(__name__)
+
+SECONDS_ALLOWED = 240.0
+_ROUNDED = 6  # decimals of a mm in the mesher's frame: far below any size, far above the round-off of moving a surface
+
+_VOLUME_WITHIN = 0.05  # a surface that passes through itself has no volume to compare with more closely
+
+
+def tetrahedralise(surface: Surface, size: float) -> TetMesh:
+    """Tetrahedra of about ``size`` [mm] inside a closed outward ``surface``; ``facets`` stay empty.
+
+    A surface finer than ``size`` is coarsened to it first. gmsh fills a surface that does not pass through itself and keeps its
+    triangles; where it cannot, fTetWild makes a surface of its own near the given one. The mesh moves with the surface: it is
+    made in a frame that the surface's own vertices span. InputError where no mesher succeeds.
+    """
+    origin, axes = _own_frame(surface.points)
+    local = np.round((surface.points - origin) @ axes, _ROUNDED) + 0.0  # + 0.0: no negative zeros
+    mesh = _mesh(surface.moved_to(local), size)
+    return TetMesh(mesh.points @ axes.T + origin, mesh.tets)
+
+
+def _own_frame(points: Floats) -> tuple[Floats, Floats]:
+    """Origin (3,) and axes in columns (3, 3): from vertex 0 to the vertex farthest from it, and from that line to the vertex
+    farthest from it; the lowest index where several are equally far."""
+    from_origin = points - points[0]
+    first = from_origin[_farthest(from_origin)]
+    first = first / np.linalg.norm(first)
+    from_line = from_origin - np.outer(from_origin @ first, first)
+    second = from_line[_farthest(from_line)]
+    second = second / np.linalg.norm(second)
+    return points[0], np.stack([first, second, np.cross(first, second)], axis=1)
+
+
+def _farthest(vectors: Floats) -> int:
+    lengths = np.linalg.norm(vectors, axis=1)
+    return int(np.flatnonzero(lengths >= lengths.max() * (1 - 1e-6))[0])
+
+
+def _mesh(surface: Surface, size: float) -> TetMesh:
+    coarse = _coarsened(surface, size)
+    crossing = len(self_intersections(coarse))
+    if crossing:
+        reason = f"{crossing} triangles pass through the surface"
+    else:
+        try:
+            log.info("%s: gmsh fills %d triangles", surface.place, len(coarse.triangles))
+            return _checked(_run("gmsh", coarse, size), coarse)
+        except InputError as error:
+            reason = str(error)
+    log.warning("%s: fTetWild meshes it, for gmsh cannot: %s", surface.place, reason)
+    return _checked(_run("tetwild", surface, size), surface)
+
+
+def _coarsened(surface: Surface, size: float) -> Surface:
+    """The surface with as many triangles as equilateral ones of side ``size`` would cover it; as it is where it has no more."""
+    count = int(triangle_areas(surface.points, surface.triangles).sum() / (size**2 * np.sqrt(3) / 4))
+    if count >= len(surface.triangles):
+        return surface
+    coarse = coarsen(surface, count)
+    lost = distances(surface.points, coarse).distance.max()
+    log.info("%s: coarsened to %d triangles, at most %.2g mm off", surface.place, len(coarse.triangles), lost)
+    if not lost <= size / 2:
+        got = f"a part that is lost ({lost:.1f} mm off) where triangles have a side of {size:g} mm"
+        raise InputError(surface.place, got, "smaller tetrahedra")
+    return coarse
+
+
+def _run(mesher: str, surface: Surface, size: float) -> TetMesh:
+    """What ``mesher`` makes of ``surface`` in a process of its own; InputError where it fails, crashes or takes too long."""
+    with tempfile.TemporaryDirectory() as folder:
+        job, result = Path(folder) / "job.npz", Path(folder) / "result.npz"
+        np.savez(job, mesher=mesher, points=surface.points, triangles=surface.triangles, size=size)
+        package = str(Path(__file__).resolve().parents[2])
+        paths = os.pathsep.join(filter(None, [package, os.environ.get("PYTHONPATH")]))
+        try:
+            done = subprocess.run(
+                [sys.executable, "-m", __spec__.name, str(job), str(result)],
+                cwd=folder,
+                env=os.environ | {"PYTHONPATH": paths},
+                capture_output=True,
+                timeout=SECONDS_ALLOWED,
+                text=True,
+                errors="replace",
+            )
+        except subprocess.TimeoutExpired:
+            got = f"a surface that {mesher} could not fill in {SECONDS_ALLOWED:g} s"
+            raise InputError(surface.place, got, "larger tetrahedra or a cleaner surface") from None
+        if done.returncode != 0 or not result.exists():
+            raise InputError(surface.place, f"a surface that {mesher} refuses ({_last_words(done)})", "a clean surface")
+        with np.load(result) as arrays:
+            return TetMesh(arrays["points"], arrays["tets"])
+
+
+def _last_words(done: subprocess.CompletedProcess[str]) -> str:
+    if done.returncode < 0:
+        return f"it crashed with signal {-done.returncode}"
+    return (done.stderr.strip().splitlines() or ["without a word"])[-1]
+
+
+def _checked(mesh: TetMesh, surface: Surface) -> TetMesh:
+    """The largest connected part of ``mesh``, its tets of positive volume, without unused points.
+
+    InputError where nothing is left, a tet is flat, the boundary is not a closed surface or bounds another volume than
+    ``surface``.
+    """
+    if len(mesh.tets) == 0:
+        raise InputError(surface.place, "no tetrahedra from the mesher", "a surface that bounds a body")
+    points, tets = _compact(mesh.points, _largest_part(mesh.tets))
+    volumes = tet_volumes(points, tets)
+    if not np.abs(volumes).min() > 0:
+        raise InputError(surface.place, "a tetrahedron of zero volume from the mesher", "a cleaner surface")
+    tets = np.where((volumes < 0)[:, None], tets[:, [0, 2, 1, 3]], tets)
+    check_closed(Surface(*_compact(points, boundary(tets)[0]), surface.place))
+    got, wanted = np.abs(volumes).sum(), enclosed_volume(surface.points, surface.triangles)
+    if not abs(got - wanted) <= _VOLUME_WITHIN * wanted:
+        raise InputError(
+            surface.place, f"tetrahedra of {got:.0f} mm3 in a surface of {wanted:.0f} mm3", "one clean body"
+        )
+    return TetMesh(points, tets)
+
+
+def _compact(points: Floats, cells: Ints) -> tuple[Floats, Ints]:
+    """Only the ``points`` that ``cells`` use, and the cells on them."""
+    used, cells_on_used = np.unique(cells, return_inverse=True)
+    return points[used], cells_on_used.reshape(cells.shape)
+
+
+def _largest_part(tets: Ints) -> Ints:
+    """The tets of the connected part that has most of them."""
+    begin, end = tets[:, [0, 0, 0]].ravel(), tets[:, 1:].ravel()
+    count = int(tets.max()) + 1
+    part = connected_components(coo_array((np.ones(len(begin)), (begin, end)), shape=(count, count)), directed=False)[1]
+    part_of_tet = part[tets[:, 0]]
+    return tets[part_of_tet == np.bincount(part_of_tet).argmax()]
+
+
+def _gmsh(points: Floats, triangles: Ints, size: float) -> tuple[Floats, Ints]:
+    """Points and tets that fill a closed surface, its triangles kept."""
+    import gmsh
+
+    gmsh.initialize()
+    for option, value in (
+        ("General.Terminal", 0),
+        ("General.NumThreads", 1),
+        ("Mesh.MeshSizeMin", 0),
+        ("Mesh.MeshSizeMax", size),
+        ("Mesh.OptimizeNetgen", 1),
+    ):
+        gmsh.option.setNumber(option, value)
+    skin = gmsh.model.addDiscreteEntity(2)
+    gmsh.model.mesh.addNodes(2, skin, np.arange(1, len(points) + 1), points.ravel())
+    gmsh.model.mesh.addElementsByType(skin, 2, [], triangles.ravel() + 1)
+    gmsh.model.mesh.createTopology()
+    loop = gmsh.model.geo.addSurfaceLoop([tag for _, tag in gmsh.model.getEntities(2)])
+    gmsh.model.geo.addVolume([loop])
+    gmsh.model.geo.synchronize()
+    gmsh.model.mesh.generate(3)
+    tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    index = np.zeros(int(tags.max()) + 1, np.int64)
+    index[tags.astype(np.int64)] = np.arange(len(tags))
+    tets = gmsh.model.mesh.getElementsByType(4)[1].astype(np.int64)
+    gmsh.finalize()
+    return coordinates.reshape(-1, 3), index[tets].reshape(-1, 4)
+
+
+def _tetwild(points: Floats, triangles: Ints, size: float) -> tuple[Floats, Ints]:
+    """Points and tets within a twentieth of ``size`` of a surface that may pass through itself."""
+    import pytetwild
+
+    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+    return pytetwild.tetrahedralize(  # type: ignore[no-any-return]
+        points,
+        triangles.astype(np.int32),
+        edge_length_abs=size,
+        epsilon=size / 20 / diagonal,
+        num_threads=1,
+    )
+
+
+def _work(job: Path, result: Path) -> None:
+    with np.load(job) as given:
+        mesher = {"gmsh": _gmsh, "tetwild": _tetwild}[str(given["mesher"])]
+        points, tets = mesher(given["points"], given["triangles"], float(given["size"]))
+    np.savez(result, points=points, tets=tets)
+
+
+if __name__ == "__main__":
+    _work(Path(sys.argv[1]), Path(sys.argv[2]))

@@ -1,0 +1,75 @@
+"""How much longer or shorter each fibre of a run is than the same fibre of the reference, frame by frame.
+
+Two runs that both carry the yardstick's fibres inside themselves are measured on those; otherwise the surfaces of
+both go through the yardstick's extension, so that like is compared with like.
+"""
+
+import numpy as np
+
+from fem_reference.mesh import Floats
+from fem_reference.metrics import Measure, Yardstick
+from fem_reference.runs import Run
+
+# Fibre points of a run this close [mm] to the yardstick's are the same points, after a file of single precision.
+_SAME = 1e-3
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def measure(run: Run, reference: Run, yardstick: Yardstick) -> tuple[Measure, ...]:
+    """Over the fibres, of L - L_reference: the signed ``mean``, the ``rms`` and the greatest magnitude ``max`` [mm].
+
+    And ``rms_percent`` and ``max_percent`` of it in per cent of each fibre's length at rest.
+    """
+    lengths = _direct if _carries(run, yardstick) and _carries(reference, yardstick) else _extended
+    longer = lengths(run, yardstick) - lengths(reference, yardstick)
+    percent = 100 * longer / yardstick.fibres.lengths()
+    statistics = (
+        ("mean", "mm", longer.mean(axis=1), longer),
+        ("rms", "mm", _rms(longer), longer),
+        ("max", "mm", np.abs(longer).max(axis=1), longer),
+        ("rms_percent", "%", _rms(percent), percent),
+        ("max_percent", "%", np.abs(percent).max(axis=1), percent),
+    )
+    return tuple(
+        Measure("fibre_length", name, unit, values, _worst(deviations)) for name, unit, values, deviations in statistics
+    )
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def extension_error(reference: Run, yardstick: Yardstick) -> Measure:
+    """The greatest error [mm] over the fibres that the extension makes on the reference's own surface.
+
+    The error is L by extension less L inside; NaN where the reference does not carry the yardstick's fibres.
+    """
+    if _carries(reference, yardstick):
+        errors = _extended(reference, yardstick) - _direct(reference, yardstick)
+    else:
+        errors = np.full((len(reference.positions), len(yardstick.fibres)), np.nan)
+    return Measure("fibre_length", "extension_error", "mm", np.abs(errors).max(axis=1), _worst(errors))
+
+
+def _carries(run: Run, yardstick: Yardstick) -> bool:
+    """Whether the fibres of ``run`` are those of the yardstick."""
+    if run.fibres is None or run.fibre_positions is None or run.fibres.points.shape != yardstick.fibres.points.shape:
+        return False
+    same_lines = np.array_equal(run.fibres.offsets, yardstick.fibres.offsets)
+    return same_lines and np.allclose(run.fibres.points, yardstick.fibres.points, rtol=0, atol=_SAME)
+
+
+def _direct(run: Run, yardstick: Yardstick) -> Floats:
+    """Length of each fibre in each frame (f, k) [mm], on the run's own fibre points."""
+    assert run.fibre_positions is not None  # the caller asked _carries
+    return np.array([yardstick.fibres.lengths(points) for points in run.fibre_positions])
+
+
+def _extended(run: Run, yardstick: Yardstick) -> Floats:
+    """Length of each fibre in each frame (f, k) [mm], on points that the surface carries along."""
+    return np.array([yardstick.fibres.lengths(yardstick.extension.apply(points)) for points in run.positions])
+
+
+def _rms(deviations: Floats) -> Floats:
+    return np.asarray(np.sqrt(np.mean(deviations**2, axis=1)))
+
+
+def _worst(deviations: Floats) -> tuple[str, ...]:
+    return tuple(f"fibre {fibre}" for fibre in np.argmax(np.abs(deviations), axis=1))

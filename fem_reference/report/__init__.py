@@ -1,0 +1,28 @@
+"""A comparison as something to read: one page that holds everything itself, and the same numbers as JSON and CSV."""
+
+import json
+from pathlib import Path
+
+from fem_reference import files
+from fem_reference.comparison import Comparison
+from fem_reference.report import page
+from fem_reference.report.tables import as_csv, summary
+
+__all__ = ["summary", "write"]
+
+
+def write(comparison: Comparison, folder: Path) -> Path:
+    """Write ``measures.json``, ``measures.csv`` and ``report.html`` into ``folder``; the path of the page.
+
+    All three are made before the first is written, and each appears whole or not at all.
+    """
+    numbers = summary(comparison)
+    texts = {
+        "measures.json": json.dumps(numbers, indent=1, allow_nan=False),
+        "measures.csv": as_csv(numbers["measures"]),
+        "report.html": page.render(comparison),
+    }
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in texts.items():
+        files.write_text(folder / name, text)
+    return folder / "report.html"

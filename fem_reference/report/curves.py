@@ -1,0 +1,163 @@
+"""Curves over frames as SVG to stand inside a page: their text stays text, and no two drawings share an id."""
+
+import io
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from fem_reference.comparison import Comparison
+from fem_reference.metrics import Measure
+from fem_reference.report.tables import find, inversion, runs
+from fem_reference.report.words import words
+
+REFERENCE = "#222222"
+# Okabe and Ito's palette for all kinds of colour vision, without its black and yellow.
+PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
+_NOT_A_NUMBER = "not a number"
+_LOOK = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "fem_reference",
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial", "sans-serif"],
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#888888",
+    "axes.grid": True,
+    "grid.color": "#e8e8e8",
+    "xtick.color": "#444444",
+    "ytick.color": "#444444",
+    "legend.frameon": False,
+}
+_STATISTICS = (
+    ("max", "worst vertex", "-"),
+    ("hausdorff", "Hausdorff", "--"),
+    ("p95", "95 % below", "-."),
+    ("rms", "rms", ":"),
+)
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A drawing: its ``title``, what it shows, and the ``svg`` text."""
+
+    title: str
+    svg: str
+
+
+def curves(comparison: Comparison) -> list[Curve]:
+    """Every drawing for which the comparison has numbers."""
+    changes = comparison.changes
+    volume = {run.name: find(changes[run.name], "volume", "deviation") for run in runs(comparison)}
+    fibres = {run.name: find(changes[run.name], "fibre_length", "mean") for run in runs(comparison)}
+    drawn = [
+        _of_runs(comparison, "volume", "Change of volume from rest", volume),
+        _of_runs(comparison, "fibres", "Change of fibre length from rest, mean over the fibres", fibres),
+    ]
+    for i, run in enumerate(comparison.candidates):
+        drawn.append(_surface(comparison, i, f"Surface of {run.name}: distance to the reference"))
+    smallest = inversion(comparison.reference)
+    drawn.append(_inversion(comparison, smallest, "Smallest det F of the reference (inside out below 0)"))
+    return [curve for curve in drawn if curve is not None]
+
+
+def label_of(inverted: Measure) -> str:
+    """What tells an inversion measure from the others, in words: where det F is smallest."""
+    return words(inverted.statistic.removeprefix("min_det_F").lstrip("_"))
+
+
+def _of_runs(comparison: Comparison, name: str, title: str, measures: dict[str, Measure | None]) -> Curve | None:
+    found = {run: measure for run, measure in measures.items() if measure is not None}
+
+    def draw(axes: Axes) -> None:
+        for i, run in enumerate(runs(comparison)):
+            if run.name in found:
+                colour = REFERENCE if i == 0 else PALETTE[(i - 1) % len(PALETTE)]
+                _line(axes, run.numbers, found[run.name], run.name, color=colour, linewidth=2.4 if i == 0 else 1.5)
+
+    return _drawing(name, title, next(iter(found.values())).unit, draw) if found else None
+
+
+def _surface(comparison: Comparison, i: int, title: str) -> Curve | None:
+    run = comparison.candidates[i]
+    measures = comparison.deviations[run.name]
+    found = [(find(measures, "surface_deviation", statistic), label, style) for statistic, label, style in _STATISTICS]
+
+    def draw(axes: Axes) -> None:
+        for measure, label, style in found:
+            if measure is not None:
+                colour = PALETTE[i % len(PALETTE)]
+                _line(axes, run.numbers, measure, label, color=colour, linestyle=style)
+        axes.set_ylim(bottom=0)
+
+    return _drawing(f"surface-{i}", title, "mm", draw) if any(measure for measure, _, _ in found) else None
+
+
+def _inversion(comparison: Comparison, measures: tuple[Measure, ...], title: str) -> Curve | None:
+    def draw(axes: Axes) -> None:
+        for measure, style in zip(measures, ("-", "--", ":", "-.") * len(measures), strict=False):
+            _line(
+                axes,
+                comparison.reference.numbers,
+                measure,
+                label_of(measure) or "det F",
+                color=REFERENCE,
+                linestyle=style,
+            )
+        axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+
+    return _drawing("inversion", title, "", draw) if measures else None
+
+
+def _line(axes: Axes, numbers: tuple[int, ...], measure: Measure, label: str, **look: str | float) -> None:
+    """A measure over frames; a cross on the frame axis where it is not finite."""
+    frames, values = np.asarray(numbers), np.asarray(measure.values, float)
+    bad = ~np.isfinite(values)
+    axes.plot(frames, np.where(bad, np.nan, values), label=label, **look)  # type: ignore[arg-type]
+    if bad.any():
+        low = axes.get_xaxis_transform()
+        told = _NOT_A_NUMBER in axes.get_legend_handles_labels()[1]
+        mark = {"color": look["color"], "label": "_" if told else _NOT_A_NUMBER}
+        axes.plot(frames[bad], np.zeros(bad.sum()), "x", transform=low, clip_on=False, **mark)  # type: ignore[arg-type]
+
+
+def _drawing(name: str, title: str, unit: str, draw: Callable[[Axes], None]) -> Curve:
+    with mpl.rc_context(_LOOK):
+        figure = Figure(figsize=(5.4, 3.1), layout="constrained")
+        FigureCanvasSVG(figure)
+        axes = figure.add_subplot()
+        draw(axes)
+        axes.margins(x=0.02)
+        axes.set_xlabel("frame")
+        axes.set_ylabel(unit)
+        axes.xaxis.set_major_locator(MaxNLocator(nbins=8, integer=True, steps=[1, 2, 5, 10]))
+        _legend(figure, axes)
+        text = io.StringIO()
+        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
+    return Curve(title, _inline(text.getvalue(), name, title))
+
+
+def _legend(figure: Figure, axes: Axes) -> None:
+    """A legend above, in as many columns as its texts leave room for, the mark of what is not a number last."""
+    entries = sorted(zip(*axes.get_legend_handles_labels(), strict=True), key=lambda entry: entry[1] == _NOT_A_NUMBER)
+    handles, labels = [entry[0] for entry in entries], [entry[1] for entry in entries]
+    lengths = [len(label) + 7 for label in labels]
+    columns = len(labels) if sum(lengths) < 75 else max(1, 75 // max(lengths))
+    figure.legend(handles, labels, loc="outside upper left", ncols=columns, handlelength=2.2, columnspacing=1.2)
+
+
+def _inline(svg: str, name: str, title: str) -> str:
+    """The ``<svg>`` alone, as wide as its place, with ``name`` before every id."""
+    svg = re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)
+    svg = re.sub(r' xmlns(:\w+)?="[^"]*"', "", svg).replace("xlink:href", "href")
+    svg = re.sub(r'(id="|href="#|url\(#)', rf"\g<1>{name}-", svg)
+    box = re.search(r'viewBox="[^"]*"', svg)
+    assert box is not None  # matplotlib writes one in every drawing
+    return f'<svg {box[0]} role="img" aria-label="{title}">{svg[svg.index(">") + 1 :]}'

@@ -1,0 +1,134 @@
+"""Which moments are pictured, from where, and the program that draws them."""
+
+import logging
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from fem_reference.comparison import Comparison
+from fem_reference.errors import MissingSoftware
+from fem_reference.mesh import Floats, Surface
+from fem_reference.problem import Body, Setup
+from fem_reference.report import pictures
+from fem_reference.report.tables import find
+from fem_reference.runs import Run
+
+log = logging.getLogger(__name__)
+
+PACKAGES = "libegl1 libegl-mesa0 libgl1-mesa-dri"
+_SECONDS = 600
+
+
+@dataclass(frozen=True, eq=False)
+class Shot:
+    """A run at a frame ``number``: ``points`` (n, 3) [mm]; a candidate also has the ``distances`` (n,) [mm] of its vertices to
+    the same vertices of the reference, whose points are the ``outline`` (n, 3)."""
+
+    name: str
+    number: int
+    points: Floats
+    distances: Floats | None = None
+    outline: Floats | None = None
+
+
+def shots(comparison: Comparison) -> list[Shot]:
+    """The reference at rest and where it moved furthest, and each candidate at its worst frame that can be drawn."""
+    reference = comparison.reference
+    travel = _apart(reference.positions, reference.surface.points).max(axis=1)
+    furthest = int(np.argmax(np.where(np.isfinite(travel), travel, -1.0)))
+    numbers = sorted({0, furthest})
+    chosen = [Shot(reference.name, reference.numbers[i], reference.positions[i]) for i in numbers]
+    return chosen + [shot for run in comparison.candidates for shot in _worst(comparison, run)]
+
+
+def draw(setup: Setup, surface: Surface, wanted: list[Shot]) -> list[tuple[bytes, bytes]]:
+    """Two WebP pictures of each shot; MissingSoftware where the program that draws them did not get to its end."""
+    with TemporaryDirectory(prefix="fem_reference_") as folder:
+        job = Path(folder) / "job.npz"
+        np.savez(job, **_job(setup, surface, wanted))
+        _run(_command(job, Path(folder)))
+        names = [[Path(folder) / f"{shot}_{view}.webp" for view in (0, 1)] for shot in range(len(wanted))]
+        if not all(path.is_file() for pair in names for path in pair):
+            raise _missing("it left no pictures")
+        return [(first.read_bytes(), second.read_bytes()) for first, second in names]
+
+
+def directions(surface: Surface, bones: tuple[Body, ...]) -> Floats:
+    """Unit vectors (2, 3) towards the cameras: along the smallest and the middle principal axis of the surface, that is where
+    its silhouette is largest and a quarter turn about its long axis from there, on the side away from the bones' vertices."""
+    middle = surface.points.mean(axis=0)
+    _, axes = np.linalg.eigh(np.cov((surface.points - middle).T))
+    views = axes.T[:2]
+    others = np.vstack([bone.surface.points for bone in bones])
+    radius = np.linalg.norm(surface.points - middle, axis=1).max()
+    near = others[np.linalg.norm(others - middle, axis=1) < 1.5 * radius]
+    away = middle - (near if len(near) else others).mean(axis=0)
+    return np.asarray(views * np.where(views @ away < 0, -1.0, 1.0)[:, None])
+
+
+def _worst(comparison: Comparison, run: Run) -> Iterator[Shot]:
+    """The shot of a candidate, none where no frame is finite."""
+    reference = comparison.reference
+    same = [reference.numbers.index(number) for number in run.numbers]
+    distances = _apart(run.positions, reference.positions[same])
+    drawable = np.isfinite(distances).all(axis=1)
+    if not drawable.any():
+        return
+    deviation = find(comparison.deviations[run.name], "surface_deviation", "rms")
+    badness = distances.max(axis=1) if deviation is None else np.abs(deviation.values)
+    i = int(np.argmax(np.where(drawable, badness, -1.0)))
+    yield Shot(run.name, run.numbers[i], run.positions[i], distances[i], reference.positions[same[i]])
+
+
+def _apart(positions: Floats, others: Floats) -> Floats:
+    """Distance of the same vertices (f, n) [mm], not finite where either is not."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        return np.asarray(np.linalg.norm(positions - others, axis=2))
+
+
+def _job(setup: Setup, surface: Surface, wanted: list[Shot]) -> dict[str, Any]:
+    """The arrays of a job, as ``pictures`` names them."""
+    job: dict[str, Any] = {
+        "triangles": surface.triangles,
+        "directions": directions(surface, setup.bones),
+        "bones": len(setup.bones),
+        "shots": len(wanted),
+    }
+    for i, bone in enumerate(setup.bones):
+        job |= {f"bone_{i}_points": bone.surface.points, f"bone_{i}_triangles": bone.surface.triangles}
+    for i, shot in enumerate(wanted):
+        parts = {"points": shot.points, "distances": shot.distances, "outline": shot.outline}
+        parts["poses"] = np.stack([bone.pose(shot.number) for bone in setup.bones])
+        job |= {f"shot_{i}_{part}": values for part, values in parts.items() if values is not None}
+    return job
+
+
+def _command(job: Path, folder: Path) -> list[str]:
+    return [sys.executable, "-P", pictures.__file__, str(job), str(folder)]
+
+
+def _run(command: list[str]) -> None:
+    settings = dict(os.environ)
+    if sys.platform == "linux":
+        settings.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    try:
+        done = subprocess.run(command, env=settings, capture_output=True, text=True, timeout=_SECONDS, check=False)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise _missing(str(error)) from error
+    if done.returncode:
+        log.info("the program that draws wrote: %s", done.stderr)
+        raise _missing(f"it ended with code {done.returncode}")
+
+
+def _missing(what: str) -> MissingSoftware:
+    return MissingSoftware(
+        f"No pictures: the program that draws them did not get through ({what}). It needs an OpenGL library; "
+        f"on Debian or Ubuntu: apt-get install {PACKAGES}"
+    )

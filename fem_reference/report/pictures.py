@@ -1,0 +1,98 @@
+"""Draws the pictures of a job file, as a program of its own: ``python -P pictures.py JOB.npz FOLDER``.
+
+Without an OpenGL library VTK ends the process that draws, with no exception, hence the process of its own. The job holds
+``triangles`` (m, 3), ``directions`` (2, 3) towards the two cameras, ``bones`` (how many) and ``shots`` (how many), bone i as
+``bone_i_points`` and ``bone_i_triangles``, and shot i as ``shot_i_points`` (n, 3), ``shot_i_poses`` (bones, 4, 4), and where it
+has them ``shot_i_distances`` (n,) [mm] to colour by and ``shot_i_outline`` (n, 3), the body whose outline is drawn over it.
+View k of shot i becomes ``i_k.webp`` in the folder.
+"""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+COLOURS = "viridis"
+SIDE = 840
+_OVERSAMPLING = 2
+_MUSCLE, _BONE, _LINE = "#b4574e", "#dedbd4", (25, 25, 25)
+
+
+def main(job: Path, folder: Path) -> None:
+    """Draw every view of every shot."""
+    with np.load(job) as stored:
+        arrays = dict(stored)
+    bones = [_surface(arrays[f"bone_{i}_points"], arrays[f"bone_{i}_triangles"]) for i in range(arrays["bones"])]
+    for shot in range(arrays["shots"]):
+        posed = [
+            bone.transform(pose, inplace=False) for bone, pose in zip(bones, arrays[f"shot_{shot}_poses"], strict=True)
+        ]
+        for view, direction in enumerate(arrays["directions"]):
+            image = _view(arrays, shot, posed, direction)
+            image.save(folder / f"{shot}_{view}.webp", quality=88, method=4)
+
+
+def _surface(points: NDArray[Any], triangles: NDArray[Any]) -> Any:
+    import pyvista
+
+    return pyvista.PolyData.from_regular_faces(points, triangles).compute_normals(
+        cell_normals=False, split_vertices=False, auto_orient_normals=False, consistent_normals=False
+    )
+
+
+def _view(arrays: dict[str, NDArray[Any]], shot: int, bones: list[Any], direction: NDArray[Any]) -> Image.Image:
+    points, outline = arrays[f"shot_{shot}_points"], arrays.get(f"shot_{shot}_outline")
+    distances = arrays.get(f"shot_{shot}_distances")
+    camera = _camera(points, points if outline is None else outline, direction)
+    muscle = _surface(points, arrays["triangles"])
+    coloured: dict[str, Any] = {"color": _MUSCLE}
+    if distances is not None:
+        coloured = {"scalars": distances, "cmap": COLOURS, "clim": (0.0, max(float(distances.max()), 1e-12))}
+    looks: dict[str, Any] = {"smooth_shading": True, "ambient": 0.35, "diffuse": 0.7, "show_scalar_bar": False}
+    picture = _render([(bone, looks | {"color": _BONE}) for bone in bones] + [(muscle, looks | coloured)], camera)
+    if outline is not None:
+        flat = {"color": "black", "lighting": False}
+        body = _render([(_surface(outline, arrays["triangles"]), flat)], camera)[:, :, 0] < 128
+        picture[_rim(body)] = _LINE
+    return Image.fromarray(picture).resize((SIDE, SIDE), Image.Resampling.LANCZOS)
+
+
+def _camera(points: NDArray[Any], frame: NDArray[Any], direction: NDArray[Any]) -> dict[str, Any]:
+    """A parallel camera from ``direction`` on the body ``frame``, wide enough for ``points`` unless they are scattered."""
+    middle = (frame.max(axis=0) + frame.min(axis=0)) / 2
+    own, both = (float(np.linalg.norm(cloud - middle, axis=1).max()) for cloud in (frame, np.vstack([frame, points])))
+    up = (0.0, 0.0, 1.0) if abs(direction[2]) < 0.95 else (0.0, 1.0, 0.0)
+    return {"middle": middle, "direction": direction, "half": 1.06 * min(both, 2 * own), "up": up}
+
+
+def _render(bodies: list[tuple[Any, dict[str, Any]]], camera: dict[str, Any]) -> NDArray[Any]:
+    import pyvista
+
+    plotter = pyvista.Plotter(off_screen=True, window_size=[SIDE * _OVERSAMPLING] * 2)
+    plotter.set_background("white")
+    for body, looks in bodies:
+        plotter.add_mesh(body, **looks)
+    plotter.camera.focal_point = camera["middle"]
+    plotter.camera.position = camera["middle"] + 10 * camera["half"] * camera["direction"]
+    plotter.camera.up = camera["up"]
+    plotter.enable_parallel_projection()
+    plotter.camera.parallel_scale = camera["half"]
+    plotter.reset_camera_clipping_range()
+    picture = np.array(plotter.screenshot(return_img=True))
+    plotter.close()
+    return picture
+
+
+def _rim(body: NDArray[Any]) -> NDArray[Any]:
+    """The pixels of ``body`` (a mask) within four of its edge."""
+    inside = np.pad(body, 4)
+    height, width = body.shape
+    around = [inside[4 + dy : 4 + dy + height, 4 + dx : 4 + dx + width] for dx in (-4, 0, 4) for dy in (-4, 0, 4)]
+    return np.asarray(body & ~np.all(around, axis=0))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), Path(sys.argv[2]))

@@ -1,0 +1,111 @@
+"""A comparison as rows of numbers: what measures.json and measures.csv hold, and the figures that the page puts first."""
+
+import csv
+import io
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from fem_reference.comparison import Comparison
+from fem_reference.judge import Verdict
+from fem_reference.metrics import Measure
+from fem_reference.runs import Run
+
+COLUMNS = ("candidate", "metric", "statistic", "frame", "value", "unit")
+
+
+def summary(comparison: Comparison) -> dict[str, Any]:
+    """Everything that was measured, as valid JSON: a number that is not finite is None.
+
+    ``measures`` holds each candidate's deviation from the reference, and under ``"reference"`` its own change from rest with the
+    inversion numbers that its solver recorded; ``from_rest`` the change from rest of every run.
+    """
+    reference = comparison.reference
+    deviations = [row for run in comparison.candidates for row in _rows(run, comparison.deviations[run.name])]
+    from_rest = {run.name: _rows(run, comparison.changes[run.name]) for run in runs(comparison)}
+    return {
+        "case": comparison.scene.name,
+        "solver": reference.solver,
+        "status": reference.outcome.status,
+        "message": reference.outcome.message,
+        "verdict": comparison.word,
+        "cost": {run.name: {key: finite(value) for key, value in run.outcome.cost.items()} for run in runs(comparison)},
+        "measures": from_rest[reference.name] + _rows(reference, inversion(reference)) + deviations,
+        "from_rest": [row for rows in from_rest.values() for row in rows],
+        "verdicts": [_verdict(verdict) for verdict in comparison.verdicts],
+    }
+
+
+def as_csv(rows: Iterable[dict[str, Any]]) -> str:
+    """Rows of ``COLUMNS`` as CSV text, numbers in full; a number that is not finite is left empty."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def runs(comparison: Comparison) -> tuple[Run, ...]:
+    """The reference and its candidates."""
+    return (comparison.reference, *comparison.candidates)
+
+
+def finite(value: float) -> float | None:
+    """``value``, or None where it is not finite.
+
+    >>> finite(2), finite(float("nan"))
+    (2.0, None)
+    """
+    return float(value) if math.isfinite(value) else None
+
+
+def find(measures: Iterable[Measure], metric: str, statistic: str) -> Measure | None:
+    """The measure of that name, None where it was not taken."""
+    return next((found for found in measures if (found.metric, found.statistic) == (metric, statistic)), None)
+
+
+def inversion(run: Run) -> tuple[Measure, ...]:
+    """The smallest det F per frame [1] that a solver recorded (scalars ``min_det_F...``), as measures."""
+    names = [name for name in run.scalars if name.startswith("min_det_F")]
+    return tuple(Measure("inversion", name, "1", run.scalars[name]) for name in names)
+
+
+def seconds_per_frame(run: Run) -> float | None:
+    """Time to solve one of the frames after the first that were reached [s]; None where somebody else computed the run elsewhere.
+
+    ``seconds_solve`` is a solver's own time without compiling and writing; without it the whole wall time counts.
+    """
+    cost = run.outcome.cost
+    seconds = cost.get("seconds_solve", cost.get("seconds"))
+    solved = int(np.isfinite(run.positions).all(axis=(1, 2)).sum()) - 1
+    if run.solver == "recorded" or seconds is None or solved < 1:
+        return None
+    return seconds / solved
+
+
+def _rows(run: Run, measures: Iterable[Measure]) -> list[dict[str, Any]]:
+    return [
+        dict(zip(COLUMNS, (run.name, one.metric, one.statistic, number, finite(value), one.unit), strict=True))
+        for one in measures
+        for number, value in zip(run.numbers, one.values, strict=True)
+    ]
+
+
+def _verdict(verdict: Verdict) -> dict[str, Any]:
+    expectation = verdict.expectation
+    return {
+        "verdict": verdict.word,
+        "of": expectation.of,
+        "metric": expectation.metric,
+        "statistic": expectation.statistic,
+        "expected_at": expectation.frame,
+        "frame": verdict.frame,
+        "value": finite(verdict.value),
+        "truth": verdict.truth,
+        "within": verdict.within,
+        "unit": verdict.unit,
+        "kind": expectation.kind,
+        "because": expectation.because,
+    }

@@ -1,0 +1,80 @@
+"""Numbers and names as people read them: three significant digits, a true minus sign, powers of ten, plain words."""
+
+import math
+
+_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def number(value: float | None) -> str:
+    """A number with three significant digits; whole numbers from 1000 on in full.
+
+    >>> number(0.12345), number(-12.3456), number(65021), number(1.5e-14), number(0)
+    ('0.123', '−12.3', '65\u202f021', '1.50 × 10⁻¹⁴', '0')
+    >>> number(float("nan")), number(float("-inf")), number(None)
+    ('not a number', '−infinite', '–')
+    """
+    if value is None:
+        return "–"
+    if math.isnan(value):
+        return "not a number"
+    sign = "−" if value < 0 else ""
+    size = abs(value)
+    if math.isinf(size):
+        return f"{sign}infinite"
+    if size != 0 and not 1e-4 <= size < 1e7:
+        mantissa, power = f"{size:.2e}".split("e")
+        return f"{sign}{mantissa} × 10{str(int(power)).translate(_SUPERSCRIPT)}"
+    if size >= 1000:
+        return sign + f"{size:,.0f}".replace(",", "\u202f")
+    return sign + (f"{size:.0f}" if size == int(size) else f"{size:#.3g}".rstrip("."))
+
+
+def duration(seconds: float | None) -> str:
+    """A time with its unit.
+
+    >>> duration(0.0301), duration(45.678), duration(7200), duration(None)
+    ('30.1 ms', '45.7 s', '120 min', '–')
+    """
+    if seconds is None:
+        return "–"
+    if seconds >= 600:
+        return f"{number(seconds / 60)} min"
+    return f"{number(seconds)} s" if seconds >= 1 or not seconds > 0 else f"{number(seconds * 1000)} ms"
+
+
+def ratio(one: float | None, other: float | None) -> float | None:
+    """One time over another, None where one of them is not known or zero.
+
+    >>> ratio(100.0, 0.5), ratio(None, 1.0)
+    (200.0, None)
+    """
+    return one / other if one and other else None
+
+
+def exact(value: object) -> str:
+    """A fact about where something comes from, with all the digits it has.
+
+    >>> exact(0.123456), exact(True), exact("0.11.0")
+    ('0.123456', 'yes', '0.11.0')
+    """
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.12g}" if isinstance(value, float) else str(value)
+
+
+def words(name: str) -> str:
+    """A name from code as words.
+
+    >>> words("surface_deviation"), words("max_percent")
+    ('surface deviation', 'max percent')
+    """
+    return name.replace("_", " ")
+
+
+def listed(names: list[str]) -> str:
+    """Names in a sentence.
+
+    >>> listed(["pbd"]), listed(["pbd", "arap", "ours"])
+    ('pbd', 'pbd, arap and ours')
+    """
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)

@@ -1,0 +1,138 @@
+"""The reference: P2 displacement, P1 pressure (Taylor-Hood) on tetrahedra, quasi-static, solved by Newton's method in FEniCSx.
+
+This side needs no FEniCSx: it runs ``worker`` in processes of its own (``mpiexec`` for more than one rank), passes the problem as
+a file, and sinks frames as the worker reports them. A worker that dies is the status *crashed*, not an exception.
+"""
+
+import importlib.util
+import json
+import os
+import pickle
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from fem_reference.errors import MissingSoftware
+from fem_reference.geometry.embedding import embed
+from fem_reference.mesh import Floats, Ints
+from fem_reference.problem import Problem
+from fem_reference.records import Record
+from fem_reference.runs import Frame, Outcome, Sink
+from fem_reference.units import Time
+
+MARK = "@fem_reference "  # begins each line of the worker's output that is meant for us
+
+
+class Settings(Record):
+    """Numerics of the reference; steps are in frame numbers.
+
+    ``first_step`` and ``smallest_step`` bound the load step: it grows by half after an easy step (at most 5 Newton iterations)
+    and is halved when Newton needs more than ``newton_iterations`` or an element inverts. ``residual`` [N, mm3] ends Newton's
+    iteration: the norm of out-of-balance nodal forces and of the volume equation. ``ranks``: MPI processes, by default two where
+    the machine has them; they change the time, not the answer.
+    """
+
+    first_step: float = Field(default=10.0, gt=0)
+    smallest_step: float = Field(default=0.02, gt=0)
+    newton_iterations: int = Field(default=14, gt=0)
+    residual: float = Field(default=1e-8, gt=0)
+    ranks: int | None = Field(default=None, gt=0)
+    time_limit: Time | None = None
+
+
+def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
+    """Solve every requested frame in worker processes; frames carry surface, fibres and tets."""
+    if not any(importlib.util.find_spec(name) for name in ("dolfinx_solver", "dolfinx")):
+        raise MissingSoftware("FEniCSx is not installed: pip install 'fem_reference[fenicsx]' (Linux x86-64), or conda's fenics-dolfinx")
+    with tempfile.TemporaryDirectory(prefix="fem_reference-") as folder:
+        job = Path(folder) / "job.pickle"
+        job.write_bytes(pickle.dumps((problem, settings, _samples(problem))))
+        return _run(_command(settings, job), settings, sink)
+
+
+def _samples(problem: Problem) -> dict[str, tuple[Ints, Floats]]:
+    """Where displacement is wanted: by name, the tet of each point and the point at rest, as the tet's own map places it."""
+    mesh = problem.mesh
+    wanted = {"tets": mesh.points, "surface": problem.surface.points, "fibres": problem.fibres.points}
+    return {name: (embed(mesh, points).tets, np.asarray(points)) for name, points in wanted.items()}
+
+
+def _command(settings: Settings, job: Path) -> list[str]:
+    """The worker's command line. DOLFINx's MPI has its ``mpiexec`` beside the interpreter; a foreign one on the PATH may not fit."""
+    worker = [sys.executable, "-m", f"{__name__}.worker", str(job)]
+    beside = Path(sys.executable).with_name("mpiexec")
+    mpiexec = str(beside) if beside.exists() else shutil.which("mpiexec")
+    ranks = settings.ranks or (min(2, os.cpu_count() or 1) if mpiexec else 1)
+    if ranks == 1:
+        return worker
+    if mpiexec is None:
+        raise MissingSoftware(f"{ranks} ranks need mpiexec, which is neither beside {sys.executable} nor on the PATH")
+    return [mpiexec, "-n", str(ranks), *worker]
+
+
+def _run(command: list[str], settings: Settings, sink: Sink) -> Outcome:
+    reached: list[int] = []
+    with _process(command, settings.time_limit) as (process, timed_out, errors):
+        for event in _events(process):
+            if "frame" in event:
+                reached.append(event["frame"])
+                with np.load(event["file"]) as arrays:
+                    sink(Frame(event["frame"], arrays["surface"], arrays["fibres"], arrays["tets"], event["scalars"]))
+                Path(event["file"]).unlink()
+            else:
+                return Outcome(event["status"], event["message"], event["cost"])
+        code = process.wait()
+    kept = f"frames up to {reached[-1]} are kept" if reached else "no frame was reached"
+    if timed_out.is_set():
+        return Outcome("timed out", f"stopped after {settings.time_limit:.0f} s, the time limit; {kept}")
+    last = "".join(errors[-1:]).strip()
+    return Outcome("crashed", f"the FEniCSx process ended with exit status {code} ({last}); {kept}")
+
+
+@contextmanager
+def _process(
+    command: list[str], time_limit: float | None
+) -> Iterator[tuple[subprocess.Popen[str], threading.Event, list[str]]]:
+    """The running worker, an event that is set when the time limit ended it, and the lines of its error output so far."""
+    environment = os.environ | {"OMP_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"}
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
+    timed_out, errors = threading.Event(), list[str]()
+
+    def stop() -> None:
+        timed_out.set()
+        process.terminate()
+
+    assert process.stderr is not None
+    listener = threading.Thread(target=lambda stream: errors.extend(line for line in stream if line.strip()), args=[process.stderr])
+    listener.start()
+    timer = threading.Timer(time_limit or threading.TIMEOUT_MAX, stop)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield process, timed_out, errors
+        process.wait()
+    finally:
+        timer.cancel()
+        if process.poll() is None:
+            process.terminate()
+            process.wait()
+        listener.join()
+        for stream in (process.stdout, process.stderr):
+            if stream is not None:
+                stream.close()
+
+
+def _events(process: subprocess.Popen[str]) -> Iterator[dict[str, Any]]:
+    assert process.stdout is not None
+    for line in process.stdout:
+        if line.startswith(MARK):
+            yield json.loads(line.removeprefix(MARK))

@@ -1,0 +1,56 @@
+"""Adaptive load steps from frame to frame: halve on failure, grow on easy steps, never skip a requested frame."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from fem_reference.runs import Status
+
+EASY = 5  # Newton iterations up to which the next step may grow
+GROWTH = 1.5
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """How the solve at one load went: ``failure`` is None where it converged, else the status that it would end the run with."""
+
+    failure: Status | None
+    iterations: int
+    sentence: str = ""
+
+
+@dataclass(frozen=True)
+class Reached:
+    """A requested frame was reached, or (``failed``) could not be: steps, Newton iterations and cut-backs since the last one."""
+
+    frame: int
+    steps: int
+    iterations: int
+    cutbacks: int
+    failed: Attempt | None = None
+    at: float = 0.0
+
+
+def march(
+    attempt: Callable[[float], Attempt], frames: tuple[int, ...], first_step: float, smallest_step: float
+) -> Iterator[Reached]:
+    """Go from ``frames[0]`` (where the body rests) through every frame; ``attempt`` solves at a load, from the last state that
+    converged, and must leave that state untouched where it fails. Ends after the first frame that cannot be reached."""
+    at, step = float(frames[0]), first_step
+    for frame in frames[1:]:
+        steps = iterations = cutbacks = 0
+        while at < frame:
+            left = frame - at
+            size = left / max(1, round(left / step + 0.3))  # equal steps to the frame, none a sliver
+            result = attempt(frame if size == left else at + size)
+            iterations += result.iterations
+            if result.failure is not None:
+                cutbacks += 1
+                step = size / 2
+                if step < smallest_step:
+                    yield Reached(frame, steps, iterations, cutbacks, result, at)
+                    return
+                continue
+            at = frame if size == left else at + size
+            steps += 1
+            step = step * GROWTH if result.iterations <= EASY else size
+        yield Reached(frame, steps, iterations, cutbacks, at=at)

@@ -1,0 +1,183 @@
+"""The three constraints of position based dynamics, compiled: value, gradient and projection. Report section 5.5.3.
+
+A projection moves ``points`` (n, 3) [mm] in place by report eq. 5.14 weighted with the inverse masses w (n,),
+``dp_i = -stiffness w_i grad_i C / (sum_j w_j |grad_j C|^2) C``, one constraint after the other in the order of the
+arrays (Gauss-Seidel), so that the result depends on that order. ``stiffness`` is the share of C that one projection
+takes away, to first order. Arrays should be writable and C-contiguous: each other kind is compiled for anew.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any, cast
+
+import numba
+import numpy as np
+
+from fem_reference.mesh import Floats, Ints
+
+Vector = tuple[float, float, float]
+
+# Below this sine of a dihedral angle its gradient is rounding noise, and the pair counts as flat.
+FLAT = 1e-5
+# One projection turns a pair by no more than this [rad]. Points go straight, not round: a turn by t lengthens a triangle
+# by t^2 / 2 of its height; where pairs are folded shut (t near pi) that grows from pair to pair until all is lost.
+LARGEST_TURN = 0.3
+_ZERO = (0.0, 0.0, 0.0)
+
+
+def compiled[F: Callable[..., Any]](function: F) -> F:
+    """The function as machine code, made at its first call and kept on disk; it runs on one thread."""
+    return cast(F, numba.njit(cache=True, error_model="numpy")(function))
+
+
+@compiled
+def _at(points: Floats, i: int) -> Vector:
+    return points[i, 0], points[i, 1], points[i, 2]
+
+
+@compiled
+def _minus(a: Vector, b: Vector) -> Vector:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@compiled
+def _times(factor: float, a: Vector) -> Vector:
+    return factor * a[0], factor * a[1], factor * a[2]
+
+
+@compiled
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@compiled
+def _cross(a: Vector, b: Vector) -> Vector:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@compiled
+def _move(points: Floats, i: int, factor: float, direction: Vector) -> None:
+    for axis in range(3):
+        points[i, axis] += factor * direction[axis]
+
+
+@compiled
+def distance(p1: Vector, p2: Vector) -> tuple[float, Vector]:
+    """Distance of two points [mm] and its gradient at ``p1``, minus that at ``p2``. Eq. 5.15-5.17.
+
+    The gradient is zero where the points coincide.
+    """
+    apart = _minus(p1, p2)
+    length = math.sqrt(_dot(apart, apart))
+    return length, (_times(1 / length, apart) if length > 0 else _ZERO)
+
+
+@compiled
+def volume(points: Floats, triangles: Ints) -> tuple[float, Floats]:
+    """Six times the volume inside closed ``triangles`` (m, 3) [mm3] and its gradient (n, 3) [mm2]. Eq. 5.19-5.21.
+
+    Eq. 5.18 drops its 1/6 halfway; here value and gradient both are without it. The origin is the mean of the points,
+    which a closed surface does not feel but rounding does.
+    """
+    centre = (points[:, 0].mean(), points[:, 1].mean(), points[:, 2].mean())
+    gradient = np.zeros_like(points)
+    value = 0.0
+    for t in range(len(triangles)):
+        i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        a, b, c = _minus(_at(points, i), centre), _minus(_at(points, j), centre), _minus(_at(points, k), centre)
+        opposite = _cross(b, c)
+        value += _dot(a, opposite)
+        _move(gradient, i, 1.0, opposite)
+        _move(gradient, j, 1.0, _cross(c, a))
+        _move(gradient, k, 1.0, _cross(a, b))
+    return value, gradient
+
+
+@compiled
+def dihedral(p1: Vector, p2: Vector, p3: Vector, p4: Vector) -> tuple[float, Vector, Vector, Vector, Vector]:
+    """Angle [rad] of triangles (p1, p2, p3) and (p1, p2, p4) about their edge p1-p2, and its gradients. Eq. 5.22-5.30.
+
+    It is pi where they are flat and cannot tell the two sides of a fold. Gradients are zero where arccos has none: flat,
+    folded shut, no area. arccos d is taken as atan2(sine, d), because arccos loses half the digits there. Eq. 5.26 needs
+    eq. 5.30 transposed, and ``n2 . (n2 x p2)`` in it is an outer product.
+    """
+    e, a, b = _minus(p2, p1), _minus(p3, p1), _minus(p4, p1)
+    u1, u2 = _cross(e, a), _cross(e, b)
+    size1, size2 = math.sqrt(_dot(u1, u1)), math.sqrt(_dot(u2, u2))
+    if size1 == 0 or size2 == 0:
+        return math.pi, _ZERO, _ZERO, _ZERO, _ZERO
+    n1, n2 = _times(1 / size1, u1), _times(1 / size2, u2)
+    d, normal = _dot(n1, n2), _cross(n1, n2)
+    sine = math.sqrt(_dot(normal, normal))
+    angle = math.atan2(sine, d)
+    if sine < FLAT:
+        return angle, _ZERO, _ZERO, _ZERO, _ZERO
+    slope = -1 / sine
+    to1 = _times(slope / size1, _minus(n2, _times(d, n1)))
+    to2 = _times(slope / size2, _minus(n1, _times(d, n2)))
+    g3, g4 = _cross(to1, e), _cross(to2, e)
+    g2 = _minus(_cross(a, to1), _cross(to2, b))
+    g1 = _minus(_minus(_ZERO, g2), (g3[0] + g4[0], g3[1] + g4[1], g3[2] + g4[2]))
+    return angle, g1, g2, g3, g4
+
+
+@compiled
+def distances(points: Floats, edges: Ints) -> Floats:
+    """Length [mm] of each of the ``edges`` (e, 2)."""
+    found = np.empty(len(edges))
+    for h in range(len(edges)):
+        found[h] = distance(_at(points, edges[h, 0]), _at(points, edges[h, 1]))[0]
+    return found
+
+
+@compiled
+def dihedrals(points: Floats, hinges: Ints) -> Floats:
+    """Angle [rad] of each of the ``hinges`` (e, 4): both ends of an edge, and the vertices opposite it."""
+    found = np.empty(len(hinges))
+    for h in range(len(hinges)):
+        i, j, k, m = hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3]
+        found[h] = dihedral(_at(points, i), _at(points, j), _at(points, k), _at(points, m))[0]
+    return found
+
+
+@compiled
+def project_distances(points: Floats, inverse_masses: Floats, edges: Ints, rest: Floats, stiffness: float) -> None:
+    """Move the ends of each of the ``edges`` (e, 2) towards their distance ``rest`` (e,) [mm]."""
+    for h in range(len(edges)):
+        i, j = edges[h, 0], edges[h, 1]
+        weight = inverse_masses[i] + inverse_masses[j]
+        if weight > 0:
+            length, direction = distance(_at(points, i), _at(points, j))
+            step = -stiffness * (length - rest[h]) / weight
+            _move(points, i, step * inverse_masses[i], direction)
+            _move(points, j, -step * inverse_masses[j], direction)
+
+
+@compiled
+def project_volume(points: Floats, inverse_masses: Floats, triangles: Ints, rest: float, stiffness: float) -> None:
+    """Move every point along the volume's gradient, towards six times a volume of ``rest`` [mm3]."""
+    value, gradient = volume(points, triangles)
+    weight = 0.0
+    for i in range(len(points)):
+        slope = _at(gradient, i)
+        weight += inverse_masses[i] * _dot(slope, slope)
+    if weight > 0:
+        step = -stiffness * (value - rest) / weight
+        for i in range(len(points)):
+            _move(points, i, step * inverse_masses[i], _at(gradient, i))
+
+
+@compiled
+def project_dihedrals(points: Floats, inverse_masses: Floats, hinges: Ints, rest: Floats, stiffness: float) -> None:
+    """Move the vertices of each of the ``hinges`` (e, 4) towards their angle ``rest`` (e,) [rad]."""
+    for h in range(len(hinges)):
+        i, j, k, m = hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3]
+        angle, g1, g2, g3, g4 = dihedral(_at(points, i), _at(points, j), _at(points, k), _at(points, m))
+        w1, w2, w3, w4 = inverse_masses[i], inverse_masses[j], inverse_masses[k], inverse_masses[m]
+        weight = w1 * _dot(g1, g1) + w2 * _dot(g2, g2) + w3 * _dot(g3, g3) + w4 * _dot(g4, g4)
+        if weight > 0:
+            step = -stiffness * min(LARGEST_TURN, max(-LARGEST_TURN, angle - rest[h])) / weight
+            _move(points, i, step * w1, g1)
+            _move(points, j, step * w2, g2)
+            _move(points, k, step * w3, g3)
+            _move(points, m, step * w4, g4)

@@ -1,0 +1,165 @@
+"""A sequence of deformed surfaces that somebody else computed, read from their files and checked against the scene."""
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from fem_reference import files
+from fem_reference.errors import InputError
+from fem_reference.mesh import Floats, Ints, Surface, check_finite
+from fem_reference.problem import Setup
+from fem_reference.records import Record
+from fem_reference.runs import Frame, Outcome, Sink
+from fem_reference.units import LengthUnit
+
+# How far [mm] (rms) the first frame may be from the rest surface: above the rounding of any format, below a wrong unit.
+AT_REST = 0.1
+# How far apart [mm] corners of an STL file that are one vertex may be: three times the spacing of float32 at 500 mm.
+SAME_POINT = 1e-4
+# How far, in frames, a time may be from the frame it is of: above rounding to four digits, below any half step.
+ON_FRAME = 1e-3
+
+_INDICES = (".pvd", ".xdmf")
+
+
+class Settings(Record):
+    """Where the sequence is, and its unit of length.
+
+    ``folder``: a folder with one mesh file a frame, numbered by the last digits of their names; a .pvd or .xdmf file or
+    a folder with one; or the folder of a stored run.
+    """
+
+    folder: str
+    unit: LengthUnit
+
+
+def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
+    """Every frame wanted, once all of them are read and known to be of this surface.
+
+    The times of an index are those of the frames by ``setup.interval`` [s], and frame numbers where that is None.
+    """
+    source = _source(Path(settings.folder))
+    sequence = _sequence(source, settings.unit, setup.interval)
+    missing = [str(number) for number in setup.frames if number not in sequence]
+    if missing:
+        there = f"{min(sequence)} to {max(sequence)}" if sequence else "none"
+        raise InputError(
+            source, f"no frame {', '.join(missing)} (there are {len(sequence)}: {there})", "every frame wanted"
+        )
+    frames = []
+    for number in setup.frames:
+        surface = _surface(sequence[number], settings.unit)
+        frames.append(Frame(number, _positions(surface, setup.surface)))
+        if number == setup.frames[0]:
+            _check_at_rest(surface.place, frames[0], setup.surface)
+    for frame in frames:
+        sink(frame)
+    return Outcome("converged", f"read {len(frames)} frames from {source}")
+
+
+def _source(path: Path) -> Path:
+    """The folder of mesh files or the index file that ``path`` leads to."""
+    if (path / "run.json").is_file():
+        return path / "surface"
+    if path.is_dir():
+        indices = sorted(file for file in _visible(path) if file.suffix.lower() in _INDICES)
+        if len(indices) > 1:
+            raise InputError(path, f"the sequences {indices[0].name} and {indices[1].name}", "one of them")
+        return indices[0] if indices else path
+    if path.suffix.lower() not in _INDICES or not path.is_file():
+        raise InputError(path, "none of them", "a folder, or a .pvd or .xdmf file")
+    return path
+
+
+def _visible(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.iterdir() if not path.name.startswith("."))
+
+
+def _sequence(source: Path, unit: float, interval: float | None) -> dict[int, Path | Surface]:
+    """By frame number: the surface, or the file that it is in."""
+    if source.suffix.lower() == ".xdmf":
+        steps = files.read_xdmf(source, unit)
+        return _by_number(source, ((_number(time, interval), step.place, step) for time, step in steps))
+    if source.suffix.lower() == ".pvd":
+        entries = files.read_pvd(source)
+        return _by_number(source, ((_number(time, interval), path.name, path) for time, path in entries))
+    return _by_number(source, ((_number_in(path), path.name, path) for path in _visible(source)))
+
+
+def _by_number(source: Path, entries: Iterable[tuple[int | None, str, Path | Surface]]) -> dict[int, Path | Surface]:
+    found: dict[int, tuple[str, Path | Surface]] = {}
+    for number, name, frame in entries:
+        if number in found:
+            raise InputError(source, f"frame {number} in {found[number][0]} and {name}", "every frame once")
+        if number is not None:
+            found[number] = (name, frame)
+    return {number: frame for number, (_, frame) in found.items()}
+
+
+def _number_in(path: Path) -> int | None:
+    """The last digits in the name of a mesh file."""
+    digits = re.findall(r"\d+", path.stem)
+    return int(digits[-1]) if digits and path.suffix.lower() in files.SURFACE_SUFFIXES else None
+
+
+def _number(time: float, interval: float | None) -> int | None:
+    """The frame number that ``time`` is of, None where it is between two."""
+    number = time if interval is None else time / interval
+    return round(number) if abs(number - round(number)) < ON_FRAME else None
+
+
+def _surface(frame: Path | Surface, unit: float) -> Surface:
+    return frame if isinstance(frame, Surface) else files.read_surface(frame, unit)
+
+
+def _positions(surface: Surface, rest: Surface) -> Floats:
+    """The points (n, 3) [mm] of ``surface``, which must have the vertices and triangles of ``rest``."""
+    check_finite(surface)
+    want = f"the vertices and triangles of {rest.place}"
+    if len(surface.triangles) != len(rest.triangles):
+        raise InputError(surface.place, f"{len(surface.triangles)} triangles instead of {len(rest.triangles)}", want)
+    if surface.place.lower().endswith(".stl"):
+        return _welded(surface, rest)
+    if len(surface.points) != len(rest.points):
+        raise InputError(surface.place, f"{len(surface.points)} vertices instead of {len(rest.points)}", want)
+    given = _turned(surface.triangles)
+    differ = [(given != _turned(same)).any(axis=1) for same in (rest.triangles, rest.triangles[:, ::-1])]
+    other = min(differ, key=np.count_nonzero)
+    if other.any():
+        got = f"{np.count_nonzero(other)} triangles of other vertices, the first triangle {other.argmax()}"
+        raise InputError(surface.place, got, want)
+    return surface.points
+
+
+def _turned(triangles: Ints) -> Ints:
+    """Each triangle beginning with its smallest vertex, its orientation kept."""
+    corners = (triangles.argmin(axis=1)[:, None] + np.arange(3)) % 3
+    return np.take_along_axis(triangles, corners, axis=1)
+
+
+def _welded(soup: Surface, rest: Surface) -> Floats:
+    """Points (n, 3) [mm] of the vertices of ``rest`` from triangles that share none, in the order of its own."""
+    ways = (_weld(soup.points, triangles, len(rest.points)) for triangles in (rest.triangles, rest.triangles[:, ::-1]))
+    points, gap, vertex = min(ways, key=lambda way: way[1])
+    if gap > SAME_POINT:
+        got = f"corners of vertex {vertex} that are {gap:.3g} mm apart"
+        raise InputError(soup.place, got, f"the triangles of {rest.place} in their order")
+    return points
+
+
+def _weld(corners: Floats, triangles: Ints, count: int) -> tuple[Floats, float, int]:
+    """Points (count, 3) from corners (3 m, 3), how far [mm] a corner is from its point at most, and from which."""
+    vertices = triangles.ravel()
+    points = np.full((count, 3), np.nan)
+    points[vertices] = corners
+    gaps = np.linalg.norm(points[vertices] - corners, axis=1)
+    return points, float(gaps.max()), int(vertices[gaps.argmax()])
+
+
+def _check_at_rest(place: str, frame: Frame, rest: Surface) -> None:
+    away = float(np.sqrt(np.mean(np.sum((frame.surface - rest.points) ** 2, axis=1))))
+    if away > AT_REST:
+        got = f"a first frame ({frame.number}) that is {away:.3g} mm (rms) from the rest surface {rest.place}"
+        raise InputError(place, got, f"at most {AT_REST} mm; the usual reason is another unit or another mesh")

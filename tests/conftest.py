@@ -1,0 +1,15 @@
+"""Fixtures that several test files share."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def data() -> Path:
+    """The folder of the report's own data, which is licensed apart from this project."""
+    folder = os.environ.get("FEM_REFERENCE_DATA")
+    if not folder:
+        pytest.skip("the report's data is not here: FEM_REFERENCE_DATA is not set")
+    return Path(folder)

@@ -1,0 +1,140 @@
+"""The reference solver: exact where the answer is exact, of the right stiffness, independent of ranks, and honest when it fails."""
+
+import sys
+
+import numpy as np
+import pytest
+import shapes
+from validation.torsion import square_bar_stiffness
+
+from fem_reference import effects
+from fem_reference.motion import Rotation, apply
+from fem_reference.runs import Frame, Outcome
+from fem_reference.solvers import fenicsx
+from fem_reference.solvers.fenicsx import Settings
+
+MU, BULK = 0.01, 10.0
+MUSCLE = (
+    effects.find("neo_hooke").model_validate({"mu": f"{MU} MPa"}),
+    effects.find("incompressible").model_validate({"bulk": f"{BULK} MPa"}),
+)
+
+
+def turning(angle: float, axis=(0, 0, 1), centre=(5.0, 5.0, 0.0), last=10.0) -> Rotation:
+    return Rotation(axis, centre, (0.0, last), (0.0, angle))
+
+
+def solved(problem, **settings) -> tuple[Outcome, list[Frame]]:
+    frames: list[Frame] = []
+    outcome = fenicsx.solve(problem, Settings(**settings), frames.append)
+    return outcome, frames
+
+
+def test_both_ends_moved_alike_is_a_rigid_motion() -> None:
+    # Exact in any finite element space with linear functions: no energy, det F = 1, up to the residual that ends Newton's method.
+    motion = turning(1.2, axis=(1, 2, 3), centre=(30, 0, 10))
+    outcome, frames = solved(shapes.bar((2, 2, 3), (10, 10, 20), {"bottom": motion, "top": motion}, MUSCLE, (0, 5, 10)), ranks=1)
+    assert outcome.status == "converged"
+    assert [frame.number for frame in frames] == [0, 5, 10]
+    problem = shapes.bar((2, 2, 3), (10, 10, 20), {"bottom": motion, "top": motion}, MUSCLE, (0, 5, 10))
+    for frame in frames:
+        expected = apply(motion.pose(frame.number), problem.surface.points)
+        assert np.abs(frame.surface - expected).max() < 1e-6
+        assert frame.fibres == pytest.approx(apply(motion.pose(frame.number), problem.fibres.points), abs=1e-6)
+        assert frame.tets == pytest.approx(apply(motion.pose(frame.number), problem.mesh.points), abs=1e-6)
+        assert frame.scalars["min_det_F_quadrature"] == pytest.approx(1, abs=1e-7)
+        assert frame.scalars["min_det_F_vertices"] == pytest.approx(1, abs=1e-7)
+        assert frame.scalars["energy"] == pytest.approx(0, abs=1e-9)
+
+
+def test_torsion_stiffness_of_a_square_bar() -> None:
+    # Held ends stiffen both bars alike, so the difference of two lengths is free of them. P2 on 4 x 4 cells across: 1 %.
+    side, angle = 10.0, 0.1
+    energy = {}
+    for length, cells in ((20, 6), (40, 12)):
+        motions = {"bottom": None, "top": turning(angle)}
+        outcome, frames = solved(shapes.bar((4, 4, cells), (side, side, length), motions, MUSCLE, (0, 10)), ranks=1)
+        assert outcome.status == "converged"
+        energy[length] = frames[-1].scalars["energy"]
+    compliance = angle**2 / 2 * (1 / energy[40] - 1 / energy[20]) / 20
+    assert compliance == pytest.approx(1 / square_bar_stiffness(MU, side), rel=0.01)
+
+
+@pytest.fixture(scope="module")
+def bent():
+    """A bar bent by 0.6 rad and back: (problem, outcome, frames) on one rank."""
+    motion = Rotation((1, 0, 0), (5, 5, 0), (0.0, 10.0, 20.0), (0.0, 0.6, 0.0))
+    problem = shapes.bar((2, 2, 6), (10, 10, 40), {"bottom": None, "top": motion}, MUSCLE, (0, 5, 10, 20))
+    return problem, *solved(problem, ranks=1)
+
+
+def test_there_and_back_forgets_the_way(bent) -> None:
+    problem, outcome, frames = bent
+    assert outcome.status == "converged"
+    assert np.abs(frames[2].surface - problem.surface.points).max() > 5
+    assert np.abs(frames[3].surface - problem.surface.points).max() < 1e-6
+    assert all(frame.scalars["volume_ratio"] == pytest.approx(1, abs=5e-3) for frame in frames)
+
+
+def test_ranks_change_the_time_and_not_the_answer(bent) -> None:
+    problem, alone, frames = bent
+    outcome, shared = solved(problem, ranks=2)
+    assert (alone.cost["ranks"], outcome.cost["ranks"]) == (1, 2)
+    for one, two in zip(frames, shared, strict=True):
+        for part in ("surface", "fibres", "tets"):
+            assert getattr(two, part) == pytest.approx(getattr(one, part), abs=1e-6)
+        assert two.scalars["energy"] == pytest.approx(one.scalars["energy"], rel=1e-6, abs=1e-9)
+
+
+def test_held_vertices_follow_their_bone(bent) -> None:
+    problem, _, frames = bent
+    for frame in frames:
+        for held in problem.held:
+            expected = apply(held.bone.pose(frame.number), problem.surface.points[held.vertices])
+            assert frame.surface[held.vertices] == pytest.approx(expected, abs=1e-9)
+
+
+def test_cost_says_where_the_time_went(bent) -> None:
+    _, outcome, frames = bent
+    cost = outcome.cost
+    assert cost["factorisations"] == cost["newton_iterations"] == sum(frame.scalars["newton_iterations"] for frame in frames)
+    assert cost["load_steps"] >= 3
+    phases = ("mesh", "set_up", "assembly", "factorisation", "back_substitution")
+    assert all(cost[f"seconds_{phase}"] >= 0 for phase in phases)
+    assert cost["unknowns"] == 3 * 5 * 5 * 13 + 3 * 3 * 7  # P2 nodes of a 2 x 2 x 6 Kuhn box, P1 nodes
+    assert cost["peak_memory_mb"] > 10
+
+
+def test_what_cannot_be_reached_is_a_status_that_keeps_the_frames_before() -> None:
+    # The top is turned through half a circle about an axis within the bar: no admissible state, and no step is small enough.
+    motion = Rotation((1, 0, 0), (5, 5, 9), (0.0, 1.0, 10.0), (0.0, 0.02, 3.1))
+    problem = shapes.bar((1, 1, 1), (10, 10, 10), {"bottom": None, "top": motion}, MUSCLE, (0, 1, 10))
+    outcome, frames = solved(problem, ranks=1, smallest_step=1.0)
+    assert outcome.status in ("diverged", "inverted")
+    assert "try smaller tetrahedra" in outcome.message
+    assert "in tet" in outcome.message
+    assert [frame.number for frame in frames] == [0, 1]
+
+
+def test_a_process_that_dies_is_a_status() -> None:
+    command = [sys.executable, "-c", "import sys; sys.exit('no memory')"]
+    outcome = fenicsx._run(command, Settings(), lambda _: None)
+    assert outcome.status == "crashed"
+    assert "exit status 1 (no memory); no frame was reached" in outcome.message
+
+
+def test_a_time_limit_is_a_status() -> None:
+    command = [sys.executable, "-c", "import time; time.sleep(60)"]
+    outcome = fenicsx._run(command, Settings(time_limit="0.5 s"), lambda _: None)
+    assert outcome.status == "timed out"
+
+
+def test_missing_software_is_named(bent, monkeypatch) -> None:
+    problem, *_ = bent
+    monkeypatch.setattr(fenicsx.importlib.util, "find_spec", lambda _: None)
+    with pytest.raises(fenicsx.MissingSoftware, match=r"pip install 'fem_reference\[fenicsx\]'"):
+        solved(problem)
+    monkeypatch.setattr(fenicsx.shutil, "which", lambda _: None)
+    monkeypatch.setattr(fenicsx.sys, "executable", "/nowhere/python")
+    with pytest.raises(fenicsx.MissingSoftware, match="3 ranks need mpiexec"):
+        fenicsx._command(Settings(ranks=3), None)

@@ -1,0 +1,134 @@
+"""Traced fibres: straight in a bar, arcs in a ring, the same lines again and on a moved mesh."""
+
+import numpy as np
+import pytest
+import shapes
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.spatial.transform import Rotation
+
+from fem_reference.errors import InputError
+from fem_reference.geometry.embedding import embed
+from fem_reference.geometry.fibres import trace
+from fem_reference.mesh import Polylines, TetMesh, boundary
+
+INNER, OUTER = 20.0, 30.0  # radii of the ring [mm]
+HIP = np.array([146.0, 238.0, -431.0])  # [mm]
+
+
+def _bar(cells: int = 4) -> TetMesh:
+    """A bar of 20 x 20 x 60 mm along z."""
+    return shapes.box((cells, cells, 3 * cells), (20.0, 20.0, 60.0))
+
+
+def _ring(fineness: int) -> TetMesh:
+    """A quarter ring of square section about the y axis, from z = 0 ("bottom") to x = 0 ("top")."""
+    side = OUTER - INNER
+    bar = shapes.box((4 * fineness, 4 * fineness, 20 * fineness), (side, side, np.pi / 2))
+    across, along, angle = bar.points.T
+    radius = INNER + across
+    points = np.stack([radius * np.cos(angle), along, radius * np.sin(angle)], axis=1)
+    return TetMesh(points, bar.tets, bar.facets)
+
+
+def _on_one_side(mesh: TetMesh, low: float, high: float) -> TetMesh:
+    """The bar attached on its side y = 0 only: below z = ``low`` and above ``high``."""
+    faces, _ = boundary(mesh.tets)
+    side, middle = (mesh.points[faces, 1] == 0).all(axis=1), mesh.points[faces].mean(axis=1)[:, 2]
+    return TetMesh(
+        mesh.points, mesh.tets, {"bottom": faces[side & (middle < low)], "top": faces[side & (middle > high)]}
+    )
+
+
+def _radii(lines: Polylines) -> np.ndarray:
+    """Distance of each point from the ring's axis, one row a line."""
+    return np.linalg.norm(lines.points[:, [0, 2]], axis=1).reshape(len(lines), -1)
+
+
+def test_fibres_of_a_straight_bar_are_straight_and_as_long() -> None:
+    lines = trace(_bar(), "bottom", "top", 12)
+    assert_array_equal(np.diff(lines.offsets), 40)
+    # A linear field is exact in linear elements; what is left is the solver's round-off.
+    assert_allclose(lines.lengths(), 60, rtol=1e-9)
+    by_line = lines.points.reshape(12, 40, 3)
+    assert_allclose(by_line[:, :, 2], np.broadcast_to(np.linspace(0, 60, 40), (12, 40)), rtol=0, atol=1e-8)
+    assert_allclose(np.ptp(by_line[:, :, :2], axis=1), 0, rtol=0, atol=1e-8)
+
+
+def test_lines_run_from_start_to_end() -> None:
+    bar = _bar()
+    lines = trace(bar, "top", "bottom", 3)
+    assert_allclose(lines.points[lines.offsets[:-1], 2], 60, atol=1e-9)
+    assert_allclose(lines.points[lines.offsets[1:] - 1, 2], 0, atol=1e-9)
+
+
+def test_lines_are_spread_over_the_section() -> None:
+    lines = trace(_bar(), "bottom", "top", 12)
+    starts = lines.points[lines.offsets[:-1], :2]
+    apart = np.linalg.norm(starts[:, None] - starts[None], axis=2) + 100 * np.eye(12)
+    # Twelve points on a grid of 20 x 20 mm would be 20 / sqrt(12) = 5.8 mm apart; half of that is no crowd.
+    assert apart.min() > 2.9
+    assert (np.ptp(starts, axis=0) > 12).all()
+
+
+def test_fibres_of_a_quarter_ring_are_arcs() -> None:
+    """The exact field is the angle; its lines are arcs of length r pi / 2.
+
+    The averaged gradient is of first order at the skin, so halving the elements halves the error.
+    """
+    errors = []
+    for fineness in (1, 2):
+        lines = trace(_ring(fineness), "bottom", "top", 12)
+        radii = _radii(lines)
+        errors.append(np.sqrt(np.mean((radii - radii.mean(axis=1, keepdims=True)) ** 2)))
+        relative = lines.lengths() / (radii.mean(axis=1) * np.pi / 2) - 1
+        assert np.abs(relative).max() < 0.005 / fineness
+        assert radii.min() > INNER
+        assert radii.max() < OUTER
+    assert errors[1] < 0.65 * errors[0]
+
+
+def test_lines_stay_in_the_mesh() -> None:
+    ring = _ring(1)
+    found = embed(ring, trace(ring, "bottom", "top", 12).points)
+    assert found.outside.max() < 0.05  # the sagitta of a chord of a 4 degree facet is 0.02 mm
+
+
+def test_the_same_mesh_gives_the_same_lines() -> None:
+    assert_array_equal(trace(_ring(1), "bottom", "top", 8).points, trace(_ring(1), "bottom", "top", 8).points)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_lines_move_with_the_mesh(seed: int) -> None:
+    ring = _ring(1)
+    turn = Rotation.random(rng=np.random.default_rng(seed))
+    moved = TetMesh(turn.apply(ring.points) + HIP, ring.tets, ring.facets)
+    lines, found = trace(ring, "bottom", "top", 8), trace(moved, "bottom", "top", 8)
+    # Round-off of the field (1e-12 relative) grows along the line.
+    assert_allclose(found.points, turn.apply(lines.points) + HIP, rtol=0, atol=1e-6)
+
+
+def test_lines_that_leave_the_body_give_way_to_others() -> None:
+    """Attached on one side of a bar, lines far from it bend along the skin; those that are given all arrive."""
+    lines = trace(_on_one_side(_bar(), 15, 45), "bottom", "top", 12)
+    begins, ends = lines.points[lines.offsets[:-1]], lines.points[lines.offsets[1:] - 1]
+    assert_allclose(np.concatenate([begins, ends])[:, 1], 0, atol=1e-12)
+    assert (begins[:, 2] <= 15).all()
+    assert (ends[:, 2] >= 45).all()
+
+
+def test_attachments_that_touch_still_give_fibres() -> None:
+    assert len(trace(_on_one_side(_bar(2), 30, 30), "bottom", "top", 2)) == 2
+
+
+def test_more_fibres_than_there_is_room_for() -> None:
+    with pytest.raises(
+        InputError, match=r"fibres\.traced\.count: got 5000, want at most \d+, the fibres that could be traced"
+    ):
+        trace(_bar(2), "bottom", "top", 5000)
+
+
+def test_nothing_between_the_attachments() -> None:
+    bar = _bar(2)
+    skin, _ = boundary(bar.tets)
+    with pytest.raises(InputError, match=r'fibres\.traced: got nothing between "all" and "all", want two attachments'):
+        trace(TetMesh(bar.points, bar.tets, {"all": skin}), "all", "all", 1)

@@ -1,0 +1,233 @@
+"""The main job on a small scene, through the command line: page, JSON, exit status, stored runs, and what bad input does."""
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import small
+
+from fem_reference import casefile, cli, files, runs
+from fem_reference.mesh import Surface
+from fem_reference.motion import Rotation
+
+
+class Job:
+    """The small scene, compared once: its folder, its outputs and its JSON."""
+
+    def __init__(self, root: Path, pose=None) -> None:
+        self.case = small.write(root / "bar", pose)
+        self.out = root / "out"
+        self.status, self.facts = self.call("compare", str(self.case))
+        (self.reference,) = (self.out / "runs" / "bar").glob("fenicsx-*")
+
+    def call(self, *words: str):
+        target = self.out / "facts.json"
+        target.unlink(missing_ok=True)
+        status = cli.main([*words, "--out", str(self.out), "--json", str(target), "--quiet"])
+        return status, json.loads(target.read_text()) if target.exists() else None
+
+    def frames(self, folder: Path, change=lambda number, points: points, suffix=".vtp") -> Path:
+        """The reference's own surfaces as a candidate, changed."""
+        run = runs.load(self.reference)
+        folder.mkdir()
+        for number, points in zip(run.numbers, run.positions, strict=True):
+            files.write_surface(folder / f"frame_{number:04d}{suffix}", run.surface, change(number, points))
+        return folder
+
+
+@pytest.fixture(scope="module")
+def job(tmp_path_factory) -> Job:
+    return Job(tmp_path_factory.mktemp("job"))
+
+
+def rows(facts, candidate):
+    return [row for row in facts["measures"] if row["candidate"] == candidate]
+
+
+def test_ends_well_and_leaves_a_page(job) -> None:
+    assert job.status == cli.DONE
+    page = (job.out / "bar" / "report.html").read_text()
+    assert "pbd" in page
+    assert (job.out / "bar" / "measures.csv").exists()
+    assert (job.out / "bar" / "measures.json").exists()
+
+
+def test_json_has_the_documented_keys(job) -> None:
+    assert {"case", "solver", "status", "verdict", "cost", "measures"} <= set(job.facts)
+    assert (job.facts["case"], job.facts["solver"], job.facts["status"]) == ("bar", "fenicsx", "converged")
+    assert job.facts["verdict"] == "pass"
+    assert all(set(row) == {"candidate", "metric", "statistic", "frame", "value", "unit"} for row in job.facts["measures"])
+    metrics = {row["metric"] for row in rows(job.facts, "pbd")}
+    assert metrics == {"volume", "fibre_length", "surface_deviation"}
+    assert {row["frame"] for row in rows(job.facts, "pbd")} == {0, 5, 10, 15, 20}
+    assert {row["unit"] for row in rows(job.facts, "pbd")} == {"mm", "mm3", "%"}
+
+
+def test_reference_keeps_its_volume_and_comes_back(job) -> None:
+    reference = {(row["metric"], row["statistic"], row["frame"]): row["value"] for row in rows(job.facts, "reference")}
+    assert all(abs(reference["volume", "deviation", frame]) < 0.5 for frame in (0, 5, 10, 15, 20))
+    assert reference["surface_deviation", "max", 10] > 1
+    assert reference["surface_deviation", "max", 20] < 1e-5
+
+
+def test_a_stored_run_is_taken_again(job) -> None:
+    before = (job.reference / "run.json").stat().st_mtime_ns
+    status, facts = job.call("run", str(job.case))
+    assert (status, facts["verdict"]) == (cli.DONE, "pass")
+    assert (job.reference / "run.json").stat().st_mtime_ns == before
+
+
+def test_stored_runs_are_judged_without_fenicsx_and_meshers(job) -> None:
+    # A Python in which neither can be imported judges and reports from the store.
+    block = (
+        "import sys\n"
+        "for name in ('dolfinx', 'dolfinx_solver', 'ufl', 'basix', 'petsc4py', 'mpi4py', 'gmsh', 'pytetwild', 'numba'):\n"
+        "    sys.modules[name] = None\n"
+        "from fem_reference import cli\n"
+        f"sys.exit(cli.main(['compare', {str(job.case)!r}, '--out', {str(job.out)!r}, '--quiet']))"
+    )
+    done = subprocess.run([sys.executable, "-c", block], capture_output=True, text=True, check=False)
+    assert done.returncode == cli.DONE, done.stderr
+    assert "verdict: pass" in done.stdout
+
+
+def test_the_references_own_surface_scores_zero(job, tmp_path) -> None:
+    for candidate in (job.reference, job.frames(tmp_path / "own")):
+        status, facts = job.call("compare", str(job.case), "--candidate", str(candidate))
+        assert status == cli.DONE
+        own = [row for row in facts["measures"] if row["candidate"] != "reference"]
+        assert len(own) > 50
+        # Zero but for rounding: positions are stored as float64.
+        assert max(abs(row["value"]) for row in own) < 1e-9
+
+
+def test_shifted_by_one_mm_scores_one_mm(job, tmp_path) -> None:
+    # The frame at rest must be at rest, so the shift begins after it.
+    shifted = job.frames(tmp_path / "shifted", lambda number, points: points + np.array([0.6, 0, 0.8]) * (number > 0))
+    _, facts = job.call("compare", str(job.case), "--candidate", str(shifted))
+    for row in rows(facts, "shifted"):
+        if row["metric"] == "surface_deviation" and row["statistic"] in ("rms", "p95", "max"):
+            assert row["value"] == pytest.approx(1.0 if row["frame"] else 0.0, abs=1e-9)
+        if row["metric"] in ("volume", "fibre_length"):
+            # A translation changes no volume and no length; rounding of 1e5 mm3 sums.
+            assert row["value"] == pytest.approx(0, abs=1e-6)
+        if row["statistic"] == "hausdorff" and row["frame"]:
+            assert 0.7 < row["value"] <= 1 + 1e-9
+
+
+def test_moving_the_whole_scene_changes_no_measure(job, tmp_path) -> None:
+    pose = Rotation((1, -2, 0.5), (20, 0, 5), (0.0, 1.0), (0.0, 2.1)).pose(1)
+    pose[:3, 3] += [300, -200, 50]
+    moved = Job(tmp_path, pose)
+    assert len(moved.facts["measures"]) == len(job.facts["measures"])
+    for here, there in zip(job.facts["measures"], moved.facts["measures"], strict=True):
+        assert {key: here[key] for key in here if key != "value"} == {key: there[key] for key in there if key != "value"}
+        # 1e-6 relative; measures that are zero up to the residual of Newton's method have no relative size.
+        assert there["value"] == pytest.approx(here["value"], rel=1e-6, abs=1e-6), here
+
+
+def test_the_spoil_turns_the_verdict(job, tmp_path, monkeypatch) -> None:
+    spoiled = casefile.read(job.case, spoiled=True)
+    monkeypatch.setattr(casefile, "read", lambda _: spoiled)
+    status = cli.main(["run", str(job.case), "--out", str(tmp_path), "--quiet"])
+    assert status == cli.VERDICT_FAIL
+
+
+def test_a_truncated_frame_is_bad_input_that_names_the_file(job, tmp_path, capsys) -> None:
+    folder = job.frames(tmp_path / "cut")
+    path = folder / "frame_0010.vtp"
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    out = tmp_path / "out"
+    assert cli.main(["compare", str(job.case), "--candidate", str(folder), "--out", str(out)]) == cli.BAD_INPUT
+    assert "frame_0010.vtp" in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_missing_frames_are_named(job, tmp_path, capsys) -> None:
+    folder = job.frames(tmp_path / "few")
+    (folder / "frame_0015.vtp").unlink()
+    assert cli.main(["compare", str(job.case), "--candidate", str(folder), "--out", str(tmp_path / "out")]) == cli.BAD_INPUT
+    assert "15" in capsys.readouterr().err
+
+
+BAD = {
+    "no such case": ("none", lambda _: None, 'CASE: got "none"'),
+    "missing file": (None, lambda case: (case / "bar.vtp").unlink(), "muscle.surface"),
+    "wrong unit": (None, lambda case: edit(case, 'tet_size = "6 mm"', 'tet_size = "6 kPa"'), "muscle.tet_size: got \"6 kPa\", want a length"),
+    "unknown key": (None, lambda case: edit(case, "[frames]", "[frames]\nskip = 1"), "frames.skip: got an unknown key"),
+    "nothing attached": (None, lambda case: edit(case, 'within = "1.5 mm"', 'within = "0.1 mm"'), "no vertex of the muscle"),
+    "open surface": (None, lambda case: tamper(case, drop=1), "edges of one triangle only"),
+    "not a number": (None, lambda case: tamper(case, value=np.nan), "not finite"),
+    "no such solver": (None, lambda case: edit(case, 'solver = "fenicsx"', 'solver = "magic"'), 'reference.solver: got "magic"'),
+    "no such setting": (None, lambda case: edit(case, "first_step = 5", "step = 5"), "reference.step: got an unknown key"),
+    "no such measure": (None, lambda case: edit(case, 'metric = "volume"', 'metric = "mass"'), "expect[0]"),
+}
+
+
+def edit(case: Path, old: str, new: str) -> None:
+    text = (case / "case.toml").read_text()
+    assert old in text
+    (case / "case.toml").write_text(text.replace(old, new))
+
+
+def tamper(case: Path, *, drop: int = 0, value: float = 0.0) -> None:
+    surface = files.read_surface(case / "bar.vtp", 1.0)
+    points = np.array(surface.points)
+    points[7, 1] += value
+    triangles = surface.triangles[drop:]
+    files.write_surface(case / "bar.vtp", Surface(points, triangles), points)
+
+
+@pytest.mark.parametrize("what", BAD)
+def test_bad_input_ends_with_one_message_and_leaves_nothing(what, job, tmp_path, capsys) -> None:
+    name, spoil, message = BAD[what]
+    case = shutil.copytree(job.case, tmp_path / "bar")
+    spoil(case)
+    status = cli.main(["compare", name or str(case), "--out", str(tmp_path / "out"), "--quiet"])
+    printed = capsys.readouterr()
+    assert status == cli.BAD_INPUT
+    assert message in printed.err
+    assert printed.err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_unknown_candidate(job, capsys) -> None:
+    assert job.call("compare", str(job.case), "--candidate", "nobody")[0] == cli.BAD_INPUT
+    assert '--candidate: got "nobody", want a folder of frames, or one of pbd' in capsys.readouterr().err
+
+
+def test_another_solver_can_run_the_case(job) -> None:
+    status, facts = job.call("run", str(job.case), "--solver", "pbd")
+    assert (status, facts["solver"], facts["verdict"]) == (cli.DONE, "pbd", "not judged")
+
+
+def test_a_reference_that_fails_is_status_three_with_its_frames_kept(job, tmp_path) -> None:
+    case = shutil.copytree(job.case, tmp_path / "bar")
+    edit(case, "first_step = 5", "first_step = 5\nsmallest_step = 2\nnewton_iterations = 6")
+    edit(case, 'angle = "0.4 rad"', 'angle = "3 rad"')
+    target = tmp_path / "facts.json"
+    assert cli.main(["compare", str(case), "--out", str(tmp_path / "out"), "--json", str(target), "--quiet"]) == cli.SOLVER_FAILED
+    facts = json.loads(target.read_text())
+    assert facts["status"] in ("diverged", "inverted")
+    assert facts["verdict"] == "fail"
+    first = [row["value"] for row in rows(facts, "pbd") if row["frame"] == 0]
+    last = [row["value"] for row in rows(facts, "pbd") if row["frame"] == 20]
+    assert None not in first
+    assert set(last) == {None}
+    assert (tmp_path / "out" / "bar" / "report.html").exists()
+
+
+def test_list_and_show(job, capsys) -> None:
+    status, facts = job.call("list")
+    assert status == cli.DONE
+    assert "hip_flexion" in facts["cases"]
+    assert any("fenicsx-" in path for path in facts["runs"])
+    status, facts = job.call("show", str(job.case))
+    assert status == cli.DONE
+    assert facts["attachments"]["origin"].endswith("held by floor")
+    assert (job.out / "bar" / "tets.vtu").exists()
+    assert "effects:" in capsys.readouterr().out

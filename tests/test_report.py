@@ -1,0 +1,332 @@
+"""The report says what the comparison holds, all of it, and opens without a network."""
+
+import csv
+import io
+import json
+import re
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fem_reference import casefile, report
+from fem_reference.comparison import Comparison
+from fem_reference.errors import MissingSoftware
+from fem_reference.judge import Verdict
+from fem_reference.mesh import Polylines, Surface
+from fem_reference.metrics import Measure, Yardstick
+from fem_reference.problem import Body, Setup
+from fem_reference.report import gallery, page
+from fem_reference.report.curves import curves
+from fem_reference.report.tables import COLUMNS, seconds_per_frame
+from fem_reference.runs import Outcome, Run
+
+NUMBERS = (0, 10, 20, 30, 40)
+NAN = float("nan")
+CASE = """
+title = "A ball that is pressed"
+proves = "The page says what was measured."
+[muscle]
+surface = "ball.txt"
+unit = "mm"
+tet_size = "2 mm"
+[[bone]]
+name = "plate"
+surface = "plate.txt"
+unit = "mm"
+motion = {axis = [0, 0, 1], centre = "0, 0, 0 mm", keyframes = [{frame = 0, angle = "0 rad"}, {frame = 40, angle = "1 rad"}]}
+[[attachment]]
+name = "foot"
+bone = "plate"
+within = "1 mm"
+[[effect]]
+name = "neo_hooke"
+mu = "10 kPa"
+[fibres]
+traced = {count = 2, start = "foot", end = "foot"}
+[frames]
+first = 0
+last = 40
+every = 10
+[reference]
+solver = "fenicsx"
+[[expect]]
+of = "reference"
+metric = "volume"
+statistic = "deviation"
+frame = "any"
+truth = "0 %"
+within = "0.5 %"
+kind = "property"
+because = "It is <nearly> incompressible & closed."
+[spoil]
+key = "effect[0].mu"
+value = "1 kPa"
+because = "softer"
+"""
+
+
+def ball() -> Surface:
+    """A closed surface of 66 points with half axes 30, 20, 10 along x, y, z [mm]."""
+    corners = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
+    triangles = np.array([[i, (i + 1) % 4, 4] for i in range(4)] + [[(i + 1) % 4, i, 5] for i in range(4)])
+    points = [tuple(corner) for corner in corners]
+    for _ in range(2):
+        finer = []
+        for triangle in triangles:
+            middles = []
+            for i, j in ((0, 1), (1, 2), (2, 0)):
+                middle = np.add(points[triangle[i]], points[triangle[j]])
+                middle = tuple(np.round(middle / np.linalg.norm(middle), 12))
+                if middle not in points:
+                    points.append(middle)
+                middles.append(points.index(middle))
+            (a, b, c), (d, e, f) = triangle, middles
+            finer += [[a, d, f], [d, b, e], [f, e, c], [d, e, f]]
+        triangles = np.array(finer)
+    return Surface(np.array(points) * [30, 20, 10], triangles)
+
+
+def measured(run: Run, other: np.ndarray) -> tuple[Measure, ...]:
+    """Measures in the manner of the metrics, made by hand so that these tests stand alone."""
+    distances = np.linalg.norm(run.positions - other, axis=2)
+    where = tuple(f"vertex {i}" for i in np.argmax(np.nan_to_num(distances), axis=1))
+    return (
+        Measure("volume", "deviation", "%", distances.mean(axis=1) / 7),
+        Measure("volume", "deviation_volume", "mm3", distances.mean(axis=1) * 700),
+        Measure("fibre_length", "mean", "mm", -distances.mean(axis=1)),
+        Measure("fibre_length", "max", "mm", distances.mean(axis=1) * 2, where),
+        Measure("surface_deviation", "rms", "mm", np.sqrt((distances**2).mean(axis=1))),
+        Measure("surface_deviation", "p95", "mm", np.quantile(distances, 0.95, axis=1)),
+        Measure("surface_deviation", "max", "mm", distances.max(axis=1), where),
+        Measure("surface_deviation", "hausdorff", "mm", distances.max(axis=1) / 2, where),
+    )
+
+
+def a_run(name: str, solver: str, positions: np.ndarray, status: str = "converged", **more) -> Run:
+    cost = {"seconds": 12.0, "seconds_solve": 8.0, "iterations": 40}
+    return Run(name, solver, Outcome(status, f"{name} has ended", cost), NUMBERS, ball(), positions, **more)
+
+
+@pytest.fixture
+def comparison(tmp_path, monkeypatch) -> Comparison:
+    """A reference that moves along x, ``quick`` which is 1 mm a frame beside it, ``torn`` whose last frame is not a number."""
+    monkeypatch.setattr(gallery, "_command", lambda _job, _folder: [sys.executable, "-c", "raise SystemExit(3)"])
+    (tmp_path / "press").mkdir()
+    for name, text in (("case.toml", CASE), ("ball.txt", "ball"), ("plate.txt", "plate")):
+        (tmp_path / "press" / name).write_text(text)
+    scene = casefile.read(tmp_path / "press")
+    rest, steps = ball(), np.arange(5.0)[:, None, None]
+    moved = rest.points + steps * [2.0, 0, 0]
+    torn = moved + steps * [0, 0.5, 0]
+    torn[-1, 7] = NAN
+    origin = {"versions": {"dolfinx": "0.11.0"}, "mesh": {"tets": 1234.0}}
+    reference = a_run(
+        "reference", "fenicsx", moved, scalars={"min_det_F_points": 1 - steps[:, 0, 0] / 8}, origin=origin
+    )
+    quick, torn = a_run("quick", "pbd", moved + steps * [0, 0, 1.0]), a_run("torn", "recorded", torn, "diverged")
+    plate = Body("plate", Surface(rest.points - [0, 0, 25], rest.triangles), scene.bone[0].motion.rotation())
+    return Comparison(
+        scene=scene,
+        setup=Setup(rest, (plate,), (), NUMBERS, None),
+        reference=reference,
+        candidates=(quick, torn),
+        yardstick=Yardstick.of(reference, Polylines([[0, 0, 0], [5, 0, 0], [0, 1, 0], [5, 1, 0]], [0, 2, 4])),
+        deviations={run.name: measured(run, moved) for run in (quick, torn)},
+        changes={run.name: measured(run, rest.points) for run in (reference, quick, torn)},
+        extension_error=Measure("fibre_length", "extension_error", "mm", np.arange(5) / 8, ("fibre 1",) * 5),
+        verdicts=(Verdict("pass", scene.expect[0], 0.25, 0.0, 0.5, "%", 20),),
+    )
+
+
+def alone(comparison: Comparison) -> Comparison:
+    return replace(comparison, candidates=(), deviations={}, changes={"reference": comparison.changes["reference"]})
+
+
+def test_summary_has_the_documented_keys_and_survives_json(comparison):
+    told = report.summary(comparison)
+    assert json.loads(json.dumps(told, allow_nan=False)) == told
+    assert list(told) == ["case", "solver", "status", "message", "verdict", "cost", "measures", "from_rest", "verdicts"]
+    assert (told["case"], told["solver"], told["status"], told["verdict"]) == ("press", "fenicsx", "converged", "pass")
+    assert told["cost"]["quick"] == {"seconds": 12.0, "seconds_solve": 8.0, "iterations": 40.0}
+    assert {row["candidate"] for row in told["from_rest"]} == {"reference", "quick", "torn"}
+    assert told["verdicts"][0]["because"] == "It is <nearly> incompressible & closed."
+
+
+def value(rows, candidate, metric, statistic, frame):
+    (found,) = (
+        row["value"]
+        for row in rows
+        if (row["candidate"], row["metric"], row["statistic"], row["frame"]) == (candidate, metric, statistic, frame)
+    )
+    return found
+
+
+def test_summary_values_are_the_measures(comparison):
+    told = report.summary(comparison)
+    # quick is 1 mm a step from the reference, and sqrt(1 + 2^2) mm a step from rest; the sums in between round at 1e-15.
+    assert value(told["measures"], "quick", "surface_deviation", "max", 30) == pytest.approx(3, abs=1e-12)
+    assert value(told["from_rest"], "quick", "surface_deviation", "max", 30) == pytest.approx(3 * 5**0.5, abs=1e-12)
+    assert value(told["measures"], "reference", "surface_deviation", "max", 30) == pytest.approx(6, abs=1e-12)
+    assert value(told["measures"], "reference", "inversion", "min_det_F_points", 40) == 0.5
+
+
+def test_what_is_not_finite_is_null(comparison):
+    told = report.summary(comparison)
+    assert value(told["measures"], "torn", "surface_deviation", "rms", 40) is None
+    assert value(told["measures"], "torn", "surface_deviation", "rms", 30) == pytest.approx(1.5, abs=1e-12)
+    spoilt = replace(comparison.verdicts[0], word="fail", value=float("inf"))
+    assert report.summary(replace(comparison, verdicts=(spoilt,)))["verdicts"][0]["value"] is None
+
+
+def test_csv_holds_the_same_numbers(comparison, tmp_path):
+    report.write(comparison, tmp_path / "out")
+    rows = list(csv.DictReader(io.StringIO((tmp_path / "out" / "measures.csv").read_text())))
+    told = json.loads((tmp_path / "out" / "measures.json").read_text())["measures"]
+    assert tuple(rows[0]) == COLUMNS
+    read = [row | {"frame": int(row["frame"]), "value": float(row["value"]) if row["value"] else None} for row in rows]
+    assert read == told
+
+
+def test_page_names_everything_and_needs_no_network(comparison, tmp_path):
+    text = report.write(comparison, tmp_path / "new" / "out").read_text(encoding="utf-8")
+    for told in (
+        "quick",
+        "torn",
+        "press",
+        "not a number",
+        "torn has ended",
+        "dolfinx",
+        "1234",
+        "0.500&#8239;",
+        "It is &lt;nearly&gt;",
+    ):
+        assert told in text
+    assert all(f"<td>{number}</td>" in text for number in NUMBERS)
+    links = re.findall(r'\b(?:src|href|action|data|srcset)\s*=\s*["\']?([^"\'\s>]*)', text)
+    assert all(link.startswith(("#", "data:")) for link in links)
+    assert not re.search(r"<script|<link|<iframe|@import|url\((?!#)|http", text)
+
+
+def test_every_id_on_the_page_is_unique_and_every_reference_meets_one(comparison):
+    text = page.render(comparison)
+    ids = re.findall(r'\bid="([^"]*)"', text)
+    assert len(ids) == len(set(ids))
+    assert set(re.findall(r'href="#([^"]*)"|url\(#([^)]*)\)', text)) <= {(name, "") for name in ids} | {
+        ("", name) for name in ids
+    }
+
+
+def test_reference_without_candidates_has_the_same_page(comparison, tmp_path):
+    text = report.write(alone(comparison), tmp_path).read_text(encoding="utf-8")
+    assert "without a candidate" in text
+    assert "quick" not in text
+    assert {row["candidate"] for row in report.summary(alone(comparison))["measures"]} == {"reference"}
+
+
+@pytest.mark.parametrize(
+    ("command", "why"),
+    [
+        ([sys.executable, "-c", "raise SystemExit(3)"], "code 3"),
+        ([sys.executable, "-c", "import os; os.abort()"], "code -6"),
+        ([sys.executable, "-c", "pass"], "no pictures"),
+        ([sys.executable, "-c", "import time; time.sleep(60)"], "timed out"),
+        (["/nowhere/python"], "No such file"),
+    ],
+)
+def test_page_without_pictures_says_what_to_install(comparison, monkeypatch, command, why):
+    monkeypatch.setattr(gallery, "_command", lambda _job, _folder: command)
+    monkeypatch.setattr(gallery, "_SECONDS", 2 if "60" in command[-1] else 60)
+    with pytest.raises(MissingSoftware, match=f"{why}.*libegl1"):
+        gallery.draw(comparison.setup, comparison.reference.surface, gallery.shots(comparison))
+    if why == "code 3":
+        assert "apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri" in page.render(comparison)
+
+
+def test_nothing_is_written_when_the_page_cannot_be_made(comparison, tmp_path, monkeypatch):
+    monkeypatch.setattr(page, "render", lambda _: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        report.write(comparison, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_shots_are_the_worst_frames_that_can_be_drawn(comparison):
+    chosen = [(shot.name, shot.number) for shot in gallery.shots(comparison)]
+    # The reference moves on to the end; the last frame of "torn" is not a number.
+    assert chosen == [("reference", 0), ("reference", 40), ("quick", 40), ("torn", 30)]
+    quick = gallery.shots(comparison)[2]
+    np.testing.assert_allclose(quick.distances, 4.0, rtol=1e-12)
+    np.testing.assert_array_equal(quick.outline, comparison.reference.positions[4])
+
+
+def test_a_candidate_without_a_frame_to_draw_is_told(comparison, monkeypatch):
+    lost = a_run("torn", "recorded", np.full_like(comparison.reference.positions, np.inf), "diverged")
+    changed = replace(comparison, candidates=(comparison.candidates[0], lost))
+    monkeypatch.setattr(gallery, "draw", lambda _setup, _surface, wanted: [(b"1", b"2") for _ in wanted])
+    assert [shot.name for shot in gallery.shots(changed)] == ["reference", "reference", "quick"]
+    assert "<b>torn</b> has no frame whose coordinates are all numbers" in page.render(changed)
+
+
+@pytest.mark.parametrize("up", [1.0, -1.0])
+def test_cameras_look_at_the_widest_side_away_from_the_bones(comparison, up):
+    # Half axes 30, 20, 10: widest seen along z, a quarter turn about x on from there is y.
+    rng = np.random.default_rng(3)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    body = comparison.setup.surface
+    bone = Surface((body.points + [0, 12, -25 * up]) @ turn.T, body.triangles)
+    views = gallery.directions(body.moved_to(body.points @ turn.T), (Body("plate", bone, None),))
+    np.testing.assert_allclose(
+        views @ turn, [[0, 0, up], [0, -1, 0]], atol=1e-9
+    )  # symmetric body: exact but for rounding
+
+
+def test_pictures_show_the_candidate_in_the_colours_of_the_bar(comparison, monkeypatch):
+    from PIL import Image
+
+    monkeypatch.undo()
+    try:
+        drawn = gallery.draw(comparison.setup, comparison.reference.surface, gallery.shots(comparison)[2:3])
+    except MissingSoftware as error:
+        pytest.skip(str(error))
+    for picture in drawn[0]:
+        pixels = np.asarray(Image.open(io.BytesIO(picture)).convert("RGB")).astype(int)
+        assert pixels.shape == (840, 840, 3)
+        assert (pixels[0, 0] > 250).all()
+        # Every vertex is 4 mm away, the top of the bar: yellow, so red and green are far above blue. The body fills at least
+        # the area of an ellipse of half axes 20 and 10 in a window of half side 1.06 * 32: 0.13 of the picture.
+        yellow = (pixels[:, :, 0] > pixels[:, :, 2] + 80) & (pixels[:, :, 1] > pixels[:, :, 2] + 80)
+        assert yellow.mean() > 0.1
+        assert (pixels.max(axis=2) < 60).any()
+
+
+def test_curves_tell_where_a_run_is_not_a_number(comparison):
+    drawn = {curve.title: curve.svg for curve in curves(comparison)}
+    assert len(drawn) == 5
+    assert "not a number" in drawn["Surface of torn: distance to the reference"]
+    assert "not a number" not in drawn["Surface of quick: distance to the reference"]
+    assert all(svg.startswith("<svg viewBox=") for svg in drawn.values())
+
+
+def test_a_scene_that_differs_from_its_file_is_told(comparison):
+    spoilt = replace(comparison, scene=casefile.read(comparison.scene.place, spoiled=True))
+    assert "effect[0].mu" not in re.sub(r"<pre>.*</pre>", "", page.render(comparison), flags=re.DOTALL)
+    assert "<th>effect[0].mu</th><td>0.01 in the file, 0.001 here</td>" in page.render(spoilt)
+
+
+def test_effects_are_told_with_their_units(comparison):
+    assert page.effect_parameters(comparison.scene.effects[0]) == [("mu", 0.01, "MPa")]
+
+
+def test_time_per_frame_counts_the_frames_that_were_reached(comparison):
+    torn = comparison.candidates[1]
+    assert seconds_per_frame(comparison.candidates[0]) == 8.0 / 4
+    assert seconds_per_frame(replace(torn, solver="pbd")) == 8.0 / 3
+    assert seconds_per_frame(torn) is None
+
+
+def test_worst_of_a_measure_with_a_frame_that_is_not_a_number(comparison):
+    torn = comparison.candidates[1]
+    it = page.worst(torn, Measure("volume", "deviation", "%", np.array([0, -3.0, 2, NAN, 1]), tuple("abcde")))
+    assert np.isnan(it["value"])
+    assert (it["frame"], it["where"], it["finite"]) == (30, "d", (-3.0, 10))

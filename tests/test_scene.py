@@ -1,0 +1,368 @@
+"""Scenes are read strictly: every mistake is one message that names file and key, and the key follows every input."""
+
+import math
+import os
+import shutil
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from fem_reference import casefile
+from fem_reference.errors import InputError
+from fem_reference.scene import DATA_SETTING, HOME, Scene
+
+SCENE = """
+title = "A bar"
+proves = "that scenes are read"
+
+[muscle]
+surface = "bar.ply"
+unit = "cm"
+tet_size = "2 cm"
+
+[[bone]]
+name = "wall"
+surface = "wall.ply"
+unit = "mm"
+
+[[bone]]
+name = "lever"
+surface = "lever.ply"
+unit = "mm"
+motion.axis = [0, 0, 2]
+motion.centre = "1, 2, 3 cm"
+motion.keyframes = [{ frame = 0, angle = "0 deg" }, { frame = 10, angle = "90 deg" }]
+
+[[attachment]]
+name = "start"
+bone = "wall"
+within = "2 mm"
+
+[[attachment]]
+name = "end"
+bone = "lever"
+vertices = { file = "end.csv", value = 2 }
+
+[[effect]]
+name = "neo_hooke"
+mu = "30 kPa"
+
+[[effect]]
+name = "incompressible"
+bulk = "30 MPa"
+
+[fibres.traced]
+count = 3
+start = "start"
+end = "end"
+
+[frames]
+first = 0
+last = 20
+every = 5
+interval = "0.02 s"
+
+[reference]
+solver = "fenicsx"
+newton_iterations = 20
+
+[[candidate]]
+name = "fast"
+solver = "pbd"
+stretch = 1.0
+
+[[expect]]
+of = "reference"
+metric = "volume"
+statistic = "deviation"
+frame = "any"
+truth = "0 %"
+within = "1 %"
+kind = "property"
+because = "it is nearly incompressible"
+
+[spoil]
+key = "effect[1].bulk"
+value = "10 kPa"
+because = "it is compressible then"
+"""
+# Solvers check their own settings.
+OPTIONAL = ("interval", "newton_iterations", "stretch")
+NEEDED = list(dict.fromkeys(line for line in SCENE.splitlines() if " = " in line and not line.startswith(OPTIONAL)))
+FILES = ("bar.ply", "wall.ply", "lever.ply", "end.csv")
+POLYLINES = {"file": "fibres.vtk", "unit": "mm"}
+OUTLINE = {"file": "marks.csv", "unit": "mm", "clouds": ["a", "b"], "reach": "3 mm"}
+
+
+@pytest.fixture
+def bar(tmp_path: Path) -> Path:
+    """A scene folder called ``bar`` with its files."""
+    folder = tmp_path / "bar"
+    folder.mkdir()
+    (folder / "case.toml").write_text(SCENE, encoding="utf-8")
+    for name in (*FILES, "fibres.vtk", "marks.csv"):
+        (folder / name).write_text(f"content of {name}", encoding="utf-8")
+    return folder
+
+
+def edited(folder: Path, old: str, new: str) -> Path:
+    assert old in SCENE
+    (folder / "case.toml").write_text(SCENE.replace(old, new, 1), encoding="utf-8")
+    return folder
+
+
+# Reading scenes
+
+
+def test_scene_holds_what_the_file_says(bar: Path) -> None:
+    scene = casefile.read(bar)
+    assert (scene.name, scene.folder, scene.place) == ("bar", bar.resolve(), str(bar.resolve() / "case.toml"))
+    assert (scene.muscle.unit, scene.muscle.tet_size) == pytest.approx((10.0, 20.0))
+    assert scene.bone[0].motion is None
+    assert scene.bone[1].motion is not None
+    assert scene.bone[1].motion.rotation().angles == pytest.approx((0.0, math.pi / 2))
+    assert scene.bone[1].motion.centre == pytest.approx((10.0, 20.0, 30.0))
+    assert [effect.model_dump() for effect in scene.effects] == [
+        {"mu": pytest.approx(0.03)},
+        {"bulk": pytest.approx(30.0)},
+    ]
+    assert scene.frames.numbers == (0, 5, 10, 15, 20)
+    assert scene.reference.settings == {"newton_iterations": 20}
+    assert scene.candidate[0].settings == {"stretch": 1.0}
+
+
+def test_folder_and_file_are_the_same_scene(bar: Path) -> None:
+    assert casefile.read(bar) == casefile.read(bar / "case.toml") == casefile.read(str(bar))
+
+
+def test_candidates_may_be_none(bar: Path) -> None:
+    start, end = SCENE.index("[[candidate]]"), SCENE.index("[[expect]]")
+    assert casefile.read(edited(bar, SCENE[start:end], "")).candidate == ()
+
+
+WRONG = [
+    # key, what stands there instead, what the message says
+    ("muscle.unit", "2 mm", 'muscle.unit: got "2 mm", want a unit of length'),
+    ("muscle.tet_size", "2 kPa", 'muscle.tet_size: got "2 kPa", want a length with its unit, such as "2 mm"'),
+    ("muscle.tet_size", "0 mm", 'muscle.tet_size: got "0 mm", want more than zero'),
+    ("muscle.tet_size", 2.0, "muscle.tet_size: got 2.0, want a length"),
+    ("effect[0].mu", "30 mm", 'effect[0].mu: got "30 mm", want a pressure with its unit, such as "30 kPa"'),
+    ("effect[0].mu", "-30 kPa", 'effect[0].mu: got "-30 kPa", want more than zero'),
+    ("effect[0].name", "hooke", 'effect[0].name: got "hooke", want one of incompressible, neo_hooke'),
+    ("effect", ["hooke"], 'effect[0].name: got "hooke", want one of incompressible, neo_hooke'),
+    ("effect", "hooke", 'effect: got "hooke", want'),
+    ("effect", [], "effect: got (), want"),
+    ("bone[1].motion.axis", [0, 0, 0], "want an axis that is not zero"),
+    ("bone[1].motion.centre", "1, 2 mm", 'bone[1].motion.centre: got "1, 2 mm", want three lengths with one unit'),
+    ("bone[1].motion.keyframes[1].frame", 0, "want keyframes in the order of their frames"),
+    (
+        "bone[1].motion.keyframes[1].angle",
+        "90",
+        'keyframes[1].angle: got "90", want an angle with its unit, such as "30 deg"',
+    ),
+    (
+        "bone[1].motion.keyframes[0].angle",
+        "1 deg",
+        "bone[1].motion: got a bone turned at the first frame, want angle 0 there",
+    ),
+    ("bone[1].name", "wall", 'bone: got the name "wall" twice, want every name once'),
+    ("attachment[1].name", "start", 'attachment: got the name "start" twice, want every name once'),
+    ("candidate[0].name", "reference", 'candidate: got the name "reference" twice, want every name once'),
+    ("candidate[0].name", "a/b", 'candidate[0].name: got "a/b", want'),
+    ("attachment[1].bone", "ulna", 'attachment[1].bone: got "ulna", want one of wall, lever'),
+    ("attachment[1]", {"name": "end", "bone": "lever"}, 'want exactly one of "vertices", "within", "outline"'),
+    ("attachment[0]", {"name": "a", "bone": "wall", "within": "2 mm", "outline": OUTLINE}, "want exactly one of"),
+    ("fibres.traced.start", "middle", 'fibres.traced.start: got "middle", want one of start, end'),
+    ("fibres.traced.end", "middle", 'fibres.traced.end: got "middle", want one of start, end'),
+    ("fibres.traced.count", 0, "fibres.traced.count: got 0, want greater than 0"),
+    ("fibres", {}, 'fibres: got {}, want exactly one of "polylines", "traced"'),
+    ("frames.every", 3, "want last = first + a multiple of every"),
+    ("frames.last", 0, "want last = first + a multiple of every"),
+    ("frames.interval", "1 mm", 'frames.interval: got "1 mm", want a time with its unit, such as "0.01 s"'),
+    ("expect[0].of", "slow", 'expect[0].of: got "slow", want one of reference, fast'),
+    ("expect[0].kind", "hope", 'expect[0].kind: got "hope", want'),
+    ("expect[0].frame", "last", "expect[0].frame"),
+    ("expect", [], "expect: got [], want"),
+]
+
+
+@pytest.mark.parametrize(("key", "value", "message"), WRONG, ids=lambda entry: str(entry)[:40])
+def test_wrong_value_names_file_and_key(bar: Path, key: str, value: object, message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        casefile.read(bar, changes={key: value})
+    assert str(caught.value).startswith(str(bar.resolve() / "case.toml") + ": ")
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize("line", NEEDED)
+def test_every_key_is_needed(bar: Path, line: str) -> None:
+    with pytest.raises(InputError, match=r"case\.toml: "):
+        casefile.read(edited(bar, line + "\n", ""))
+
+
+@pytest.mark.parametrize(
+    ("table", "place", "known"),
+    [
+        ('title = "A bar"\n', "colour", "attachment, bone, candidate"),
+        ("[muscle]\n", "muscle.colour", "surface, tet_size, unit"),
+        ("[[bone]]\n", "bone[0].colour", "motion, name, surface, unit"),
+        ("[[attachment]]\n", "attachment[0].colour", "bone, name, outline, vertices, within"),
+        ("[[effect]]\n", "effect[0].colour", "mu"),
+        ("[fibres.traced]\n", "fibres.traced.colour", "count, end, start"),
+        ("[frames]\n", "frames.colour", "every, first, interval, last"),
+        ("[[expect]]\n", "expect[0].colour", "because, frame, kind, metric, of, statistic, truth, within"),
+        ("[spoil]\n", "spoil.colour", "because, key, value"),
+    ],
+)
+def test_unknown_key_is_told_the_known_ones(bar: Path, table: str, place: str, known: str) -> None:
+    with pytest.raises(InputError) as caught:
+        casefile.read(edited(bar, table, table + 'colour = "red"\n'))
+    assert f"case.toml: {place}: got an unknown key, want one of {known}" in str(caught.value)
+
+
+@pytest.mark.parametrize("text", [b"title = ", b"\xff\xfe"])
+def test_text_that_is_no_toml(bar: Path, text: bytes) -> None:
+    (bar / "case.toml").write_bytes(text)
+    with pytest.raises(InputError, match="want a TOML file"):
+        casefile.read(bar)
+
+
+def test_case_that_is_not_there() -> None:
+    with pytest.raises(InputError, match=r'CASE: got "nowhere", want a scene file, .* one of .*hip_flexion'):
+        casefile.read("nowhere")
+
+
+# Changes and the spoil
+
+
+def test_changes_replace_values(bar: Path) -> None:
+    changed = casefile.read(
+        bar, changes={"frames.last": 10, "effect[0].mu": "1 kPa", "bone[1].motion.keyframes[1].angle": "1 rad"}
+    )
+    assert changed.frames.numbers == (0, 5, 10)
+    assert changed.effects[0] == casefile.read(bar, changes={"effect[0].mu": "0.001 MPa"}).effects[0]
+    assert changed.bone[1].motion is not None
+    assert changed.bone[1].motion.keyframes[1].angle == 1.0
+    assert casefile.read(bar).frames.last == 20
+
+
+@pytest.mark.parametrize("key", ["frames.final", "effect[7].mu", "effect.mu", "frames.last.more", "title[0]"])
+def test_change_of_a_key_that_is_not_there(bar: Path, key: str) -> None:
+    with pytest.raises(InputError, match="got nothing, want a key of this scene"):
+        casefile.read(bar, changes={key: 1})
+
+
+def test_spoil_changes_one_key(bar: Path) -> None:
+    assert casefile.read(bar, spoiled=True) == casefile.read(bar, changes={"effect[1].bulk": "10 kPa"})
+
+
+def test_spoil_that_is_missing(bar: Path) -> None:
+    with pytest.raises(InputError, match=r"case.toml: spoil: got None"):
+        casefile.read(edited(bar, SCENE[SCENE.index("[spoil]") :], ""), spoiled=True)
+
+
+# Files
+
+
+def test_file_is_found_beside_the_scene_in_meshes_and_in_data(bar: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = casefile.read(bar)
+    assert scene.file("bar.ply", "muscle.surface") == bar.resolve() / "bar.ply"
+    assert scene.file("mesh:hip/card.toml", "muscle.surface") == HOME / "meshes" / "hip" / "card.toml"
+    monkeypatch.setenv(DATA_SETTING, str(bar))
+    assert scene.file("data:wall.ply", "muscle.surface") == bar / "wall.ply"
+
+
+def test_file_without_the_data_setting(bar: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(DATA_SETTING, raising=False)
+    with pytest.raises(InputError, match=f'muscle.surface: got "data:a.ply" while {DATA_SETTING} is not set'):
+        casefile.read(bar).file("data:a.ply", "muscle.surface")
+
+
+def test_file_that_is_not_there(bar: Path) -> None:
+    with pytest.raises(
+        InputError, match=r'bone\[0\].surface: got "lost.ply", which is not at .*lost.ply, want a file that exists'
+    ):
+        casefile.read(bar).file("lost.ply", "bone[0].surface")
+
+
+# The key
+
+SOLUTION = {
+    "muscle.unit": "m",
+    "muscle.tet_size": "1 cm",
+    "muscle.surface": "wall.ply",
+    "bone[0].name": "floor",
+    "bone[1].unit": "cm",
+    "bone[1].surface": "wall.ply",
+    "bone[1].motion.axis": [0, 1, 2],
+    "bone[1].motion.centre": "1, 2, 4 cm",
+    "bone[1].motion.keyframes[1].angle": "91 deg",
+    "bone[1].motion.keyframes[1].frame": 11,
+    "attachment[0].within": "3 mm",
+    "attachment[1].vertices.value": 1,
+    "attachment[1].vertices.file": "wall.ply",
+    "attachment[1]": {"name": "end", "bone": "lever", "outline": OUTLINE},
+    "effect[0].mu": "31 kPa",
+    "effect[1].bulk": "31 MPa",
+    "fibres.traced.count": 4,
+    "fibres": {"polylines": POLYLINES},
+    "frames.last": 25,
+    "frames.every": 10,
+}
+
+
+def changed(folder: Path, key: str, value: object) -> Scene:
+    if key == "bone[0].name":
+        return casefile.read(folder, changes={key: value, "attachment[0].bone": value})
+    return casefile.read(folder, changes={key: value})
+
+
+def test_key_differs_with_every_input_of_the_solution(bar: Path) -> None:
+    keys = [casefile.read(bar).key, *(changed(bar, key, value).key for key, value in SOLUTION.items())]
+    assert len(set(keys)) == len(keys)
+
+
+def test_key_is_blind_to_what_does_not_change_the_solution(bar: Path) -> None:
+    changes = {"title": "x", "expect[0].within": "2 %", "candidate[0].stretch": 0.5, "effect[0].mu": "0.03 MPa"}
+    moved = Path(shutil.copytree(bar, bar.parent / "elsewhere"))
+    assert casefile.read(moved, changes=changes).key == casefile.read(bar).key
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_key_follows_the_content_of_files(bar: Path, name: str) -> None:
+    before = casefile.read(bar).key
+    (bar / name).write_text("other content", encoding="utf-8")
+    assert casefile.read(bar).key != before
+
+
+@pytest.mark.parametrize(("key", "name"), [("fibres", "fibres.vtk"), ("attachment[1]", "marks.csv")])
+def test_key_follows_the_content_of_polylines_and_outlines(bar: Path, key: str, name: str) -> None:
+    before = changed(bar, key, SOLUTION[key]).key
+    (bar / name).write_text("other content", encoding="utf-8")
+    assert changed(bar, key, SOLUTION[key]).key != before
+
+
+# The shipped cases
+
+
+@pytest.mark.parametrize("case", casefile.cases())
+def test_shipped_case_reads_and_its_files_exist(case: str) -> None:
+    text = (HOME / "cases" / case / "case.toml").read_text(encoding="utf-8")
+    if '"data:' in text and DATA_SETTING not in os.environ:
+        pytest.skip(f"its anatomy is in {DATA_SETTING}, which is not set")
+    scene = casefile.read(case)
+    assert scene.name == case
+    assert len(scene.key) == 64
+    assert casefile.read(case, spoiled=True).key != scene.key
+    for i, candidate in enumerate(scene.candidate):
+        if "folder" in candidate.settings:
+            assert scene.file(candidate.settings["folder"], f"candidate[{i}].folder").is_dir()
+
+
+def test_every_folder_of_cases_is_a_case() -> None:
+    assert casefile.cases() == sorted(path.name for path in (HOME / "cases").iterdir() if path.is_dir())
+    assert all(
+        tomllib.loads((HOME / "cases" / name / "case.toml").read_text(encoding="utf-8"))["spoil"]
+        for name in casefile.cases()
+    )

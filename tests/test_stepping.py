@@ -1,0 +1,52 @@
+"""Adaptive load steps: every requested frame is hit, failures are cut, easy steps grow, and what cannot be reached is said."""
+
+from fem_reference.solvers.fenicsx.stepping import Attempt, march
+
+
+def marched(attempt, frames=(0, 10, 20), first_step=10.0, smallest_step=0.5):
+    return list(march(attempt, frames, first_step, smallest_step))
+
+
+def test_easy_steps_hit_every_frame_at_once() -> None:
+    tried = []
+    reached = marched(lambda at: tried.append(at) or Attempt(None, 3))
+    assert tried == [10, 20]
+    assert [entry.frame for entry in reached] == [10, 20]
+    assert [entry.iterations for entry in reached] == [3, 3]
+
+
+def test_large_steps_never_skip_a_frame() -> None:
+    reached = marched(lambda _: Attempt(None, 2), frames=(0, 1, 2, 7), first_step=100.0)
+    assert [entry.frame for entry in reached] == [1, 2, 7]
+
+
+def test_failed_steps_are_halved_and_resume_from_the_last_good_state() -> None:
+    state = {"at": 0.0}
+
+    def attempt(at: float) -> Attempt:
+        if at - state["at"] > 4:
+            return Attempt("diverged", 14)
+        state["at"] = at
+        return Attempt(None, 6)
+
+    reached = marched(attempt)
+    assert [entry.frame for entry in reached] == [10, 20]
+    assert all(entry.failed is None for entry in reached)
+    assert reached[0].cutbacks == 2  # 10 -> 5 -> 2.5
+    assert reached[0].steps == 4
+
+
+def test_steps_are_equal_and_none_is_a_sliver() -> None:
+    tried = []
+    marched(lambda at: tried.append(at) or Attempt(None, 6), frames=(0, 10), first_step=3.0)
+    assert tried == [2.5, 5.0, 7.5, 10]
+
+
+def test_gives_up_below_the_smallest_step_and_says_where() -> None:
+    reached = marched(lambda at: Attempt("inverted", 4, "det F") if at > 10 else Attempt(None, 3))
+    assert reached[0].frame == 10
+    assert reached[0].failed is None
+    assert reached[1].failed is not None
+    assert reached[1].failed.failure == "inverted"
+    assert reached[1].at == 10
+    assert len(reached) == 2
