@@ -8,13 +8,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fem_reference import __version__, casefile, files, metrics, problem, report, solvers
+from fem_reference import __version__, casefile, files, judge, metrics, problem, report, solvers
 from fem_reference.comparison import Comparison, compare
 from fem_reference.errors import InputError, MissingSoftware
 from fem_reference.execution import Bench, complete
 from fem_reference.mesh import enclosed_volume, vertex_areas
 from fem_reference.runs import Run
-from fem_reference.scene import Candidate, Scene, SolverChoice, cases
+from fem_reference.scene import Candidate, Scene, SolverChoice
 
 DONE, VERDICT_FAIL, BAD_INPUT, SOLVER_FAILED = range(4)
 MAIN_JOB = "hip_flexion"
@@ -28,7 +28,7 @@ def entry() -> None:
 def main(arguments: list[str]) -> int:
     """Carry out a command line; returns the exit status."""
     options = _parser().parse_args(arguments)
-    logging.basicConfig(level=logging.WARNING if options.quiet else logging.INFO, format="%(message)s", force=True)
+    _show_progress(on=not options.quiet)
     try:
         status: int = options.verb(options)
     except InputError as error:
@@ -38,6 +38,15 @@ def main(arguments: list[str]) -> int:
         print(f"fem-reference: {error}", file=sys.stderr)
         return SOLVER_FAILED
     return status
+
+
+def _show_progress(*, on: bool) -> None:
+    """Our own log lines, and nobody else's, on standard error."""
+    log = logging.getLogger("fem_reference")
+    log.setLevel(logging.INFO if on else logging.WARNING)
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(logging.Formatter("%(message)s"))
+    log.handlers[:] = [handler]
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -109,6 +118,7 @@ def _choice(scene: Scene, solver: str) -> SolverChoice:
 
 def _judge(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
     """Reference and candidates -> page, JSON and exit status. What is bad in the input shows before anything is solved."""
+    judge.check(scene)
     bench = Bench(scene, _out(options) / "runs", options.ranks)
     for candidate, place in [(scene.reference, "reference"), *chosen]:
         bench.settings(candidate, place)
@@ -159,7 +169,7 @@ def _run_text(run: Run) -> str:
 
 
 def _list(options: argparse.Namespace) -> int:
-    scenes = {name: casefile.read(name).title for name in cases()}
+    scenes = {name: casefile.read(name).title for name in casefile.cases()}
     stored = sorted(str(path.parent) for path in (_out(options) / "runs").glob("*/*/run.json"))
     facts = {"cases": scenes, "solvers": solvers.names(), "metrics": metrics.names(), "runs": stored}
     width = max(map(len, scenes))

@@ -42,8 +42,8 @@ def compare(scene: Scene, setup: Setup, reference: Run, candidates: tuple[Run, .
     changes = {run.name: measure(run, at_rest(run), yardstick) for run in (reference, *candidates)}
     of = {"reference": changes["reference"]} | deviations
     verdicts = tuple(
-        verdict(scene, i, of[expectation.of], reference.numbers)
-        for i, expectation in enumerate(scene.expect)
+        verdict(expectation, of[expectation.of], reference.numbers)
+        for expectation in scene.expect
         if expectation.of in of
     )
     error = extension_error(reference, yardstick)

@@ -18,7 +18,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from fem_reference.errors import InputError
-from fem_reference.formats import Soup, only_triangles, read_obj, read_ply, read_stl
+from fem_reference.formats import Soup, only_triangles, read_obj, read_off, read_ply, read_stl
 from fem_reference.mesh import Floats, Ints, Polylines, Surface, TetMesh
 
 _TRIANGLE, _TETRA = 5, 10  # VTK's numbers of cell types
@@ -35,10 +35,9 @@ def read_surface(path: Path, unit: float) -> Surface:
     if reader is None:
         raise InputError(path, f'the suffix "{path.suffix}"', want)
     points, triangles = _attempt(reader, path, want)
-    points, triangles = np.asarray(points, np.float64), np.asarray(triangles, np.int64)
     if len(triangles) == 0:
         raise InputError(path, "no triangles", want)
-    return Surface(points * unit, triangles, str(path))
+    return Surface(np.asarray(points, np.float64) * unit, triangles, str(path))
 
 
 def read_polylines(path: Path, unit: float) -> Polylines:
@@ -149,12 +148,6 @@ def _attempt[T](read: Callable[[Path], T], path: Path, want: str) -> T:
         raise InputError(path, str(error) or type(error).__name__, want) from error
 
 
-def _read_off(path: Path) -> Soup:
-    import meshio
-
-    return _meshio_triangles(meshio.off.read(path))
-
-
 def _read_msh(path: Path) -> Soup:
     import meshio
 
@@ -199,7 +192,7 @@ def _read_vtk(path: Path) -> Soup:
         cells = data.GetPolys()
     else:
         raise ValueError(f"{data.GetClassName()} that is not made of triangles")
-    if cells.GetNumberOfCells() == 0:
+    if cells is None or cells.GetNumberOfCells() == 0:
         return np.empty((0, 3)), np.empty((0, 3))
     only_triangles(set(np.diff(vtk_to_numpy(cells.GetOffsetsArray())).tolist()))
     return vtk_to_numpy(data.GetPoints().GetData()), vtk_to_numpy(cells.GetConnectivityArray()).reshape(-1, 3)
@@ -245,9 +238,11 @@ def _vtk_data(path: Path) -> Any:
     reader.SetFileName(str(path))
     with _vtk_messages() as messages:
         reader.Update()
-    complaint = re.search(r"[^\n]*error[^\n]*\n(?:vtk\w+ \(0x\w+\): )?([^\n]*)", messages.GetOutput(), re.IGNORECASE)
-    if complaint:
-        raise ValueError(complaint[1])
+    told = messages.GetOutput()
+    if "error" in told.lower():
+        raise ValueError(
+            re.sub(r"^.*: In .*\n|^vtk\w+ \(0x\w+\): | for file: .*", "", told, flags=re.MULTILINE).split("\n")[0]
+        )
     return reader.GetOutput()
 
 
@@ -301,7 +296,7 @@ _READERS: dict[str, Callable[[Path], Soup]] = {
     ".ply": read_ply,
     ".obj": read_obj,
     ".stl": read_stl,
-    ".off": _read_off,
+    ".off": read_off,
     ".msh": _read_msh,
     **dict.fromkeys((".vtk", ".vtp", ".vtu"), _read_vtk),
 }

@@ -1,4 +1,4 @@
-"""PLY, OBJ and STL with numpy alone: points and triangles as the file has them; ValueError where it is not whole."""
+"""PLY, OBJ, OFF and STL with numpy alone: points and triangles as in the file; ValueError where it is not whole."""
 
 import re
 from pathlib import Path
@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 Soup = tuple[Any, Any]
-_PLY_TYPES = {
-    name: code
-    for code, names in (("i1", "char int8"), ("i2", "short int16"), ("i4", "int int32"), ("f4", "float float32"))
-    + (("u1", "uchar uint8"), ("u2", "ushort uint16"), ("u4", "uint uint32"), ("f8", "double float64"))
-    for name in names.split()
-}
+_PLY_TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"}
+_PLY_TYPES |= {"float": "f4", "double": "f8"}
+_PLY_TYPES |= {
+    np.dtype(code).name: code for code in _PLY_TYPES.values()
+}  # PLY also has numpy's names: int8 ... float64
+_PLY_CORNERS = ("vertex_indices", "vertex_index")
 _STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -40,10 +40,9 @@ def read_ply(path: Path) -> Soup:
         properties = [line[1:] for line in words[start:stop] if line[:1] == ["property"]]
         tables[name], body = _ply_element(body, int(count), properties, types)
     if not {"vertex", "face"} <= tables.keys():
-        raise ValueError(f"elements {', '.join(tables) or 'none'}")
+        raise ValueError("no vertices with faces")
     vertex, face = tables["vertex"], tables["face"]
-    corners = "vertex_index" if "vertex_index" in face.dtype.names else "vertex_indices"
-    only_triangles({face[corners].shape[1]})
+    corners = next(name for name in _PLY_CORNERS if name in face.dtype.names)
     return np.column_stack([vertex[axis] for axis in "xyz"]), face[corners]
 
 
@@ -52,8 +51,10 @@ def _ply_element(body: bytes, count: int, properties: list[list[str]], types: di
     fields: list[tuple[Any, ...]] = []
     for *kind, name in properties:
         if kind[0] == "list":
-            sizes = np.frombuffer(body, types[kind[1]], min(count, 1), np.dtype(fields).itemsize)
-            fields += [(f"{name} size", types[kind[1]]), (name, types[kind[2]], (int(sizes.max(initial=3)),))]
+            first = np.frombuffer(body, types[kind[1]], 1, np.dtype(fields).itemsize) if count else [3]
+            if name in _PLY_CORNERS:
+                only_triangles({int(first[0])})
+            fields += [(f"{name} size", types[kind[1]]), (name, types[kind[2]], (int(first[0]),))]
         else:
             fields.append((name, types[kind[0]]))
     table = np.frombuffer(body, np.dtype(fields), count)
@@ -70,13 +71,33 @@ def read_obj(path: Path) -> Soup:
     for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
         word, *values = line.split() or [""]
         if word == "v":
-            x, y, z = values[:3]
-            points.append([float(x), float(y), float(z)])
+            points.append([float(value) for value in values[:3]])
         elif word == "f":
             only_triangles({len(values)})
             corners = (int(value.split("/")[0]) for value in values)
             triangles.append([corner - 1 if corner > 0 else len(points) + corner for corner in corners])
-    return points, triangles
+    return _positions(points), triangles
+
+
+def read_off(path: Path) -> Soup:
+    """Geomview OFF: text, counts, positions, faces; colours are passed over."""
+    text = re.sub(r"#[^\n]*", "", path.read_text(encoding="utf-8"))
+    parts = re.match(r"\s*C?N?OFF\s+(\d+)\s+(\d+)\s+\d+\s+(.*)", text, re.DOTALL)
+    if parts is None:
+        raise ValueError("no OFF header")
+    vertices, faces = int(parts[1]), int(parts[2])
+    rows = [line.split() for line in parts[3].splitlines() if line.strip()]
+    if len(rows) != vertices + faces:
+        raise ValueError(f"{len(rows)} rows of {vertices} vertices and {faces} faces")
+    only_triangles({size for row in rows[vertices:] for size in (int(row[0]), len(row[1:4]))})
+    points = _positions([[float(value) for value in row[:3]] for row in rows[:vertices]])
+    return points, [[int(value) for value in row[1:4]] for row in rows[vertices:]]
+
+
+def _positions(rows: list[list[float]]) -> Any:
+    if any(len(row) != 3 for row in rows):
+        raise ValueError("a position of fewer than three coordinates")
+    return np.array(rows)
 
 
 def read_stl(path: Path) -> Soup:

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 from fem_reference.errors import InputError
-from fem_reference.metrics import Measure
+from fem_reference.metrics import Measure, units
 from fem_reference.records import join
 from fem_reference.scene import Expectation, Scene
 from fem_reference.units import quantity
 
 Word = Literal["pass", "fail", "cannot say"]
-_KINDS = {"mm": ("a length", 1.0), "%": ("a fraction", 100.0), "mm3": ("a volume", 1.0), "1": ("a fraction", 1.0)}
+_KINDS = {"mm": ("a length", 1.0), "%": ("a fraction", 100.0), "mm3": ("a volume", 1.0)}
 
 
 @dataclass(frozen=True)
@@ -45,32 +45,37 @@ def overall(words: Iterable[Word]) -> Word:
     return "fail" if "fail" in found else "cannot say" if "cannot say" in found else "pass"
 
 
-def verdict(scene: Scene, i: int, measures: Iterable[Measure], numbers: tuple[int, ...]) -> Verdict:
-    """The verdict on ``scene.expect[i]`` from the measures of the run that it is of, over frame ``numbers``."""
-    expectation = scene.expect[i]
-    place = join(scene.place, f"expect[{i}]")
-    by_name = {f"{measure.metric}.{measure.statistic}": measure for measure in measures}
-    name = f"{expectation.metric}.{expectation.statistic}"
-    if name not in by_name:
-        raise InputError(f"{place}.statistic", f'"{name}"', f"one of {', '.join(sorted(by_name))}")
-    found = by_name[name]
-    truth, within = (_number(getattr(expectation, key), found.unit, f"{place}.{key}") for key in ("truth", "within"))
-    if expectation.frame == "any":
-        frames = range(len(numbers))
-    elif expectation.frame in numbers:
-        frames = range(at := numbers.index(expectation.frame), at + 1)
-    else:
-        raise InputError(f"{place}.frame", expectation.frame, f'"any" or a frame from {numbers[0]} to {numbers[-1]}')
-    words = [judge(float(found.values[frame]), truth, within) for frame in frames]
+def check(scene: Scene) -> None:
+    """InputError unless every expectation of the scene is of a measure and a frame that there will be, in its unit."""
+    known, numbers = units(), scene.frames.numbers
+    for i, expectation in enumerate(scene.expect):
+        place, name = join(scene.place, f"expect[{i}]"), f"{expectation.metric}.{expectation.statistic}"
+        if name not in known:
+            raise InputError(f"{place}.statistic", f'"{name}"', f"one of {', '.join(sorted(known))}")
+        for key in ("truth", "within"):
+            try:
+                _number(getattr(expectation, key), known[name])
+            except ValueError as error:
+                raise InputError(f"{place}.{key}", f'"{getattr(expectation, key)}"', str(error)) from error
+        if expectation.frame != "any" and expectation.frame not in numbers:
+            want = f'"any" or one of {numbers[0]}, {numbers[1]}, ..., {numbers[-1]}'
+            raise InputError(f"{place}.frame", expectation.frame, want)
+
+
+def verdict(expectation: Expectation, measures: Iterable[Measure], numbers: tuple[int, ...]) -> Verdict:
+    """The verdict on a checked ``expectation`` from the measures of the run that it is of, over frame ``numbers``."""
+    name = (expectation.metric, expectation.statistic)
+    found = next(measure for measure in measures if (measure.metric, measure.statistic) == name)
+    truth, within = (_number(text, found.unit) for text in (expectation.truth, expectation.within))
+    frames = range(len(numbers)) if expectation.frame == "any" else [numbers.index(expectation.frame)]
+    values = [float(found.values[frame]) for frame in frames]
+    words = [judge(value, truth, within) for value in values]
     # The frame that decides: the first that fails, else the one furthest from the truth.
-    decides = words.index("fail") if "fail" in words else max(range(len(words)), key=lambda k: abs(found.values[frames[k]] - truth))
-    frame = frames[decides]
-    return Verdict(overall(words), expectation, float(found.values[frame]), truth, within, found.unit, numbers[frame])
+    furthest = max(range(len(values)), key=lambda k: abs(values[k] - truth))
+    decides = words.index("fail") if "fail" in words else furthest
+    return Verdict(overall(words), expectation, values[decides], truth, within, found.unit, numbers[frames[decides]])
 
 
-def _number(text: str, unit: str, place: str) -> float:
+def _number(text: str, unit: str) -> float:
     kind, factor = _KINDS[unit]
-    try:
-        return quantity(text, kind) * factor
-    except ValueError as error:
-        raise InputError(place, f'"{text}"', str(error)) from error
+    return quantity(text, kind) * factor

@@ -33,13 +33,14 @@ FORMAT = 1
 @dataclass(frozen=True, eq=False)
 class Frame:
     """One requested frame: positions [mm] of the surface (n, 3), and where the solver has them of the fibre points (m, 3) and
-    tet points (k, 3); ``scalars`` by name."""
+    tet points (k, 3); ``scalars`` by name; ``note`` is what progress says of it."""
 
     number: int
     surface: Floats
     fibres: Floats | None = None
     tets: Floats | None = None
     scalars: dict[str, float] = field(default_factory=dict)
+    note: str = ""
 
 
 Sink = Callable[[Frame], None]
@@ -127,9 +128,9 @@ class Writer:
         done, wanted = len(self.state["numbers"]), len(self.state["frames"])
         passed = time.perf_counter() - self.begin
         left = f", about {passed / (done - 1) * (wanted - done):.0f} s left" if 1 < done < wanted else ""
-        told = "".join(f", {name.replace('_', ' ')} {value:.4g}" for name, value in frame.scalars.items())
-        solver = self.state["solver"]
-        log.info("%s: frame %d (%d of %d)%s, %.0f s%s", solver, frame.number, done, wanted, told, passed, left)
+        note = f", {frame.note}" if frame.note else ""
+        name = self.state["name"]
+        log.info("%s: frame %d (%d of %d)%s, %.0f s%s", name, frame.number, done, wanted, note, passed, left)
 
 
 def load(folder: Path) -> Run:

@@ -85,7 +85,7 @@ def test_stored_runs_are_judged_without_fenicsx_and_meshers(job) -> None:
     # A Python in which neither can be imported judges and reports from the store.
     block = (
         "import sys\n"
-        "for name in ('dolfinx', 'dolfinx_solver', 'ufl', 'basix', 'petsc4py', 'mpi4py', 'gmsh', 'pytetwild', 'numba'):\n"
+        "for name in ('dolfinx', 'dolfinx_solver', 'ufl', 'basix', 'petsc4py', 'mpi4py', 'gmsh', 'pytetwild'):\n"
         "    sys.modules[name] = None\n"
         "from fem_reference import cli\n"
         f"sys.exit(cli.main(['compare', {str(job.case)!r}, '--out', {str(job.out)!r}, '--quiet']))"

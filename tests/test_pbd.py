@@ -26,7 +26,7 @@ SWING = Rotation((1, 0, 0), (0, 20, -10), (0.0, 50.0), (0.0, 0.5))
 
 
 def spindle():
-    """A closed surface like a muscle, 20 mm thick, 60 mm long in z: 11 rings of 12 vertices, each turned by half a step."""
+    """A closed surface like a muscle, 20 mm by 60 mm in z: rings of 12 vertices, turned by half a step each."""
     ring, step = np.divmod(np.arange(11 * 12), 12)
     along, around = np.pi * (ring + 1) / 12, np.pi * (2 * step + ring) / 12
     sides = np.column_stack(

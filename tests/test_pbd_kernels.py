@@ -67,9 +67,15 @@ def test_gradient_of_distance():
 def test_gradient_of_dihedral(angle):
     points = apply(TURN, folded(angle))
     value, *gradients = kernels.dihedral(*rows(points))
-    assert value == pytest.approx(abs(angle), abs=1e-13)  # blind to the sign; arccos loses a digit 0.1 from its end
+    assert value == pytest.approx(abs(angle), abs=1e-14)  # blind to the sign
     expected = slopes(lambda moved: kernels.dihedral(*rows(moved))[0], points, 1e-5)
     np.testing.assert_allclose(gradients, expected, atol=1e-8)  # at 3.0 rounding grows by 1/sin(3.0) = 7
+
+
+@pytest.mark.parametrize("angle", [1e-7, math.pi - 1e-7])
+def test_dihedral_is_exact_near_flat(angle):
+    # Normals are rounded by 1e-16; arccos of their product would be off by 1e-16 / 1e-7.
+    assert kernels.dihedral(*rows(apply(TURN, folded(angle))))[0] == pytest.approx(angle, abs=1e-14)
 
 
 def test_gradient_of_volume():

@@ -23,7 +23,7 @@ def write(folder, *, close=True):
     for number in (0, 5):
         shift = np.array([0.1 * number, 0, 0])
         scalars = {"energy": 2.0 * number}
-        writer.add(Frame(number, SURFACE.points + shift, FIBRES.points + shift, MESH.points + shift, scalars))
+        writer.add(Frame(number, SURFACE.points + shift, FIBRES.points + shift, MESH.points + shift, scalars, "well"))
     if close:
         writer.close(Outcome("converged", "done", {"newton_iterations": 7.0}))
     return folder
@@ -59,8 +59,8 @@ def test_opens_in_paraview(tmp_path) -> None:
 def test_progress_is_logged_with_how_far_and_how_long(tmp_path, caplog) -> None:
     caplog.set_level(logging.INFO)
     write(tmp_path / "run")
-    assert "frame 0 (1 of 2)" in caplog.text
-    assert "frame 5 (2 of 2), energy 10" in caplog.text
+    assert "reference: frame 0 (1 of 2)" in caplog.text
+    assert "frame 5 (2 of 2), well, " in caplog.text
 
 
 def test_a_run_that_was_cut_off_is_no_result(tmp_path) -> None:

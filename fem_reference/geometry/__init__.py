@@ -1,1 +1,1 @@
-"""What is pure geometry: distances, intersections, tetrahedra, attachments, embedding, fibres and the extension inward."""
+"""What is pure geometry: distances, intersections, tetrahedra, attachments, embedding, fibres, extension."""

@@ -1,4 +1,4 @@
-"""Which part of a muscle a bone holds: vertices of its surface, and the boundary triangles of its tetrahedra below them."""
+"""Which part of a muscle a bone holds: vertices of its surface, and boundary triangles of its tetrahedra below."""
 
 from pathlib import Path
 
@@ -26,9 +26,10 @@ _SAMPLES = np.array(
 
 
 def pick(scene: Scene, i: int, surface: Surface, bone_surface: Surface) -> Ints:
-    """The vertices (k,) of the muscle ``surface`` that ``scene.attachment[i]`` selects, sorted; ``bone_surface`` is its bone's.
+    """The vertices (k,) of the muscle ``surface`` that ``scene.attachment[i]`` selects, sorted.
 
-    InputError names the key of the scene, or the file and row, that is not usable.
+    ``bone_surface`` is the surface of the attachment's bone. InputError names the key of the scene, or the file and
+    row (comment lines not counted), that is not usable.
     """
     attachment = scene.attachment[i]
     key = f"attachment[{i}]"
@@ -45,8 +46,11 @@ def pick(scene: Scene, i: int, surface: Surface, bone_surface: Surface) -> Ints:
 
 
 def facets_under(mesh: TetMesh, surface: Surface, vertices: Ints) -> Ints:
-    """The boundary triangles (m, 3) of ``mesh``, outward, more than half of which lies under attached ``vertices`` (k,) of
-    ``surface``: the mean over seven samples of the attached share at the closest point of the surface."""
+    """The boundary triangles (m, 3) of ``mesh``, outward, that lie under the attached ``vertices`` (k,) of ``surface``.
+
+    A triangle does where the attached share at the closest point of the surface, averaged over seven samples, is above
+    a half.
+    """
     triangles, _ = boundary(mesh.tets)
     attached = np.zeros(len(surface.points))
     attached[vertices] = 1.0
@@ -77,7 +81,7 @@ def _is_integer(text: str) -> bool:
 
 
 def _patches(path: Path, outline: Outline, place: str) -> Surface:
-    """The patches that the clouds of an outline span, as one surface [mm]; ``place`` is the key that names the clouds."""
+    """The patches that the clouds of an outline span, as one surface [mm]; ``place`` is the key of the clouds."""
     clouds = _clouds(path, outline.unit)
     points, triangles = np.zeros((0, 3)), np.zeros((0, 3), np.int64)
     for name in outline.clouds:
@@ -107,7 +111,7 @@ def _clouds(path: Path, unit: float) -> dict[str, list[list[float]]]:
 
 
 def _fan(points: Floats) -> Surface:
-    """Triangles from the centroid of ``points`` (n, 3) to each two that follow each other by angle in their best-fit plane."""
+    """Triangles from the centroid of ``points`` (n, 3) to each two that are next in angle in their best-fit plane."""
     centre = points.mean(axis=0)
     _, _, axes = np.linalg.svd(points - centre)
     x, y, _ = axes @ (points - centre).T

@@ -11,20 +11,20 @@ from fem_reference.mesh import Floats, Ints, Surface, enclosed_volume, triangle_
 
 # Chosen on four hip muscles and a box. More rounds gain nothing.
 _ROUNDS = 6
-# A direction is free at a vertex when the normals around it have less than this share of their squares along it: moving along
-# a free direction keeps the vertex on its plane or its sharp edge. Above 0.05 a thin rim shrinks, below 0.02 slivers stay.
+# A direction is free at a vertex when the normals around it have less than this share of their squares along it: moving
+# along it keeps the vertex on its plane or its sharp edge. Above 0.05 a thin rim shrinks, below 0.02 slivers stay.
 _FREE = 0.03
-# How far the pole of the inversion is from the body, in its diagonals: nearer, sharp edges move; farther, flat parts stay flat.
+# Distance of the inversion's pole in diagonals of the body: nearer, sharp edges move; farther, flat parts stay flat.
 _POLE = 6.0
 _NEARLY_FLAT = np.cos(np.radians(30))
 _TINY = np.finfo(float).tiny
 
 
 def coarsen(surface: Surface, count: int) -> Surface:
-    """A closed surface of about ``count`` triangles on the closed ``surface``: sharp edges kept, the same volume enclosed.
+    """A closed surface of about ``count`` triangles on a closed one: sharp edges kept, the same volume enclosed.
 
-    Edges collapse by quadric error (Garland and Heckbert 1997, doi 10.1145/258734.258849), then edges flip towards Delaunay and
-    vertices slide to the middle of their neighbours, back on ``surface`` after each round.
+    Edges collapse by quadric error (Garland and Heckbert 1997, doi 10.1145/258734.258849), then edges flip towards
+    Delaunay and vertices slide to the middle of their neighbours, back on ``surface`` after each round.
     """
     points, triangles = _collapse(surface, count)
     for _ in range(_ROUNDS):
@@ -37,8 +37,8 @@ def coarsen(surface: Surface, count: int) -> Surface:
 def _collapse(surface: Surface, count: int) -> tuple[Floats, Ints]:
     """Points and triangles after quadric edge collapses to ``count``.
 
-    Quadrics leave flat parts undetermined, so the collapses happen in the image of a sphere inversion, which keeps angles and
-    bends planes to spheres.
+    Quadrics leave flat parts undetermined, so the collapses happen in the image of a sphere inversion, which keeps
+    angles and bends planes to spheres.
     """
     low, high = surface.points.min(axis=0), surface.points.max(axis=0)
     radius = _POLE * float(np.linalg.norm(high - low))
@@ -54,7 +54,7 @@ def _invert(points: Floats, pole: Floats, radius: float) -> Floats:
 
 
 def slide(points: Floats, triangles: Ints) -> Floats:
-    """``points`` (n, 3) moved to the mean of the triangles around them, weighted by area, along their free directions only."""
+    """``points`` (n, 3) moved to the area-weighted mean of the triangles around them, along free directions only."""
     areas = triangle_areas(points, triangles)
     total = _around(areas, triangles, len(points))[:, None]
     pulled = _around(areas[:, None] * points[triangles].mean(axis=1), triangles, len(points))
@@ -66,7 +66,7 @@ def slide(points: Floats, triangles: Ints) -> Floats:
 
 
 def _normal_tensors(points: Floats, triangles: Ints) -> Floats:
-    """Sum over the triangles around each point of ``angle n n^T``, with n the unit normal and their angle there, (n, 3, 3)."""
+    """Sum over the triangles around each point of their angle there times ``n n^T``, n the unit normal, (n, 3, 3)."""
     normals = _normals(points, triangles)
     normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _TINY)
     squares = normals[:, :, None] * normals[:, None, :]
@@ -89,7 +89,7 @@ def inflate(points: Floats, triangles: Ints, volume: float) -> Floats:
 
 
 def flip_edges(points: Floats, triangles: Ints) -> Ints:
-    """The closed surface's ``triangles`` (m, 3) after flips towards Delaunay, until none is left to flip (at most 20 passes)."""
+    """``triangles`` (m, 3) of a closed surface after flips towards Delaunay, until none is left (at most 20 passes)."""
     for _ in range(20):
         flipped = _flip_once(points, triangles)
         if flipped is triangles:
@@ -119,7 +119,7 @@ class _Hinges:
 
 
 def _flip_once(points: Floats, triangles: Ints) -> Ints:
-    """Every edge worth a flip flipped, the most worthwhile first, each triangle at most once; the same array where none is."""
+    """Edges worth a flip flipped, the best first, each triangle at most once; the same array where none is."""
     hinge = _Hinges.of(triangles)
     gain = _flip_gain(points, hinge)
     there = set(zip(np.minimum(hinge.a, hinge.b).tolist(), np.maximum(hinge.a, hinge.b).tolist(), strict=True))
@@ -138,8 +138,10 @@ def _flip_once(points: Floats, triangles: Ints) -> Ints:
 
 
 def _flip_gain(points: Floats, hinge: _Hinges) -> Floats:
-    """By how much the angles opposite to each edge exceed a straight one [rad], (e,); 0 where a flip would not be worth it or the
-    two triangles are not nearly in one plane before and after."""
+    """By how much the angles opposite to each edge exceed a straight one [rad], (e,).
+
+    0 where a flip is not worth it, or the two triangles are not nearly in one plane before and after.
+    """
     a, b, c, d = (points[corner] for corner in (hinge.a, hinge.b, hinge.c, hinge.d))
     excess = _angle(a - c, b - c) + _angle(a - d, b - d) - np.pi
     before = _cosine(np.cross(b - a, c - a), np.cross(a - b, d - b))
@@ -163,7 +165,7 @@ def _around(values: NDArray[np.float64], triangles: Ints, count: int) -> Floats:
 
 
 def _angle(one: Floats, other: Floats) -> Floats:
-    return np.arctan2(np.linalg.norm(np.cross(one, other), axis=1), np.einsum("ij,ij->i", one, other))
+    return np.asarray(np.arctan2(np.linalg.norm(np.cross(one, other), axis=1), np.einsum("ij,ij->i", one, other)))
 
 
 def _cosine(one: Floats, other: Floats) -> Floats:

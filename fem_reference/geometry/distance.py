@@ -9,8 +9,10 @@ from fem_reference.mesh import Floats, Ints, Surface
 
 
 class Distances(NamedTuple):
-    """For each of n points: ``distance`` (n,) [mm] to the surface, its closest ``triangle`` (n,), the ``closest`` point (n, 3)
-    [mm] on it and that point's ``barycentric`` coordinates (n, 3) there."""
+    """For each of n points: ``distance`` (n,) [mm] to the surface and the ``triangle`` (n,) that is closest.
+
+    ``closest`` (n, 3) [mm] is the closest point of that triangle, ``barycentric`` (n, 3) its coordinates there.
+    """
 
     distance: Floats
     triangle: Ints
@@ -31,7 +33,7 @@ def distances(points: Floats, surface: Surface) -> Distances:
 
 
 def _barycentric(points: Floats, corners: Floats) -> Floats:
-    """Weights (n, 3), at least 0 and of sum 1, of ``corners`` (n, 3, 3) at ``points`` (n, 3) that lie in their triangles."""
+    """Weights (n, 3), at least 0 and of sum 1, of ``corners`` (n, 3, 3) at ``points`` (n, 3) in their triangles."""
     opposite = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
     normal = np.cross(opposite[:, 0], opposite[:, 1])
     to_point = points[:, None] - corners[:, [1, 2, 0]]

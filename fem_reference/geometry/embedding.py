@@ -5,10 +5,13 @@ from dataclasses import dataclass
 import igl
 import numpy as np
 
-from fem_reference.mesh import Floats, Ints, TetMesh, boundary
+from fem_reference.geometry.distance import Distances, distances
+from fem_reference.mesh import Floats, Ints, Surface, TetMesh, boundary
 
 # A point that round-off leaves between two tets is looked for again this far away, as a share of the mesh's diagonal.
 _NUDGE = 1e-9
+# A closest point whose weight for a corner is below this lies on the edge or corner opposite.
+_TIE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,9 +38,9 @@ class Locator:
         self.mesh = mesh
         self.faces, self.behind = boundary(mesh.tets)
         self.diagonal = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
-        self._tree, self._skin = igl.AABB(), igl.AABB()
+        self.skin = Surface(mesh.points, self.faces, "the skin of the tetrahedra")
+        self._tree = igl.AABB()
         self._tree.init(mesh.points, mesh.tets)
-        self._skin.init(mesh.points, self.faces)
 
     def embed(self, points: Floats) -> Embedding:
         """The tets that contain ``points`` (n, 3) [mm]."""
@@ -48,16 +51,19 @@ class Locator:
             tets[lost] = self._containing(points[lost] + _NUDGE * self.diagonal * np.array(corner))
             lost = lost[tets[lost] < 0]
         outside = np.zeros(len(points))
-        outside[lost], face = self.skin_distance(points[lost])
-        tets[lost] = self.behind[face]
+        skin = distances(points[lost], self.skin)
+        outside[lost] = skin.distance
+        tets[lost] = self.behind[self._first_of_ties(skin)]
         return Embedding(tets, _barycentric(points, self.mesh.points[self.mesh.tets[tets]]), outside)
 
-    def skin_distance(self, points: Floats) -> tuple[Floats, Ints]:
-        """Distance (n,) [mm] from ``points`` (n, 3) to the boundary, and the closest boundary triangle (n,)."""
-        if len(points) == 0:
-            return np.zeros(0), np.zeros(0, np.int64)
-        square, face, _ = self._skin.squared_distance(self.mesh.points, self.faces, np.ascontiguousarray(points))
-        return np.sqrt(square), face
+    def _first_of_ties(self, skin: Distances) -> Ints:
+        """The closest boundary triangles (n,); a closest point on an edge or corner is in several, and round-off must not choose
+        between their tets, which extrapolate differently: the first of them is taken."""
+        chosen = np.array(skin.triangle)
+        for i in np.flatnonzero((skin.barycentric < _TIE).any(axis=1)):
+            shared = self.faces[chosen[i]][skin.barycentric[i] >= _TIE]
+            chosen[i] = np.argmax(np.isin(self.faces, shared).sum(axis=1) == len(shared))
+        return chosen
 
     def _containing(self, points: Floats) -> Ints:
         if len(points) == 0:

@@ -59,9 +59,7 @@ def _mean_value_weights(point: Floats, rest: Surface) -> Floats:
     mean = np.einsum("ik,ijk->jk", np.arctan2(sines, cosines), normals) / 2
     heights = np.einsum("ijk,ijk->ik", normals, corners)
     seen = (np.abs(heights) > _EDGE_ON * sines.max(axis=0)).all(axis=0)
-    weights = np.zeros((3, len(rest.triangles)))
-    weights[:, seen] = np.einsum("ijk,jk->ik", normals[:, :, seen], mean[:, seen]) / heights[:, seen]
-    weights /= lengths[rest.triangles.T]
+    weights = np.einsum("ijk,jk->ik", normals, mean) / np.where(seen, heights, np.inf) / lengths[rest.triangles.T]
     total = np.bincount(rest.triangles.T.ravel(), weights=weights.ravel(), minlength=len(rest.points))
     return np.asarray(total / total.sum())
 

@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 from skfem.models.poisson import laplace
 
 from fem_reference.errors import InputError
+from fem_reference.geometry.distance import distances
 from fem_reference.geometry.embedding import Locator
 from fem_reference.mesh import Floats, Ints, Polylines, TetMesh, tet_volumes
 
 _POINTS = 40  # of each line
 _NEAR = 1e-3  # the field this close to 0 or 1 counts as having arrived
-# Candidates that differ by less, relatively, are told apart by their number, so that a turned mesh gives the same lines.
+# Seeds that differ by less, relatively, are told apart by their number, so that a turned mesh gives the same lines.
 _TIES = 1e-6
 _HALFWAY = 0.5 - _TIES  # where the field is 1/2 but for round-off it is above
 
@@ -108,7 +109,7 @@ def _seeds(field: _Field) -> Floats:
     middles = (crossings * cut[:, :, None]).sum(axis=1) / cut.sum(axis=1)[:, None]
     halfway = ((crossings + middles[:, None]) / 2)[cut]
     seeds = np.concatenate([middles, halfway])
-    depths, _ = field.locator.skin_distance(seeds)
+    depths = distances(seeds, field.locator.skin).distance
     enough = (1 - _TIES) * min(field.size / 4, depths.max(initial=0) / 2)
     return np.asarray(seeds[depths > enough])
 

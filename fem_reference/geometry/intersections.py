@@ -9,8 +9,8 @@ from fem_reference.mesh import Floats, Ints, Surface
 def self_intersections(surface: Surface) -> Ints:
     """The triangles (k,), sorted, that an edge of another triangle pierces or whose edge pierces another.
 
-    An edge that has a vertex in common with the other triangle does not count; nor do triangles that touch or overlap in one
-    plane.
+    An edge that has a vertex in common with the other triangle does not count; nor do triangles that touch or overlap
+    in one plane.
     """
     first, second = _near_pairs(surface.points[surface.triangles])
     hit = np.zeros(len(first), bool)
@@ -21,7 +21,7 @@ def self_intersections(surface: Surface) -> Ints:
 
 
 def _near_pairs(corners: Floats) -> tuple[Ints, Ints]:
-    """Pairs (p,), (p,) of triangles whose bounding boxes overlap, from ``corners`` (m, 3, 3); a pair may come more than once."""
+    """Pairs (p,), (p,) of triangles whose bounding boxes overlap, from ``corners`` (m, 3, 3); a pair may come twice."""
     low, high = corners.min(axis=1), corners.max(axis=1)
     triangle, cell = _cells(low, high)
     order = np.argsort(cell, kind="stable")
@@ -41,7 +41,7 @@ def _near_pairs(corners: Floats) -> tuple[Ints, Ints]:
 
 
 def _cells(low: Floats, high: Floats) -> tuple[Ints, Ints]:
-    """Each box from ``low`` to ``high`` (m, 3) with each cell of a uniform grid that it reaches: box (p,) and cell number (p,)."""
+    """Each box from ``low`` to ``high`` (m, 3) with each cell of a uniform grid it reaches: box (p,), cell (p,)."""
     extent = (high - low).max(axis=1)
     # Twice the mean box keeps few boxes in a cell; no box may reach more than some 50 cells along an axis.
     width = max(2 * extent.mean(), extent.max() / 50, np.finfo(float).tiny)

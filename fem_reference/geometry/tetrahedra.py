@@ -1,7 +1,7 @@
 """Filling a closed surface with tetrahedra made for quality: the mesh does not keep the vertices of a finer surface.
 
-``python -m fem_reference.geometry.tetrahedra JOB.npz RESULT.npz`` runs one mesher in a process of its own, where it may crash,
-hang or keep its global state.
+``python -m fem_reference.geometry.tetrahedra JOB.npz RESULT.npz`` runs one mesher in a process of its own, where it may
+crash, hang or keep its global state.
 """
 
 import logging
@@ -35,16 +35,15 @@ log = logging.getLogger(__name__)
 
 SECONDS_ALLOWED = 240.0
 _ROUNDED = 6  # decimals of a mm in the mesher's frame: far below any size, far above the round-off of moving a surface
-
 _VOLUME_WITHIN = 0.05  # a surface that passes through itself has no volume to compare with more closely
 
 
 def tetrahedralise(surface: Surface, size: float) -> TetMesh:
     """Tetrahedra of about ``size`` [mm] inside a closed outward ``surface``; ``facets`` stay empty.
 
-    A surface finer than ``size`` is coarsened to it first. gmsh fills a surface that does not pass through itself and keeps its
-    triangles; where it cannot, fTetWild makes a surface of its own near the given one. The mesh moves with the surface: it is
-    made in a frame that the surface's own vertices span. InputError where no mesher succeeds.
+    A surface finer than ``size`` is coarsened to it first. gmsh fills a surface that does not pass through itself and
+    keeps its triangles; where it cannot, fTetWild makes a surface of its own near the given one. The mesh moves with
+    the surface: it is made in a frame that the surface's own vertices span. InputError where no mesher succeeds.
     """
     origin, axes = _own_frame(surface.points)
     local = np.round((surface.points - origin) @ axes, _ROUNDED) + 0.0  # + 0.0: no negative zeros
@@ -53,8 +52,11 @@ def tetrahedralise(surface: Surface, size: float) -> TetMesh:
 
 
 def _own_frame(points: Floats) -> tuple[Floats, Floats]:
-    """Origin (3,) and axes in columns (3, 3): from vertex 0 to the vertex farthest from it, and from that line to the vertex
-    farthest from it; the lowest index where several are equally far."""
+    """Origin (3,) and axes in columns (3, 3) that the points themselves span.
+
+    From point 0 to the point farthest from it, and from that line to the point farthest from it; the lowest index where
+    several are equally far.
+    """
     from_origin = points - points[0]
     first = from_origin[_farthest(from_origin)]
     first = first / np.linalg.norm(first)
@@ -85,7 +87,7 @@ def _mesh(surface: Surface, size: float) -> TetMesh:
 
 
 def _coarsened(surface: Surface, size: float) -> Surface:
-    """The surface with as many triangles as equilateral ones of side ``size`` would cover it; as it is where it has no more."""
+    """The surface with as many triangles as equilateral ones of side ``size`` cover it; as it is where it has less."""
     count = int(triangle_areas(surface.points, surface.triangles).sum() / (size**2 * np.sqrt(3) / 4))
     if count >= len(surface.triangles):
         return surface
@@ -99,7 +101,7 @@ def _coarsened(surface: Surface, size: float) -> Surface:
 
 
 def _run(mesher: str, surface: Surface, size: float) -> TetMesh:
-    """What ``mesher`` makes of ``surface`` in a process of its own; InputError where it fails, crashes or takes too long."""
+    """What ``mesher`` makes of ``surface`` in its own process; InputError where it fails, crashes or takes too long."""
     with tempfile.TemporaryDirectory() as folder:
         job, result = Path(folder) / "job.npz", Path(folder) / "result.npz"
         np.savez(job, mesher=mesher, points=surface.points, triangles=surface.triangles, size=size)
@@ -164,7 +166,7 @@ def _largest_part(tets: Ints) -> Ints:
     count = int(tets.max()) + 1
     part = connected_components(coo_array((np.ones(len(begin)), (begin, end)), shape=(count, count)), directed=False)[1]
     part_of_tet = part[tets[:, 0]]
-    return tets[part_of_tet == np.bincount(part_of_tet).argmax()]
+    return np.asarray(tets[part_of_tet == np.bincount(part_of_tet).argmax()])
 
 
 def _gmsh(points: Floats, triangles: Ints, size: float) -> tuple[Floats, Ints]:

@@ -59,6 +59,12 @@ def names() -> list[str]:
     return sorted(module.name for module in pkgutil.iter_modules(__path__))
 
 
+def units() -> dict[str, str]:
+    """The unit of every ``metric.statistic`` there is."""
+    modules = {name: importlib.import_module(f"{__name__}.{name}") for name in names()}
+    return {f"{name}.{statistic}": unit for name, module in modules.items() for statistic, unit in module.UNITS.items()}
+
+
 def measure(run: Run, reference: Run, yardstick: Yardstick) -> tuple[Measure, ...]:
     """Every statistic of every metric of ``run`` against ``reference``, frame by frame; both must have the same frames."""
     modules = (importlib.import_module(f"{__name__}.{name}") for name in names())

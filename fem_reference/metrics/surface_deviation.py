@@ -11,6 +11,9 @@ from fem_reference.mesh import Floats
 from fem_reference.metrics import Measure, Yardstick
 from fem_reference.runs import Run
 
+UNITS = {"rms": "mm", "p95": "mm", "max": "mm", "rms_percent": "%", "max_percent": "%"}
+UNITS |= {"distance_mean": "mm", "distance_rms": "mm", "hausdorff": "mm"}
+
 
 @np.errstate(over="ignore", invalid="ignore")
 def measure(run: Run, reference: Run, yardstick: Yardstick) -> tuple[Measure, ...]:
@@ -33,11 +36,11 @@ def _material(deviations: Floats, reference: Run, yardstick: Yardstick) -> tuple
     """The material statistics of ``deviations`` (f, n) [mm]."""
     rms, greatest = _rms(deviations, yardstick.areas), deviations.max(axis=1)
     values = {
-        "rms": ("mm", rms),
-        "p95": ("mm", np.array([_percentile(each, yardstick.areas, 0.95) for each in deviations])),
-        "max": ("mm", greatest),
-        "rms_percent": ("%", _percent(rms, yardstick.travel)),
-        "max_percent": ("%", _percent(greatest, yardstick.travel)),
+        "rms": rms,
+        "p95": np.array([_percentile(each, yardstick.areas, 0.95) for each in deviations]),
+        "max": greatest,
+        "rms_percent": _percent(rms, yardstick.travel),
+        "max_percent": _percent(greatest, yardstick.travel),
     }
     return _measures(values, _worst(deviations, reference))
 
@@ -45,15 +48,15 @@ def _material(deviations: Floats, reference: Run, yardstick: Yardstick) -> tuple
 def _geometric(deviations: Floats, reference: Run, areas: Floats) -> tuple[Measure, ...]:
     """The geometric statistics of ``deviations`` (f, 2n) [mm], each vertex of the run, then each of the reference."""
     values = {
-        "distance_mean": ("mm", deviations @ areas / areas.sum()),
-        "distance_rms": ("mm", _rms(deviations, areas)),
-        "hausdorff": ("mm", deviations.max(axis=1)),
+        "distance_mean": deviations @ areas / areas.sum(),
+        "distance_rms": _rms(deviations, areas),
+        "hausdorff": deviations.max(axis=1),
     }
     return _measures(values, _worst(deviations, reference))
 
 
-def _measures(values: dict[str, tuple[str, Floats]], where: tuple[str, ...]) -> tuple[Measure, ...]:
-    return tuple(Measure("surface_deviation", name, unit, each, where) for name, (unit, each) in values.items())
+def _measures(values: dict[str, Floats], where: tuple[str, ...]) -> tuple[Measure, ...]:
+    return tuple(Measure("surface_deviation", name, UNITS[name], each, where) for name, each in values.items())
 
 
 def _both_ways(run: Run, reference: Run, frame: int) -> Floats:

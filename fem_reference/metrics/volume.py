@@ -6,6 +6,8 @@ from fem_reference.mesh import enclosed_volume
 from fem_reference.metrics import Measure, Yardstick
 from fem_reference.runs import Run
 
+UNITS = {"deviation": "%", "deviation_volume": "mm3"}
+
 
 @np.errstate(over="ignore", invalid="ignore")
 def measure(run: Run, reference: Run, _yardstick: Yardstick) -> tuple[Measure, ...]:
@@ -14,8 +16,5 @@ def measure(run: Run, reference: Run, _yardstick: Yardstick) -> tuple[Measure, .
         np.array([enclosed_volume(positions, each.surface.triangles) for positions in each.positions])
         for each in (run, reference)
     )
-    nowhere = ("",) * len(volumes)
-    return (
-        Measure("volume", "deviation", "%", 100 * (volumes / wanted - 1), nowhere),
-        Measure("volume", "deviation_volume", "mm3", volumes - wanted, nowhere),
-    )
+    values = {"deviation": 100 * (volumes / wanted - 1), "deviation_volume": volumes - wanted}
+    return tuple(Measure("volume", name, UNITS[name], each, ("",) * len(volumes)) for name, each in values.items())

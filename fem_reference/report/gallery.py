@@ -28,8 +28,11 @@ _SECONDS = 600
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """A run at a frame ``number``: ``points`` (n, 3) [mm]; a candidate also has the ``distances`` (n,) [mm] of its vertices to
-    the same vertices of the reference, whose points are the ``outline`` (n, 3)."""
+    """A run at a frame ``number``: ``points`` (n, 3) [mm].
+
+    A candidate also has the ``distances`` (n,) [mm] of its vertices to the same vertices of the reference, whose points
+    are the ``outline`` (n, 3).
+    """
 
     name: str
     number: int
@@ -61,8 +64,11 @@ def draw(setup: Setup, surface: Surface, wanted: list[Shot]) -> list[tuple[bytes
 
 
 def directions(surface: Surface, bones: tuple[Body, ...]) -> Floats:
-    """Unit vectors (2, 3) towards the cameras: along the smallest and the middle principal axis of the surface, that is where
-    its silhouette is largest and a quarter turn about its long axis from there, on the side away from the bones' vertices."""
+    """Unit vectors (2, 3) towards the cameras: along the smallest and the middle principal axis of the surface.
+
+    From the first its silhouette is largest, the second is a quarter turn about its long axis from there. Both cameras
+    stand on the side away from the bones' vertices.
+    """
     middle = surface.points.mean(axis=0)
     _, axes = np.linalg.eigh(np.cov((surface.points - middle).T))
     views = axes.T[:2]

@@ -2,6 +2,7 @@
 
 import base64
 import json
+import math
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
@@ -77,6 +78,7 @@ def render(comparison: Comparison) -> str:
         seconds_per_frame=seconds_per_frame,
         ratio=ratio,
         label_of=label_of,
+        least=least,
         figures=figures,
         missing=missing,
         colours=_colours(),
@@ -91,8 +93,10 @@ def render(comparison: Comparison) -> str:
 
 
 def worst(run: Run, measure: Measure) -> dict[str, Any]:
-    """A measure at its worst frame: ``value``, ``frame`` number and ``where`` in words; where that value is not a number,
-    ``finite`` is the worst (value, frame) of the frames where it is one, else None."""
+    """A measure at its worst frame: ``value``, ``frame`` number and ``where`` in words.
+
+    Where that value is not a number, ``finite`` is the worst (value, frame) of the frames where it is one, else None.
+    """
     i = measure.worst
     known = np.flatnonzero(np.isfinite(measure.values))
     finite = None
@@ -103,6 +107,12 @@ def worst(run: Run, measure: Measure) -> dict[str, Any]:
     return {"value": float(measure.values[i]), "frame": run.numbers[i], "where": where, "finite": finite}
 
 
+def least(measure: Measure) -> float:
+    """The smallest value of a measure over the frames where it is a number, NaN where it nowhere is."""
+    known = measure.values[np.isfinite(measure.values)]
+    return float(known.min()) if len(known) else math.nan
+
+
 def ticks(top: float) -> list[tuple[float, float]]:
     """Round values from 0 to ``top`` with their share of the way, and ``top`` itself.
 
@@ -111,10 +121,10 @@ def ticks(top: float) -> list[tuple[float, float]]:
     """
     if not top > 0:
         return [(0.0, 0.0)]
-    power = 10.0 ** np.floor(np.log10(top / 2))
+    power = 10.0 ** math.floor(math.log10(top / 2))
     step = next(power * factor for factor in (1, 2, 5, 10) if top / (power * factor) <= 6)
     values = [k * step for k in range(int(top / step) + 1) if k * step < 0.86 * top]
-    return [(round(value / top, 3), float(value)) for value in values] + [(1.0, top)]
+    return [(round(value / top, 3), value) for value in values] + [(1.0, top)]
 
 
 def effect_parameters(effect: Effect) -> list[tuple[str, float, str]]:

@@ -1,10 +1,11 @@
 """Draws the pictures of a job file, as a program of its own: ``python -P pictures.py JOB.npz FOLDER``.
 
-Without an OpenGL library VTK ends the process that draws, with no exception, hence the process of its own. The job holds
-``triangles`` (m, 3), ``directions`` (2, 3) towards the two cameras, ``bones`` (how many) and ``shots`` (how many), bone i as
-``bone_i_points`` and ``bone_i_triangles``, and shot i as ``shot_i_points`` (n, 3), ``shot_i_poses`` (bones, 4, 4), and where it
-has them ``shot_i_distances`` (n,) [mm] to colour by and ``shot_i_outline`` (n, 3), the body whose outline is drawn over it.
-View k of shot i becomes ``i_k.webp`` in the folder.
+Without an OpenGL library VTK ends the process that draws, with no exception, hence the process of its own.
+
+The job holds ``triangles`` (m, 3), ``directions`` (2, 3) towards the two cameras, ``bones`` and ``shots`` (how many),
+bone i as ``bone_i_points`` and ``bone_i_triangles``, and shot i as ``shot_i_points`` (n, 3), ``shot_i_poses``
+(bones, 4, 4), and where it has them ``shot_i_distances`` (n,) [mm] to colour by and ``shot_i_outline`` (n, 3), the body
+whose outline is drawn over it. View k of shot i becomes ``i_k.webp`` in the folder.
 """
 
 import sys
@@ -61,7 +62,7 @@ def _view(arrays: dict[str, NDArray[Any]], shot: int, bones: list[Any], directio
 
 
 def _camera(points: NDArray[Any], frame: NDArray[Any], direction: NDArray[Any]) -> dict[str, Any]:
-    """A parallel camera from ``direction`` on the body ``frame``, wide enough for ``points`` unless they are scattered."""
+    """A parallel camera from ``direction`` on the body ``frame``, wide enough for ``points`` unless scattered."""
     middle = (frame.max(axis=0) + frame.min(axis=0)) / 2
     own, both = (float(np.linalg.norm(cloud - middle, axis=1).max()) for cloud in (frame, np.vstack([frame, points])))
     up = (0.0, 0.0, 1.0) if abs(direction[2]) < 0.95 else (0.0, 1.0, 0.0)

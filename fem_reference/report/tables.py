@@ -1,4 +1,4 @@
-"""A comparison as rows of numbers: what measures.json and measures.csv hold, and the figures that the page puts first."""
+"""A comparison as rows of numbers: what measures.json and measures.csv hold, and the time of a frame."""
 
 import csv
 import io
@@ -19,8 +19,8 @@ COLUMNS = ("candidate", "metric", "statistic", "frame", "value", "unit")
 def summary(comparison: Comparison) -> dict[str, Any]:
     """Everything that was measured, as valid JSON: a number that is not finite is None.
 
-    ``measures`` holds each candidate's deviation from the reference, and under ``"reference"`` its own change from rest with the
-    inversion numbers that its solver recorded; ``from_rest`` the change from rest of every run.
+    ``measures`` holds each candidate's deviation from the reference, and under ``"reference"`` its own change from rest
+    with the inversion numbers that its solver recorded; ``from_rest`` the change from rest of every run.
     """
     reference = comparison.reference
     deviations = [row for run in comparison.candidates for row in _rows(run, comparison.deviations[run.name])]
@@ -73,7 +73,7 @@ def inversion(run: Run) -> tuple[Measure, ...]:
 
 
 def seconds_per_frame(run: Run) -> float | None:
-    """Time to solve one of the frames after the first that were reached [s]; None where somebody else computed the run elsewhere.
+    """Time to solve one of the frames after the first that were reached [s]; None where the run was computed elsewhere.
 
     ``seconds_solve`` is a solver's own time without compiling and writing; without it the whole wall time counts.
     """

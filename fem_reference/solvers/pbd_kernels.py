@@ -19,8 +19,8 @@ Vector = tuple[float, float, float]
 
 # Below this sine of a dihedral angle its gradient is rounding noise, and the pair counts as flat.
 FLAT = 1e-5
-# One projection turns a pair by no more than this [rad]. Points go straight, not round: a turn by t lengthens a triangle
-# by t^2 / 2 of its height; where pairs are folded shut (t near pi) that grows from pair to pair until all is lost.
+# One projection turns a pair by no more than this [rad]. Points go straight, not round: a turn by t makes a triangle
+# higher by t^2 / 2; where pairs are folded shut (t near pi) that grows from pair to pair until all is lost.
 LARGEST_TURN = 0.3
 _ZERO = (0.0, 0.0, 0.0)
 
@@ -97,8 +97,8 @@ def volume(points: Floats, triangles: Ints) -> tuple[float, Floats]:
 def dihedral(p1: Vector, p2: Vector, p3: Vector, p4: Vector) -> tuple[float, Vector, Vector, Vector, Vector]:
     """Angle [rad] of triangles (p1, p2, p3) and (p1, p2, p4) about their edge p1-p2, and its gradients. Eq. 5.22-5.30.
 
-    It is pi where they are flat and cannot tell the two sides of a fold. Gradients are zero where arccos has none: flat,
-    folded shut, no area. arccos d is taken as atan2(sine, d), because arccos loses half the digits there. Eq. 5.26 needs
+    It is pi if they are flat and cannot tell the two sides of a fold. Gradients are zero where arccos has none: flat,
+    folded shut, no area. There arccos d loses half its digits too: it is taken as atan2(sine, d). Eq. 5.26 needs
     eq. 5.30 transposed, and ``n2 . (n2 x p2)`` in it is an outer product.
     """
     e, a, b = _minus(p2, p1), _minus(p3, p1), _minus(p4, p1)

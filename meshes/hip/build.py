@@ -6,7 +6,8 @@ writes muscle.ply, pelvis.ply, femur.ply and card.toml beside this file. Lengths
 origin, +x the subject's left, +y posterior, +z superior. Flexion turns the femur by a negative angle about +x.
 
 The muscle is a loft of ellipses along a Bezier curve. Its two ends are flat and lie ``GAP`` before flat faces of the
-bones, so that the vertices within 2.5 mm of a bone are those of the end and no others.
+bones, so that the vertices within 1.5 mm of a bone are those of the end and no others. Its triangles are finer towards
+the ends: what is attached then stops at their rims.
 """
 
 import hashlib
@@ -24,6 +25,7 @@ GAP = 0.5  # between an end of the muscle and its bone
 ORIGIN, ORIGIN_NORMAL = np.array([12.0, 82.0, 68.0]), np.array([-0.25, 0.36, -0.90])
 INSERTION, INSERTION_NORMAL = np.array([-46.0, 30.0, -96.0]), np.array([0.05, 0.50, 0.87])
 BOW = 58.0  # length of the Bezier handles: how far the muscle bulges backwards
+END_SIZE = 2.4  # edges of the muscle's triangles at its ends
 END_RADIUS, BELLY_RADIUS, FLATNESS = 9.6, 21.0, 1.12
 SECTIONS = 15
 
@@ -113,6 +115,12 @@ def femur() -> list[Tag]:
     return fused([head, neck, trochanter, tuberosity, condyles, *rod([-44, 0, -24], [-40, 0, -265], (15, 14))])
 
 
+def finer_towards_the_ends(_dimension: int, _tag: int, x: float, y: float, z: float, size: float) -> float:
+    """The edge length wanted of the muscle at a point: ``END_SIZE`` on its end faces, 0.7 mm more each mm away."""
+    heights = (unit(ORIGIN_NORMAL) @ ([x, y, z] - ORIGIN), unit(INSERTION_NORMAL) @ ([x, y, z] - INSERTION))
+    return min(size, END_SIZE + 0.7 * max(0.0, float(min(heights)) - GAP))
+
+
 @contextmanager
 def gmsh_session(size: float) -> Iterator[None]:
     """A gmsh session that meshes curves and surfaces with edges of about ``size`` [mm]."""
@@ -121,7 +129,7 @@ def gmsh_session(size: float) -> Iterator[None]:
         for name, value in {
             "General.Terminal": 0,
             "General.NumThreads": 1,
-            "Mesh.MeshSizeMin": size,
+            "Mesh.MeshSizeMin": min(size, END_SIZE),
             "Mesh.MeshSizeMax": size,
             "Mesh.RandomSeed": 1,
         }.items():
@@ -136,6 +144,8 @@ def surface(solid: Callable[[], list[Tag]], size: float) -> tuple[Floats, Ints]:
     with gmsh_session(size):
         tags = solid()
         gmsh.model.occ.synchronize()
+        if solid is muscle:
+            gmsh.model.mesh.setSizeCallback(finer_towards_the_ends)
         gmsh.model.mesh.generate(2)
         faces = gmsh.model.getBoundary(tags)
         corners = [gmsh.model.mesh.getElementsByType(2, tag)[1].reshape(-1, 3) for _, tag in faces]
@@ -164,7 +174,7 @@ def ply(points: Floats, triangles: Ints) -> bytes:
 
 
 SURFACES = {
-    "muscle": (muscle, 4.7, "gluteus-like fusiform muscle with flat ends"),
+    "muscle": (muscle, 5.2, "gluteus-like fusiform muscle with flat ends"),
     "pelvis": (pelvis, 11.5, "right half of a pelvis: ilium, sacrum, ischium, pubic ramus"),
     "femur": (femur, 10.0, "right femur: head, neck, trochanter, tuberosity, shaft, condyles"),
 }

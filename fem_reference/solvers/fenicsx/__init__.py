@@ -85,8 +85,7 @@ def _run(command: list[str], settings: Settings, sink: Sink) -> Outcome:
         for event in _events(process):
             if "frame" in event:
                 reached.append(event["frame"])
-                with np.load(event["file"]) as arrays:
-                    sink(Frame(event["frame"], arrays["surface"], arrays["fibres"], arrays["tets"], event["scalars"]))
+                sink(_frame(event))
                 Path(event["file"]).unlink()
             else:
                 return Outcome(event["status"], event["message"], event["cost"])
@@ -96,6 +95,13 @@ def _run(command: list[str], settings: Settings, sink: Sink) -> Outcome:
         return Outcome("timed out", f"stopped after {settings.time_limit:.0f} s, the time limit; {kept}")
     last = "".join(errors[-1:]).strip()
     return Outcome("crashed", f"the FEniCSx process ended with exit status {code} ({last}); {kept}")
+
+
+def _frame(event: dict[str, Any]) -> Frame:
+    scalars = event["scalars"]
+    note = f"{scalars['newton_iterations']:.0f} Newton iterations, det F at least {scalars['min_det_F_quadrature']:.2g}"
+    with np.load(event["file"]) as arrays:
+        return Frame(event["frame"], arrays["surface"], arrays["fibres"], arrays["tets"], scalars, note)
 
 
 @contextmanager

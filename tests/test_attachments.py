@@ -1,0 +1,171 @@
+"""Attachments: what each of the three ways selects on bodies where it can be counted, and the facets below."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapes
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.spatial.transform import Rotation
+
+from fem_reference import files
+from fem_reference.errors import InputError
+from fem_reference.geometry.attachments import facets_under, pick
+from fem_reference.mesh import Surface, check_closed, triangle_areas, vertex_areas
+from fem_reference.scene import Attachment, Scene
+
+BLOCK = shapes.skin(shapes.box((10, 10, 2), (20.0, 20.0, 4.0)))
+FLOOR = Surface(np.array([[-50.0, -50, -1], [50, -50, -1], [0, 80, -1]]), np.array([[0, 1, 2]]))
+HIP = np.array([146.0, 238.0, -431.0])  # [mm]
+RING = [(6, 6), (14, 14), (14, 6), (6, 14), (10, 5), (10, 15)]  # [mm], not in the order of their angles
+
+
+def _pick(folder: Path, surface: Surface = BLOCK, **way: Any) -> np.ndarray:
+    attachment = Attachment(name="origin", bone="floor", **way)
+    return pick(Scene.model_construct(folder=folder, attachment=(attachment,)), 0, surface, FLOOR)
+
+
+def _listed(folder: Path, text: str, **keys: Any) -> np.ndarray:
+    (folder / "list.csv").write_text(text)
+    return _pick(folder, vertices={"file": "list.csv", **keys})
+
+
+def _outline(
+    folder: Path, text: str, reach: str = "1 mm", clouds: tuple[str, ...] = ("A",), unit: str = "mm"
+) -> np.ndarray:
+    (folder / "marks.csv").write_text(text)
+    return _pick(folder, outline={"file": "marks.csv", "unit": unit, "clouds": clouds, "reach": reach})
+
+
+def _marks(points: np.ndarray, cloud: str = "A") -> str:
+    rows = [f"{cloud},{i},{x},{y},{z}" for i, (x, y, z) in enumerate(points)]
+    return "\n".join(["cloud,landmark,x_mm,y_mm,z_mm", *rows])
+
+
+def test_listed_vertices_come_sorted_and_once(tmp_path: Path) -> None:
+    text = "# chosen by hand\nvertex\n7\n3\n\n7\n0\n"
+    assert_array_equal(_listed(tmp_path, text), [0, 3, 7])
+
+
+def test_a_value_chooses_among_the_rows(tmp_path: Path) -> None:
+    text = "# vertex, bone\n4,1\n5,2\n2,1\n"
+    assert_array_equal(_listed(tmp_path, text, value=1), [2, 4])
+    assert_array_equal(_listed(tmp_path, text, value=2), [5])
+    assert_array_equal(_listed(tmp_path, text), [2, 4, 5])
+    assert len(_listed(tmp_path, text, value=3)) == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "keys", "what"),
+    [
+        ("vertex\n3\n9999\n", {}, r'list.csv: row 3: got "9999", want a vertex from 0 to 281'),
+        ("3\n-1\n", {}, r'list.csv: row 2: got "-1"'),
+        ("3\nfour\n", {}, r'list.csv: row 2: got "four"'),
+        ("3\n4.0\n", {}, r'list.csv: row 2: got "4.0"'),
+        ("vertex,value\n3,1\n4\n", {"value": 1}, r'list.csv: row 3: got "4", want a vertex and its value'),
+        ("3,femur\n", {"value": 1}, r'list.csv: row 1: got "3,femur", want a vertex and its value'),
+    ],
+)
+def test_a_wrong_list_is_named(tmp_path: Path, text: str, keys: dict[str, int], what: str) -> None:
+    with pytest.raises(InputError, match=what):
+        _listed(tmp_path, text, **keys)
+
+
+def test_a_list_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"case.toml: attachment\[0\].vertices.file: got .*nowhere.csv"):
+        _pick(tmp_path, vertices={"file": "nowhere.csv"})
+
+
+def test_within_takes_the_vertices_near_the_bone(tmp_path: Path) -> None:
+    heights = BLOCK.points[:, 2] + 1  # above the floor at z = -1
+    for reach in (0.5, 1.0, 3.0, 9.0):
+        assert_array_equal(_pick(tmp_path, within=f"{reach} mm"), np.flatnonzero(heights <= reach))
+
+
+def test_an_outline_takes_what_is_near_its_patch(tmp_path: Path) -> None:
+    found = _outline(tmp_path, _marks(np.array([(x, y, 0) for x, y in RING])))
+    x, y, z = BLOCK.points.T
+    # The hexagon's corners in order: distance to it is 0 inside, and the vertices stand 2 mm apart.
+    inside = (x >= 6) & (x <= 14) & (y >= 5 + abs(x - 10) / 4) & (y <= 15 - abs(x - 10) / 4) & (z == 0)
+    beside = (np.abs(x - 10) <= 4) & (np.abs(y - 10) <= 6) & (z == 0)
+    assert set(np.flatnonzero(inside)) <= set(found) <= set(np.flatnonzero(beside))
+
+
+def test_an_outline_does_not_depend_on_unit_order_or_place(tmp_path: Path) -> None:
+    points = np.array([(x, y, -0.3 * (x > 9)) for x, y in RING])
+    found = _outline(tmp_path, _marks(points), reach="2.5 mm")
+    assert len(found) > 10
+    assert_array_equal(_outline(tmp_path, _marks(points[::-1] / 10), reach="2.5 mm", unit="cm"), found)
+    turn = Rotation.random(rng=np.random.default_rng(11))
+    (tmp_path / "marks.csv").write_text(_marks(turn.apply(points) + HIP))
+    outline = {"file": "marks.csv", "unit": "mm", "clouds": ("A",), "reach": "2.5 mm"}
+    turned = BLOCK.moved_to(turn.apply(BLOCK.points) + HIP)
+    assert_array_equal(_pick(tmp_path, turned, outline=outline), found)
+
+
+def test_two_clouds_are_two_patches(tmp_path: Path) -> None:
+    square = np.array([(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0)])
+    text = _marks(square) + "\n" + _marks(square + np.array([16, 16, 0]), "B").split("\n", 1)[1]
+    found = _outline(tmp_path, text, reach="0.1 mm", clouds=("A", "B"))
+    low, high = (
+        BLOCK.points.max(axis=1) <= 2,
+        (BLOCK.points[:, :2].min(axis=1) >= 16) & (BLOCK.points[:, :2].max(axis=1) <= 18),
+    )
+    assert_array_equal(found, np.flatnonzero((low | high) & (BLOCK.points[:, 2] == 0)))
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        (
+            _marks(np.eye(3), "B"),
+            r'attachment\[0\].outline.clouds: got "A", which .*marks.csv does not have, want some of B',
+        ),
+        (_marks(np.eye(3)[:2]), r'marks.csv: cloud "A": got 2 landmarks, want at least three'),
+        (_marks(np.eye(3)) + "\nA,4,0,nan,1", r'marks.csv: row 5: got "A,4,0,nan,1", want cloud, landmark and three'),
+        (_marks(np.eye(3)) + "\nA,4,0,1", r'marks.csv: row 5: got "A,4,0,1"'),
+        (_marks(np.eye(3)) + "\nA", r'marks.csv: row 5: got "A"'),
+        (_marks(np.eye(3)) + "\nA,4,0,east,1", r'marks.csv: row 5: got "A,4,0,east,1"'),
+    ],
+)
+def test_a_wrong_outline_is_named(tmp_path: Path, text: str, what: str) -> None:
+    with pytest.raises(InputError, match=what):
+        _outline(tmp_path, text)
+
+
+def test_facets_under_a_face_are_that_face() -> None:
+    # One layer: on its sides the share sinks to 0 in half the height, which is 5/12 on average over a triangle that stands.
+    mesh = shapes.box((5, 4, 1), (20.0, 20.0, 4.0))
+    bottom = np.flatnonzero(BLOCK.points[:, 2] == 0)
+    facets = facets_under(mesh, BLOCK, bottom)
+    assert {tuple(sorted(facet)) for facet in facets.tolist()} == {
+        tuple(sorted(facet)) for facet in mesh.facets["bottom"].tolist()
+    }
+    a, b, c = (mesh.points[facets[:, corner]] for corner in range(3))
+    assert (np.cross(b - a, c - a)[:, 2] < 0).all()  # outward
+
+
+def test_no_vertices_have_no_facets() -> None:
+    assert facets_under(shapes.box((2, 2, 2), (20.0, 20.0, 4.0)), BLOCK, np.zeros(0, np.int64)).shape == (0, 3)
+
+
+def test_the_area_converges_as_the_tets_shrink() -> None:
+    disc = np.flatnonzero((np.hypot(*(BLOCK.points[:, :2] - 10).T) < 7) & (BLOCK.points[:, 2] == 0))
+    wanted = vertex_areas(BLOCK.points, BLOCK.triangles)[disc].sum()
+    for cells, within in ((10, 0.1), (30, 0.03)):
+        mesh = shapes.box((cells, cells, 2), (20.0, 20.0, 4.0))
+        area = triangle_areas(mesh.points, facets_under(mesh, BLOCK, disc)).sum()
+        # The rim (44 mm) is off by at most a tenth of a facet's side on average: 0.2 mm of 2, 0.07 mm of 0.7, on 154 mm2.
+        assert_allclose(area, wanted, rtol=within)
+
+
+def test_the_origins_of_gluteus_maximus(data: Path, tmp_path: Path) -> None:
+    muscle = check_closed(files.read_surface(data / "hip/muscles/gluteus_maximus.vtk", 1.0))
+    clouds = tuple(f"LC_SET_Ori_{i}_R_M081_Glut_Max" for i in (1, 2))
+    outline = {"file": str(data / "hip/landmarks.csv"), "unit": "mm", "clouds": clouds}
+    near, far = (_pick(tmp_path, muscle, outline=outline | {"reach": reach}) for reach in ("5 mm", "10 mm"))
+    assert set(near) < set(far)
+    areas = vertex_areas(muscle.points, muscle.triangles)
+    # Two strips of about 130 mm along the iliac crest and the sacrum, some 30 mm wide: 10 to 100 cm2.
+    assert 1000 < areas[near].sum() < areas[far].sum() < 10000

@@ -1,0 +1,57 @@
+"""Distance to a surface: against closed forms on a cube and on one triangle."""
+
+import numpy as np
+import shapes
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+
+from fem_reference.geometry.distance import distances
+from fem_reference.mesh import Surface
+
+HIP = np.array([146.0, 238.0, -431.0])  # [mm]
+CUBE = shapes.skin(shapes.box((3, 3, 3), (2.0, 2.0, 2.0)))
+
+
+def _distance_to_cube(points: np.ndarray) -> np.ndarray:
+    """Distance to the surface of the cube from 0 to 2."""
+    outside = np.linalg.norm(np.maximum(np.abs(points - 1) - 1, 0), axis=1)
+    inside = np.minimum(points, 2 - points).min(axis=1)
+    return np.where(outside > 0, outside, inside)
+
+
+def test_distance_to_a_cube_inside_and_outside() -> None:
+    points = np.random.default_rng(1).uniform(-2, 4, (500, 3))
+    found = distances(points, CUBE)
+    # 1e-12: round-off of squares of lengths below 10.
+    assert_allclose(found.distance, _distance_to_cube(points), atol=1e-12)
+    assert_allclose(np.linalg.norm(found.closest - points, axis=1), found.distance, atol=1e-12)
+
+
+def test_barycentric_coordinates_give_the_closest_point() -> None:
+    points = np.random.default_rng(2).uniform(-2, 4, (500, 3))
+    turn = Rotation.random(rng=np.random.default_rng(3))
+    surface = CUBE.moved_to(turn.apply(CUBE.points) + HIP)
+    found = distances(turn.apply(points) + HIP, surface)
+    corners = surface.points[surface.triangles[found.triangle]]
+    # 1e-10: coordinates near 500 with 16 digits, divided by triangle heights near 0.5.
+    assert_allclose(np.einsum("nk,nkd->nd", found.barycentric, corners), found.closest, atol=1e-10)
+    assert_allclose(found.barycentric.sum(axis=1), 1, rtol=1e-12)
+    assert found.barycentric.min() >= 0
+
+
+def test_vertices_edges_and_middles_have_their_own_weights() -> None:
+    surface = Surface(np.eye(3), np.array([[0, 1, 2]]))
+    weights = np.array([[1, 0, 0], [0, 1, 0], [0, 0.5, 0.5], [0.2, 0.3, 0.5]])
+    assert_allclose(distances(weights @ surface.points, surface).barycentric, weights, atol=1e-12)
+
+
+def test_a_triangle_without_area_still_has_weights() -> None:
+    surface = Surface(np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]]), np.array([[0, 1, 2]]))
+    found = distances(np.array([[1.0, 3, 0]]), surface)
+    assert_allclose(found.distance, 3)
+    assert_allclose(found.barycentric.sum(), 1)
+
+
+def test_no_points_have_no_distances() -> None:
+    found = distances(np.zeros((0, 3)), CUBE)
+    assert [len(part) for part in found] == [0, 0, 0, 0]

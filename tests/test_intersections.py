@@ -1,0 +1,97 @@
+"""Self-intersections: against all pairs solved one by one, and against what is known of the report's surfaces."""
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapes
+from numpy.testing import assert_array_equal
+from scipy.spatial.transform import Rotation
+
+from fem_reference import files
+from fem_reference.geometry.intersections import self_intersections
+from fem_reference.mesh import Surface
+
+HIP = np.array([146.0, 238.0, -431.0])  # [mm]
+TURN = Rotation.random(rng=np.random.default_rng(4))
+
+
+def _together(*surfaces: Surface) -> Surface:
+    starts = np.cumsum([0, *(len(surface.points) for surface in surfaces)])
+    triangles = [surface.triangles + start for surface, start in zip(surfaces, starts, strict=False)]
+    return Surface(np.concatenate([surface.points for surface in surfaces]), np.concatenate(triangles))
+
+
+def _by_brute_force(surface: Surface) -> list[int]:
+    """Every edge against every triangle: begin + t way = a + u (b - a) + v (c - a), solved as three equations."""
+    hit = set()
+    for one, other in itertools.permutations(range(len(surface.triangles)), 2):
+        a, b, c = surface.points[surface.triangles[other]]
+        for i, j in ((0, 1), (1, 2), (2, 0)):
+            ends = surface.triangles[one][[i, j]]
+            if set(ends) & set(surface.triangles[other]):
+                continue
+            begin, end = surface.points[ends]
+            matrix = np.column_stack([begin - end, b - a, c - a])
+            if abs(np.linalg.det(matrix)) < 1e-12:
+                continue
+            t, u, v = np.linalg.solve(matrix, begin - a)
+            if 0 < t < 1 and u >= 0 and v >= 0 and u + v <= 1:
+                hit |= {one, other}
+    return sorted(hit)
+
+
+def test_two_spheres_through_each_other() -> None:
+    ball = shapes.sphere(0)
+    both = _together(ball, ball.moved_to(TURN.apply(ball.points) + np.array([0.9, 0.7, 0.3])))
+    found = self_intersections(both)
+    assert len(found) > 10
+    assert_array_equal(found, _by_brute_force(both))
+
+
+def test_triangles_of_very_different_size() -> None:
+    rng = np.random.default_rng(5)
+    small = shapes.sphere(0)
+    large = Surface(rng.uniform(-20, 20, (9, 3)), np.arange(9).reshape(3, 3))
+    wall = Surface(np.array([[0.1, 0, -30], [0, 30, 30], [1, -30, 30]]), np.array([[0, 1, 2]]))
+    both = _together(large, wall, small, small.moved_to(small.points + np.array([0.2, 0.1, 1.5])))
+    found = self_intersections(both)
+    assert 3 in found  # the wall
+    assert_array_equal(found, _by_brute_force(both))
+
+
+@pytest.mark.parametrize("surface", [shapes.sphere(3), shapes.skin(shapes.box((4, 3, 2), (4.0, 3.0, 2.0)))])
+def test_a_clean_surface_has_none(surface: Surface) -> None:
+    assert len(self_intersections(surface)) == 0
+
+
+def test_spheres_apart_or_inside_each_other_have_none() -> None:
+    ball = shapes.sphere(2)
+    assert len(self_intersections(_together(ball, ball.moved_to(ball.points / 2), ball.moved_to(ball.points + 3)))) == 0
+
+
+def test_moving_the_surface_changes_nothing() -> None:
+    ball = shapes.sphere(2, 30.0)
+    both = _together(ball, ball.moved_to(ball.points + np.array([17, 23, 31])))
+    moved = both.moved_to(TURN.apply(both.points) + HIP)
+    assert_array_equal(self_intersections(both), self_intersections(moved))
+
+
+def test_only_edges_apart_from_the_triangle_count() -> None:
+    points = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [0.5, 0.5, -1], [0.5, 0.5, 1], [5, 5, 0]])
+    apart = Surface(points, np.array([[0, 1, 2], [3, 4, 5]]))
+    sharing = Surface(points, np.array([[0, 1, 2], [0, 3, 4]]))
+    hinge = Surface(points, np.array([[0, 1, 2], [0, 1, 4]]))
+    assert_array_equal(self_intersections(apart), [0, 1])
+    assert_array_equal(self_intersections(sharing), [0, 1])  # the edge 3-4 is apart from the first triangle
+    assert_array_equal(self_intersections(hinge), [])
+
+
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [("muscles/adductor_brevis", 3), ("muscles/gluteus_maximus", 0), ("bones/femur_report", 0)],
+)
+def test_the_report_surfaces(data: Path, name: str, count: int) -> None:
+    # Counts of data/README.md, found there by another program.
+    assert len(self_intersections(files.read_surface(data / "hip" / f"{name}.vtk", 1.0))) == count

@@ -1,0 +1,179 @@
+"""Tetrahedra: they fill the surface, are well shaped and move with it; what cannot be meshed is an error that says why."""
+
+import logging
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapes
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.spatial.transform import Rotation
+
+from fem_reference import files
+from fem_reference.errors import InputError
+from fem_reference.geometry import tetrahedra
+from fem_reference.geometry.distance import distances
+from fem_reference.geometry.intersections import self_intersections
+from fem_reference.geometry.tetrahedra import tetrahedralise
+from fem_reference.mesh import (
+    Surface,
+    TetMesh,
+    boundary,
+    check_closed,
+    enclosed_volume,
+    tet_qualities,
+    tet_volumes,
+)
+
+HIP = np.array([146.0, 238.0, -431.0])  # [mm]
+
+
+def _bumpy(subdivisions: int = 4) -> Surface:
+    """A body without symmetry, some 60 mm across."""
+    ball = shapes.sphere(subdivisions)
+    x, y, z = ball.points.T
+    radii = 30 * (1 + 0.15 * np.sin(3 * x + 1) + 0.1 * np.cos(4 * y * z) + 0.1 * x * y)
+    return Surface(radii[:, None] * ball.points, ball.triangles, "bumpy.ply")
+
+
+@pytest.fixture(scope="module")
+def mesh() -> TetMesh:
+    return tetrahedralise(_bumpy(), 8.0)
+
+
+def _check(mesh: TetMesh, surface: Surface, size: float) -> None:
+    """Filled without holes, near the surface, with the same volume, and no bad tet."""
+    skin = shapes.skin(mesh)
+    check_closed(skin)
+    assert tet_volumes(mesh.points, mesh.tets).min() > 0
+    assert_array_equal(np.unique(mesh.tets), np.arange(len(mesh.points)))
+    volume = enclosed_volume(surface.points, surface.triangles)
+    # Coarsening corrects the volume to 1e-5; what is asked for is 0.3 %, below what FEM changes it by.
+    assert_allclose(tet_volumes(mesh.points, mesh.tets).sum(), volume, rtol=1e-4)
+    # A chord of length h is h^2 / (8 r) off: h / 8 on average at the sharpest curvature that h resolves, r = h.
+    assert distances(surface.points, skin).distance.mean() < size / 8
+    qualities = tet_qualities(mesh.points, mesh.tets)
+    assert qualities.min() > 0.15
+    assert np.percentile(qualities, 5) > 0.5
+
+
+def test_a_fine_surface_is_filled_with_good_tets_of_the_size_asked_for(mesh: TetMesh) -> None:
+    _check(mesh, _bumpy(), 8.0)
+    pairs = mesh.tets[:, [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]]
+    edges = np.diff(mesh.points[pairs], axis=2)[:, :, 0]
+    # Points of a tet mesh cannot all be a size apart: gmsh splits an edge above 1.4 sizes and leaves those below 0.7.
+    assert 0.7 * 8 < np.linalg.norm(edges, axis=2).mean() < 1.4 * 8
+
+
+def test_the_mesh_moves_with_the_surface(mesh: TetMesh) -> None:
+    turn, surface = Rotation.random(rng=np.random.default_rng(12)), _bumpy()
+    moved = tetrahedralise(surface.moved_to(turn.apply(surface.points) + HIP), 8.0)
+    assert_array_equal(moved.tets, mesh.tets)
+    # The mesher's frame is rounded to 1e-6 mm.
+    assert_allclose(moved.points, turn.apply(mesh.points) + HIP, atol=1e-5)
+
+
+def test_the_same_surface_gives_the_same_mesh(mesh: TetMesh) -> None:
+    again = tetrahedralise(_bumpy(), 8.0)
+    assert_array_equal(again.points, mesh.points)
+    assert_array_equal(again.tets, mesh.tets)
+
+
+def test_a_box_keeps_its_corners() -> None:
+    fine = shapes.skin(shapes.box((20, 16, 20), (100.0, 80.0, 100.0)))
+    coarse = tetrahedralise(fine, 16.0)
+    _check(coarse, fine, 16.0)
+    corners = np.array([[x, y, z] for x in (0, 100) for y in (0, 80) for z in (0, 100)])
+    # h^2 / (2 * 6 diagonals) = 0.13 mm: how much the inversion in coarsening bends a plane over one triangle.
+    assert np.linalg.norm(coarse.points[:, None] - corners, axis=2).min(axis=0).max() < 0.15
+
+
+def test_a_surface_coarser_than_the_size_is_kept() -> None:
+    ball = shapes.sphere(2, 30.0)
+    kept = shapes.skin(tetrahedralise(ball, 8.0))
+    order = [np.lexsort(np.round(points, 4).T) for points in (kept.points, ball.points)]
+    assert_allclose(kept.points[order[0]], ball.points[order[1]], atol=1e-5)
+    assert len(kept.triangles) == len(ball.triangles)
+
+
+def test_a_surface_through_itself_is_meshed_by_the_other_mesher(caplog: pytest.LogCaptureFixture) -> None:
+    ball = shapes.sphere(1, 30.0)
+    points = ball.points.copy()
+    points[20] += 1.6 * (points[24] - points[20])
+    dirty = Surface(points, ball.triangles, "dirty.ply")
+    assert len(self_intersections(dirty)) > 0
+    with caplog.at_level(logging.WARNING):
+        mesh = tetrahedralise(dirty, 16.0)
+    assert "dirty.ply: fTetWild meshes it, for gmsh cannot" in caplog.text
+    assert_allclose(tet_volumes(mesh.points, mesh.tets).sum(), enclosed_volume(points, ball.triangles), rtol=0.05)
+
+
+def test_a_size_that_loses_a_part_is_refused() -> None:
+    with pytest.raises(
+        InputError, match=r"bumpy.ply: got a part that is lost \(.* mm off\) .* want smaller tetrahedra"
+    ):
+        tetrahedralise(_bumpy(3), 100.0)
+
+
+def test_a_mesher_that_takes_too_long_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tetrahedra, "SECONDS_ALLOWED", 0.01)
+    with pytest.raises(
+        InputError, match=r"bumpy.ply: got a surface that tetwild could not fill in 0.01 s, want larger"
+    ):
+        tetrahedralise(_bumpy(1), 8.0)
+
+
+def test_what_gmsh_says_is_passed_on() -> None:
+    ball = shapes.sphere(1, 30.0)
+    twice = Surface(
+        np.concatenate([ball.points, ball.points + 20]),
+        np.concatenate([ball.triangles, ball.triangles + len(ball.points)]),
+        "two.ply",
+    )
+    with pytest.raises(
+        InputError, match=r"two.ply: got a surface that gmsh refuses \(Exception: .+\), want a clean surface"
+    ):
+        tetrahedra._run("gmsh", twice, 16.0)
+
+
+@pytest.mark.parametrize(
+    ("code", "said", "words"),
+    [(-11, "", "it crashed with signal 11"), (1, "one\ntwo\n", "two"), (1, "", "without a word")],
+)
+def test_the_last_words_of_a_mesher(code: int, said: str, words: str) -> None:
+    assert tetrahedra._last_words(subprocess.CompletedProcess([], code, "", said)) == words
+
+
+CORNER = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1], [-1, -2, 1]])
+SIXTH = Surface(CORNER[:4], boundary(np.array([[0, 1, 2, 3]]))[0], "corner.ply")
+
+
+@pytest.mark.parametrize(
+    ("points", "tets", "what"),
+    [
+        (CORNER, np.zeros((0, 4), int), "no tetrahedra from the mesher"),
+        (CORNER * (1, 1, 0), [[0, 1, 2, 3]], "a tetrahedron of zero volume"),
+        (CORNER, [[0, 1, 2, 3], [0, 3, 4, 5]], "1 edges of more than two triangles"),
+        (2 * CORNER, [[0, 1, 2, 3]], "tetrahedra of 1 mm3 in a surface of 0 mm3, want one clean body"),
+    ],
+)
+def test_what_a_mesher_must_not_give_is_named(points: np.ndarray, tets: list[list[int]], what: str) -> None:
+    with pytest.raises(InputError, match=f"corner.ply: got {what}"):
+        tetrahedra._checked(TetMesh(points, np.array(tets)), SIXTH)
+
+
+def test_only_the_largest_part_is_kept_the_right_way_round() -> None:
+    box = shapes.box((2, 2, 2), (1.0, 1.0, 1.0))
+    tets = np.concatenate([box.tets[:, [1, 0, 2, 3]], [[27, 28, 29, 30]]])
+    kept = tetrahedra._checked(TetMesh(np.concatenate([box.points, CORNER[:4] + 7]), tets), shapes.skin(box))
+    assert_array_equal(kept.points, box.points)
+    assert_allclose(tet_volumes(kept.points, kept.tets), 1 / 48)
+
+
+@pytest.mark.parametrize(
+    ("name", "size"), [("gluteus_maximus", 9.0), ("gluteus_medius", 8.0), ("iliacus", 6.0), ("adductor_brevis", 5.0)]
+)
+def test_the_muscles_of_the_report(data: Path, name: str, size: float) -> None:
+    surface = check_closed(files.read_surface(data / f"hip/muscles/{name}.vtk", 1.0))
+    _check(tetrahedralise(surface, size), surface, size)
