@@ -5,8 +5,6 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from fem_reference.effects import Effect
 from fem_reference.effects import find as find_effect
 from fem_reference.effects import names as effect_names
@@ -51,7 +49,7 @@ def _change(table: dict[str, Any], key: str, value: Any, place: str) -> None:
     try:
         for part in way:
             inside = inside[part]
-        inside[last]  # a change replaces what is there  # noqa: B018
+        inside[last]  # a change replaces what is there
         inside[last] = value
     except (KeyError, IndexError, TypeError) as error:
         raise InputError(join(place, key), "nothing", "a key of this scene") from error
@@ -93,4 +91,6 @@ def _check_names(scene: Scene) -> None:
     for i, bone in enumerate(scene.bone):
         angle = bone.motion.rotation().pose(scene.frames.first) if bone.motion else None
         if angle is not None and abs(angle - [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]).max() > 1e-12:
-            raise InputError(join(scene.place, f"bone[{i}].motion"), "a bone turned at the first frame", "angle 0 there")
+            raise InputError(
+                join(scene.place, f"bone[{i}].motion"), "a bone turned at the first frame", "angle 0 there"
+            )

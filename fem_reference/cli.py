@@ -50,17 +50,23 @@ def _show_progress(*, on: bool) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="fem-reference", description="Finite element reference and validation for muscle deformation.")
+    parser = argparse.ArgumentParser(
+        prog="fem-reference", description="Finite element reference and validation for muscle deformation."
+    )
     parser.add_argument("--version", action="version", version=f"fem-reference {__version__}")
     verbs = parser.add_subparsers(metavar="VERB", required=True)
 
-    def add(name: str, verb: Callable[[argparse.Namespace], int], text: str, *, case: bool = True) -> argparse.ArgumentParser:
+    def add(
+        name: str, verb: Callable[[argparse.Namespace], int], text: str, *, case: bool = True
+    ) -> argparse.ArgumentParser:
         sub = verbs.add_parser(name, help=text, description=text)
         if case:
             sub.add_argument("case", metavar="CASE", help="a shipped case (see list), a case folder or a case.toml")
         sub.add_argument("--out", type=Path, metavar="DIR", help="where pages and stored runs go (default: reports)")
         sub.add_argument("--json", type=Path, metavar="FILE", help="write what is printed as JSON")
-        sub.add_argument("--ranks", type=int, metavar="N", help="MPI processes of the reference (default: 2 where there are)")
+        sub.add_argument(
+            "--ranks", type=int, metavar="N", help="MPI processes of the reference (default: 2 where there are)"
+        )
         sub.add_argument("--quiet", action="store_true", help="show no progress")
         sub.set_defaults(verb=verb)
         return sub
@@ -70,7 +76,10 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--solver", metavar="NAME", help="another solver than the case's own reference")
     comparison = add("compare", _compare, "measure candidates against the reference and write the page")
     comparison.add_argument(
-        "--candidate", action="append", metavar="NAME|DIR", help="a candidate of the case or a folder of frames; may be repeated"
+        "--candidate",
+        action="append",
+        metavar="NAME|DIR",
+        help="a candidate of the case or a folder of frames; may be repeated",
     )
     comparison.add_argument("--unit", default="mm", help="unit of length of the frames in DIR (default: mm)")
     add("list", _list, "what there is: cases, solvers, metrics, stored runs", case=False)
@@ -98,7 +107,9 @@ def _candidate(scene: Scene, text: str, unit: str) -> tuple[Candidate, str]:
     if not path.exists():
         raise InputError("--candidate", f'"{text}"', f"a folder of frames, or one of {', '.join(names)}")
     folder = path.resolve()
-    return Candidate.model_validate({"name": folder.stem, "solver": "recorded", "folder": str(folder), "unit": unit}), "--candidate"
+    return Candidate.model_validate(
+        {"name": folder.stem, "solver": "recorded", "folder": str(folder), "unit": unit}
+    ), "--candidate"
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -124,7 +135,9 @@ def _judge(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candida
         bench.settings(candidate, place)
     read = {entry.name: bench.read(entry.name, entry, place) for entry, place in chosen if entry.solver == "recorded"}
     reference = bench.obtain("reference", scene.reference, "reference")
-    solved = {entry.name: bench.obtain(entry.name, entry, place) for entry, place in chosen if entry.solver != "recorded"}
+    solved = {
+        entry.name: bench.obtain(entry.name, entry, place) for entry, place in chosen if entry.solver != "recorded"
+    }
     numbers = scene.frames.numbers
     candidates = tuple(complete((read | solved)[entry.name], numbers) for entry, _ in chosen)
     result = compare(scene, bench.setup(), complete(reference, numbers), candidates)
@@ -136,7 +149,9 @@ def _judge(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candida
 
 
 def _comparison_text(result: Comparison, page: Path) -> str:
-    runs = [f"{run.name}: {run.outcome.status}, {run.outcome.message}" for run in (result.reference, *result.candidates)]
+    runs = [
+        f"{run.name}: {run.outcome.status}, {run.outcome.message}" for run in (result.reference, *result.candidates)
+    ]
     judged = [
         f"{verdict.word}: {verdict.expectation.of} {verdict.expectation.metric} {verdict.expectation.statistic} at frame "
         f"{verdict.frame} is {verdict.value:.4g} {verdict.unit}, expected {verdict.truth:.4g} within {verdict.within:.4g}"
@@ -206,7 +221,10 @@ def _scene_facts(scene: Scene, setup: problem.Setup) -> dict[str, Any]:
             "volume_mm3": enclosed_volume(surface.points, surface.triangles),
             "tet_size_mm": scene.muscle.tet_size,
         },
-        "bones": {bone.name: f"{len(bone.surface.triangles)} triangles, {'moves' if bone.motion else 'rests'}" for bone in setup.bones},
+        "bones": {
+            bone.name: f"{len(bone.surface.triangles)} triangles, {'moves' if bone.motion else 'rests'}"
+            for bone in setup.bones
+        },
         "attachments": {
             held.attachment: f"{len(held.vertices)} vertices, {areas[held.vertices].sum():.0f} mm2, held by {held.bone.name}"
             for held in setup.held
@@ -215,7 +233,10 @@ def _scene_facts(scene: Scene, setup: problem.Setup) -> dict[str, Any]:
         "frames": f"{scene.frames.first} to {scene.frames.last}, every {scene.frames.every}",
         "reference": scene.reference.solver,
         "candidates": {candidate.name: candidate.solver for candidate in scene.candidate},
-        "expects": [f"{e.of} {e.metric} {e.statistic} at frame {e.frame}: {e.truth} within {e.within} ({e.kind})" for e in scene.expect],
+        "expects": [
+            f"{e.of} {e.metric} {e.statistic} at frame {e.frame}: {e.truth} within {e.within} ({e.kind})"
+            for e in scene.expect
+        ],
     }
 
 

@@ -15,7 +15,8 @@ from fem_reference.scene import Scene
 class Comparison:
     """``deviations``: by candidate name, its measures against the reference. ``changes``: by run name (``"reference"`` among
     them), its measures against the rest state. ``extension_error`` [mm]: by frame, the greatest error over the fibres that the
-    extension makes on the reference's own surface."""
+    extension makes on the reference's own surface.
+    """
 
     scene: Scene
     setup: Setup
@@ -36,7 +37,9 @@ class Comparison:
 def compare(scene: Scene, setup: Setup, reference: Run, candidates: tuple[Run, ...]) -> Comparison:
     """Measure and judge runs that all have the frames of the scene (``not a number`` where a run did not reach one)."""
     if reference.fibres is None:
-        raise InputError(f"{reference.name}: fibres", "a run without an interior", "a reference that carries the fibres")
+        raise InputError(
+            f"{reference.name}: fibres", "a run without an interior", "a reference that carries the fibres"
+        )
     yardstick = Yardstick.of(reference, reference.fibres)
     deviations = {run.name: measure(run, reference, yardstick) for run in candidates}
     changes = {run.name: measure(run, at_rest(run), yardstick) for run in (reference, *candidates)}

@@ -112,7 +112,17 @@ def code_hash() -> str:
 
 def _versions() -> dict[str, str]:
     """The versions of the packages that a run may depend on, and of Python."""
-    wanted = ("numpy", "scipy", "gmsh", "libigl", "pytetwild", "scikit-fem", "numba", "dolfinx-solver-real", "fenics-dolfinx")
+    wanted = (
+        "numpy",
+        "scipy",
+        "gmsh",
+        "libigl",
+        "pytetwild",
+        "scikit-fem",
+        "numba",
+        "dolfinx-solver-real",
+        "fenics-dolfinx",
+    )
     found = {"python": platform.python_version()}
     for package in wanted:
         try:

@@ -53,7 +53,7 @@ def read_polylines(path: Path, unit: float) -> Polylines:
 def read_xdmf(path: Path, unit: float) -> list[tuple[float, Surface]]:
     """Time and surface of each step of a temporal collection, in units of ``unit`` mm.
 
-    The points are moved by the point data ``displacement``, or by the only point data of three components.
+    The points are moved by the point data ``displacement``, or ``u`` where that is its name.
     """
     want = "an XDMF time series of one triangle mesh with its displacement"
     steps = _attempt(_meshio_steps, path, want)
@@ -76,7 +76,8 @@ def read_rows(path: Path) -> list[list[str]]:
 
     def read(table: Path) -> list[list[str]]:
         lines = table.read_text(encoding="utf-8-sig").splitlines()
-        rows = csv.reader(line for line in lines if line.strip() and not line.lstrip().startswith("#"))
+        table_lines = (line for line in lines if line.strip() and not line.lstrip().startswith("#"))
+        rows = csv.reader(table_lines, skipinitialspace=True)
         return [[cell.strip() for cell in row] for row in rows]
 
     return _attempt(read, path, "a comma separated table in UTF-8")
@@ -173,10 +174,10 @@ def _meshio_steps(path: Path) -> list[tuple[float, Floats, Ints]]:
 
 
 def _displacement(data: dict[str, Any], points: Floats) -> Any:
-    vectors = {name: values for name, values in data.items() if np.shape(values) == points.shape}
-    if "displacement" not in vectors and len(vectors) != 1:
+    name = next((name for name in ("displacement", "u") if np.shape(data.get(name, 0)) == points.shape), None)
+    if name is None:
         raise ValueError(f"point data {', '.join(data) or 'nothing'} in a step")
-    return vectors.get("displacement", next(iter(vectors.values())))
+    return data[name]
 
 
 def _read_vtk(path: Path) -> Soup:
@@ -205,10 +206,9 @@ def _vtk_lines(path: Path) -> tuple[Floats, list[list[int]]]:
     data = _vtk_data(path)
     if not data.IsA("vtkPolyData") or data.GetNumberOfLines() == 0:
         raise ValueError("no lines")
-    connectivity, offsets = (
-        vtk_to_numpy(array) for array in (data.GetLines().GetConnectivityArray(), data.GetLines().GetOffsetsArray())
-    )
-    cells = [cell.tolist() for cell in np.split(connectivity, offsets[1:-1])]
+    lines = data.GetLines()
+    offsets = vtk_to_numpy(lines.GetOffsetsArray())
+    cells = [cell.tolist() for cell in np.split(vtk_to_numpy(lines.GetConnectivityArray()), offsets[1:-1])]
     return np.asarray(vtk_to_numpy(data.GetPoints().GetData()), np.float64), _joined(cells)
 
 
@@ -240,9 +240,8 @@ def _vtk_data(path: Path) -> Any:
         reader.Update()
     told = messages.GetOutput()
     if "error" in told.lower():
-        raise ValueError(
-            re.sub(r"^.*: In .*\n|^vtk\w+ \(0x\w+\): | for file: .*", "", told, flags=re.MULTILINE).split("\n")[0]
-        )
+        words = re.sub(r"^.*: In .*\n|^vtk\w+ \(0x\w+\): | for file: .*", "", told, flags=re.MULTILINE)
+        raise ValueError(words.split("\n")[0])
     return reader.GetOutput()
 
 
@@ -251,11 +250,8 @@ def _vtk_messages() -> Iterator[Any]:
     """What VTK has to say meanwhile, instead of on stderr."""
     from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutputWindow
 
-    window, before, verbosity = (
-        vtkStringOutputWindow(),
-        vtkOutputWindow.GetInstance(),
-        vtkLogger.GetCurrentVerbosityCutoff(),
-    )
+    window, before = vtkStringOutputWindow(), vtkOutputWindow.GetInstance()
+    verbosity = vtkLogger.GetCurrentVerbosityCutoff()
     vtkOutputWindow.SetInstance(window)
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
     try:

@@ -46,7 +46,8 @@ class Surface:
 @dataclass(frozen=True, eq=False)
 class TetMesh:
     """Tetrahedra: ``points`` (n, 3) [mm], ``tets`` (k, 4), all of positive volume; ``facets`` maps the name of a region of the
-    boundary to its triangles (m, 3)."""
+    boundary to its triangles (m, 3).
+    """
 
     points: Floats
     tets: Ints
@@ -87,9 +88,7 @@ def tet_volumes(points: Floats, tets: Ints) -> Floats:
 
 def tet_qualities(points: Floats, tets: Ints) -> Floats:
     """Mean-ratio quality of each tet, (k,): 1 for a regular tet, 0 for a flat one (Liu and Joe 1994)."""
-    squares = sum(
-        np.sum((points[tets[:, i]] - points[tets[:, j]]) ** 2, axis=1) for i in range(4) for j in range(i)
-    )
+    squares = sum(np.sum((points[tets[:, i]] - points[tets[:, j]]) ** 2, axis=1) for i in range(4) for j in range(i))
     return np.asarray(12 * np.cbrt(3 * np.abs(tet_volumes(points, tets))) ** 2 / squares)
 
 
@@ -109,7 +108,9 @@ def check_finite(surface: Surface) -> None:
     if len(bad):
         raise InputError(surface.place, f"a point that is not finite (vertex {bad[0]})", "finite coordinates")
     if surface.triangles.min() < 0 or surface.triangles.max() >= len(surface.points):
-        raise InputError(surface.place, "a triangle with a vertex that does not exist", f"0 to {len(surface.points) - 1}")
+        raise InputError(
+            surface.place, "a triangle with a vertex that does not exist", f"0 to {len(surface.points) - 1}"
+        )
 
 
 def check_closed(surface: Surface) -> Surface:

@@ -1,5 +1,6 @@
 """Scene -> everything a solver needs, as arrays: bodies, what is held, effects, fibres, frames. It knows no solver."""
 
+import logging
 import time
 from dataclasses import dataclass
 
@@ -9,6 +10,8 @@ from fem_reference import files
 from fem_reference.effects import Effect
 from fem_reference.errors import InputError
 from fem_reference.geometry.attachments import facets_under, pick
+from fem_reference.geometry.distance import distances
+from fem_reference.geometry.embedding import Locator
 from fem_reference.geometry.fibres import trace
 from fem_reference.geometry.tetrahedra import tetrahedralise
 from fem_reference.mesh import (
@@ -27,6 +30,8 @@ from fem_reference.mesh import (
 from fem_reference.motion import Rotation
 from fem_reference.records import join
 from fem_reference.scene import Scene
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +59,8 @@ class Held:
 @dataclass(frozen=True, eq=False)
 class Setup:
     """What a surface solver needs: the muscle ``surface`` at rest, the bones, what they hold, and the frames wanted;
-    ``interval`` [s] from a frame number to the next where the scene says it."""
+    ``interval`` [s] from a frame number to the next where the scene says it.
+    """
 
     surface: Surface
     bones: tuple[Body, ...]
@@ -66,7 +72,8 @@ class Setup:
 @dataclass(frozen=True, eq=False)
 class Problem(Setup):
     """A setup filled with tetrahedra (``mesh.facets`` by attachment), with its effects and fibres; ``mesh_facts`` are what the
-    mesh is like, ``seconds`` how long it took to make."""
+    mesh is like, ``seconds`` how long it took to make.
+    """
 
     mesh: TetMesh
     effects: tuple[Effect, ...]
@@ -126,7 +133,9 @@ def _held(scene: Scene, surface: Surface, bones: tuple[Body, ...]) -> tuple[Held
         if len(vertices) == 0:
             raise InputError(place, "no vertex of the muscle", "an attachment that selects some")
         if taken[vertices].any():
-            raise InputError(place, f"vertex {vertices[taken[vertices]][0]}, which another attachment holds", "each vertex once")
+            raise InputError(
+                place, f"vertex {vertices[taken[vertices]][0]}, which another attachment holds", "each vertex once"
+            )
         taken[vertices] = True
         held.append(Held(attachment.name, by_name[attachment.bone], vertices))
     return tuple(held)
@@ -135,10 +144,26 @@ def _held(scene: Scene, surface: Surface, bones: tuple[Body, ...]) -> tuple[Held
 def _fibres(scene: Scene, mesh: TetMesh) -> Polylines:
     if scene.fibres.polylines is not None:
         given = scene.fibres.polylines
-        return files.read_polylines(scene.file(given.file, "fibres.polylines.file"), given.unit)
+        return _inside(mesh, files.read_polylines(scene.file(given.file, "fibres.polylines.file"), given.unit))
     traced = scene.fibres.traced
     assert traced is not None  # a Fibres record has one of the two
     return trace(mesh, traced.start, traced.end, traced.count)
+
+
+def _inside(mesh: TetMesh, fibres: Polylines) -> Polylines:
+    """The fibres with every point outside the tets moved to the nearest point of their skin: outside, a solution says nothing."""
+    locator = Locator(mesh)
+    outside = locator.embed(fibres.points).outside
+    points = np.array(fibres.points)
+    points[outside > 0] = distances(points[outside > 0], locator.skin).closest
+    if outside.max() > 0:
+        log.info(
+            "fibres: %d of %d points moved into the muscle, by up to %.1f mm",
+            (outside > 0).sum(),
+            len(points),
+            outside.max(),
+        )
+    return Polylines(points, fibres.offsets)
 
 
 def _mesh_facts(rest: Setup, mesh: TetMesh) -> dict[str, float]:

@@ -1,6 +1,6 @@
 """Strict frozen records read from TOML: an unknown key, a missing key or a wrong value is one InputError that names it."""
 
-from typing import Any, TypeVar
+from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -13,10 +13,7 @@ class Record(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=False, arbitrary_types_allowed=True)
 
 
-R = TypeVar("R", bound=Record)
-
-
-def parse(record: type[R], table: object, place: str) -> R:
+def parse[R: Record](record: type[R], table: object, place: str) -> R:
     """``table`` as a ``record``; ``place`` is what its keys are reported below, for example ``"case.toml: effect[0]"``."""
     try:
         return record.model_validate(table)

@@ -33,7 +33,8 @@ FORMAT = 1
 @dataclass(frozen=True, eq=False)
 class Frame:
     """One requested frame: positions [mm] of the surface (n, 3), and where the solver has them of the fibre points (m, 3) and
-    tet points (k, 3); ``scalars`` by name; ``note`` is what progress says of it."""
+    tet points (k, 3); ``scalars`` by name; ``note`` is what progress says of it.
+    """
 
     number: int
     surface: Floats

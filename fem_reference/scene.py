@@ -6,6 +6,7 @@
 import hashlib
 import json
 import os
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -48,7 +49,7 @@ class Motion(Record):
     @model_validator(mode="after")
     def _check(self) -> Self:
         frames = [keyframe.frame for keyframe in self.keyframes]
-        if any(late <= early for early, late in zip(frames, frames[1:], strict=False)):
+        if any(late <= early for early, late in pairwise(frames)):
             raise ValueError("keyframes in the order of their frames")
         if not any(self.axis):
             raise ValueError("an axis that is not zero")
@@ -131,7 +132,8 @@ class Fibres(Record):
 
 class Frames(Record):
     """The frame numbers wanted: ``first``, ``first + every``, ... up to ``last``; ``interval`` is the time from a number to the
-    next, needed only where a recorded sequence states times."""
+    next, needed only where a recorded sequence states times.
+    """
 
     first: int = Field(ge=0)
     last: int
@@ -223,7 +225,9 @@ class Scene(Record):
         if text.startswith("data:"):
             root = os.environ.get(DATA_SETTING)
             if not root:
-                raise InputError(place, f'"{text}" while {DATA_SETTING} is not set', f"the setting {DATA_SETTING}=FOLDER")
+                raise InputError(
+                    place, f'"{text}" while {DATA_SETTING} is not set', f"the setting {DATA_SETTING}=FOLDER"
+                )
             path = Path(root) / text.removeprefix("data:")
         elif text.startswith("mesh:"):
             path = HOME / "meshes" / text.removeprefix("mesh:")
@@ -253,6 +257,9 @@ def _files(tables: Any, key: str = "") -> list[tuple[str, str]]:
         found = [(f"{key}.{name}".lstrip("."), value) for name, value in tables.items() if name in ("surface", "file")]
         below = [(f"{key}.{name}".lstrip("."), value) for name, value in tables.items()]
     else:
-        found, below = [], [(f"{key}[{i}]", value) for i, value in enumerate(tables)] if isinstance(tables, list) else []
+        found, below = (
+            [],
+            [(f"{key}[{i}]", value) for i, value in enumerate(tables)] if isinstance(tables, list) else [],
+        )
     named = [(where, text) for where, text in found if isinstance(text, str)]
     return named + [entry for where, value in below for entry in _files(value, where)]

@@ -38,7 +38,9 @@ def quantity(text: object, kind: str) -> float:
     try:
         read = _registry().Quantity(text)
         value = float(read.to(_INSIDE[kind] or "dimensionless").magnitude)
-    except Exception as error:  # pint raises its own errors, tokenizer errors and TypeError for text that is no quantity
+    except (
+        Exception
+    ) as error:  # pint raises its own errors, tokenizer errors and TypeError for text that is no quantity
         raise wrong from error
     if not math.isfinite(value) or (kind == "an angle" and read.unitless):
         raise wrong

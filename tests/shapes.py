@@ -37,10 +37,16 @@ def skin(mesh: TetMesh) -> Surface:
 def sphere(subdivisions: int, radius: float = 1.0) -> Surface:
     """A sphere from an icosahedron, whose vertices all lie on the sphere."""
     golden = (1 + 5**0.5) / 2
-    points = [point for a, b in itertools.product((1.0, -1.0), (golden, -golden)) for point in ((0, a, b), (a, b, 0), (b, 0, a))]
+    points = [
+        point
+        for a, b in itertools.product((1.0, -1.0), (golden, -golden))
+        for point in ((0, a, b), (a, b, 0), (b, 0, a))
+    ]
     corners = np.array(points)
     triangles = [
-        triple for triple in itertools.combinations(range(12), 3) if np.ptp(corners[list(triple)], axis=0).max() < 2 * golden - 0.1
+        triple
+        for triple in itertools.combinations(range(12), 3)
+        if np.ptp(corners[list(triple)], axis=0).max() < 2 * golden - 0.1
         and all(np.isclose(np.linalg.norm(corners[i] - corners[j]), 2) for i, j in itertools.combinations(triple, 2))
     ]
     for _ in range(subdivisions):

@@ -67,7 +67,11 @@ def imports(path: Path) -> set[str]:
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
-            found |= {node.module} if node.module != "fem_reference" else {f"fem_reference.{alias.name}" for alias in node.names}
+            found |= (
+                {node.module}
+                if node.module != "fem_reference"
+                else {f"fem_reference.{alias.name}" for alias in node.names}
+            )
     return found
 
 
@@ -116,7 +120,11 @@ def test_truths_import_numpy_and_scipy_only() -> None:
 
 def test_only_the_command_line_prints_and_exits() -> None:
     for path in sources():
-        calls = {node.func.id for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)}
+        calls = {
+            node.func.id
+            for node in ast.walk(ast.parse(path.read_text()))
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+        }
         assert entry(path) == "cli" or not calls & {"print", "exit", "quit"}, path
 
 

@@ -22,7 +22,7 @@ def test_a_coarser_sphere_is_near_the_fine_one_with_second_order() -> None:
     fine = shapes.sphere(4, 30.0)
     coarse = [check_closed(coarsen(fine, count)) for count in (250, 1000)]
     off = [distances(fine.points, surface).distance.mean() for surface in coarse]
-    # Four times the triangles halve h and leave a quarter of the distance h^2 / (8 r), up to the triangles' shapes (a third).
+    # Four times the triangles halve h and leave a quarter of the distance h^2 / (8 r), up to a third by their shapes.
     assert 3 < off[0] / off[1] < 5.3
     for surface in coarse:
         # What is missing after each shift is divided by about h / r squared: 1e-6 is left after three.

@@ -49,7 +49,9 @@ def test_rest_state_has_no_energy_and_no_stress(name: str) -> None:
         for j in range(3):
             push = np.zeros((3, 3))
             push[i, j] = step
-            slope = (effect.energy(state(np.eye(3) + push, 0.0)) - effect.energy(state(np.eye(3) - push, 0.0))) / (2 * step)
+            slope = (effect.energy(state(np.eye(3) + push, 0.0)) - effect.energy(state(np.eye(3) - push, 0.0))) / (
+                2 * step
+            )
             assert abs(slope) < 1e-9
 
 

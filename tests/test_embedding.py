@@ -72,7 +72,9 @@ def test_nothing_in_nothing_out() -> None:
 def test_round_off_does_not_choose_between_tets_outside_an_edge() -> None:
     # Beyond an edge or a corner of the box two or more boundary triangles are equally close; their tets extrapolate differently.
     mesh = _block()
-    points = np.array([[x, y, z] for x in (-2.0, 5.0, 10.0, 32.0) for y in (-3.0, 10.0, 31.0) for z in (-1.0, 20.0, 34.0)])
+    points = np.array(
+        [[x, y, z] for x in (-2.0, 5.0, 10.0, 32.0) for y in (-3.0, 10.0, 31.0) for z in (-1.0, 20.0, 34.0)]
+    )
     chosen = embed(mesh, points).tets
     for seed in range(5):
         turn = Rotation.random(random_state=seed).as_matrix()

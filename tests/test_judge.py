@@ -14,7 +14,14 @@ NUMBERS = (0, 10, 20)
 
 
 def expectation(**changes) -> Expectation:
-    keys = {"of": "reference", "metric": "volume", "statistic": "deviation", "frame": "any", "truth": "0 %", "within": "0.5 %"}
+    keys = {
+        "of": "reference",
+        "metric": "volume",
+        "statistic": "deviation",
+        "frame": "any",
+        "truth": "0 %",
+        "within": "0.5 %",
+    }
     return Expectation(**(keys | {"kind": "property", "because": "a test"} | changes))
 
 

@@ -30,7 +30,7 @@ class Job:
         status = cli.main([*words, "--out", str(self.out), "--json", str(target), "--quiet"])
         return status, json.loads(target.read_text()) if target.exists() else None
 
-    def frames(self, folder: Path, change=lambda number, points: points, suffix=".vtp") -> Path:
+    def frames(self, folder: Path, change=lambda _, points: points, suffix=".vtp") -> Path:
         """The reference's own surfaces as a candidate, changed."""
         run = runs.load(self.reference)
         folder.mkdir()
@@ -60,7 +60,9 @@ def test_json_has_the_documented_keys(job) -> None:
     assert {"case", "solver", "status", "verdict", "cost", "measures"} <= set(job.facts)
     assert (job.facts["case"], job.facts["solver"], job.facts["status"]) == ("bar", "fenicsx", "converged")
     assert job.facts["verdict"] == "pass"
-    assert all(set(row) == {"candidate", "metric", "statistic", "frame", "value", "unit"} for row in job.facts["measures"])
+    assert all(
+        set(row) == {"candidate", "metric", "statistic", "frame", "value", "unit"} for row in job.facts["measures"]
+    )
     metrics = {row["metric"] for row in rows(job.facts, "pbd")}
     assert metrics == {"volume", "fibre_length", "surface_deviation"}
     assert {row["frame"] for row in rows(job.facts, "pbd")} == {0, 5, 10, 15, 20}
@@ -125,7 +127,9 @@ def test_moving_the_whole_scene_changes_no_measure(job, tmp_path) -> None:
     moved = Job(tmp_path, pose)
     assert len(moved.facts["measures"]) == len(job.facts["measures"])
     for here, there in zip(job.facts["measures"], moved.facts["measures"], strict=True):
-        assert {key: here[key] for key in here if key != "value"} == {key: there[key] for key in there if key != "value"}
+        assert {key: here[key] for key in here if key != "value"} == {
+            key: there[key] for key in there if key != "value"
+        }
         # 1e-6 relative; measures that are zero up to the residual of Newton's method have no relative size.
         assert there["value"] == pytest.approx(here["value"], rel=1e-6, abs=1e-6), here
 
@@ -150,20 +154,39 @@ def test_a_truncated_frame_is_bad_input_that_names_the_file(job, tmp_path, capsy
 def test_missing_frames_are_named(job, tmp_path, capsys) -> None:
     folder = job.frames(tmp_path / "few")
     (folder / "frame_0015.vtp").unlink()
-    assert cli.main(["compare", str(job.case), "--candidate", str(folder), "--out", str(tmp_path / "out")]) == cli.BAD_INPUT
+    assert (
+        cli.main(["compare", str(job.case), "--candidate", str(folder), "--out", str(tmp_path / "out")])
+        == cli.BAD_INPUT
+    )
     assert "15" in capsys.readouterr().err
 
 
 BAD = {
     "no such case": ("none", lambda _: None, 'CASE: got "none"'),
     "missing file": (None, lambda case: (case / "bar.vtp").unlink(), "muscle.surface"),
-    "wrong unit": (None, lambda case: edit(case, 'tet_size = "6 mm"', 'tet_size = "6 kPa"'), "muscle.tet_size: got \"6 kPa\", want a length"),
+    "wrong unit": (
+        None,
+        lambda case: edit(case, 'tet_size = "6 mm"', 'tet_size = "6 kPa"'),
+        'muscle.tet_size: got "6 kPa", want a length',
+    ),
     "unknown key": (None, lambda case: edit(case, "[frames]", "[frames]\nskip = 1"), "frames.skip: got an unknown key"),
-    "nothing attached": (None, lambda case: edit(case, 'within = "1.5 mm"', 'within = "0.1 mm"'), "no vertex of the muscle"),
+    "nothing attached": (
+        None,
+        lambda case: edit(case, 'within = "1.5 mm"', 'within = "0.1 mm"'),
+        "no vertex of the muscle",
+    ),
     "open surface": (None, lambda case: tamper(case, drop=1), "edges of one triangle only"),
     "not a number": (None, lambda case: tamper(case, value=np.nan), "not finite"),
-    "no such solver": (None, lambda case: edit(case, 'solver = "fenicsx"', 'solver = "magic"'), 'reference.solver: got "magic"'),
-    "no such setting": (None, lambda case: edit(case, "first_step = 5", "step = 5"), "reference.step: got an unknown key"),
+    "no such solver": (
+        None,
+        lambda case: edit(case, 'solver = "fenicsx"', 'solver = "magic"'),
+        'reference.solver: got "magic"',
+    ),
+    "no such setting": (
+        None,
+        lambda case: edit(case, "first_step = 5", "step = 5"),
+        "reference.step: got an unknown key",
+    ),
     "no such measure": (None, lambda case: edit(case, 'metric = "volume"', 'metric = "mass"'), "expect[0]"),
 }
 
@@ -210,7 +233,10 @@ def test_a_reference_that_fails_is_status_three_with_its_frames_kept(job, tmp_pa
     edit(case, "first_step = 5", "first_step = 5\nsmallest_step = 2\nnewton_iterations = 6")
     edit(case, 'angle = "0.4 rad"', 'angle = "3 rad"')
     target = tmp_path / "facts.json"
-    assert cli.main(["compare", str(case), "--out", str(tmp_path / "out"), "--json", str(target), "--quiet"]) == cli.SOLVER_FAILED
+    assert (
+        cli.main(["compare", str(case), "--out", str(tmp_path / "out"), "--json", str(target), "--quiet"])
+        == cli.SOLVER_FAILED
+    )
     facts = json.loads(target.read_text())
     assert facts["status"] in ("diverged", "inverted")
     assert facts["verdict"] == "fail"

@@ -125,7 +125,7 @@ def comparison(tmp_path, monkeypatch) -> Comparison:
     moved = rest.points + steps * [2.0, 0, 0]
     torn = moved + steps * [0, 0.5, 0]
     torn[-1, 7] = NAN
-    origin = {"versions": {"dolfinx": "0.11.0"}, "mesh": {"tets": 1234.0}}
+    origin = {"versions": {"dolfinx": "0.11.0"}, "mesh": {"tets": 234.0}}
     reference = a_run(
         "reference", "fenicsx", moved, scalars={"min_det_F_points": 1 - steps[:, 0, 0] / 8}, origin=origin
     )
@@ -195,8 +195,10 @@ def test_csv_holds_the_same_numbers(comparison, tmp_path):
 
 def test_page_names_everything_and_needs_no_network(comparison, tmp_path):
     text = report.write(comparison, tmp_path / "new" / "out").read_text(encoding="utf-8")
-    expected = ("quick", "torn", "press", "torn has ended", "dolfinx", "1234", "0.500&#8239;", "It is &lt;nearly&gt;")
-    assert [told for told in expected if told not in text] == []
+    for told in ("quick", "torn", "press", "torn has ended", "dolfinx", "<td>234</td>"):
+        assert told in text
+    assert "0.500&#8239;" in text
+    assert "It is &lt;nearly&gt; incompressible &amp; closed." in text
     assert '<span class="bad">not a number</span>' in text
     assert all(f"<td>{frame}</td>" in text for frame in NUMBERS)
     links = re.findall(r'\b(?:src|href|action|data|srcset)\s*=\s*["\']?([^"\'\s>]*)', text)

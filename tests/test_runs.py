@@ -15,6 +15,7 @@ from fem_reference.runs import Frame, Outcome, Writer
 SURFACE = shapes.sphere(1, 10.0)
 FIBRES = Polylines(np.array([[0.0, 0, -9], [0, 0, 0], [0, 0, 9], [1, 0, -5], [1, 0, 5]]), np.array([0, 3, 5]))
 MESH = shapes.box((1, 1, 1), (5, 5, 5))
+SHIFT = np.array([0.5, 0, 0])
 IDENTITY = {"name": "reference", "solver": "test", "origin": {"case": "none"}, "frames": (0, 5)}
 
 
@@ -34,8 +35,8 @@ def test_what_is_written_reads_back(tmp_path) -> None:
     assert (run.name, run.solver, run.numbers) == ("reference", "test", (0, 5))
     assert np.array_equal(run.surface.points, SURFACE.points)
     assert np.array_equal(run.surface.triangles, SURFACE.triangles)
-    assert np.array_equal(run.positions[1], SURFACE.points + [0.5, 0, 0])
-    assert np.array_equal(run.fibre_positions[1], FIBRES.points + [0.5, 0, 0])
+    assert np.array_equal(run.positions[1], SURFACE.points + SHIFT)
+    assert np.array_equal(run.fibre_positions[1], FIBRES.points + SHIFT)
     assert run.fibres.offsets.tolist() == [0, 3, 5]
     assert run.scalars["energy"].tolist() == [0, 10]
     assert run.outcome == Outcome("converged", "done", run.outcome.cost)
@@ -57,7 +58,7 @@ def test_opens_in_paraview(tmp_path) -> None:
 
 
 def test_progress_is_logged_with_how_far_and_how_long(tmp_path, caplog) -> None:
-    caplog.set_level(logging.INFO)
+    caplog.set_level(logging.INFO, logger="fem_reference")
     write(tmp_path / "run")
     assert "reference: frame 0 (1 of 2)" in caplog.text
     assert "frame 5 (2 of 2), well, " in caplog.text

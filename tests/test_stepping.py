@@ -1,4 +1,4 @@
-"""Adaptive load steps: every requested frame is hit, failures are cut, easy steps grow, and what cannot be reached is said."""
+"""Adaptive load steps: every frame is hit, failures are cut, easy steps grow, and what cannot be reached is said."""
 
 from fem_reference.solvers.fenicsx.stepping import Attempt, march
 

@@ -58,7 +58,8 @@ class Locator:
 
     def _first_of_ties(self, skin: Distances) -> Ints:
         """The closest boundary triangles (n,); a closest point on an edge or corner is in several, and round-off must not choose
-        between their tets, which extrapolate differently: the first of them is taken."""
+        between their tets, which extrapolate differently: the first of them is taken.
+        """
         chosen = np.array(skin.triangle)
         for i in np.flatnonzero((skin.barycentric < _TIE).any(axis=1)):
             shared = self.faces[chosen[i]][skin.barycentric[i] >= _TIE]

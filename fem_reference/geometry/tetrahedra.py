@@ -20,12 +20,11 @@ from fem_reference.geometry.coarsening import coarsen
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.intersections import self_intersections
 from fem_reference.mesh import (
+    TET_FACES,
     Floats,
     Ints,
     Surface,
     TetMesh,
-    boundary,
-    check_closed,
     enclosed_volume,
     tet_volumes,
     triangle_areas,
@@ -36,14 +35,16 @@ log = logging.getLogger(__name__)
 SECONDS_ALLOWED = 240.0
 _ROUNDED = 6  # decimals of a mm in the mesher's frame: far below any size, far above the round-off of moving a surface
 _VOLUME_WITHIN = 0.05  # a surface that passes through itself has no volume to compare with more closely
+_SHARES = (1.0, 0.9, 1.1, 0.8, 1.25)  # of the number of triangles wanted, tried in turn
 
 
 def tetrahedralise(surface: Surface, size: float) -> TetMesh:
     """Tetrahedra of about ``size`` [mm] inside a closed outward ``surface``; ``facets`` stay empty.
 
     A surface finer than ``size`` is coarsened to it first. gmsh fills a surface that does not pass through itself and
-    keeps its triangles; where it cannot, fTetWild makes a surface of its own near the given one. The mesh moves with
-    the surface: it is made in a frame that the surface's own vertices span. InputError where no mesher succeeds.
+    keeps its triangles. The mesh moves with the surface: it is made in a frame that the surface's own vertices span. Where
+    gmsh cannot, fTetWild makes a mesh of its own near the surface, another one each time (its issue 72). InputError where
+    no mesher succeeds.
     """
     origin, axes = _own_frame(surface.points)
     local = np.round((surface.points - origin) @ axes, _ROUNDED) + 0.0  # + 0.0: no negative zeros
@@ -82,16 +83,22 @@ def _mesh(surface: Surface, size: float) -> TetMesh:
             return _checked(_run("gmsh", coarse, size), coarse)
         except InputError as error:
             reason = str(error)
-    log.warning("%s: fTetWild meshes it, for gmsh cannot: %s", surface.place, reason)
+    log.warning("%s: fTetWild meshes it, differently each time, for gmsh cannot: %s", surface.place, reason)
     return _checked(_run("tetwild", surface, size), surface)
 
 
 def _coarsened(surface: Surface, size: float) -> Surface:
-    """The surface with as many triangles as equilateral ones of side ``size`` cover it; as it is where it has less."""
-    count = int(triangle_areas(surface.points, surface.triangles).sum() / (size**2 * np.sqrt(3) / 4))
+    """The surface with as many triangles as equilateral ones of side ``size`` cover it; as it is where it has less.
+
+    Where that surface passes through itself, one of a few other counts may give one that does not.
+    """
+    count = triangle_areas(surface.points, surface.triangles).sum() / (size**2 * np.sqrt(3) / 4)
     if count >= len(surface.triangles):
         return surface
-    coarse = coarsen(surface, count)
+    for share in _SHARES:
+        coarse = coarsen(surface, int(share * count))
+        if len(self_intersections(coarse)) == 0:
+            break
     lost = distances(surface.points, coarse).distance.max()
     log.info("%s: coarsened to %d triangles, at most %.2g mm off", surface.place, len(coarse.triangles), lost)
     if not lost <= size / 2:
@@ -135,38 +142,33 @@ def _last_words(done: subprocess.CompletedProcess[str]) -> str:
 def _checked(mesh: TetMesh, surface: Surface) -> TetMesh:
     """The largest connected part of ``mesh``, its tets of positive volume, without unused points.
 
-    InputError where nothing is left, a tet is flat, the boundary is not a closed surface or bounds another volume than
-    ``surface``.
+    InputError where nothing is left, a tet is flat, or the tets do not fill about the volume in ``surface``. Their boundary
+    is closed, for no triangle belongs to more than two of them.
     """
     if len(mesh.tets) == 0:
         raise InputError(surface.place, "no tetrahedra from the mesher", "a surface that bounds a body")
-    points, tets = _compact(mesh.points, _largest_part(mesh.tets))
+    used, tets = np.unique(_largest_part(mesh.tets, surface.place), return_inverse=True)
+    points, tets = mesh.points[used], tets.reshape(-1, 4)
     volumes = tet_volumes(points, tets)
     if not np.abs(volumes).min() > 0:
         raise InputError(surface.place, "a tetrahedron of zero volume from the mesher", "a cleaner surface")
-    tets = np.where((volumes < 0)[:, None], tets[:, [0, 2, 1, 3]], tets)
-    check_closed(Surface(*_compact(points, boundary(tets)[0]), surface.place))
     got, wanted = np.abs(volumes).sum(), enclosed_volume(surface.points, surface.triangles)
     if not abs(got - wanted) <= _VOLUME_WITHIN * wanted:
-        raise InputError(
-            surface.place, f"tetrahedra of {got:.0f} mm3 in a surface of {wanted:.0f} mm3", "one clean body"
-        )
-    return TetMesh(points, tets)
+        volumes_got = f"tetrahedra of {got:.0f} mm3 in a surface of {wanted:.0f} mm3"
+        raise InputError(surface.place, volumes_got, "one clean body")
+    return TetMesh(points, np.where((volumes < 0)[:, None], tets[:, [0, 2, 1, 3]], tets))
 
 
-def _compact(points: Floats, cells: Ints) -> tuple[Floats, Ints]:
-    """Only the ``points`` that ``cells`` use, and the cells on them."""
-    used, cells_on_used = np.unique(cells, return_inverse=True)
-    return points[used], cells_on_used.reshape(cells.shape)
-
-
-def _largest_part(tets: Ints) -> Ints:
-    """The tets of the connected part that has most of them."""
-    begin, end = tets[:, [0, 0, 0]].ravel(), tets[:, 1:].ravel()
-    count = int(tets.max()) + 1
-    part = connected_components(coo_array((np.ones(len(begin)), (begin, end)), shape=(count, count)), directed=False)[1]
-    part_of_tet = part[tets[:, 0]]
-    return np.asarray(tets[part_of_tet == np.bincount(part_of_tet).argmax()])
+def _largest_part(tets: Ints, place: str) -> Ints:
+    """The tets of the part, connected by triangles, that has most of them."""
+    faces = np.sort(tets[:, TET_FACES].reshape(-1, 3), axis=1)
+    _, face, sides = np.unique(faces, axis=0, return_inverse=True, return_counts=True)
+    if sides.max() > 2:
+        raise InputError(place, f"a triangle between {sides.max()} tetrahedra from the mesher", "a cleaner surface")
+    tet, count = np.repeat(np.arange(len(tets)), 4), len(tets) + len(sides)
+    links = coo_array((np.ones(len(tet)), (tet, len(tets) + face.ravel())), shape=(count, count))
+    part = connected_components(links, directed=False)[1][: len(tets)]
+    return np.asarray(tets[part == np.bincount(part).argmax()])
 
 
 def _gmsh(points: Floats, triangles: Ints, size: float) -> tuple[Floats, Ints]:

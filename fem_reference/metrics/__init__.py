@@ -35,7 +35,8 @@ class Measure:
 class Yardstick:
     """What every run of a scene is measured with, the same for all: ``areas`` (n,) [mm2] around the surface's vertices at rest,
     the ``fibres`` at rest and the ``extension`` that carries a surface's displacement to their points, and ``travel`` [mm], the
-    greatest displacement of the reference's surface over its frames."""
+    greatest displacement of the reference's surface over its frames.
+    """
 
     areas: Floats
     fibres: Polylines

@@ -32,7 +32,8 @@ def measure(run: Run, reference: Run, yardstick: Yardstick) -> tuple[Measure, ..
         ("max_percent", np.abs(percent).max(axis=1), percent),
     )
     return tuple(
-        Measure("fibre_length", name, UNITS[name], values, _worst(deviations)) for name, values, deviations in statistics
+        Measure("fibre_length", name, UNITS[name], values, _worst(deviations))
+        for name, values, deviations in statistics
     )
 
 

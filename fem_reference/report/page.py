@@ -187,7 +187,7 @@ def _flat(table: Any, key: str = "") -> list[tuple[str, Any]]:
     """Every (key, value) below ``table``, keys joined by dots."""
     if isinstance(table, dict):
         return [entry for name, value in table.items() for entry in _flat(value, f"{key}.{name}".lstrip("."))]
-    return [(key, table if isinstance(table, str | float | int) else json.dumps(table, default=str))]
+    return [(key, table if isinstance(table, str | float | int | None) else json.dumps(table, default=str))]
 
 
 def _changes(scene: Scene) -> list[tuple[str, Any, Any]]:

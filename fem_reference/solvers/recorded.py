@@ -1,5 +1,6 @@
 """A sequence of deformed surfaces that somebody else computed, read from their files and checked against the scene."""
 
+import math
 import re
 from collections.abc import Iterable
 from pathlib import Path
@@ -107,7 +108,7 @@ def _number_in(path: Path) -> int | None:
 def _number(time: float, interval: float | None) -> int | None:
     """The frame number that ``time`` is of, None where it is between two."""
     number = time if interval is None else time / interval
-    return round(number) if abs(number - round(number)) < ON_FRAME else None
+    return round(number) if math.isfinite(number) and abs(number - round(number)) < ON_FRAME else None
 
 
 def _surface(frame: Path | Surface, unit: float) -> Surface:

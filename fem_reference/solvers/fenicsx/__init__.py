@@ -52,7 +52,9 @@ class Settings(Record):
 def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
     """Solve every requested frame in worker processes; frames carry surface, fibres and tets."""
     if not any(importlib.util.find_spec(name) for name in ("dolfinx_solver", "dolfinx")):
-        raise MissingSoftware("FEniCSx is not installed: pip install 'fem_reference[fenicsx]' (Linux x86-64), or conda's fenics-dolfinx")
+        raise MissingSoftware(
+            "FEniCSx is not installed: pip install 'fem_reference[fenicsx]' (Linux x86-64), or conda's fenics-dolfinx"
+        )
     with tempfile.TemporaryDirectory(prefix="fem_reference-") as folder:
         job = Path(folder) / "job.pickle"
         job.write_bytes(pickle.dumps((problem, settings, _samples(problem))))
@@ -67,7 +69,7 @@ def _samples(problem: Problem) -> dict[str, tuple[Ints, Floats]]:
 
 
 def _command(settings: Settings, job: Path) -> list[str]:
-    """The worker's command line. DOLFINx's MPI has its ``mpiexec`` beside the interpreter; a foreign one on the PATH may not fit."""
+    """The worker's command line. The wheel's MPI has its ``mpiexec`` beside the interpreter; one on the PATH may not fit."""
     worker = [sys.executable, "-m", f"{__name__}.worker", str(job)]
     beside = Path(sys.executable).with_name("mpiexec")
     mpiexec = str(beside) if beside.exists() else shutil.which("mpiexec")
@@ -118,7 +120,9 @@ def _process(
         process.terminate()
 
     assert process.stderr is not None
-    listener = threading.Thread(target=lambda stream: errors.extend(line for line in stream if line.strip()), args=[process.stderr])
+    listener = threading.Thread(
+        target=lambda stream: errors.extend(line for line in stream if line.strip()), args=[process.stderr]
+    )
     listener.start()
     timer = threading.Timer(time_limit or threading.TIMEOUT_MAX, stop)
     timer.daemon = True

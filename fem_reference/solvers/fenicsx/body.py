@@ -95,7 +95,8 @@ class Body:
         r = self.points[where][point]
         at = np.array([1 - r.sum(), *r]) @ corners
         mine = Smallest(float(values[cell, point]), int(self.tets[cell]), (float(at[0]), float(at[1]), float(at[2])))
-        return min(self.comm.allgather(mine), key=lambda found: (not np.isnan(found.value), found.value))
+        everywhere: list[Smallest] = self.comm.allgather(mine)
+        return min(everywhere, key=lambda found: (not np.isnan(found.value), found.value))
 
     def positions(self, tets: Ints, points: Floats) -> Floats:
         """Where the material points ``points`` (n, 3), each seen from tet ``tets`` (n,), are now; (n, 3) on every rank."""

@@ -10,6 +10,8 @@ from petsc4py import PETSc
 
 from fem_reference.errors import MissingSoftware
 
+__all__ = ["PETSc", "dolfinx"]
+
 _VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
 if _VERSION < (0, 10):
     raise MissingSoftware(f"DOLFINx {dolfinx.__version__} is installed, want 0.10 or newer")

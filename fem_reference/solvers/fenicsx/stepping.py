@@ -34,7 +34,8 @@ def march(
     attempt: Callable[[float], Attempt], frames: tuple[int, ...], first_step: float, smallest_step: float
 ) -> Iterator[Reached]:
     """Go from ``frames[0]`` (where the body rests) through every frame; ``attempt`` solves at a load, from the last state that
-    converged, and must leave that state untouched where it fails. Ends after the first frame that cannot be reached."""
+    converged, and must leave that state untouched where it fails. Ends after the first frame that cannot be reached.
+    """
     at, step = float(frames[0]), first_step
     for frame in frames[1:]:
         steps = iterations = cutbacks = 0
