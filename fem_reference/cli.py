@@ -130,6 +130,10 @@ def _choice(scene: Scene, solver: str) -> SolverChoice:
 def _judge(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
     """Reference and candidates -> page, JSON and exit status. What is bad in the input shows before anything is solved."""
     judge.check(scene)
+    names = ["reference", *(entry.name for entry, _ in chosen)]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError("--candidate", f'"{name}" twice', "every name once, and none the name of the reference")
     bench = Bench(scene, _out(options) / "runs", options.ranks)
     for candidate, place in [(scene.reference, "reference"), *chosen]:
         bench.settings(candidate, place)

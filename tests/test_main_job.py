@@ -223,6 +223,13 @@ def test_unknown_candidate(job, capsys) -> None:
     assert '--candidate: got "nobody", want a folder of frames, or one of pbd' in capsys.readouterr().err
 
 
+def test_names_of_candidates_are_used_once(job, tmp_path, capsys) -> None:
+    for name in ("pbd", "reference"):
+        folder = job.frames(tmp_path / name)
+        assert job.call("compare", str(job.case), "--candidate", "pbd", "--candidate", str(folder))[0] == cli.BAD_INPUT
+        assert f'--candidate: got "{name}" twice' in capsys.readouterr().err
+
+
 def test_another_solver_can_run_the_case(job) -> None:
     status, facts = job.call("run", str(job.case), "--solver", "pbd")
     assert (status, facts["solver"], facts["verdict"]) == (cli.DONE, "pbd", "not judged")

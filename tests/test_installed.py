@@ -1,0 +1,49 @@
+"""The built wheel: it carries cases and meshes, and works where no checkout is near."""
+
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("wheel")
+    command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
+    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
+    (wheel,) = folder.glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(folder / "site")
+    return folder / "site"
+
+
+def call(installed: Path, folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    # -I keeps the checkout, which is installed as editable, from being found by its place.
+    code = f"import sys; sys.path.insert(0, {str(installed)!r}); from fem_reference import cli; sys.exit(cli.main(sys.argv[1:]))"
+    return subprocess.run(
+        [sys.executable, "-I", "-c", code, *words], cwd=folder, capture_output=True, text=True, check=False
+    )
+
+
+def test_carries_everything_that_is_shipped(installed) -> None:
+    for top in ("cases", "meshes"):
+        for path in (ROOT / top).rglob("*"):
+            if path.is_file() and "__pycache__" not in path.parts:
+                assert (installed / "fem_reference" / path.relative_to(ROOT)).read_bytes() == path.read_bytes()
+
+
+def test_works_outside_the_checkout(installed, tmp_path) -> None:
+    done = call(installed, tmp_path, "show", "hip_flexion", "--json", "facts.json")
+    assert done.returncode == 0, done.stderr
+    assert "Idealised gluteus" in done.stdout
+    assert (tmp_path / "facts.json").exists()
+
+
+def test_solves_outside_the_checkout(installed, tmp_path) -> None:
+    done = call(installed, tmp_path, "run", "hip_flexion", "--solver", "pbd", "--out", "here")
+    assert done.returncode == 0, done.stderr
+    assert list((tmp_path / "here" / "runs" / "hip_flexion").glob("pbd-*/run.json"))
