@@ -48,7 +48,17 @@ def test_main_job(tmp_path) -> None:
 def test_gluteus_maximus_against_the_recorded_output(data, tmp_path) -> None:
     target, recorded = tmp_path / "facts.json", data / "candidates" / "report_pbd_gluteus_maximus"
     status = cli.main(
-        ["compare", "gluteus_maximus", "--candidate", str(recorded), "--out", str(tmp_path), "--json", str(target), "--quiet"]
+        [
+            "compare",
+            "gluteus_maximus",
+            "--candidate",
+            str(recorded),
+            "--out",
+            str(tmp_path),
+            "--json",
+            str(target),
+            "--quiet",
+        ]
     )
     facts = json.loads(target.read_text())
     assert (status, facts["verdict"], facts["status"]) == (cli.DONE, "pass", "converged")
@@ -66,7 +76,10 @@ def test_gluteus_maximus_with_a_truncated_frame(data, tmp_path, capsys) -> None:
     for path in (data / "candidates" / "report_pbd_gluteus_maximus").glob("*.ply"):
         content = path.read_bytes()
         (folder / path.name).write_bytes(content[: len(content) // 2] if path.stem == "frame_0120" else content)
-    assert cli.main(["compare", "gluteus_maximus", "--candidate", str(folder), "--out", str(tmp_path / "out")]) == cli.BAD_INPUT
+    assert (
+        cli.main(["compare", "gluteus_maximus", "--candidate", str(folder), "--out", str(tmp_path / "out")])
+        == cli.BAD_INPUT
+    )
     assert "frame_0120.ply" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
