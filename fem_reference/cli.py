@@ -17,6 +17,7 @@ from fem_reference.runs import Run
 from fem_reference.scene import Candidate, Scene, SolverChoice
 
 DONE, VERDICT_FAIL, BAD_INPUT, SOLVER_FAILED = range(4)
+INTERRUPTED = 130  # what shells report for it
 MAIN_JOB = "hip_flexion"
 
 
@@ -37,6 +38,9 @@ def main(arguments: list[str]) -> int:
     except MissingSoftware as error:
         print(f"fem-reference: {error}", file=sys.stderr)
         return SOLVER_FAILED
+    except KeyboardInterrupt:
+        print("fem-reference: interrupted; a run that was not finished is solved again next time", file=sys.stderr)
+        return INTERRUPTED
     return status
 
 

@@ -1,12 +1,15 @@
 """A scene and a choice of solver -> a run: from the store where it was solved before, else solved now and stored."""
 
+import fcntl
 import hashlib
 import importlib.metadata
 import json
 import logging
 import os
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -46,15 +49,18 @@ class Bench:
         """The run of a solver of our own, by the name that pages give it; ``place`` is where the scene chooses it."""
         settings = self.settings(choice, place)
         folder = self.store / f"{choice.solver}-{self.key(choice.solver, settings)[:16]}"
-        stored = runs.finished(folder)
-        if stored is not None:
-            log.info("%s: solved before, taken from %s", name, folder)
-            return _named(stored, name)
+        if (stored := _stored(folder, name)) is not None:
+            return stored
+        self.problem()  # what is wrong with the input shows before anything is written
+        with _alone(folder):
+            return _stored(folder, name) or self._solve(name, choice.solver, settings, folder)
+
+    def _solve(self, name: str, solver: str, settings: Record, folder: Path) -> Run:
         built = self.problem()
-        origin = self.origin(choice.solver, settings) | {"mesh": built.mesh_facts}
-        identity = {"name": name, "solver": choice.solver, "origin": origin, "frames": built.frames}
+        origin = self.origin(solver, settings) | {"mesh": built.mesh_facts}
+        identity = {"name": name, "solver": solver, "origin": origin, "frames": built.frames}
         writer = runs.Writer(folder, identity, built.surface, built.fibres, built.mesh)
-        writer.close(solvers.find(choice.solver, place).solve(built, settings, writer.add))
+        writer.close(solvers.find(solver, self.scene.place).solve(built, settings, writer.add))
         return runs.load(folder)
 
     def read(self, name: str, choice: SolverChoice, place: str) -> Run:
@@ -87,6 +93,19 @@ class Bench:
         }
 
 
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Nobody else makes the run in ``folder`` meanwhile: whoever comes second waits, and then finds it made."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with (folder.parent / f".{folder.name}.lock").open("w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            log.info("%s: another process is making this run; waiting for it", folder)
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
 def _build(scene: Scene) -> Problem:
     log.info("%s: filling the muscle with tetrahedra of %g mm", scene.name, scene.muscle.tet_size)
     built = problem.build(scene)
@@ -95,8 +114,13 @@ def _build(scene: Scene) -> Problem:
     return built
 
 
-def _named(run: Run, name: str) -> Run:
-    return Run(**{**vars(run), "name": name})
+def _stored(folder: Path, name: str) -> Run | None:
+    """The finished run in ``folder`` under the name that it has here, None where there is none."""
+    run = runs.finished(folder)
+    if run is None:
+        return None
+    log.info("%s: solved before, taken from %s", name, folder)
+    return replace(run, name=name)
 
 
 @cache
@@ -144,12 +168,10 @@ def complete(run: Run, numbers: tuple[int, ...]) -> Run:
         blank = np.full(values.shape[1:], np.nan)
         return np.stack([blank if row is None else values[row] for row in rows])
 
-    return Run(
-        **{
-            **vars(run),
-            "numbers": numbers,
-            "positions": pick(run.positions),
-            "fibre_positions": pick(run.fibre_positions),
-            "scalars": {name: pick(values) for name, values in run.scalars.items()},
-        }
+    return replace(
+        run,
+        numbers=numbers,
+        positions=pick(run.positions),
+        fibre_positions=pick(run.fibre_positions),
+        scalars={name: pick(values) for name, values in run.scalars.items()},
     )
