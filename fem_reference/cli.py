@@ -3,26 +3,31 @@
 import argparse
 import json
 import logging
+import re
+import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fem_reference import __version__, casefile, files, judge, metrics, problem, report, solvers
+from fem_reference import __version__, casefile, files, judge, metrics, problem, report, runs, solvers
 from fem_reference.comparison import Comparison, compare
 from fem_reference.errors import InputError, MissingSoftware
 from fem_reference.execution import Bench, complete
 from fem_reference.mesh import enclosed_volume, vertex_areas
+from fem_reference.motion import Rotation
+from fem_reference.records import parse
 from fem_reference.runs import Run
 from fem_reference.scene import Candidate, Scene, SolverChoice
 
 DONE, VERDICT_FAIL, BAD_INPUT, SOLVER_FAILED = range(4)
-INTERRUPTED = 130  # what shells report for it
+INTERRUPTED, TERMINATED = 130, 143  # what shells report for them
 MAIN_JOB = "hip_flexion"
 
 
 def entry() -> None:
     """The installed command."""
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))  # so that what is under way is cleaned up
     sys.exit(main(sys.argv[1:]))
 
 
@@ -31,8 +36,9 @@ def main(arguments: list[str]) -> int:
     options = _parser().parse_args(arguments)
     _show_progress(on=not options.quiet)
     try:
+        _check_outputs(options)
         status: int = options.verb(options)
-    except InputError as error:
+    except (InputError, OSError) as error:
         print(f"fem-reference: {error}", file=sys.stderr)
         return BAD_INPUT
     except MissingSoftware as error:
@@ -42,6 +48,14 @@ def main(arguments: list[str]) -> int:
         print("fem-reference: interrupted; a run that was not finished is solved again next time", file=sys.stderr)
         return INTERRUPTED
     return status
+
+
+def _check_outputs(options: argparse.Namespace) -> None:
+    """InputError where something else already stands in the place of an output."""
+    if options.out is not None and options.out.exists() and not options.out.is_dir():
+        raise InputError("--out", f'"{options.out}", a file', "a folder")
+    if options.json is not None and options.json.is_dir():
+        raise InputError("--json", f'"{options.json}", a folder', "a file")
 
 
 def _show_progress(*, on: bool) -> None:
@@ -93,7 +107,12 @@ def _parser() -> argparse.ArgumentParser:
 
 def _demo(options: argparse.Namespace) -> int:
     scene = casefile.read(MAIN_JOB)
-    return _judge(scene, options, [(candidate, f"candidate[{i}]") for i, candidate in enumerate(scene.candidate)])
+    return _judge(scene, options, _own_candidates(scene))
+
+
+def _own_candidates(scene: Scene) -> list[tuple[Candidate, str]]:
+    """The candidates of the scene, each with its place."""
+    return [(candidate, f"candidate[{i}]") for i, candidate in enumerate(scene.candidate)]
 
 
 def _compare(options: argparse.Namespace) -> int:
@@ -111,9 +130,9 @@ def _candidate(scene: Scene, text: str, unit: str) -> tuple[Candidate, str]:
     if not path.exists():
         raise InputError("--candidate", f'"{text}"', f"a folder of frames, or one of {', '.join(names)}")
     folder = path.resolve()
-    return Candidate.model_validate(
-        {"name": folder.stem, "solver": "recorded", "folder": str(folder), "unit": unit}
-    ), "--candidate"
+    name = re.sub(r"[^\w.-]+", "_", folder.stem if folder.is_file() else folder.name) or "candidate"
+    table = {"name": name, "solver": "recorded", "folder": str(folder), "unit": unit}
+    return parse(Candidate, table, "--candidate"), "--candidate"
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -137,7 +156,9 @@ def _judge(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candida
     names = ["reference", *(entry.name for entry, _ in chosen)]
     for name in names:
         if names.count(name) > 1:
-            raise InputError("--candidate", f'"{name}" twice', "every name once, and none the name of the reference")
+            raise InputError(
+                "--candidate", f'"{name}" twice', 'folders and candidates of different names, none of them "reference"'
+            )
     bench = Bench(scene, _out(options) / "runs", options.ranks)
     for candidate, place in [(scene.reference, "reference"), *chosen]:
         bench.settings(candidate, place)
@@ -193,7 +214,7 @@ def _run_text(run: Run) -> str:
 
 def _list(options: argparse.Namespace) -> int:
     scenes = {name: casefile.read(name).title for name in casefile.cases()}
-    stored = sorted(str(path.parent) for path in (_out(options) / "runs").glob("*/*/run.json"))
+    stored = [_stored(path.parent) for path in sorted((_out(options) / "runs").glob("*/*/run.json"))]
     facts = {"cases": scenes, "solvers": solvers.names(), "metrics": metrics.names(), "runs": stored}
     width = max(map(len, scenes))
     lines = ["cases:", *(f"  {name:{width}}  {title}" for name, title in scenes.items())]
@@ -203,8 +224,18 @@ def _list(options: argparse.Namespace) -> int:
     return DONE
 
 
+def _stored(folder: Path) -> str:
+    """A stored run, with its status where it did not converge."""
+    status = runs.status(folder)
+    return str(folder) if status == "converged" else f"{folder} ({status})"
+
+
 def _show(options: argparse.Namespace) -> int:
     scene = casefile.read(options.case)
+    judge.check(scene)
+    bench = Bench(scene, _out(options) / "runs")
+    for choice, place in [(scene.reference, "reference"), *_own_candidates(scene)]:
+        bench.settings(choice, place)
     facts = _scene_facts(scene, problem.setup(scene))
     if options.out is not None:
         built, folder = problem.build(scene), options.out / scene.name
@@ -230,8 +261,7 @@ def _scene_facts(scene: Scene, setup: problem.Setup) -> dict[str, Any]:
             "tet_size_mm": scene.muscle.tet_size,
         },
         "bones": {
-            bone.name: f"{len(bone.surface.triangles)} triangles, {'moves' if bone.motion else 'rests'}"
-            for bone in setup.bones
+            bone.name: f"{len(bone.surface.triangles)} triangles, {_motion(bone.motion)}" for bone in setup.bones
         },
         "attachments": {
             held.attachment: f"{len(held.vertices)} vertices, {areas[held.vertices].sum():.0f} mm2, held by {held.bone.name}"
@@ -246,6 +276,14 @@ def _scene_facts(scene: Scene, setup: problem.Setup) -> dict[str, Any]:
             for e in scene.expect
         ],
     }
+
+
+def _motion(motion: Rotation | None) -> str:
+    if motion is None:
+        return "rests"
+    x, y, z = motion.centre
+    keys = ", ".join(f"{angle:g} at {frame:g}" for frame, angle in zip(motion.frames, motion.angles, strict=True))
+    return f"turns about ({x:g}, {y:g}, {z:g}) mm along {motion.axis}, rad at frame: {keys}"
 
 
 def _lines(facts: dict[str, Any], indent: str = "") -> list[str]:

@@ -43,11 +43,12 @@ def compare(scene: Scene, setup: Setup, reference: Run, candidates: tuple[Run, .
     yardstick = Yardstick.of(reference, reference.fibres)
     deviations = {run.name: measure(run, reference, yardstick) for run in candidates}
     changes = {run.name: measure(run, at_rest(run), yardstick) for run in (reference, *candidates)}
-    of = {"reference": changes["reference"]} | deviations
+    measured = {"reference": changes["reference"]} | deviations
     verdicts = tuple(
-        verdict(expectation, of[expectation.of], reference.numbers)
+        verdict(expectation.model_copy(update={"of": name}), measured[name], reference.numbers)
         for expectation in scene.expect
-        if expectation.of in of
+        for name in (deviations if expectation.of == "candidates" else [expectation.of])
+        if name in measured
     )
     error = extension_error(reference, yardstick)
     return Comparison(scene, setup, reference, candidates, yardstick, deviations, changes, error, verdicts)

@@ -47,10 +47,13 @@ class Bench:
 
     def obtain(self, name: str, choice: SolverChoice, place: str) -> Run:
         """The run of a solver of our own, by the name that pages give it; ``place`` is where the scene chooses it."""
+        if choice.solver == "recorded":  # files may change behind a name; they are read anew each time
+            return self.read(name, choice, place)
         settings = self.settings(choice, place)
         folder = self.store / f"{choice.solver}-{self.key(choice.solver, settings)[:16]}"
         if (stored := _stored(folder, name)) is not None:
             return stored
+        solvers.require(choice.solver, settings, place)
         self.problem()  # what is wrong with the input shows before anything is written
         with _alone(folder):
             return _stored(folder, name) or self._solve(name, choice.solver, settings, folder)
@@ -60,7 +63,10 @@ class Bench:
         origin = self.origin(solver, settings) | {"mesh": built.mesh_facts}
         identity = {"name": name, "solver": solver, "origin": origin, "frames": built.frames}
         writer = runs.Writer(folder, identity, built.surface, built.fibres, built.mesh)
-        writer.close(solvers.find(solver, self.scene.place).solve(built, settings, writer.add))
+        outcome = solvers.find(solver, self.scene.place).solve(built, settings, writer.add)
+        if not writer.frames:  # it failed before its first frame, which is rest
+            writer.add(Frame(built.frames[0], built.surface.points, built.fibres.points))
+        writer.close(outcome)
         return runs.load(folder)
 
     def read(self, name: str, choice: SolverChoice, place: str) -> Run:
@@ -115,9 +121,14 @@ def _build(scene: Scene) -> Problem:
 
 
 def _stored(folder: Path, name: str) -> Run | None:
-    """The finished run in ``folder`` under the name that it has here, None where there is none."""
+    """The finished run in ``folder`` under the name that it has here; None where there is none, or other packages made it."""
     run = runs.finished(folder)
     if run is None:
+        return None
+    now, then = _versions(), run.origin["versions"]
+    other = [package for package in now if package in then and now[package] != then[package] and package != "python"]
+    if other:
+        log.info("%s: solved before, but with another %s; solving again", name, other[0])
         return None
     log.info("%s: solved before, taken from %s", name, folder)
     return replace(run, name=name)

@@ -7,7 +7,6 @@ import csv
 import io
 import os
 import re
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr
 from pathlib import Path
@@ -17,6 +16,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from fem_reference import formats
 from fem_reference.errors import InputError
 from fem_reference.formats import Soup, only_triangles, read_obj, read_off, read_ply, read_stl
 from fem_reference.mesh import Floats, Ints, Polylines, Surface, TetMesh
@@ -34,18 +34,34 @@ def read_surface(path: Path, unit: float) -> Surface:
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
         raise InputError(path, f'the suffix "{path.suffix}"', want)
-    points, triangles = _attempt(reader, path, want)
-    if len(triangles) == 0:
-        raise InputError(path, "no triangles", want)
-    return Surface(np.asarray(points, np.float64) * unit, triangles, str(path))
+    points, triangles = _attempt(lambda file: formats.arrays(reader(file)), path, want)
+    return Surface(points * unit, triangles, str(path))
 
 
 def read_polylines(path: Path, unit: float) -> Polylines:
-    """The lines of a VTK or VTP file in units of ``unit`` mm; cells that go on where another ends are one line."""
+    """The lines of a VTK or VTP file in units of ``unit`` mm; cells that go on where another ends are one line.
+
+    InputError where it cannot be read whole, a point is not finite or a line has no length.
+    """
+
+    def read(file: Path) -> tuple[Floats, list[list[int]]]:
+        points, lines = _vtk_lines(file)
+        formats.check_lengths(points, lines)
+        return points, lines
+
+    return _polylines(read, path, unit)
+
+
+def read_moved_polylines(path: Path, unit: float) -> Polylines:
+    """As ``read_polylines``, of what a solver made of the lines: points not finite and lines of no length as well."""
+    return _polylines(_vtk_lines, path, unit)
+
+
+def _polylines(read: Callable[[Path], tuple[Floats, list[list[int]]]], path: Path, unit: float) -> Polylines:
     want = "polylines, whole, as .vtk or .vtp"
     if path.suffix.lower() not in (".vtk", ".vtp"):
         raise InputError(path, f'the suffix "{path.suffix}"', want)
-    points, lines = _attempt(_vtk_lines, path, want)
+    points, lines = _attempt(read, path, want)
     offsets = np.cumsum([0, *(len(line) for line in lines)])
     return Polylines(points[np.concatenate(lines)] * unit, offsets)
 
@@ -123,7 +139,10 @@ def write_pvd(path: Path, frames: Sequence[tuple[int, str]]) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """The text in UTF-8."""
+    """The text in UTF-8; into ``path`` itself where that is a pipe or a device."""
+    if path.exists() and not path.is_file():
+        path.write_text(text, encoding="utf-8")
+        return
     with _whole(path) as part:
         part.write_text(text, encoding="utf-8")
 
@@ -168,7 +187,7 @@ def _meshio_steps(path: Path) -> list[tuple[float, Floats, Ints]]:
     import meshio
 
     with meshio.xdmf.TimeSeriesReader(path) as series:
-        points, triangles = _meshio_triangles(meshio.Mesh(*series.read_points_cells()))
+        points, triangles = formats.arrays(_meshio_triangles(meshio.Mesh(*series.read_points_cells())))
         steps = [series.read_data(step)[:2] for step in range(series.num_steps)]
     return [(time, points + _displacement(data, points), triangles) for time, data in steps]
 
@@ -200,7 +219,7 @@ def _read_vtk(path: Path) -> Soup:
 
 
 def _vtk_lines(path: Path) -> tuple[Floats, list[list[int]]]:
-    """Points (n, 3) of the file, and the points of each line."""
+    """Points (n, 3) of the file, and the points of each line; ValueError where one is not usable."""
     from vtkmodules.util.numpy_support import vtk_to_numpy
 
     data = _vtk_data(path)
@@ -209,23 +228,9 @@ def _vtk_lines(path: Path) -> tuple[Floats, list[list[int]]]:
     lines = data.GetLines()
     offsets = vtk_to_numpy(lines.GetOffsetsArray())
     cells = [cell.tolist() for cell in np.split(vtk_to_numpy(lines.GetConnectivityArray()), offsets[1:-1])]
-    return np.asarray(vtk_to_numpy(data.GetPoints().GetData()), np.float64), _joined(cells)
-
-
-def _joined(cells: list[list[int]]) -> list[list[int]]:
-    """Lines of point numbers; a cell that begins where one other ends goes on from there."""
-    starts, ends = Counter(cell[0] for cell in cells), Counter(cell[-1] for cell in cells)
-    shared = {point for point in starts if starts[point] == ends[point] == 1}
-    after = {cell[0]: cell for cell in cells}
-    lines = []
-    for cell in (cell for cell in cells if cell[0] not in shared):
-        line = list(cell)
-        while line[-1] in shared:
-            line += after[line[-1]][1:]
-        lines.append(line)
-    if sum(len(line) - 1 for line in lines) != sum(len(cell) - 1 for cell in cells):
-        raise ValueError("lines that close to a ring")
-    return lines
+    points = np.asarray(vtk_to_numpy(data.GetPoints().GetData()), np.float64)
+    formats.check_lines(points, cells)
+    return points, formats.joined(cells)
 
 
 def _vtk_data(path: Path) -> Any:

@@ -10,7 +10,7 @@ from fem_reference.records import join
 from fem_reference.scene import Expectation, Scene
 from fem_reference.units import quantity
 
-Word = Literal["pass", "fail", "cannot say"]
+Word = Literal["pass", "fail", "cannot say", "not judged"]
 _KINDS = {"mm": ("a length", 1.0), "%": ("a fraction", 100.0), "mm3": ("a volume", 1.0)}
 
 
@@ -34,15 +34,16 @@ def judge(value: float, truth: float, within: float, error_bar: float = 0.0) -> 
     >>> judge(1.02, 1.0, 0.05), judge(float("nan"), 1.0, 0.05), judge(1.02, 1.0, 0.05, error_bar=0.02)
     ('pass', 'fail', 'cannot say')
     """
-    if error_bar > within / 3:
+    if not error_bar <= within / 3:
         return "cannot say"
     return "pass" if abs(value - truth) <= within else "fail"
 
 
 def overall(words: Iterable[Word]) -> Word:
-    """Fail if one fails, else cannot say if one cannot, else pass."""
+    """Fail if one fails, else cannot say if one cannot, else pass; not judged where there is none."""
     found = set(words)
-    return "fail" if "fail" in found else "cannot say" if "cannot say" in found else "pass"
+    order: tuple[Word, ...] = ("fail", "cannot say", "pass")
+    return next((word for word in order if word in found), "not judged")
 
 
 def check(scene: Scene) -> None:
@@ -51,12 +52,15 @@ def check(scene: Scene) -> None:
     for i, expectation in enumerate(scene.expect):
         place, name = join(scene.place, f"expect[{i}]"), f"{expectation.metric}.{expectation.statistic}"
         if name not in known:
-            raise InputError(f"{place}.statistic", f'"{name}"', f"one of {', '.join(sorted(known))}")
+            raise InputError(f"{place}: metric and statistic", f'"{name}"', f"one of {', '.join(sorted(known))}")
         for key in ("truth", "within"):
+            text = getattr(expectation, key)
             try:
-                _number(getattr(expectation, key), known[name])
+                value = _number(text, known[name])
             except ValueError as error:
-                raise InputError(f"{place}.{key}", f'"{getattr(expectation, key)}"', str(error)) from error
+                raise InputError(f"{place}.{key}", f'"{text}"', str(error)) from error
+            if key == "within" and value < 0:
+                raise InputError(f"{place}.{key}", f'"{text}"', "a tolerance of at least zero")
         if expectation.frame != "any" and expectation.frame not in numbers:
             want = f'"any" or one of {numbers[0]}, {numbers[1]}, ..., {numbers[-1]}'
             raise InputError(f"{place}.frame", expectation.frame, want)

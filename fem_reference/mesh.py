@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from fem_reference.errors import InputError
 
@@ -46,12 +48,13 @@ class Surface:
 @dataclass(frozen=True, eq=False)
 class TetMesh:
     """Tetrahedra: ``points`` (n, 3) [mm], ``tets`` (k, 4), all of positive volume; ``facets`` maps the name of a region of the
-    boundary to its triangles (m, 3).
+    boundary to its triangles (m, 3); ``maker`` names the mesher, where one made it.
     """
 
     points: Floats
     tets: Ints
     facets: dict[str, Ints] = field(default_factory=dict)
+    maker: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", read_only(self.points, np.float64))
@@ -114,9 +117,9 @@ def check_finite(surface: Surface) -> None:
 
 
 def check_closed(surface: Surface) -> Surface:
-    """The surface, outward, if it bounds a body: finite, closed, manifold, consistently oriented, every point used.
+    """The surface, outward, if it bounds one body: finite, closed, manifold, consistently oriented, every point used.
 
-    InputError otherwise, with the number of offending edges and where the first is.
+    InputError otherwise, with the number of offending edges, vertices or parts and where the first or smallest is.
     """
     check_finite(surface)
     points, triangles = surface.points, surface.triangles
@@ -135,10 +138,50 @@ def check_closed(surface: Surface) -> Surface:
     lost = len(points) - len(np.unique(triangles))
     if lost:
         raise InputError(surface.place, f"{lost} points that no triangle uses", "every point on the surface")
+    _check_fans(surface)
+    _check_one_part(surface)
     volume = enclosed_volume(points, triangles)
     if volume == 0:
         raise InputError(surface.place, "an enclosed volume of zero", "a body")
     return surface if volume > 0 else Surface(points, triangles[:, ::-1], surface.place)
+
+
+def _twins(triangles: Ints) -> tuple[Ints, Ints]:
+    """The two sides (e,), (e,) of each edge of a closed oriented surface; side 3 t + i leaves corner i of triangle t."""
+    ends = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    pairs = np.lexsort(ends.T).reshape(-1, 2)
+    return pairs[:, 0], pairs[:, 1]
+
+
+def _parts(first: Ints, second: Ints, count: int) -> Ints:
+    """The number (count,) of the connected part that each of ``count`` things is in, ``first`` (e,) linked to ``second``."""
+    links = coo_array((np.ones(len(first), bool), (first, second)), shape=(count, count))
+    return np.asarray(connected_components(links, directed=False)[1], np.int64)
+
+
+def _check_fans(surface: Surface) -> None:
+    """InputError where the triangles around a vertex of a closed oriented surface are more than one fan."""
+    one, other = _twins(surface.triangles)
+    after_one, after_other = (side - side % 3 + (side + 1) % 3 for side in (one, other))
+    corners = surface.triangles.ravel()
+    fan = _parts(np.concatenate([one, after_one]), np.concatenate([after_other, other]), len(corners))
+    _, corner = np.unique(fan, return_index=True)
+    wrong = np.flatnonzero(np.bincount(corners[corner]) > 1)
+    if len(wrong):
+        x, y, z = surface.points[wrong[0]]
+        got = f"{len(wrong)} vertices where parts touch, the first vertex {wrong[0]} at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
+        raise InputError(surface.place, got, "a manifold surface")
+
+
+def _check_one_part(surface: Surface) -> None:
+    """InputError where a closed surface is more than one part, connected by edges."""
+    one, other = _twins(surface.triangles)
+    part = _parts(one // 3, other // 3, len(surface.triangles))
+    areas = np.bincount(part, weights=triangle_areas(surface.points, surface.triangles))
+    if len(areas) > 1:
+        x, y, z = surface.points[surface.triangles[part == areas.argmin()]].mean(axis=(0, 1))
+        got = f"{len(areas)} separate parts, the smallest ({areas.min():.3g} mm2) around ({x:.1f}, {y:.1f}, {z:.1f}) mm"
+        raise InputError(surface.place, got, "one connected surface")
 
 
 def enclosed_volume(points: Floats, triangles: Ints) -> float:

@@ -2,7 +2,7 @@
 
 import logging
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from fem_reference.geometry.attachments import facets_under, pick
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.embedding import Locator
 from fem_reference.geometry.fibres import trace
+from fem_reference.geometry.intersections import self_intersections
 from fem_reference.geometry.tetrahedra import tetrahedralise
 from fem_reference.mesh import (
     Floats,
@@ -22,6 +23,7 @@ from fem_reference.mesh import (
     TetMesh,
     check_closed,
     check_finite,
+    fingerprint,
     tet_qualities,
     tet_volumes,
     triangle_areas,
@@ -78,7 +80,7 @@ class Problem(Setup):
     mesh: TetMesh
     effects: tuple[Effect, ...]
     fibres: Polylines
-    mesh_facts: dict[str, float]
+    mesh_facts: dict[str, float | str]
     seconds: float
 
 
@@ -101,7 +103,7 @@ def build(scene: Scene) -> Problem:
         if len(facets[held.attachment]) == 0:
             place = join(scene.place, f"attachment[{i}]")
             raise InputError(place, "an area smaller than the tetrahedra resolve", "a smaller muscle.tet_size")
-    mesh = TetMesh(bare.points, bare.tets, facets)
+    mesh = replace(bare, facets=facets)
     return Problem(
         rest.surface,
         rest.bones,
@@ -166,10 +168,13 @@ def _inside(mesh: TetMesh, fibres: Polylines) -> Polylines:
     return Polylines(points, fibres.offsets)
 
 
-def _mesh_facts(rest: Setup, mesh: TetMesh) -> dict[str, float]:
-    """Tets, their quality, the volume against the surface's, and for each attachment the area held on both."""
+def _mesh_facts(rest: Setup, mesh: TetMesh) -> dict[str, float | str]:
+    """Who made the mesh of what, tets, their quality, the volume against the surface's, and for each attachment the area held on both."""
     qualities = tet_qualities(mesh.points, mesh.tets)
-    facts = {
+    facts: dict[str, float | str] = {
+        "maker": mesh.maker,
+        "fingerprint": fingerprint(mesh.points, mesh.tets)[:16],
+        "self_intersections_of_surface": float(len(self_intersections(rest.surface))),
         "tets": float(len(mesh.tets)),
         "points": float(len(mesh.points)),
         "quality_min": float(qualities.min()),

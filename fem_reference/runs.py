@@ -11,6 +11,7 @@ A file appears whole or not at all; ``run.json`` is written after the frame file
 
 import json
 import logging
+import math
 import shutil
 import time
 from collections.abc import Callable
@@ -92,6 +93,11 @@ class Writer:
         folder.mkdir(parents=True)
         self._write_state()
 
+    @property
+    def frames(self) -> tuple[int, ...]:
+        """The numbers of the frames stored so far."""
+        return tuple(self.state["numbers"])
+
     def add(self, frame: Frame) -> None:
         """Store a frame: its files first, then the index files and run.json."""
         parts: dict[str, Callable[[Path], None]] = {
@@ -112,7 +118,7 @@ class Writer:
             names = [(number, f"{part}/frame_{number:04d}{suffix}") for number in self.state["numbers"]]
             files.write_pvd(self.folder / f"{part}.pvd", names)
         for name, value in frame.scalars.items():
-            self.state["scalars"].setdefault(name, []).append(value)
+            self.state["scalars"].setdefault(name, []).append(value if math.isfinite(value) else None)
         self._write_state()
         self._log_progress(frame)
 
@@ -123,7 +129,7 @@ class Writer:
         self._write_state()
 
     def _write_state(self) -> None:
-        files.write_text(self.folder / "run.json", json.dumps(self.state, indent=1, allow_nan=True))
+        files.write_text(self.folder / "run.json", json.dumps(self.state, indent=1, allow_nan=False))
 
     def _log_progress(self, frame: Frame) -> None:
         done, wanted = len(self.state["numbers"]), len(self.state["frames"])
@@ -155,7 +161,7 @@ def load(folder: Path) -> Run:
         raise InputError(place, "a run without frames", "at least the rest frame")
     fibres, fibre_positions = None, None
     if "fibres" in parts:
-        lines = [files.read_polylines(folder / "fibres" / path.name, 1.0) for path in paths]
+        lines = [files.read_moved_polylines(folder / "fibres" / path.name, 1.0) for path in paths]
         fibres, fibre_positions = lines[0], np.stack([line.points for line in lines])
     return Run(
         name=name,
@@ -170,6 +176,14 @@ def load(folder: Path) -> Run:
         origin=origin,
         folder=folder,
     )
+
+
+def status(folder: Path) -> str:
+    """What ``run.json`` in ``folder`` says of the run: a status, ``"running"`` where it was cut off, or ``"damaged"``."""
+    try:
+        return str(json.loads((folder / "run.json").read_text(encoding="utf-8"))["status"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return "damaged"
 
 
 def finished(folder: Path) -> Run | None:

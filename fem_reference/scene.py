@@ -5,12 +5,13 @@
 
 import hashlib
 import json
+import math
 import os
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal, Self
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from fem_reference.effects import Effect
 from fem_reference.errors import InputError
@@ -19,9 +20,16 @@ from fem_reference.records import Record, join
 from fem_reference.units import Angle, LengthUnit, Point, PositiveLength, Time
 
 DATA_SETTING = "FEM_REFERENCE_DATA"
-_PACKAGE = Path(__file__).resolve().parent
-# In a checkout cases/ and meshes/ stand beside the package, in an installed copy inside it.
-HOME = _PACKAGE.parent if (_PACKAGE.parent / "cases").is_dir() else _PACKAGE
+MOST_FRAMES = 100_000
+LAST_FRAME = 1_000_000_000
+
+
+def home(package: Path) -> Path:
+    """Where cases/ and meshes/ are: inside an installed package, beside it in a checkout."""
+    return package if (package / "cases").is_dir() else package.parent
+
+
+HOME = home(Path(__file__).resolve().parent)
 
 
 class Muscle(Record):
@@ -46,13 +54,18 @@ class Motion(Record):
     centre: Point
     keyframes: tuple[Keyframe, ...] = Field(min_length=2)
 
+    @field_validator("axis")
+    @classmethod
+    def _check_axis(cls, axis: tuple[float, float, float]) -> tuple[float, float, float]:
+        if not 1e-9 < math.hypot(*axis) < 1e9:
+            raise ValueError("an axis that is not zero, with a length from 1e-9 to 1e9")
+        return axis
+
     @model_validator(mode="after")
     def _check(self) -> Self:
         frames = [keyframe.frame for keyframe in self.keyframes]
         if any(late <= early for early, late in pairwise(frames)):
             raise ValueError("keyframes in the order of their frames")
-        if not any(self.axis):
-            raise ValueError("an axis that is not zero")
         return self
 
     def rotation(self) -> Rotation:
@@ -112,7 +125,7 @@ class Polylines(Record):
 class Traced(Record):
     """Fibres traced along the gradient of a Laplace field that is 0 on the attachment ``start`` and 1 on ``end``."""
 
-    count: int = Field(gt=0)
+    count: int = Field(gt=0, le=100_000)
     start: str
     end: str
 
@@ -144,6 +157,10 @@ class Frames(Record):
     def _check(self) -> Self:
         if self.last <= self.first or (self.last - self.first) % self.every:
             raise ValueError("last = first + a multiple of every")
+        if (self.last - self.first) // self.every >= MOST_FRAMES:
+            raise ValueError(f"at most {MOST_FRAMES} frames")
+        if self.last > LAST_FRAME:
+            raise ValueError(f"frame numbers up to {LAST_FRAME}")
         return self
 
     @property
@@ -187,15 +204,13 @@ class Spoil(Record):
     """One change of this scene that must turn its verdict to fail: the ``key`` to change and its ``value``."""
 
     key: str
-    value: str | float
+    value: str | int | float
     because: str
 
 
-class Scene(Record):
-    """A case, read and checked."""
+class SceneFile(Record):
+    """What a scene file holds."""
 
-    name: str
-    folder: Path
     title: str
     proves: str
     muscle: Muscle
@@ -208,6 +223,13 @@ class Scene(Record):
     candidate: tuple[Candidate, ...]
     expect: tuple[Expectation, ...] = Field(min_length=1)
     spoil: Spoil
+
+
+class Scene(SceneFile):
+    """A case, read and checked: what its file holds, and the name and place of its folder."""
+
+    name: str
+    folder: Path
 
     @property
     def place(self) -> str:

@@ -4,6 +4,8 @@ The annotated types are what scene records are made of: a field of type ``Pressu
 """
 
 import math
+import re
+import sys
 from functools import cache, partial
 from typing import Annotated
 
@@ -19,6 +21,8 @@ _INSIDE = {
     "a time": "s",
     "a volume": "mm**3",
 }
+# A number, then what may be a unit.
+_NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.ASCII)
 
 
 @cache
@@ -27,24 +31,32 @@ def _registry() -> pint.UnitRegistry:
 
 
 def quantity(text: object, kind: str) -> float:
-    """Read ``text`` as a quantity of ``kind`` (a key such as ``"a pressure"``); ValueError when it is none.
+    """Read ``text``, a number and then its unit, as a quantity of ``kind`` (``"a pressure"``); ValueError when it is none.
+
+    A fraction is in per cent or has no unit.
 
     >>> quantity("30 kPa", "a pressure"), quantity("2 cm", "a length"), quantity("0.5 %", "a fraction")
     (0.03, 20.0, 0.005)
     """
     wrong = ValueError(f"{kind} with its unit, such as {_EXAMPLE[kind]}")
-    if not isinstance(text, str):
+    number, unit = _split(text)
+    if not number or (kind == "a fraction" and unit not in ("", "%", "percent")):
         raise wrong
     try:
-        read = _registry().Quantity(text)
+        read = _registry().Quantity(float(number), _registry().parse_units(unit))
         value = float(read.to(_INSIDE[kind] or "dimensionless").magnitude)
-    except (
-        Exception
-    ) as error:  # pint raises its own errors, tokenizer errors and TypeError for text that is no quantity
+        same = read.to_root_units().units == _registry().Quantity(1.0, _INSIDE[kind]).to_root_units().units
+    except Exception as error:  # pint raises its own errors, tokenizer errors and TypeError for text that is no unit
         raise wrong from error
-    if not math.isfinite(value) or (kind == "an angle" and read.unitless):
+    if not math.isfinite(value) or not same:  # to pint an angle has no dimension, its root unit tells it apart
         raise wrong
     return value
+
+
+def _split(text: object) -> tuple[str, str]:
+    """Number and unit as text; both empty where ``text`` does not begin with a number."""
+    match = _NUMBER_AND_UNIT.fullmatch(text) if isinstance(text, str) else None
+    return (match[1], match[2]) if match else ("", "")
 
 
 _EXAMPLE = {
@@ -59,10 +71,10 @@ _EXAMPLE = {
 
 def point(text: object) -> tuple[float, float, float]:
     """Three lengths that share one unit: ``"146, 238, -431 mm"`` -> (146.0, 238.0, -431.0) [mm]."""
-    parts = text.split(",") if isinstance(text, str) else []
-    unit = parts[-1].split()[-1] if parts and parts[-1].split() else ""
+    parts = [_split(part) for part in text.split(",")] if isinstance(text, str) else []
+    shared = parts[-1][1] if parts else ""
     try:
-        x, y, z = (quantity(part if unit in part else f"{part} {unit}", "a length") for part in parts)
+        x, y, z = (quantity(f"{number} {shared}", "a length") for number, unit in parts if unit in ("", shared))
     except ValueError as error:
         raise ValueError('three lengths with one unit, such as "146, 238, -431 mm"') from error
     return x, y, z
@@ -76,7 +88,7 @@ def length_unit(text: object) -> float:
 
 
 def _positive(value: float) -> float:
-    if not value > 0:
+    if not value >= sys.float_info.min:  # below it numbers lose their digits
         raise ValueError("more than zero")
     return value
 

@@ -16,6 +16,7 @@ ORDER = [
     "motion",
     "records",
     "effects",
+    "children",
     "formats",
     "files",
     "scene",

@@ -27,7 +27,7 @@ def _pick(folder: Path, surface: Surface = BLOCK, **way: Any) -> np.ndarray:
 
 
 def _listed(folder: Path, text: str, **keys: Any) -> np.ndarray:
-    (folder / "list.csv").write_text(text)
+    (folder / "list.csv").write_text(text, encoding="utf-8")
     return _pick(folder, vertices={"file": "list.csv", **keys})
 
 
@@ -64,6 +64,13 @@ def test_a_value_chooses_among_the_rows(tmp_path: Path) -> None:
         ("3\nfour\n", {}, r'list.csv: row 2: got "four"'),
         ("3\n4.0\n", {}, r'list.csv: row 2: got "4.0"'),
         ("vertex,value\n3,1\n4\n", {"value": 1}, r'list.csv: row 3: got "4", want a vertex and its value'),
+        ("1.5\n3\n", {}, r'list.csv: row 1: got "1.5", want a vertex from 0 to 281'),
+        ("1e2\n3\n", {}, r'list.csv: row 1: got "1e2"'),
+        ("-\n3\n", {}, r'list.csv: row 1: got "-"'),
+        (",7\n3\n", {}, r'list.csv: row 1: got ""'),
+        ("3\n\u00b2\n", {}, r'list.csv: row 2: got "\u00b2"'),
+        (f"3\n{'9' * 5000}\n", {}, rf'list.csv: row 2: got "{"9" * 40}\.\.\.", want a vertex'),
+        (f"3,{'9' * 5000}\n", {"value": 1}, rf'list.csv: row 1: got "3,{"9" * 38}\.\.\.", want a vertex and its value'),
         ("3,femur\n", {"value": 1}, r'list.csv: row 1: got "3,femur", want a vertex and its value'),
     ],
 )

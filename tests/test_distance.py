@@ -1,6 +1,7 @@
 """Distance to a surface: against closed forms on a cube and on one triangle."""
 
 import numpy as np
+import pytest
 import shapes
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
@@ -55,3 +56,13 @@ def test_a_triangle_without_area_still_has_weights() -> None:
 def test_no_points_have_no_distances() -> None:
     found = distances(np.zeros((0, 3)), CUBE)
     assert [len(part) for part in found] == [0, 0, 0, 0]
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_what_is_not_finite_has_no_distance(bad: float) -> None:
+    points = np.ones((3, 3))
+    points[1, 2] = bad
+    with pytest.raises(ValueError, match="distances: points that are not finite"):
+        distances(points, CUBE)
+    with pytest.raises(ValueError, match="distances: points of the surface that are not finite"):
+        distances(np.ones((1, 3)), Surface(points, np.array([[0, 1, 2]])))

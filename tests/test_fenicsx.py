@@ -123,6 +123,30 @@ def test_what_cannot_be_reached_is_a_status_that_keeps_the_frames_before() -> No
     assert [frame.number for frame in frames] == [0, 1]
 
 
+def test_more_ranks_than_tets_still_solve(bent) -> None:
+    problem = shapes.bar((1, 1, 1), (10, 10, 10), {"bottom": None, "top": turning(0.1)}, MUSCLE, (0, 10))
+    outcome, frames = solved(problem, ranks=7)
+    assert outcome.status == "converged"
+    assert len(frames) == 2
+
+
+def test_an_error_on_one_rank_ends_all(tmp_path) -> None:
+    # The first rank finds no job and stops; the other would wait for it for ever.
+    code = "from mpi4py import MPI; comm = MPI.COMM_WORLD; 1 / comm.rank; comm.Barrier()"
+    (tmp_path / "half.py").write_text(code)
+    (*start, _) = fenicsx._command(Settings(ranks=2), tmp_path)
+    outcome = fenicsx._run([*start[:-2], str(tmp_path / "half.py")], Settings(time_limit="30 s"), lambda _: None)
+    assert outcome.status == "crashed"
+    assert "ZeroDivisionError" in outcome.message
+
+
+def test_how_far_held_vertices_are_off_is_recorded(bent) -> None:
+    # On this body every held vertex is a corner of a held facet.
+    _, _, frames = bent
+    for frame in frames:
+        assert 0 <= frame.scalars["held_off_rms"] <= frame.scalars["held_off_max"] < 1e-9
+
+
 def test_a_process_that_dies_is_a_status() -> None:
     command = [sys.executable, "-c", "import sys; sys.exit('no memory')"]
     outcome = fenicsx._run(command, Settings(), lambda _: None)

@@ -1,5 +1,6 @@
 """What goes out comes back the same, and a file that is not whole is never read nor left behind."""
 
+from contextlib import chdir
 from pathlib import Path
 
 import meshio
@@ -87,6 +88,12 @@ def test_segments_become_lines(tmp_path: Path, cells: tuple[list[int], ...], wan
         ("ring.vtk", segments([0, 1], [1, 2], [2, 0]), "lines that close to a ring"),
         ("none.vtk", segments(), "no lines"),
         ("cut.vtk", segments([0, 1], [1, 2])[:-6], "Error reading"),
+        ("beyond.vtk", segments([0, 1], [1, 9]), "line 1 with a point that does not exist, of 9"),
+        ("below.vtk", segments([0, 1], [-1, 2]), "line 1 with a point that does not exist, of 9"),
+        ("point.vtk", segments([0, 1], [3]), "line 1 of 1 points"),
+        ("nan.vtk", segments([0, 1]).replace("5 0 0", "5 nan 0"), r"a point that is not finite \(point 5\)"),
+        ("inf.vtk", segments([0, 1]).replace("1 0 0", "1 0 inf"), r"a point that is not finite \(point 1\)"),
+        ("flat.vtk", segments([0, 1], [3, 4]).replace("4 0 0", "3 0 0"), "line 1 of zero length"),
         ("lines.obj", "l 1 2\n", 'the suffix ".obj"'),
     ],
 )
@@ -94,6 +101,20 @@ def test_lines_that_are_none_are_refused(tmp_path: Path, name: str, text: str, g
     (tmp_path / name).write_text(text)
     with pytest.raises(InputError, match=f"{name}: got {got}.*want polylines, whole, as .vtk or .vtp"):
         files.read_polylines(tmp_path / name, 1.0)
+
+
+def test_what_a_solver_made_of_lines_is_read(tmp_path: Path) -> None:
+    """Stored frames in which a solver lost points, or drew a line into one; their cells must be whole all the same."""
+    path = tmp_path / "moved.vtp"
+    lines = Polylines(MOVED[:4], np.array([0, 2, 4]))
+    moved = np.array([[np.nan] * 3, [np.inf] * 3, [1.0, 2, 3], [1.0, 2, 3]])
+    files.write_polylines(path, lines, moved)
+    assert np.array_equal(files.read_moved_polylines(path, 1.0).points, moved, equal_nan=True)
+    with pytest.raises(InputError, match=r"moved\.vtp: got a point that is not finite \(point 0\)"):
+        files.read_polylines(path, 1.0)
+    (tmp_path / "cells.vtk").write_text(segments([0, 9]))
+    with pytest.raises(InputError, match=r"cells\.vtk: got line 0 with a point that does not exist"):
+        files.read_moved_polylines(tmp_path / "cells.vtk", 1.0)
 
 
 def test_an_index_comes_back(tmp_path: Path) -> None:
@@ -111,9 +132,9 @@ def test_a_damaged_index_is_refused(tmp_path: Path, text: str) -> None:
         files.read_pvd(tmp_path / "run.pvd")
 
 
-def write_series(path: Path, **data: np.ndarray) -> None:
-    """Two steps at 0 and 0.5 s; each value of ``data`` is that of the second."""
-    with meshio.xdmf.TimeSeriesWriter(path, data_format="XML") as series:
+def write_series(path: Path, data_format: str = "XML", **data: np.ndarray) -> None:
+    """Two steps at 0 and 0.5 s; each value of ``data`` is that of the second; meshio puts its .h5 beside the path."""
+    with chdir(path.parent), meshio.xdmf.TimeSeriesWriter(path, data_format=data_format) as series:
         series.write_points_cells(BALL.points, [("triangle", BALL.triangles)])
         for time in (0.0, 0.5):
             series.write_data(time, point_data={name: 2 * time * values for name, values in data.items()})
@@ -128,6 +149,32 @@ def test_a_series_moves_by_its_displacement(tmp_path: Path, name: str) -> None:
     assert np.allclose(first.points, 10 * BALL.points, rtol=0, atol=1e-13)
     assert np.allclose(last.points, 10 * MOVED, rtol=0, atol=1e-13)
     assert last.place == f"{tmp_path / 'run.xdmf'}: time 0.5"
+
+
+@pytest.mark.parametrize("relative", [False, True])
+def test_a_series_whose_numbers_are_in_hdf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, relative: bool) -> None:
+    """As meshio chooses by itself; the .h5 is beside the .xdmf, wherever we are."""
+    (tmp_path / "there").mkdir()
+    write_series(tmp_path / "there" / "run.xdmf", "HDF", displacement=MOVED - BALL.points)
+    assert (tmp_path / "there" / "run.h5").is_file()
+    monkeypatch.chdir(tmp_path)
+    (start, first), (end, last) = files.read_xdmf(Path("." if relative else tmp_path) / "there" / "run.xdmf", 10.0)
+    assert (start, end) == (0.0, 0.5)
+    assert np.array_equal(first.points, 10 * BALL.points)
+    assert np.array_equal(first.triangles, BALL.triangles)
+    assert np.allclose(last.points, 10 * MOVED, rtol=0, atol=1e-13)  # the sum is rounded, as above
+
+
+@pytest.mark.parametrize("share", [None, 0.0, 0.5])
+def test_a_series_without_its_hdf_is_refused(tmp_path: Path, share: float | None) -> None:
+    write_series(tmp_path / "run.xdmf", "HDF", displacement=MOVED - BALL.points)
+    store = tmp_path / "run.h5"
+    if share is None:
+        store.unlink()
+    else:
+        store.write_bytes(store.read_bytes()[: int(share * store.stat().st_size)])
+    with pytest.raises(InputError, match=r"run\.xdmf: got .*open file.*, want an XDMF time series"):
+        files.read_xdmf(tmp_path / "run.xdmf", 1.0)
 
 
 def test_a_series_without_displacement_is_refused(tmp_path: Path) -> None:

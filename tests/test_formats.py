@@ -156,6 +156,10 @@ def test_off_in_its_variety(tmp_path: Path) -> None:
 QUAD = Surface(np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2, 3]]))
 PLY_TEXT = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
 CORNERS = "property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
+LIST_PLY = (
+    "ply\nformat ascii 1.0\nelement vertex 3\nproperty list uchar float x\nproperty float y\nproperty float z\n"
+    "element face 1\nproperty list uchar int vertex_indices\nend_header\n2 0 0 0 0\n2 1 1 0 0\n2 1 1 1 0\n3 0 1 2\n"
+)
 
 
 @pytest.mark.parametrize(
@@ -175,6 +179,17 @@ CORNERS = "property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n1 1
         ("none.ply", f"{PLY_TEXT}element face 0\n{CORNERS}", "no triangles"),
         ("cloud.ply", f"{PLY_TEXT}end_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n", "no vertices with faces"),
         ("short.off", "OFF 3 1 0\n0 0 0\n1 0 0\n0 1\n3 0 1 2\n", "a position of fewer than three coordinates"),
+        ("huge.obj", f"v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 {10**30}\n", "Python int too large"),
+        ("huge.off", f"OFF 3 1 0\n0 0 0\n1 0 0\n1 1 0\n3 0 1 {10**30}\n", "Python int too large"),
+        ("empty.obj", "f 1 2 3\n", "no vertices"),
+        ("empty.off", "OFF 0 1 0\n3 0 1 2\n", "no vertices"),
+        ("list.ply", LIST_PLY, r"points of shape \(3, 4\)"),
+        (
+            "half.ply",
+            f"{PLY_TEXT}element face 1\n{CORNERS}3 0 1 1.5\n",
+            r"corners of shape \(1, 3\) that are not three",
+        ),
+        ("nan.ply", f"{PLY_TEXT}element face 1\n{CORNERS}3 0 1 nan\n", r"corners of shape \(1, 3\) that are not three"),
         ("word.off", "a text\n", "no OFF header"),
         ("word.vtp", "a text\n", "Error parsing XML"),
         ("word.step", "ISO-10303-21\n", 'the suffix ".step"'),

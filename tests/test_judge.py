@@ -55,6 +55,7 @@ def test_overall() -> None:
     assert overall(["pass", "cannot say", "fail"]) == "fail"
     assert overall(["pass", "cannot say"]) == "cannot say"
     assert overall(["pass"]) == "pass"
+    assert overall([]) == "not judged"
 
 
 def test_any_frame_means_every_frame_and_shows_the_one_that_decides() -> None:
@@ -75,6 +76,17 @@ def test_units_of_tolerances_are_those_of_the_measure() -> None:
         checked(statistic="deviation_volume", truth="0 ml")
 
 
+def test_a_tolerance_below_zero_is_refused() -> None:
+    with pytest.raises(InputError, match=r'expect\[0\].within: got "-0.5 %", want a tolerance of at least zero'):
+        checked(within="-0.5 %")
+
+
+def test_a_truth_known_to_nobody_knows_what_judges_nothing() -> None:
+    assert judge(0.0, 0.0, 1.0, error_bar=float("nan")) == "cannot say"
+
+
 def test_a_measure_that_does_not_exist_is_named() -> None:
-    with pytest.raises(InputError, match=r'expect\[0\].statistic: got "volume.median", want one of .*volume.deviation'):
+    with pytest.raises(
+        InputError, match=r'expect\[0\]: metric and statistic: got "volume.median", want one of .*volume.deviation'
+    ):
         checked(statistic="median")

@@ -108,16 +108,15 @@ def test_the_references_own_surface_scores_zero(job, tmp_path) -> None:
 
 
 def test_shifted_by_one_mm_scores_one_mm(job, tmp_path) -> None:
-    # The frame at rest must be at rest, so the shift begins after it.
-    shifted = job.frames(tmp_path / "shifted", lambda number, points: points + np.array([0.6, 0, 0.8]) * (number > 0))
+    shifted = job.frames(tmp_path / "shifted", lambda _, points: points + np.array([0.6, 0, 0.8]))
     _, facts = job.call("compare", str(job.case), "--candidate", str(shifted))
     for row in rows(facts, "shifted"):
         if row["metric"] == "surface_deviation" and row["statistic"] in ("rms", "p95", "max"):
-            assert row["value"] == pytest.approx(1.0 if row["frame"] else 0.0, abs=1e-9)
+            assert row["value"] == pytest.approx(1.0, abs=1e-9)
         if row["metric"] in ("volume", "fibre_length"):
             # A translation changes no volume and no length; rounding of 1e5 mm3 sums.
             assert row["value"] == pytest.approx(0, abs=1e-6)
-        if row["statistic"] == "hausdorff" and row["frame"]:
+        if row["statistic"] == "hausdorff":
             assert 0.7 < row["value"] <= 1 + 1e-9
 
 
@@ -187,7 +186,7 @@ BAD = {
         lambda case: edit(case, "first_step = 5", "step = 5"),
         "reference.step: got an unknown key",
     ),
-    "no such measure": (None, lambda case: edit(case, 'metric = "volume"', 'metric = "mass"'), "expect[0]"),
+    "no such measure": (None, lambda case: edit(case, 'metric = "volume"', 'metric = "mass"'), "expect[0]: metric"),
 }
 
 
@@ -252,6 +251,58 @@ def test_a_reference_that_fails_is_status_three_with_its_frames_kept(job, tmp_pa
     assert None not in first
     assert set(last) == {None}
     assert (tmp_path / "out" / "bar" / "report.html").exists()
+
+
+def test_a_reference_that_fails_before_its_first_frame_says_why(job, tmp_path, capsys) -> None:
+    case = shutil.copytree(job.case, tmp_path / "bar")
+    edit(case, "first_step = 5", 'first_step = 5\ntime_limit = "0.01 s"')
+    assert cli.main(["run", str(case), "--out", str(tmp_path / "out"), "--quiet"]) == cli.SOLVER_FAILED
+    assert "reference: timed out, stopped after" in capsys.readouterr().out
+
+
+def test_candidates_can_be_judged_whoever_they_are(job, tmp_path, capsys) -> None:
+    case = shutil.copytree(job.case, tmp_path / "bar")
+    edit(case, 'of = "reference"', 'of = "candidates"')
+    assert cli.main(["run", str(case), "--out", str(job.out), "--quiet"]) == cli.DONE
+    assert "verdict: not judged" in capsys.readouterr().out
+    large = job.frames(tmp_path / "large", lambda number, points: points * (1.01 if number else 1))
+    words = ["compare", str(case), "--candidate", str(large), "--out", str(job.out), "--quiet"]
+    assert cli.main(words) == cli.VERDICT_FAIL
+    assert "fail: large volume deviation" in capsys.readouterr().out
+
+
+def test_recorded_frames_are_read_anew_each_time(job, tmp_path, capsys) -> None:
+    case = shutil.copytree(job.case, tmp_path / "bar")
+    with (case / "case.toml").open("a") as text:
+        text.write('\n[[candidate]]\nname = "mine"\nsolver = "recorded"\nfolder = "mine"\nunit = "mm"\n')
+    folder = job.frames(case / "mine")
+    words = ["run", str(case), "--solver", "recorded", "--out", str(tmp_path / "out"), "--quiet"]
+    assert cli.main(words) == cli.DONE
+    (folder / "frame_0010.vtp").unlink()
+    assert cli.main(words) == cli.BAD_INPUT
+    assert "10" in capsys.readouterr().err
+
+
+def test_outputs_that_cannot_be_are_refused_at_once(job, tmp_path, capsys) -> None:
+    file = tmp_path / "file"
+    file.write_text("mine")
+    assert cli.main(["compare", str(job.case), "--out", str(file)]) == cli.BAD_INPUT
+    assert "--out: got" in capsys.readouterr().err
+    assert cli.main(["compare", str(job.case), "--json", str(tmp_path)]) == cli.BAD_INPUT
+    assert "--json: got" in capsys.readouterr().err
+    assert file.read_text() == "mine"
+
+
+def test_json_can_go_into_a_pipe(job) -> None:
+    words = [sys.executable, "-m", "fem_reference", "list", "--json", "/dev/stdout"]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    assert '"cases"' in done.stdout
+
+
+def test_a_folder_of_any_name_is_a_candidate(job, tmp_path) -> None:
+    folder = job.frames(tmp_path / "my frames v1.2")
+    _, facts = job.call("compare", str(job.case), "--candidate", str(folder))
+    assert rows(facts, "my_frames_v1.2")
 
 
 def test_list_and_show(job, capsys) -> None:

@@ -124,6 +124,32 @@ def test_a_closed_surface_is_given_back_outward() -> None:
     assert check_closed(inward).place == "here"
 
 
+def _two(first: Surface, second: Surface, same: tuple[tuple[int, int], ...] = ()) -> tuple[np.ndarray, np.ndarray]:
+    """Two surfaces as one, where each pair of ``same`` is a vertex of the first and of the second that become one."""
+    count = len(first.points)
+    number = np.arange(count, count + len(second.points))
+    for here, there in same:
+        number[there] = here
+    used, triangles = np.unique(np.concatenate([first.triangles, number[second.triangles]]), return_inverse=True)
+    return np.concatenate([first.points, second.points])[used], triangles.reshape(-1, 3)
+
+
+BAR = shapes.skin(shapes.box((2, 2, 6), (10.0, 10.0, 60.0)))
+CUBE = shapes.skin(shapes.box((2, 2, 2), (4.0, 4.0, 4.0)))
+APART = CUBE.moved_to(CUBE.points + (20, 30, 40))
+TOP = int(np.flatnonzero((BAR.points == (10, 10, 60)).all(axis=1))[0])
+ON_TOP = CUBE.moved_to(CUBE.points + (10, 10, 60))
+BALL = shapes.sphere(3, 30.0)
+NORTH, SOUTH = int(BALL.points[:, 2].argmax()), int(BALL.points[:, 2].argmin())
+
+
+def _pinched() -> tuple[np.ndarray, np.ndarray]:
+    """A ball whose poles are one vertex."""
+    triangles = np.where(BALL.triangles == SOUTH, NORTH, BALL.triangles)
+    used, triangles = np.unique(triangles, return_inverse=True)
+    return BALL.points[used], triangles.reshape(-1, 3)
+
+
 FAN = np.array([*TET_FACES, [1, 2, 4], [2, 1, 4]])
 UNUSABLE = {
     "no triangles": (CORNER, np.zeros((0, 3), int)),
@@ -137,6 +163,11 @@ UNUSABLE = {
     ),
     "3 edges that both their triangles run the same way": (CORNER, np.array([TET_FACES[0][::-1], *TET_FACES[1:]])),
     "1 points that no triangle uses": (np.concatenate([CORNER, CORNER[:1]]), TET_FACES),
+    r"2 separate parts, the smallest \(96 mm2\) around \(22.0, 32.0, 42.0\) mm, want one": _two(BAR, APART),
+    rf"1 vertices where parts touch, the first vertex {TOP} at \(10.0, 10.0, 60.0\) mm, want a manifold": _two(
+        BAR, ON_TOP, ((TOP, 0),)
+    ),
+    "1 vertices where parts touch, the first vertex": _pinched(),
     "an enclosed volume of zero": (CORNER * (1, 1, 0), TET_FACES),
 }
 

@@ -21,9 +21,24 @@ RADIUS = 40.0
 CENTRE = np.array([146.0, 238.0, -431.0])
 UNITS = {
     "volume": {"deviation": "%", "deviation_volume": "mm3"},
-    "fibre_length": {"mean": "mm", "rms": "mm", "max": "mm", "rms_percent": "%", "max_percent": "%"},
-    "surface_deviation": {"rms": "mm", "p95": "mm", "max": "mm", "rms_percent": "%", "max_percent": "%"}
-    | {"distance_mean": "mm", "distance_rms": "mm", "hausdorff": "mm"},
+    "fibre_length": {
+        "mean": "mm",
+        "rms": "mm",
+        "max": "mm",
+        "mean_percent": "%",
+        "rms_percent": "%",
+        "max_percent": "%",
+    },
+    "surface_deviation": {
+        "rms": "mm",
+        "p95": "mm",
+        "max": "mm",
+        "rms_percent": "%",
+        "p95_percent": "%",
+        "max_percent": "%",
+    }
+    | {"distance_mean": "mm", "distance_rms": "mm", "hausdorff": "mm"}
+    | {"distance_mean_percent": "%", "distance_rms_percent": "%", "hausdorff_percent": "%"},
 }
 
 

@@ -1,6 +1,7 @@
 """A record says which key is unknown, missing or wrong, and cannot be changed."""
 
-from typing import Any
+import math
+from typing import Any, Literal
 
 import pytest
 
@@ -19,6 +20,12 @@ class Tree(Record):
 
     leaf: Leaf
     leaves: tuple[Leaf, ...] = ()
+    height: float = 1.0
+    age: int | Literal["any"] = "any"
+    rings: tuple[tuple[float, float], ...] = ()
+
+
+LEAF = {"number": 1}
 
 
 @pytest.mark.parametrize(
@@ -29,8 +36,23 @@ class Tree(Record):
             {"leaf": {"number": 1}, "leaves": [{"number": 1, "x": 2}]},
             "a.toml: leaves[0].x: got an unknown key, want one of number",
         ),
-        ({"leaf": {"number": 1}, "root": 1}, "a.toml: root: got an unknown key, want one of leaf, leaves"),
+        (
+            {"leaf": {"number": 1}, "root": 1},
+            "a.toml: root: got an unknown key, want one of age, height, leaf, leaves, rings",
+        ),
         ({"leaf": {}}, "a.toml: leaf.number: got nothing, want this key"),
+        ({"leaf": {"number": True}}, "a.toml: leaf.number: got True, want a valid integer"),
+        ({"leaf": {"number": "1"}}, 'a.toml: leaf.number: got "1", want a valid integer'),
+        ({"leaf": {"number": 1.0}}, "a.toml: leaf.number: got 1.0, want a valid integer"),
+        ({"leaf": LEAF, "height": "1"}, 'a.toml: height: got "1", want a valid number'),
+        ({"leaf": LEAF, "height": True}, "a.toml: height: got True, want a valid number"),
+        ({"leaf": LEAF, "height": math.nan}, "a.toml: height: got nan, want a finite number"),
+        ({"leaf": LEAF, "height": -math.inf}, "a.toml: height: got -inf, want a finite number"),
+        ({"leaf": LEAF, "age": 1.5}, "a.toml: age: got 1.5, want a valid integer"),
+        ({"leaf": LEAF, "rings": [[1, 2], [3]]}, "a.toml: rings[1][1]: got nothing, want this key"),
+        ({"leaf": LEAF, "rings": [[1, math.inf]]}, "a.toml: rings[0][1]: got inf, want a finite number"),
+        ({"leaf": LEAF, "rings": 3}, "a.toml: rings: got 3, want a valid tuple"),
+        ({"leaf": [1, [2]]}, "a.toml: leaf: got [1, [2]], want"),
         ({"leaf": {"number": "x"}}, 'a.toml: leaf.number: got "x", want a valid integer'),
     ],
 )
@@ -38,6 +60,12 @@ def test_record_names_the_key(table: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError) as caught:
         parse(Tree, table, "a.toml")
     assert str(caught.value).startswith(message)
+
+
+def test_lists_become_tuples_and_integers_floats() -> None:
+    tree = parse(Tree, {"leaf": LEAF, "leaves": [LEAF], "height": 2, "age": 3, "rings": [[1, 2.5]]}, "a.toml")
+    assert (tree.leaves, tree.height, tree.age, tree.rings) == ((Leaf(number=1),), 2.0, 3, ((1.0, 2.5),))
+    assert isinstance(tree.height, float)
 
 
 def test_records_are_frozen() -> None:

@@ -309,10 +309,10 @@ def test_a_scene_that_differs_from_its_file_is_told(comparison):
 
 
 def test_a_reference_turned_inside_out_is_told(comparison):
-    assert "inside out, and" not in page.render(alone(comparison))
+    assert "inside out. At" not in page.render(alone(comparison))
     scalars = {"min_det_F_points": np.array([1, 0.5, -0.25, 0.5, NAN])}
     turned = replace(alone(comparison), reference=replace(comparison.reference, scalars=scalars))
-    assert re.search(r"at points falls to \N{MINUS SIGN}0.250: somewhere the reference is turned", page.render(turned))
+    assert re.search(r"at points falls to \N{MINUS SIGN}0.250: there the reference is turned", page.render(turned))
 
 
 def test_least_of_nothing_known_is_not_a_number():

@@ -10,7 +10,7 @@ import pytest
 
 from fem_reference import casefile
 from fem_reference.errors import InputError
-from fem_reference.scene import DATA_SETTING, HOME, Scene
+from fem_reference.scene import DATA_SETTING, HOME, Scene, home
 
 SCENE = """
 title = "A bar"
@@ -141,6 +141,7 @@ def test_candidates_may_be_none(bar: Path) -> None:
     assert casefile.read(edited(bar, SCENE[start:end], "")).candidate == ()
 
 
+NAN, INF = math.nan, math.inf
 WRONG = [
     # key, what stands there instead, what the message says
     ("muscle.unit", "2 mm", 'muscle.unit: got "2 mm", want a unit of length'),
@@ -152,8 +153,19 @@ WRONG = [
     ("effect[0].name", "hooke", 'effect[0].name: got "hooke", want one of incompressible, neo_hooke'),
     ("effect", ["hooke"], 'effect[0].name: got "hooke", want one of incompressible, neo_hooke'),
     ("effect", "hooke", 'effect: got "hooke", want'),
-    ("effect", [], "effect: got (), want"),
-    ("bone[1].motion.axis", [0, 0, 0], "want an axis that is not zero"),
+    ("effect", [], "effect: got [], want"),
+    ("effect[1]", {"name": "neo_hooke", "mu": "1 kPa"}, 'effect[1].name: got "neo_hooke" a second time, want every'),
+    ("bone[1].motion.axis", [0, 0, 0], "bone[1].motion.axis: got [0, 0, 0], want an axis that is not zero"),
+    ("bone[1].motion.axis", [1e-320, 0, 0], "bone[1].motion.axis: got [1e-320, 0, 0], want an axis that is not zero"),
+    ("bone[1].motion.axis", [1e200, 0, 0], "want an axis that is not zero, with a length from 1e-9 to 1e9"),
+    ("bone[1].motion.axis", [NAN, 0, 0], "bone[1].motion.axis[0]: got nan, want a finite number"),
+    ("bone[1].motion.axis", [0, INF, 0], "bone[1].motion.axis[1]: got inf, want a finite number"),
+    ("bone[1].motion.axis", ["1", "0", "0"], 'bone[1].motion.axis[0]: got "1", want a valid number'),
+    ("bone[1].motion.keyframes[1].frame", NAN, "bone[1].motion.keyframes[1].frame: got nan, want a finite number"),
+    ("bone[1].motion.keyframes[1].frame", "10", 'bone[1].motion.keyframes[1].frame: got "10", want a valid number'),
+    ("muscle.tet_size", "1e-320 mm", 'muscle.tet_size: got "1e-320 mm", want more than zero'),
+    ("muscle.tet_size", "mm", 'muscle.tet_size: got "mm", want a length with its unit'),
+    ("title", 3, "title: got 3, want a valid string"),
     ("bone[1].motion.centre", "1, 2 mm", 'bone[1].motion.centre: got "1, 2 mm", want three lengths with one unit'),
     ("bone[1].motion.keyframes[1].frame", 0, "want keyframes in the order of their frames"),
     (
@@ -176,14 +188,30 @@ WRONG = [
     ("fibres.traced.start", "middle", 'fibres.traced.start: got "middle", want one of start, end'),
     ("fibres.traced.end", "middle", 'fibres.traced.end: got "middle", want one of start, end'),
     ("fibres.traced.count", 0, "fibres.traced.count: got 0, want greater than 0"),
+    ("fibres.traced.count", 10**18, "want less than or equal to 100000"),
     ("fibres", {}, 'fibres: got {}, want exactly one of "polylines", "traced"'),
     ("frames.every", 3, "want last = first + a multiple of every"),
     ("frames.last", 0, "want last = first + a multiple of every"),
+    ("frames.every", True, "frames.every: got True, want a valid integer"),
+    ("frames.every", "5", 'frames.every: got "5", want a valid integer'),
+    ("frames.every", 5.0, "frames.every: got 5.0, want a valid integer"),
+    ("frames.last", 2000000000000000, "want at most 100000 frames"),
+    ("frames", {"first": 10**12, "last": 10**12 + 5, "every": 5}, "want frame numbers up to 1000000000"),
     ("frames.interval", "1 mm", 'frames.interval: got "1 mm", want a time with its unit, such as "0.01 s"'),
     ("expect[0].of", "slow", 'expect[0].of: got "slow", want one of reference, fast'),
     ("expect[0].kind", "hope", 'expect[0].kind: got "hope", want'),
-    ("expect[0].frame", "last", "expect[0].frame"),
+    ("expect[0].frame", "last", 'expect[0].frame: got "last", want'),
+    ("expect[0].frame", True, "expect[0].frame: got True, want"),
     ("expect", [], "expect: got [], want"),
+    ("spoil.key", "nonsense.key", 'spoil.key: got "nonsense.key", want a key of this scene'),
+    ("spoil.key", "", 'spoil.key: got "", want a key of this scene'),
+    ("spoil.key", "effect[\u00b2].bulk", "want a key of this scene"),
+    ("spoil.key", "spoil.because", 'spoil.value: got "10 kPa", want a value that changes spoil.because'),
+    ("spoil.value", "30000 kPa", 'spoil.value: got "30000 kPa", want a value that changes effect[1].bulk'),
+    ("spoil.value", "5 mm", 'spoil.value: got "5 mm", want a value that can be read (effect[1].bulk: got "5 mm", want'),
+    ("spoil.value", 5, "spoil.value: got 5, want a value that can be read (effect[1].bulk: got 5, want a pressure"),
+    ("spoil.value", True, "spoil.value: got True, want"),
+    ("spoil.value", NAN, "spoil.value: got nan, want"),
 ]
 
 
@@ -204,7 +232,11 @@ def test_every_key_is_needed(bar: Path, line: str) -> None:
 @pytest.mark.parametrize(
     ("table", "place", "known"),
     [
-        ('title = "A bar"\n', "colour", "attachment, bone, candidate"),
+        (
+            'title = "A bar"\n',
+            "colour",
+            "attachment, bone, candidate, effect, expect, fibres, frames, muscle, proves, reference, spoil, title",
+        ),
         ("[muscle]\n", "muscle.colour", "surface, tet_size, unit"),
         ("[[bone]]\n", "bone[0].colour", "motion, name, surface, unit"),
         ("[[attachment]]\n", "attachment[0].colour", "bone, name, outline, vertices, within"),
@@ -219,6 +251,18 @@ def test_unknown_key_is_told_the_known_ones(bar: Path, table: str, place: str, k
     with pytest.raises(InputError) as caught:
         casefile.read(edited(bar, table, table + 'colour = "red"\n'))
     assert f"case.toml: {place}: got an unknown key, want one of {known}" in str(caught.value)
+
+
+@pytest.mark.parametrize("key", ["name", "folder"])
+def test_what_the_folder_says_is_no_key(bar: Path, key: str) -> None:
+    with pytest.raises(InputError, match=rf"case\.toml: {key}: got an unknown key, want one of attachment, "):
+        casefile.read(edited(bar, 'title = "A bar"\n', f'title = "A bar"\n{key} = "hip_flexion"\n'))
+
+
+@pytest.mark.parametrize(("number", "told"), [("nan", "nan"), ("inf", "inf"), ("-inf", "-inf")])
+def test_numbers_of_a_file_are_finite(bar: Path, number: str, told: str) -> None:
+    with pytest.raises(InputError, match=rf"axis\[2\]: got {told}, want a finite number"):
+        casefile.read(edited(bar, "axis = [0, 0, 2]", f"axis = [0, 0, {number}]"))
 
 
 @pytest.mark.parametrize("text", [b"title = ", b"\xff\xfe"])
@@ -247,7 +291,7 @@ def test_changes_replace_values(bar: Path) -> None:
     assert casefile.read(bar).frames.last == 20
 
 
-@pytest.mark.parametrize("key", ["frames.final", "effect[7].mu", "effect.mu", "frames.last.more", "title[0]"])
+@pytest.mark.parametrize("key", ["", "frames.final", "effect[7].mu", "effect.mu", "frames.last.more", "title[0]"])
 def test_change_of_a_key_that_is_not_there(bar: Path, key: str) -> None:
     with pytest.raises(InputError, match="got nothing, want a key of this scene"):
         casefile.read(bar, changes={key: 1})
@@ -260,6 +304,31 @@ def test_spoil_changes_one_key(bar: Path) -> None:
 def test_spoil_that_is_missing(bar: Path) -> None:
     with pytest.raises(InputError, match=r"case.toml: spoil: got None"):
         casefile.read(edited(bar, SCENE[SCENE.index("[spoil]") :], ""), spoiled=True)
+
+
+def test_spoil_is_tried_on_reading(bar: Path) -> None:
+    with pytest.raises(InputError, match=r"case\.toml: spoil\.key: got .*want a key of this scene"):
+        casefile.read(edited(bar, 'key = "effect[1].bulk"', 'key = "effect[2].bulk"'))
+
+
+def test_spoil_may_be_a_number(bar: Path) -> None:
+    file = edited(bar, 'key = "effect[1].bulk"\nvalue = "10 kPa"', 'key = "frames.last"\nvalue = 15')
+    assert casefile.read(file, spoiled=True).frames.last == 15
+
+
+def test_changes_may_take_away_what_the_spoil_changes(bar: Path) -> None:
+    changes = {"effect": [{"name": "neo_hooke", "mu": "1 kPa"}]}
+    assert len(casefile.read(bar, changes=changes).effects) == 1
+    with pytest.raises(InputError, match=r"spoil\.key: got .*, want a key of this scene"):
+        casefile.read(bar, changes=changes, spoiled=True)
+
+
+@pytest.mark.parametrize("inside", [True, False])
+def test_cases_inside_the_package_come_before_those_beside_it(tmp_path: Path, inside: bool) -> None:
+    package = tmp_path / "site-packages" / "fem_reference"
+    for folder in (package.parent, *([package] if inside else [])):
+        (folder / "cases").mkdir(parents=True)
+    assert home(package) == (package if inside else package.parent)
 
 
 # Files

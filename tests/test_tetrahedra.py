@@ -60,6 +60,7 @@ def _check(mesh: TetMesh, surface: Surface, size: float) -> None:
 
 def test_a_fine_surface_is_filled_with_good_tets_of_the_size_asked_for(mesh: TetMesh) -> None:
     _check(mesh, _bumpy(), 8.0)
+    assert mesh.maker == "gmsh"
     pairs = mesh.tets[:, [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]]
     edges = np.diff(mesh.points[pairs], axis=2)[:, :, 0]
     # Tets do not fill space with equal edges, and the next size that users try is half or twice this one: sqrt 2 apart.
@@ -109,14 +110,36 @@ def test_a_surface_through_itself_is_meshed_by_the_other_mesher(caplog: pytest.L
         "dirty.ply: fTetWild meshes it, differently each time, for gmsh cannot: 12 triangles pass through"
         in caplog.text
     )
+    assert "dirty.ply: 12 triangles of the given surface pass through it" in caplog.text
+    assert mesh.maker == "fTetWild"
     assert_allclose(tet_volumes(mesh.points, mesh.tets).sum(), enclosed_volume(points, ball.triangles), rtol=0.05)
 
 
 def test_a_size_that_loses_a_part_is_refused() -> None:
+    ball = shapes.sphere(4, 30.0)
+    x, y, z = ball.points.T
+    finger = np.outer(60 * np.exp(-(((x**2 + y**2) / 4**2) ** 2)) * (z > 0), [0, 0, 1])
     with pytest.raises(
-        InputError, match=r"bumpy.ply: got a part that is lost \(.* mm off\) .* want smaller tetrahedra"
+        InputError, match=r"finger.ply: got a part that is lost \(.* mm off\) .* want smaller tetrahedra"
     ):
-        tetrahedralise(_bumpy(3), 100.0)
+        tetrahedralise(Surface(ball.points + finger, ball.triangles, "finger.ply"), 30.0)
+
+
+@pytest.mark.parametrize(
+    ("size", "what"),
+    [
+        (1e-5, r"more than 3 million tetrahedra of 1e-05 mm in .* mm3, want a larger tet_size"),
+        (0.3, r"more than 3 million tetrahedra of 0.3 mm in .* mm3, want a larger tet_size"),
+        (70.0, r"tetrahedra of 70 mm in a body .* mm thick, want a smaller tet_size"),
+        (1000.0, r"tetrahedra of 1000 mm in a body .* mm thick, want a smaller tet_size"),
+    ],
+)
+def test_a_size_far_from_the_body_is_refused_before_a_mesher_starts(
+    size: float, what: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tetrahedra, "_mesh", lambda *_: pytest.fail("it went on"))
+    with pytest.raises(InputError, match=f"bumpy.ply: got {what}"):
+        tetrahedralise(_bumpy(2), size)
 
 
 def test_a_mesher_that_takes_too_long_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:

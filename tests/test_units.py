@@ -24,6 +24,10 @@ from fem_reference.units import length_unit, point, quantity
         ("0.5", "a fraction", 0.5),
         ("10 ms", "a time", 0.01),
         ("3 ml", "a volume", 3000.0),
+        ("1e1 mm", "a length", 10.0),
+        (".5mm", "a length", 0.5),
+        ("0.01", "a fraction", 0.01),
+        ("-1.5 %", "a fraction", -0.015),
     ],
 )
 def test_quantity_is_in_inside_units(text: str, kind: str, value: float) -> None:
@@ -45,6 +49,16 @@ def test_quantity_is_in_inside_units(text: str, kind: str, value: float) -> None
         ("1 parsnip", "a length"),
         ("nan mm", "a length"),
         ("inf kPa", "a pressure"),
+        ("1e400 mm", "a length"),
+        ("mm", "a length"),
+        ("2*3 mm", "a length"),
+        ("2 mm * 3", "a length"),
+        ("2 3 mm", "a length"),
+        ("2 mm + 3 mm", "a length"),
+        ("1 rad", "a fraction"),
+        ("1 deg", "a fraction"),
+        ("1 rad^2", "an angle"),
+        ("1 kPa*rad", "a pressure"),
     ],
 )
 def test_quantity_refuses_what_is_none(text: object, kind: str) -> None:
@@ -54,11 +68,24 @@ def test_quantity_refuses_what_is_none(text: object, kind: str) -> None:
 
 def test_point_shares_one_unit() -> None:
     assert point("1, -2, 3.5 cm") == pytest.approx((10.0, -20.0, 35.0), rel=1e-14)
+    assert point("1,2,3cm") == pytest.approx((10.0, 20.0, 30.0), rel=1e-14)
     assert point("1 cm, 2 cm, 3 cm") == pytest.approx((10.0, 20.0, 30.0), rel=1e-14)
 
 
 @pytest.mark.parametrize(
-    "text", ["1, 2 mm", "1, 2, 3, 4 mm", "1, 2, 3", "1, 2, 3 kPa", "", "1, 2,", [1, 2, 3], "a, 2, 3 mm"]
+    "text",
+    [
+        "1, 2 mm",
+        "1, 2, 3, 4 mm",
+        "1, 2, 3",
+        "1, 2, 3 kPa",
+        "",
+        "1, 2,",
+        [1, 2, 3],
+        "a, 2, 3 mm",
+        "1 mm, 2 mm, 3 m",
+        "nan, 2, 3 mm",
+    ],
 )
 def test_point_refuses_what_is_none(text: object) -> None:
     with pytest.raises(ValueError, match=r'^three lengths with one unit, such as "146, 238, -431 mm"$'):

@@ -1,5 +1,6 @@
 """Which part of a muscle a bone holds: vertices of its surface, and boundary triangles of its tetrahedra below."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -64,20 +65,32 @@ def _listed(path: Path, chosen: VertexList, count: int) -> Ints:
     """The vertices of a file of ``vertex[,value]`` rows, of which there are ``count`` on the surface."""
     vertices = []
     for number, row in enumerate(files.read_rows(path), start=1):
-        if number == 1 and not _is_integer(row[0]):
+        if number == 1 and _is_header(row[0]):
             continue
         place = f"{path}: row {number}"
-        if not _is_integer(row[0]) or not 0 <= int(row[0]) < count:
-            raise InputError(place, f'"{row[0]}"', f"a vertex from 0 to {count - 1}")
-        if chosen.value is not None and (len(row) < 2 or not _is_integer(row[1])):
-            raise InputError(place, f'"{",".join(row)}"', "a vertex and its value, an integer")
-        if chosen.value is None or int(row[1]) == chosen.value:
-            vertices.append(int(row[0]))
+        vertex = _integer(row[0])
+        if vertex is None or not 0 <= vertex < count:
+            raise InputError(place, _quoted(row[0]), f"a vertex from 0 to {count - 1}")
+        value = _integer(row[1]) if chosen.value is not None and len(row) > 1 else None
+        if chosen.value is not None and value is None:
+            raise InputError(place, _quoted(",".join(row)), "a vertex and its value, an integer")
+        if value == chosen.value:
+            vertices.append(vertex)
     return np.unique(np.array(vertices, np.int64))
 
 
-def _is_integer(text: str) -> bool:
-    return text.removeprefix("-").isdecimal()
+def _is_header(cell: str) -> bool:
+    """Whether the first cell of a list is a word: it has a letter, and does not begin as a number does (``1e5``)."""
+    return any(character.isalpha() for character in cell) and re.match(r"[-+.]?\d", cell) is None
+
+
+def _integer(text: str) -> int | None:
+    """The integer, of at most 18 digits, that a cell is."""
+    return int(text) if re.fullmatch(r"-?\d{1,18}", text) else None
+
+
+def _quoted(text: str) -> str:
+    return f'"{text}"' if len(text) <= 40 else f'"{text[:40]}..."'
 
 
 def _patches(path: Path, outline: Outline, place: str) -> Surface:

@@ -21,8 +21,11 @@ class Distances(NamedTuple):
 
 
 def distances(points: Floats, surface: Surface) -> Distances:
-    """The closest point of ``surface`` for each of ``points`` (n, 3) [mm]."""
+    """The closest point of ``surface`` for each of ``points`` (n, 3) [mm]; ValueError where one is not finite."""
     points = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
+    for what, given in (("points", points), ("points of the surface", surface.points)):
+        if not np.isfinite(given).all():  # libigl would give triangles that do not exist
+            raise ValueError(f"distances: {what} that are not finite")
     if len(points) == 0:
         return Distances(np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)))
     squares, triangle, closest = igl.point_mesh_squared_distance(points, surface.points, surface.triangles)

@@ -5,7 +5,6 @@ crash, hang or keep its global state.
 """
 
 import logging
-import os
 import subprocess
 import sys
 import tempfile
@@ -15,6 +14,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from fem_reference import children
 from fem_reference.errors import InputError
 from fem_reference.geometry.coarsening import coarsen
 from fem_reference.geometry.distance import distances
@@ -35,21 +35,41 @@ log = logging.getLogger(__name__)
 SECONDS_ALLOWED = 240.0
 _ROUNDED = 6  # decimals of a mm in the mesher's frame: far below any size, far above the round-off of moving a surface
 _VOLUME_WITHIN = 0.05  # a surface that passes through itself has no volume to compare with more closely
+_MOST_TETS = 3e6  # some GB and minutes, far above what a solver takes
+_MAKERS = {"gmsh": "gmsh", "tetwild": "fTetWild"}
 _SHARES = (1.0, 0.9, 1.1, 0.8, 1.25)  # of the number of triangles wanted, tried in turn
 
 
 def tetrahedralise(surface: Surface, size: float) -> TetMesh:
-    """Tetrahedra of about ``size`` [mm] inside a closed outward ``surface``; ``facets`` stay empty.
+    """Tetrahedra of about ``size`` [mm] inside a closed outward ``surface``, with their ``maker``; ``facets`` stay empty.
 
     A surface finer than ``size`` is coarsened to it first. gmsh fills a surface that does not pass through itself and
     keeps its triangles. The mesh moves with the surface: it is made in a frame that the surface's own vertices span. Where
     gmsh cannot, fTetWild makes a mesh of its own near the surface, another one each time (its issue 72). InputError where
-    no mesher succeeds.
+    no mesher succeeds, and at once where ``size`` is far too small or too large.
     """
     origin, axes = _own_frame(surface.points)
     local = np.round((surface.points - origin) @ axes, _ROUNDED) + 0.0  # + 0.0: no negative zeros
+    _check_size(surface.moved_to(local), size)
+    crossing = len(self_intersections(surface))
+    if crossing:
+        log.warning("%s: %d triangles of the given surface pass through it", surface.place, crossing)
     mesh = _mesh(surface.moved_to(local), size)
-    return TetMesh(mesh.points @ axes.T + origin, mesh.tets)
+    return TetMesh(mesh.points @ axes.T + origin, mesh.tets, maker=mesh.maker)
+
+
+def _check_size(surface: Surface, size: float) -> None:
+    """InputError where it takes more than ``_MOST_TETS`` regular tets to fill a surface, or ``size`` is above its smallest extent.
+
+    In the frame that its vertices span, so that turning the surface changes nothing.
+    """
+    volume, extent = enclosed_volume(surface.points, surface.triangles), np.ptp(surface.points, axis=0).min()
+    if not volume <= _MOST_TETS * size**3 / (6 * np.sqrt(2)):
+        got = f"more than {_MOST_TETS / 1e6:g} million tetrahedra of {size:g} mm in {volume:.3g} mm3"
+        raise InputError(surface.place, got, "a larger tet_size")
+    if not size <= extent:
+        got = f"tetrahedra of {size:g} mm in a body {extent:.3g} mm thick"
+        raise InputError(surface.place, got, "a smaller tet_size")
 
 
 def _own_frame(points: Floats) -> tuple[Floats, Floats]:
@@ -112,13 +132,12 @@ def _run(mesher: str, surface: Surface, size: float) -> TetMesh:
     with tempfile.TemporaryDirectory() as folder:
         job, result = Path(folder) / "job.npz", Path(folder) / "result.npz"
         np.savez(job, mesher=mesher, points=surface.points, triangles=surface.triangles, size=size)
-        package = str(Path(__file__).resolve().parents[2])
-        paths = os.pathsep.join(filter(None, [package, os.environ.get("PYTHONPATH")]))
         try:
             done = subprocess.run(
-                [sys.executable, "-m", __spec__.name, str(job), str(result)],
+                children.command("-m", __spec__.name, str(job), str(result)),
                 cwd=folder,
-                env=os.environ | {"PYTHONPATH": paths},
+                env=children.environment(),
+                stdin=subprocess.DEVNULL,
                 capture_output=True,
                 timeout=SECONDS_ALLOWED,
                 text=True,
@@ -130,7 +149,7 @@ def _run(mesher: str, surface: Surface, size: float) -> TetMesh:
         if done.returncode != 0 or not result.exists():
             raise InputError(surface.place, f"a surface that {mesher} refuses ({_last_words(done)})", "a clean surface")
         with np.load(result) as arrays:
-            return TetMesh(arrays["points"], arrays["tets"])
+            return TetMesh(arrays["points"], arrays["tets"], maker=_MAKERS[mesher])
 
 
 def _last_words(done: subprocess.CompletedProcess[str]) -> str:
@@ -156,7 +175,7 @@ def _checked(mesh: TetMesh, surface: Surface) -> TetMesh:
     if not abs(got - wanted) <= _VOLUME_WITHIN * wanted:
         volumes_got = f"tetrahedra of {got:.0f} mm3 in a surface of {wanted:.0f} mm3"
         raise InputError(surface.place, volumes_got, "one clean body")
-    return TetMesh(points, np.where((volumes < 0)[:, None], tets[:, [0, 2, 1, 3]], tets))
+    return TetMesh(points, np.where((volumes < 0)[:, None], tets[:, [0, 2, 1, 3]], tets), maker=mesh.maker)
 
 
 def _largest_part(tets: Ints, place: str) -> Ints:

@@ -10,7 +10,7 @@ from fem_reference.mesh import Floats
 from fem_reference.metrics import Measure, Yardstick
 from fem_reference.runs import Run
 
-UNITS = {"mean": "mm", "rms": "mm", "max": "mm", "rms_percent": "%", "max_percent": "%"}
+UNITS = {"mean": "mm", "rms": "mm", "max": "mm", "mean_percent": "%", "rms_percent": "%", "max_percent": "%"}
 # Fibre points of a run this close [mm] to the yardstick's are the same points, after a file of single precision.
 _SAME = 1e-3
 
@@ -19,7 +19,7 @@ _SAME = 1e-3
 def measure(run: Run, reference: Run, yardstick: Yardstick) -> tuple[Measure, ...]:
     """Over the fibres, of L - L_reference: the signed ``mean``, the ``rms`` and the greatest magnitude ``max`` [mm].
 
-    And ``rms_percent`` and ``max_percent`` of it in per cent of each fibre's length at rest.
+    And ``mean_percent``, ``rms_percent`` and ``max_percent`` of it in per cent of each fibre's length at rest.
     """
     lengths = _direct if _carries(run, yardstick) and _carries(reference, yardstick) else _extended
     longer = lengths(run, yardstick) - lengths(reference, yardstick)
@@ -28,6 +28,7 @@ def measure(run: Run, reference: Run, yardstick: Yardstick) -> tuple[Measure, ..
         ("mean", longer.mean(axis=1), longer),
         ("rms", _rms(longer), longer),
         ("max", np.abs(longer).max(axis=1), longer),
+        ("mean_percent", percent.mean(axis=1), percent),
         ("rms_percent", _rms(percent), percent),
         ("max_percent", np.abs(percent).max(axis=1), percent),
     )

@@ -11,52 +11,35 @@ from fem_reference.mesh import Floats
 from fem_reference.metrics import Measure, Yardstick
 from fem_reference.runs import Run
 
-UNITS = {"rms": "mm", "p95": "mm", "max": "mm", "rms_percent": "%", "max_percent": "%"}
-UNITS |= {"distance_mean": "mm", "distance_rms": "mm", "hausdorff": "mm"}
+_STATISTICS = ("rms", "p95", "max", "distance_mean", "distance_rms", "hausdorff")
+UNITS = dict.fromkeys(_STATISTICS, "mm") | {f"{name}_percent": "%" for name in _STATISTICS}
 
 
 @np.errstate(over="ignore", invalid="ignore")
 def measure(run: Run, reference: Run, yardstick: Yardstick) -> tuple[Measure, ...]:
-    """Material and geometric deviation.
+    """Material: ``rms``, ``p95`` (area-weighted 95th percentile) and ``max`` of the distance of the same vertex [mm].
 
-    Material, of the distance of the same vertex: ``rms``, ``p95`` (95th percentile) and ``max`` [mm], and
-    ``rms_percent`` and ``max_percent`` of the reference's greatest displacement.
-
-    Geometric, of the distances from the vertices of each surface to the closest point of the other, over both
-    directions: ``distance_mean``, ``distance_rms`` and ``hausdorff`` [mm]. Only vertices are sampled, so
-    ``hausdorff`` is a lower bound of the Hausdorff distance.
+    Geometric: ``distance_mean``, ``distance_rms`` and ``hausdorff`` [mm] of the distances from the vertices of each surface to
+    the closest point of the other, over both directions. Only vertices are sampled, so ``hausdorff`` is a lower bound of the
+    Hausdorff distance. Each also as ``..._percent`` of the reference's greatest displacement.
     """
     material = np.linalg.norm(run.positions - reference.positions, axis=2)
     geometric = np.array([_both_ways(run, reference, frame) for frame in range(len(reference.positions))])
-    twice = np.concatenate([yardstick.areas, yardstick.areas])
-    return (*_material(material, reference, yardstick), *_geometric(geometric, reference, twice))
-
-
-def _material(deviations: Floats, reference: Run, yardstick: Yardstick) -> tuple[Measure, ...]:
-    """The material statistics of ``deviations`` (f, n) [mm]."""
-    rms, greatest = _rms(deviations, yardstick.areas), deviations.max(axis=1)
+    areas, twice = yardstick.areas, np.concatenate([yardstick.areas, yardstick.areas])
     values = {
-        "rms": rms,
-        "p95": np.array([_percentile(each, yardstick.areas, 0.95) for each in deviations]),
-        "max": greatest,
-        "rms_percent": _percent(rms, yardstick.travel),
-        "max_percent": _percent(greatest, yardstick.travel),
+        "rms": _rms(material, areas),
+        "p95": np.array([_percentile(each, areas, 0.95) for each in material]),
+        "max": material.max(axis=1),
+        "distance_mean": geometric @ twice / twice.sum(),
+        "distance_rms": _rms(geometric, twice),
+        "hausdorff": geometric.max(axis=1),
     }
-    return _measures(values, _worst(deviations, reference))
-
-
-def _geometric(deviations: Floats, reference: Run, areas: Floats) -> tuple[Measure, ...]:
-    """The geometric statistics of ``deviations`` (f, 2n) [mm], each vertex of the run, then each of the reference."""
-    values = {
-        "distance_mean": deviations @ areas / areas.sum(),
-        "distance_rms": _rms(deviations, areas),
-        "hausdorff": deviations.max(axis=1),
-    }
-    return _measures(values, _worst(deviations, reference))
-
-
-def _measures(values: dict[str, Floats], where: tuple[str, ...]) -> tuple[Measure, ...]:
-    return tuple(Measure("surface_deviation", name, UNITS[name], each, where) for name, each in values.items())
+    values |= {f"{name}_percent": _percent(each, yardstick.travel) for name, each in values.items()}
+    worst = [_worst(deviations, reference) for deviations in (material, geometric)]
+    return tuple(
+        Measure("surface_deviation", name, UNITS[name], each, worst[name.startswith(("distance", "hausdorff"))])
+        for name, each in values.items()
+    )
 
 
 def _both_ways(run: Run, reference: Run, frame: int) -> Floats:

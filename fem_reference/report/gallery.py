@@ -1,7 +1,6 @@
 """Which moments are pictured, from where, and the program that draws them."""
 
 import logging
-import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -12,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from fem_reference.children import command, environment
 from fem_reference.comparison import Comparison
 from fem_reference.errors import MissingSoftware
 from fem_reference.mesh import Floats, Surface
@@ -117,15 +117,17 @@ def _job(setup: Setup, surface: Surface, wanted: list[Shot]) -> dict[str, Any]:
 
 
 def _command(job: Path, folder: Path) -> list[str]:
-    return [sys.executable, "-P", pictures.__file__, str(job), str(folder)]
+    return command(pictures.__file__, str(job), str(folder))
 
 
-def _run(command: list[str]) -> None:
-    settings = dict(os.environ)
+def _run(words: list[str]) -> None:
+    settings = environment()
     if sys.platform == "linux":
         settings.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     try:
-        done = subprocess.run(command, env=settings, capture_output=True, text=True, timeout=_SECONDS, check=False)
+        done = subprocess.run(
+            words, env=settings, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=_SECONDS, check=False
+        )
     except (OSError, subprocess.TimeoutExpired) as error:
         raise _missing(str(error)) from error
     if done.returncode:

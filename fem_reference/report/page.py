@@ -79,6 +79,7 @@ def render(comparison: Comparison) -> str:
         ratio=ratio,
         label_of=label_of,
         least=least,
+        greatest=greatest,
         figures=figures,
         missing=missing,
         colours=_colours(),
@@ -105,6 +106,12 @@ def worst(run: Run, measure: Measure) -> dict[str, Any]:
         finite = (float(measure.values[k]), run.numbers[k])
     where = measure.where[i] if measure.where else ""
     return {"value": float(measure.values[i]), "frame": run.numbers[i], "where": where, "finite": finite}
+
+
+def greatest(run: Run, scalar: str) -> float:
+    """The greatest value of a scalar over the frames that have one, NaN without any."""
+    values = run.scalars[scalar]
+    return float(np.nanmax(values)) if np.isfinite(values).any() else float("nan")
 
 
 def least(measure: Measure) -> float:
@@ -144,7 +151,9 @@ def _sentence(comparison: Comparison) -> str:
     numbers, names = comparison.reference.numbers, [run.name for run in comparison.candidates]
     over = f"over {len(numbers)} frames ({numbers[0]} to {numbers[-1]})"
     told = [verdict.word for verdict in comparison.verdicts]
-    judged = f"{told.count('pass')} of {len(told)} expectations met."
+    judged = f"{told.count('pass')} of {len(told)} expectations met"
+    unjudged = [name for name in names if all(verdict.expectation.of != name for verdict in comparison.verdicts)]
+    judged += f"; none concerns {listed(unjudged)}, which is measured and not judged." if unjudged else "."
     solver = comparison.reference.solver
     if not names:
         return f"The reference computed by {solver}, {over}, without a candidate: {judged}"

@@ -39,6 +39,13 @@ def find(name: str, place: str) -> Solver:
     return cast(Solver, importlib.import_module(f"{__name__}.{name}"))
 
 
+def require(name: str, settings: Record, place: str) -> None:
+    """MissingSoftware where the solver ``name`` needs what is not installed; a module says so in ``require(settings)``."""
+    check = getattr(find(name, place), "require", None)
+    if check is not None:
+        check(settings)
+
+
 def settings(choice: SolverChoice, place: str) -> Record:
     """The settings of a choice, checked by its solver; ``place`` is where the scene makes the choice."""
     return parse(find(choice.solver, place).Settings, choice.settings, place)

@@ -8,6 +8,7 @@ import importlib.util
 import json
 import os
 import pickle
+import re
 import shutil
 import subprocess
 import sys
@@ -15,20 +16,31 @@ import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from pydantic import Field
 
+from fem_reference.children import command, environment
 from fem_reference.errors import MissingSoftware
 from fem_reference.geometry.embedding import embed
 from fem_reference.mesh import Floats, Ints
+from fem_reference.motion import apply
 from fem_reference.problem import Problem
 from fem_reference.records import Record
 from fem_reference.runs import Frame, Outcome, Sink
 from fem_reference.units import Time
 
+# One thread a rank. Open MPI, where it is used, refuses root and more ranks than cores unless told otherwise.
+_SETTINGS = {
+    "OMP_NUM_THREADS": "1",
+    "PYTHONUNBUFFERED": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+    "OMPI_MCA_rmaps_base_oversubscribe": "1",
+}
 MARK = "@fem_reference "  # begins each line of the worker's output that is meant for us
 
 
@@ -49,16 +61,39 @@ class Settings(Record):
     time_limit: Time | None = None
 
 
-def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
-    """Solve every requested frame in worker processes; frames carry surface, fibres and tets."""
+def require(settings: Settings) -> None:
+    """MissingSoftware where FEniCSx is not installed or the ranks wanted cannot be started."""
     if not any(importlib.util.find_spec(name) for name in ("dolfinx_solver", "dolfinx")):
         raise MissingSoftware(
             "FEniCSx is not installed: pip install 'fem_reference[fenicsx]' (Linux x86-64), or conda's fenics-dolfinx"
         )
+    _command(settings, Path())
+
+
+def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
+    """Solve every requested frame in worker processes; frames carry surface, fibres and tets."""
+    require(settings)
     with tempfile.TemporaryDirectory(prefix="fem_reference-") as folder:
         job = Path(folder) / "job.pickle"
         job.write_bytes(pickle.dumps((problem, settings, _samples(problem))))
-        return _run(_command(settings, job), settings, sink)
+        return _run(_command(settings, job), settings, lambda frame: sink(_with_held(problem, frame)))
+
+
+def _with_held(problem: Problem, frame: Frame) -> Frame:
+    """The frame with what the mesh makes of the attachments: how far the surface vertices that bones hold are from where the
+    bones have them, ``held_off_rms`` and ``held_off_max`` [mm]. Tets hold facets, which cover the attachments only roughly."""
+    off = np.concatenate(
+        [
+            np.linalg.norm(
+                frame.surface[held.vertices]
+                - apply(held.bone.pose(frame.number), problem.surface.points[held.vertices]),
+                axis=1,
+            )
+            for held in problem.held
+        ]
+    )
+    scalars = {"held_off_rms": float(np.sqrt(np.mean(off**2))), "held_off_max": float(off.max())}
+    return replace(frame, scalars=frame.scalars | scalars)
 
 
 def _samples(problem: Problem) -> dict[str, tuple[Ints, Floats]]:
@@ -70,7 +105,8 @@ def _samples(problem: Problem) -> dict[str, tuple[Ints, Floats]]:
 
 def _command(settings: Settings, job: Path) -> list[str]:
     """The worker's command line. The wheel's MPI has its ``mpiexec`` beside the interpreter; one on the PATH may not fit."""
-    worker = [sys.executable, "-m", f"{__name__}.worker", str(job)]
+    # Under mpi4py's own runner an error on one rank ends all of them; without it the others wait for ever.
+    worker = command("-m", "mpi4py", "-m", f"{__name__}.worker", str(job))
     beside = Path(sys.executable).with_name("mpiexec")
     mpiexec = str(beside) if beside.exists() else shutil.which("mpiexec")
     ranks = settings.ranks or (min(2, os.cpu_count() or 1) if mpiexec else 1)
@@ -81,9 +117,9 @@ def _command(settings: Settings, job: Path) -> list[str]:
     return [mpiexec, "-n", str(ranks), *worker]
 
 
-def _run(command: list[str], settings: Settings, sink: Sink) -> Outcome:
+def _run(command_line: list[str], settings: Settings, sink: Sink) -> Outcome:
     reached: list[int] = []
-    with _process(command, settings.time_limit) as (process, timed_out, errors):
+    with _process(command_line, settings.time_limit) as (process, timed_out, errors):
         for event in _events(process):
             if "frame" in event:
                 reached.append(event["frame"])
@@ -95,8 +131,13 @@ def _run(command: list[str], settings: Settings, sink: Sink) -> Outcome:
     kept = f"frames up to {reached[-1]} are kept" if reached else "no frame was reached"
     if timed_out.is_set():
         return Outcome("timed out", f"stopped after {settings.time_limit:.0f} s, the time limit; {kept}")
-    last = "".join(errors[-1:]).strip()
-    return Outcome("crashed", f"the FEniCSx process ended with exit status {code} ({last}); {kept}")
+    return Outcome("crashed", f"the FEniCSx process ended with exit status {code} ({_reason(errors)}); {kept}")
+
+
+def _reason(errors: list[str]) -> str:
+    """The line of a process's error output that tells most: the last that names an error, else the last."""
+    named = [line for line in errors if re.match(r"\w*(\.\w+)*(Error|Exception)\b", line)]
+    return (named or errors or ["without a word"])[-1].strip()
 
 
 def _frame(event: dict[str, Any]) -> Frame:
@@ -108,11 +149,18 @@ def _frame(event: dict[str, Any]) -> Frame:
 
 @contextmanager
 def _process(
-    command: list[str], time_limit: float | None
+    command_line: list[str], time_limit: float | None
 ) -> Iterator[tuple[subprocess.Popen[str], threading.Event, list[str]]]:
     """The running worker, an event that is set when the time limit ended it, and the lines of its error output so far."""
-    environment = os.environ | {"OMP_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"}
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
+    process = subprocess.Popen(
+        command_line,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="replace",
+        env=environment(**_SETTINGS),
+    )
     timed_out, errors = threading.Event(), list[str]()
 
     def stop() -> None:

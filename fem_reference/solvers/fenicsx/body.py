@@ -89,12 +89,17 @@ class Body:
 
     def smallest_determinant(self, where: str) -> Smallest:
         """The smallest det F at the ``"quadrature points"`` or the ``"vertices"`` of the tets; NaN counts as smallest."""
+        if len(self.tets) == 0:  # a rank without tets
+            return self._smallest_of_all(Smallest(float("inf"), -1, (0.0, 0.0, 0.0)))
         values = self.determinants[where].eval(self.mesh, np.arange(len(self.tets), dtype=np.int32))
         cell, point = np.unravel_index(np.argmin(np.where(np.isnan(values), -np.inf, values)), values.shape)
         corners = self.mesh.geometry.x[self.mesh.geometry.dofmap[cell]]
         r = self.points[where][point]
         at = np.array([1 - r.sum(), *r]) @ corners
         mine = Smallest(float(values[cell, point]), int(self.tets[cell]), (float(at[0]), float(at[1]), float(at[2])))
+        return self._smallest_of_all(mine)
+
+    def _smallest_of_all(self, mine: Smallest) -> Smallest:
         everywhere: list[Smallest] = self.comm.allgather(mine)
         return min(everywhere, key=lambda found: (not np.isnan(found.value), found.value))
 
@@ -147,17 +152,22 @@ def _local_facets(msh: mesh.Mesh, facets: Ints) -> Ints:
 def _unknowns(msh: mesh.Mesh, effects: tuple[Effect, ...]) -> fem.Function:
     """Displacement P2, and P1 for each further unknown that an effect brings."""
     elements = [basix.ufl.element("Lagrange", "tetrahedron", 2, shape=(3,))]
-    brought = {unknown for effect in effects for unknown in effect.unknowns}
-    elements += [basix.ufl.element("Lagrange", "tetrahedron", 1) for _ in sorted(brought)]
+    elements += [basix.ufl.element("Lagrange", "tetrahedron", 1) for _ in _brought(effects)]
     return fem.Function(fem.functionspace(msh, basix.ufl.mixed_element(elements)))
+
+
+def _brought(effects: tuple[Effect, ...]) -> list[str]:
+    """The names of the unknowns that effects bring, each once."""
+    return sorted({unknown for effect in effects for unknown in effect.unknowns})
 
 
 def _energy(unknowns: fem.Function, effects: tuple[Effect, ...]) -> tuple[Any, Any]:
     """The sum of the effects' energies per rest volume, and det F, as UFL expressions."""
     displacement, *others = ufl.split(unknowns)
+    by_name = dict(zip(_brought(effects), others, strict=True))
     F = ufl.Identity(3) + ufl.grad(displacement)
     J = ufl.det(F)
-    state = State(I1=ufl.tr(F.T * F), J=J, pressure=others[0] if others else None)
+    state = State(I1=ufl.tr(F.T * F), J=J, pressure=by_name.get("pressure"))
     return sum(effect.energy(state) for effect in effects), J
 
 
