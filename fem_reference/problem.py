@@ -169,7 +169,7 @@ def _inside(mesh: TetMesh, fibres: Polylines) -> Polylines:
 
 
 def _mesh_facts(rest: Setup, mesh: TetMesh) -> dict[str, float | str]:
-    """Who made the mesh of what, tets, their quality, the volume against the surface's, and for each attachment the area held on both."""
+    """Who made the mesh, its size and quality, and for each attachment the area held on the surface and on the tets."""
     qualities = tet_qualities(mesh.points, mesh.tets)
     facts: dict[str, float | str] = {
         "maker": mesh.maker,

@@ -188,7 +188,10 @@ class Candidate(SolverChoice):
 
 
 class Expectation(Record):
-    """A number that a measure of this case must have; ``of`` is ``"reference"`` or a candidate, ``frame`` a number or ``"any"``."""
+    """A number that a measure of this case must have.
+
+    ``of`` is ``"reference"``, a candidate, or ``"candidates"`` for each that is compared; ``frame`` a number or ``"any"``.
+    """
 
     of: str
     metric: str

@@ -123,7 +123,7 @@ def test_what_cannot_be_reached_is_a_status_that_keeps_the_frames_before() -> No
     assert [frame.number for frame in frames] == [0, 1]
 
 
-def test_more_ranks_than_tets_still_solve(bent) -> None:
+def test_more_ranks_than_tets_still_solve() -> None:
     problem = shapes.bar((1, 1, 1), (10, 10, 10), {"bottom": None, "top": turning(0.1)}, MUSCLE, (0, 10))
     outcome, frames = solved(problem, ranks=7)
     assert outcome.status == "converged"

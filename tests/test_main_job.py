@@ -150,6 +150,15 @@ def test_a_truncated_frame_is_bad_input_that_names_the_file(job, tmp_path, capsy
     assert not out.exists()
 
 
+def test_another_unit_in_one_frame_is_bad_input_that_names_the_file(job, tmp_path, capsys) -> None:
+    folder = job.frames(tmp_path / "units", lambda number, points: points * (1e-3 if number == 10 else 1))
+    assert (
+        cli.main(["compare", str(job.case), "--candidate", str(folder), "--out", str(tmp_path / "out")])
+        == cli.BAD_INPUT
+    )
+    assert "frame_0010.vtp: got a surface of 0.001 times the size at rest" in capsys.readouterr().err
+
+
 def test_missing_frames_are_named(job, tmp_path, capsys) -> None:
     folder = job.frames(tmp_path / "few")
     (folder / "frame_0015.vtp").unlink()
@@ -293,7 +302,7 @@ def test_outputs_that_cannot_be_are_refused_at_once(job, tmp_path, capsys) -> No
     assert file.read_text() == "mine"
 
 
-def test_json_can_go_into_a_pipe(job) -> None:
+def test_json_can_go_into_a_pipe() -> None:
     words = [sys.executable, "-m", "fem_reference", "list", "--json", "/dev/stdout"]
     done = subprocess.run(words, capture_output=True, text=True, check=True)
     assert '"cases"' in done.stdout

@@ -198,7 +198,7 @@ WRONG = [
     ("frames.last", 2000000000000000, "want at most 100000 frames"),
     ("frames", {"first": 10**12, "last": 10**12 + 5, "every": 5}, "want frame numbers up to 1000000000"),
     ("frames.interval", "1 mm", 'frames.interval: got "1 mm", want a time with its unit, such as "0.01 s"'),
-    ("expect[0].of", "slow", 'expect[0].of: got "slow", want one of reference, fast'),
+    ("expect[0].of", "slow", 'expect[0].of: got "slow", want one of reference, candidates, fast'),
     ("expect[0].kind", "hope", 'expect[0].kind: got "hope", want'),
     ("expect[0].frame", "last", 'expect[0].frame: got "last", want'),
     ("expect[0].frame", True, "expect[0].frame: got True, want"),

@@ -24,6 +24,8 @@ AT_REST = 0.1
 # How far (rms), in diagonals of the rest surface's bounding box, it may be at all: above what a solver does to its first
 # frame, below another unit (a tenth of the size is 0.9 of the rms radius away at least, for a ball 0.26 diagonals).
 NEAR_REST = 0.05
+# How much smaller than at rest a frame may be: no solver folds a body up this far, while cm are 10 and m 1000 mm.
+SMALLEST = 1 / 50
 # How far apart [mm] corners of an STL file that are one vertex may be: three times the spacing of float32 at 500 mm.
 SAME_POINT = 1e-4
 # How far, in frames, a time may be from the frame it is of: above rounding to four digits, below any half step.
@@ -62,9 +64,17 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
         frames.append(Frame(number, _positions(surface, setup.surface)))
         if number == setup.frames[0]:
             _check_at_rest(surface.place, frames[0], setup.surface)
+        _check_size(surface.place, frames[-1].surface, setup.surface)
     for frame in frames:
         sink(frame)
     return Outcome("converged", f"read {len(frames)} frames from {source}")
+
+
+def _check_size(place: str, positions: Floats, rest: Surface) -> None:
+    """InputError where a frame is so small that it must be in another unit than the first."""
+    size = np.linalg.norm(np.ptp(positions, axis=0)) / np.linalg.norm(np.ptp(rest.points, axis=0))
+    if not size >= SMALLEST:
+        raise InputError(place, f"a surface of {size:.2g} times the size at rest", "one unit of length in all frames")
 
 
 def _source(path: Path) -> Path:

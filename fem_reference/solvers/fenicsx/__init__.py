@@ -81,7 +81,8 @@ def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
 
 def _with_held(problem: Problem, frame: Frame) -> Frame:
     """The frame with what the mesh makes of the attachments: how far the surface vertices that bones hold are from where the
-    bones have them, ``held_off_rms`` and ``held_off_max`` [mm]. Tets hold facets, which cover the attachments only roughly."""
+    bones have them, ``held_off_rms`` and ``held_off_max`` [mm]. Tets hold facets, which cover the attachments only roughly.
+    """
     off = np.concatenate(
         [
             np.linalg.norm(
