@@ -14,8 +14,7 @@ from fem_reference import __version__, casefile, files, judge, metrics, problem,
 from fem_reference.comparison import Comparison, compare
 from fem_reference.errors import InputError, MissingSoftware
 from fem_reference.execution import Bench, complete
-from fem_reference.mesh import enclosed_volume, vertex_areas
-from fem_reference.motion import Rotation
+from fem_reference.overview import scene_facts
 from fem_reference.records import parse
 from fem_reference.runs import Run
 from fem_reference.scene import Candidate, Scene, SolverChoice
@@ -236,7 +235,7 @@ def _show(options: argparse.Namespace) -> int:
     bench = Bench(scene, _out(options) / "runs")
     for choice, place in [(scene.reference, "reference"), *_own_candidates(scene)]:
         bench.settings(choice, place)
-    facts = _scene_facts(scene, problem.setup(scene))
+    facts = scene_facts(scene, problem.setup(scene))
     if options.out is not None:
         built, folder = problem.build(scene), options.out / scene.name
         folder.mkdir(parents=True, exist_ok=True)
@@ -246,44 +245,6 @@ def _show(options: argparse.Namespace) -> int:
         facts |= {"mesh": built.mesh_facts, "folder": str(folder)}
     _tell(facts, "\n".join(_lines(facts)), options)
     return DONE
-
-
-def _scene_facts(scene: Scene, setup: problem.Setup) -> dict[str, Any]:
-    surface = setup.surface
-    areas = vertex_areas(surface.points, surface.triangles)
-    return {
-        "case": scene.name,
-        "title": scene.title,
-        "proves": scene.proves,
-        "muscle": {
-            "triangles": len(surface.triangles),
-            "volume_mm3": enclosed_volume(surface.points, surface.triangles),
-            "tet_size_mm": scene.muscle.tet_size,
-        },
-        "bones": {
-            bone.name: f"{len(bone.surface.triangles)} triangles, {_motion(bone.motion)}" for bone in setup.bones
-        },
-        "attachments": {
-            held.attachment: f"{len(held.vertices)} vertices, {areas[held.vertices].sum():.0f} mm2, held by {held.bone.name}"
-            for held in setup.held
-        },
-        "effects": {type(effect).__name__: effect.model_dump(mode="json") for effect in scene.effects},
-        "frames": f"{scene.frames.first} to {scene.frames.last}, every {scene.frames.every}",
-        "reference": scene.reference.solver,
-        "candidates": {candidate.name: candidate.solver for candidate in scene.candidate},
-        "expects": [
-            f"{e.of} {e.metric} {e.statistic} at frame {e.frame}: {e.truth} within {e.within} ({e.kind})"
-            for e in scene.expect
-        ],
-    }
-
-
-def _motion(motion: Rotation | None) -> str:
-    if motion is None:
-        return "rests"
-    x, y, z = motion.centre
-    keys = ", ".join(f"{angle:g} at {frame:g}" for frame, angle in zip(motion.frames, motion.angles, strict=True))
-    return f"turns about ({x:g}, {y:g}, {z:g}) mm along {motion.axis}, rad at frame: {keys}"
 
 
 def _lines(facts: dict[str, Any], indent: str = "") -> list[str]:

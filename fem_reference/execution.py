@@ -25,7 +25,16 @@ from fem_reference.scene import Scene, SolverChoice
 log = logging.getLogger(__name__)
 
 # What happens after a run is solved does not change the run.
-_AFTER_THE_RUN = ("metrics", "report", "judge.py", "comparison.py", "cli.py", "__main__.py", "execution.py")
+_AFTER_THE_RUN = (
+    "metrics",
+    "report",
+    "judge.py",
+    "comparison.py",
+    "overview.py",
+    "cli.py",
+    "__main__.py",
+    "execution.py",
+)
 _MACHINE_ONLY = {"ranks", "time_limit"}  # settings that change the time and not the answer
 
 

@@ -23,7 +23,9 @@ def parse[R: Record](record: type[R], table: object, place: str) -> R:
     try:
         return record.model_validate(_frozen(table))
     except ValidationError as error:
-        raise _as_input_error(error.errors()[0], record, place, table) from None
+        # An unknown key first: where a key is mistyped, it says more than that the right one is missing.
+        first = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
+        raise _as_input_error(first, record, place, table) from None
 
 
 def _frozen(value: Any) -> Any:

@@ -30,6 +30,7 @@ ORDER = [
     "comparison",
     "report",
     "execution",
+    "overview",
     "cli",
     "__main__",
 ]
