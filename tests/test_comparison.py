@@ -1,0 +1,66 @@
+"""A comparison measures every run against the reference and against rest, and judges what it was asked to judge."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import shapes
+
+from fem_reference.comparison import compare
+from fem_reference.errors import InputError
+from fem_reference.mesh import Polylines
+from fem_reference.runs import Outcome, Run
+from fem_reference.scene import Expectation
+
+REST = shapes.sphere(2, 10.0)
+FIBRE = Polylines(np.array([[0.0, 0, -5], [0, 0, 5]]), np.array([0, 2]))
+OUTCOME = Outcome("converged", "done")
+
+
+def run(name: str, growth: tuple[float, float], *, fibres: bool = True) -> Run:
+    positions = np.stack([REST.points * factor for factor in growth])
+    inside = np.stack([FIBRE.points * factor for factor in growth]) if fibres else None
+    return Run(name, "test", OUTCOME, (0, 10), REST, positions, FIBRE if fibres else None, inside)
+
+
+def volume_deviation(measures) -> float:
+    (found,) = (one for one in measures if (one.metric, one.statistic) == ("volume", "deviation"))
+    return float(found.values[1])
+
+
+def expectation(of: str, truth: str) -> Expectation:
+    keys = {"metric": "volume", "statistic": "deviation", "frame": 10, "within": "0.01 %", "kind": "closed form"}
+    return Expectation(of=of, truth=truth, because="a test", **keys)
+
+
+def scene(*expectations: Expectation) -> SimpleNamespace:
+    return SimpleNamespace(expect=expectations, place="case.toml")
+
+
+def test_candidates_are_measured_against_the_reference_and_all_against_rest() -> None:
+    # Spheres that grow by 10 and 21 %: 1.1^3 = 1.331 of rest, and 1.1^3 of each other.
+    result = compare(scene(), None, run("reference", (1, 1.1)), (run("large", (1, 1.21), fibres=False),))
+    volume = {name: volume_deviation(measures) for name, measures in result.changes.items()}
+    assert volume == pytest.approx({"reference": 33.1, "large": 100 * (1.21**3 - 1)})
+    assert volume_deviation(result.deviations["large"]) == pytest.approx(33.1)
+    assert set(result.deviations) == {"large"}
+    # An extension with linear precision makes no error in a linear field.
+    assert result.extension_error.values == pytest.approx(0, abs=1e-9)
+
+
+def test_expectations_meet_the_runs_that_they_are_of() -> None:
+    expected = (expectation("reference", "33.1 %"), expectation("candidates", "33.1 %"), expectation("absent", "0 %"))
+    candidates = (run("right", (1, 1.21)), run("wrong", (1, 1.1)))
+    result = compare(scene(*expected), None, run("reference", (1, 1.1)), candidates)
+    assert [(one.expectation.of, one.word) for one in result.verdicts] == [
+        ("reference", "pass"),
+        ("right", "pass"),
+        ("wrong", "fail"),
+    ]
+    assert result.word == "fail"
+    assert compare(scene(), None, run("reference", (1, 1.1)), candidates).word == "not judged"
+
+
+def test_a_reference_carries_the_fibres() -> None:
+    with pytest.raises(InputError, match="reference: fibres: got a run without an interior"):
+        compare(scene(), None, run("reference", (1, 1.1), fibres=False), ())

@@ -1,0 +1,88 @@
+"""Scene -> problem: what is held, what the mesh is like, and fibres that stay where the solution is."""
+
+import numpy as np
+import pytest
+import small
+
+from fem_reference import casefile, files, problem
+from fem_reference.errors import InputError
+from fem_reference.geometry.embedding import embed
+from fem_reference.mesh import Polylines, enclosed_volume
+
+
+@pytest.fixture(scope="module")
+def bar(tmp_path_factory):
+    return small.write(tmp_path_factory.mktemp("problem") / "bar")
+
+
+@pytest.fixture(scope="module")
+def built(bar):
+    return problem.build(casefile.read(bar))
+
+
+def test_attachments_keep_their_names_and_areas(built) -> None:
+    # Each end is a square of 10 mm; what the surface counts as held besides is half of the strip, 3.3 mm high, around it.
+    assert set(built.mesh.facets) == {"origin", "insertion"}
+    assert {held.attachment: held.bone.name for held in built.held} == {"origin": "floor", "insertion": "lid"}
+    for name in ("origin", "insertion"):
+        on_surface, on_tets = (built.mesh_facts[f"{name}_area{suffix}"] for suffix in ("_mm2", "_on_tets_mm2"))
+        assert on_surface == pytest.approx(100 + 40 * 3.3 / 2, rel=0.05)
+        assert on_tets == pytest.approx(on_surface, rel=0.2)
+
+
+def test_mesh_facts_say_who_made_it_and_how_good_it_is(built) -> None:
+    facts = built.mesh_facts
+    assert facts["maker"] == "gmsh"
+    assert facts["self_intersections_of_surface"] == 0
+    assert facts["tets"] == len(built.mesh.tets)
+    assert 0 < facts["quality_min"] <= facts["quality_5_percent"] <= 1
+    body = small.body()  # coarsening keeps the enclosed volume
+    assert facts["volume_mm3"] == pytest.approx(enclosed_volume(body.points, body.triangles), rel=1e-3)
+
+
+def test_a_body_rests_where_it_has_no_motion(built) -> None:
+    floor, lid = built.bones
+    assert np.array_equal(floor.pose(7), np.eye(4))
+    assert not np.array_equal(lid.pose(7), np.eye(4))
+
+
+def test_given_fibres_stay_inside_the_muscle(built) -> None:
+    inside, far = [5.0, 5.0, 20.0], [5.0, 30.0, 20.0]
+    given = Polylines(np.array([inside, far]), np.array([0, 2]))
+    moved = problem._inside(built.mesh, given)
+    assert np.array_equal(moved.points[0], inside)
+    # The nearest point of the side, which bulges to y = 5 + 5 * 1.3 = 11.5 halfway up, within what coarsening moves it.
+    assert moved.points[1] == pytest.approx([5, 11.5, 20], abs=0.7)
+    assert embed(built.mesh, moved.points).outside.max() < 1e-9
+
+
+def test_given_fibres_are_read(bar) -> None:
+    lines = Polylines(np.array([[5.0, 5, 2], [5, 5, 20], [5, 5, 38]]), np.array([0, 3]))
+    files.write_polylines(bar / "lines.vtp", lines, lines.points)
+    text = (bar / "case.toml").read_text()
+    traced = 'traced = { count = 4, start = "origin", end = "insertion" }'
+    assert traced in text
+    (bar / "case.toml").write_text(text.replace(traced, 'polylines = { file = "lines.vtp", unit = "mm" }'))
+    try:
+        assert problem.build(casefile.read(bar)).fibres.lengths().tolist() == [36]
+    finally:
+        (bar / "case.toml").write_text(text)
+
+
+def test_a_vertex_has_one_bone(bar) -> None:
+    scene = casefile.read(bar, changes={"attachment[1].bone": "floor"})
+    with pytest.raises(InputError, match=r"attachment\[1\]: got vertex \d+, which another attachment holds"):
+        problem.setup(scene)
+
+
+def test_an_attachment_that_tets_cannot_resolve_is_named(bar) -> None:
+    (bar / "one.csv").write_text("7\n")
+    text = (bar / "case.toml").read_text()
+    (bar / "case.toml").write_text(
+        text.replace('bone = "lid"\nwithin = "1.5 mm"', 'bone = "lid"\nvertices = { file = "one.csv" }')
+    )
+    try:
+        with pytest.raises(InputError, match=r"attachment\[1\]: got an area smaller than the tetrahedra resolve"):
+            problem.build(casefile.read(bar))
+    finally:
+        (bar / "case.toml").write_text(text)
