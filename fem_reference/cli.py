@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fem_reference import __version__, casefile, files, judge, metrics, problem, report, runs, solvers
+from fem_reference import __version__, casefile, files, judge, metrics, report, runs, solvers
 from fem_reference.comparison import Comparison, compare
 from fem_reference.errors import InputError, MissingSoftware
 from fem_reference.execution import Bench, complete
@@ -151,16 +151,13 @@ def _choice(scene: Scene, solver: str) -> SolverChoice:
 
 def _judge(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
     """Reference and candidates -> page, JSON and exit status. What is bad in the input shows before anything is solved."""
-    judge.check(scene)
     names = ["reference", *(entry.name for entry, _ in chosen)]
     for name in names:
         if names.count(name) > 1:
             raise InputError(
                 "--candidate", f'"{name}" twice', 'folders and candidates of different names, none of them "reference"'
             )
-    bench = Bench(scene, _out(options) / "runs", options.ranks)
-    for candidate, place in [(scene.reference, "reference"), *chosen]:
-        bench.settings(candidate, place)
+    bench = _checked_bench(scene, options, chosen)
     read = {entry.name: bench.read(entry.name, entry, place) for entry, place in chosen if entry.solver == "recorded"}
     reference = bench.obtain("reference", scene.reference, "reference")
     solved = {
@@ -174,6 +171,15 @@ def _judge(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candida
     if any(run.outcome.status != "converged" for run in (reference, *candidates)):
         return SOLVER_FAILED
     return VERDICT_FAIL if result.word == "fail" else DONE
+
+
+def _checked_bench(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> Bench:
+    """The bench of a scene whose expectations, reference and ``chosen`` candidates can all be read."""
+    judge.check(scene)
+    bench = Bench(scene, _out(options) / "runs", options.ranks)
+    for choice, place in [(scene.reference, "reference"), *chosen]:
+        bench.settings(choice, place)
+    return bench
 
 
 def _comparison_text(result: Comparison, page: Path) -> str:
@@ -231,13 +237,10 @@ def _stored(folder: Path) -> str:
 
 def _show(options: argparse.Namespace) -> int:
     scene = casefile.read(options.case)
-    judge.check(scene)
-    bench = Bench(scene, _out(options) / "runs")
-    for choice, place in [(scene.reference, "reference"), *_own_candidates(scene)]:
-        bench.settings(choice, place)
-    facts = scene_facts(scene, problem.setup(scene))
+    bench = _checked_bench(scene, options, _own_candidates(scene))
+    facts = scene_facts(scene, bench.setup())
     if options.out is not None:
-        built, folder = problem.build(scene), options.out / scene.name
+        built, folder = bench.problem(), options.out / scene.name
         folder.mkdir(parents=True, exist_ok=True)
         files.write_surface(folder / "surface.vtp", built.surface, built.surface.points)
         files.write_polylines(folder / "fibres.vtp", built.fibres, built.fibres.points)

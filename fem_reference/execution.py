@@ -44,7 +44,7 @@ class Bench:
     def __init__(self, scene: Scene, store: Path, ranks: int | None = None) -> None:
         self.scene, self.store, self.ranks = scene, store / scene.name, ranks
         self.setup: Callable[[], Setup] = cache(lambda: problem.setup(scene))
-        self.problem: Callable[[], Problem] = cache(lambda: _build(scene))
+        self.problem: Callable[[], Problem] = cache(lambda: _build(scene, self.setup()))
 
     def settings(self, choice: SolverChoice, place: str) -> Record:
         """The settings of ``choice``, checked; a folder among them is found as files of the scene are."""
@@ -121,9 +121,9 @@ def _alone(folder: Path) -> Iterator[None]:
         yield
 
 
-def _build(scene: Scene) -> Problem:
+def _build(scene: Scene, setup: Setup) -> Problem:
     log.info("%s: filling the muscle with tetrahedra of %g mm", scene.name, scene.muscle.tet_size)
-    built = problem.build(scene)
+    built = problem.build(scene, setup)
     facts = built.mesh_facts
     log.info("%s: %d tetrahedra, quality at least %.2f", scene.name, facts["tets"], facts["quality_min"])
     return built

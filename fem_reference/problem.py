@@ -93,10 +93,9 @@ def setup(scene: Scene) -> Setup:
     return Setup(surface, bones, _held(scene, surface, bones), scene.frames.numbers, scene.frames.interval)
 
 
-def build(scene: Scene) -> Problem:
-    """The whole problem of a scene: its setup, tetrahedra and fibres."""
+def build(scene: Scene, rest: Setup) -> Problem:
+    """The whole problem of a scene: its setup ``rest``, filled with tetrahedra and fibres."""
     begin = time.perf_counter()
-    rest = setup(scene)
     bare = tetrahedralise(rest.surface, scene.muscle.tet_size)
     facets = {held.attachment: facets_under(bare, rest.surface, held.vertices) for held in rest.held}
     for i, held in enumerate(rest.held):

@@ -10,6 +10,11 @@ from fem_reference.geometry.embedding import embed
 from fem_reference.mesh import Polylines, enclosed_volume
 
 
+def build(case):
+    scene = casefile.read(case)
+    return problem.build(scene, problem.setup(scene))
+
+
 @pytest.fixture(scope="module")
 def bar(tmp_path_factory):
     return small.write(tmp_path_factory.mktemp("problem") / "bar")
@@ -17,7 +22,7 @@ def bar(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def built(bar):
-    return problem.build(casefile.read(bar))
+    return build(bar)
 
 
 def test_attachments_keep_their_names_and_areas(built) -> None:
@@ -64,7 +69,7 @@ def test_given_fibres_are_read(bar) -> None:
     assert traced in text
     (bar / "case.toml").write_text(text.replace(traced, 'polylines = { file = "lines.vtp", unit = "mm" }'))
     try:
-        assert problem.build(casefile.read(bar)).fibres.lengths().tolist() == [36]
+        assert build(bar).fibres.lengths().tolist() == [36]
     finally:
         (bar / "case.toml").write_text(text)
 
@@ -83,6 +88,6 @@ def test_an_attachment_that_tets_cannot_resolve_is_named(bar) -> None:
     )
     try:
         with pytest.raises(InputError, match=r"attachment\[1\]: got an area smaller than the tetrahedra resolve"):
-            problem.build(casefile.read(bar))
+            build(bar)
     finally:
         (bar / "case.toml").write_text(text)

@@ -25,7 +25,7 @@ from pydantic import Field
 
 from fem_reference.children import command, environment
 from fem_reference.errors import MissingSoftware
-from fem_reference.geometry.embedding import embed
+from fem_reference.geometry.embedding import Locator
 from fem_reference.mesh import Floats, Ints
 from fem_reference.motion import apply
 from fem_reference.problem import Problem
@@ -99,9 +99,9 @@ def _with_held(problem: Problem, frame: Frame) -> Frame:
 
 def _samples(problem: Problem) -> dict[str, tuple[Ints, Floats]]:
     """Where displacement is wanted: by name, the tet of each point and the point at rest, as the tet's own map places it."""
-    mesh = problem.mesh
-    wanted = {"tets": mesh.points, "surface": problem.surface.points, "fibres": problem.fibres.points}
-    return {name: (embed(mesh, points).tets, np.asarray(points)) for name, points in wanted.items()}
+    locator = Locator(problem.mesh)
+    wanted = {"tets": problem.mesh.points, "surface": problem.surface.points, "fibres": problem.fibres.points}
+    return {name: (locator.embed(points).tets, np.asarray(points)) for name, points in wanted.items()}
 
 
 def _command(settings: Settings, job: Path) -> list[str]:
