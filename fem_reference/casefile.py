@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.effects import Effect
+from fem_reference.effects import Effect, FieldEffect
 from fem_reference.effects import find as find_effect
 from fem_reference.effects import names as effect_names
 from fem_reference.errors import InputError
-from fem_reference.records import join, parse
+from fem_reference.field.scene import FieldScene, FieldSceneFile
+from fem_reference.records import Record, join, parse
 from fem_reference.scene import HOME, Scene, SceneFile, Spoil
 
 
@@ -21,8 +22,9 @@ def cases() -> list[str]:
     return sorted(path.parent.name for path in (HOME / "cases").glob("*/case.toml"))
 
 
-def read(case: str | Path, *, spoiled: bool = False, changes: dict[str, Any] | None = None) -> Scene:
-    """The scene of a shipped case (by name), a folder with a ``case.toml``, or a scene file.
+def read(case: str | Path, *, spoiled: bool = False, changes: dict[str, Any] | None = None) -> Scene | FieldScene:
+    """The scene of a shipped case (by name), a folder with a ``case.toml``, or a scene file: with a ``domain`` that of a scalar
+    field, else that of a muscle.
 
     ``changes`` maps keys such as ``"frames.last"`` or ``"effect[1].bulk"`` to other values; ``spoiled`` applies the case's spoil.
     That the spoil can be applied is checked too, except after changes of other keys: they may take away what it spoils.
@@ -62,7 +64,30 @@ def _change(table: dict[str, Any], key: str, value: Any, place: str) -> None:
         raise InputError(join(place, key), "nothing", "a key of this scene") from error
 
 
-def _spoiled(table: dict[str, Any], path: Path) -> Scene:
+def setting(text: str) -> tuple[str, Any]:
+    """``KEY=VALUE`` of the command line as a key and a TOML value; what is no TOML value is text.
+
+    >>> setting("candidate[1].peclet=10"), setting("domain.mesh.triangles=delaunay")
+    (('candidate[1].peclet', 10), ('domain.mesh.triangles', 'delaunay'))
+    """
+    key, equals, value = text.partition("=")
+    if not equals or not key:
+        raise InputError("--set", f'"{text}"', "KEY=VALUE, such as candidate[1].peclet=10")
+    try:
+        return key, tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return key, value
+
+
+def read_muscle(case: str | Path) -> Scene:
+    """The scene of a case that has a muscle."""
+    scene = read(case)
+    if not isinstance(scene, Scene):
+        raise InputError(scene.place, "the scene of a scalar field", "the scene of a muscle")
+    return scene
+
+
+def _spoiled(table: dict[str, Any], path: Path) -> Scene | FieldScene:
     """The scene with its spoil applied; ``table`` stays as it is."""
     place = str(path)
     spoil = parse(Spoil, table.get("spoil"), join(place, "spoil"))
@@ -78,7 +103,7 @@ def _spoiled(table: dict[str, Any], path: Path) -> Scene:
         raise InputError(join(place, "spoil.value"), _told(spoil), f"a value that can be read ({why})") from error
 
 
-def _check_spoil(scene: Scene, spoiled: Scene) -> None:
+def _check_spoil(scene: Scene | FieldScene, spoiled: Scene | FieldScene) -> None:
     if spoiled.model_copy(update={"spoil": scene.spoil}) == scene:
         raise InputError(
             join(scene.place, "spoil.value"), _told(scene.spoil), f"a value that changes {scene.spoil.key}"
@@ -89,14 +114,29 @@ def _told(spoil: Spoil) -> str:
     return f'"{spoil.value}"' if isinstance(spoil.value, str) else repr(spoil.value)
 
 
-def _scene(table: dict[str, Any], path: Path) -> Scene:
+def _scene(table: dict[str, Any], path: Path) -> Scene | FieldScene:
     place = str(path)
+    scalar = "domain" in table
+    kind: type[Record] = FieldEffect if scalar else Effect
     effects = table.get("effect", [])
     if isinstance(effects, list):
-        table = table | {"effect": tuple(_effect(entry, f"{place}: effect[{i}]") for i, entry in enumerate(effects))}
-    inside = parse(SceneFile, {"candidate": ()} | table, place)
+        read_effects = tuple(_effect(entry, f"{place}: effect[{i}]", kind) for i, entry in enumerate(effects))
+        table = table | {"effect": read_effects}
+    inside: Record
+    if scalar:
+        inside = parse(FieldSceneFile, {"candidate": (), "boundary": ()} | table, place)
+    else:
+        inside = parse(SceneFile, {"candidate": ()} | table, place)
     if isinstance(effects, list):
         _check_effects([entry["name"] for entry in effects], place)
+    if scalar:
+        field_scene = FieldScene(name=path.parent.name, folder=path.parent, **dict(inside))
+        _check_used(
+            [*_candidate_names(field_scene)],
+            [(f"expect[{i}].of", e.of) for i, e in enumerate(field_scene.expect)],
+            place,
+        )
+        return field_scene
     scene = Scene(name=path.parent.name, folder=path.parent, **dict(inside))
     _check_names(scene)
     _check_rest(scene)
@@ -110,10 +150,10 @@ def _check_effects(names: list[str], place: str) -> None:
             raise InputError(join(place, f"effect[{i}].name"), f'"{name}" a second time', "every effect once")
 
 
-def _effect(table: Any, place: str) -> Effect:
-    if not isinstance(table, dict) or table.get("name") not in effect_names():
+def _effect(table: Any, place: str, kind: type[Record]) -> Record:
+    if not isinstance(table, dict) or table.get("name") not in effect_names(kind):
         got = table.get("name") if isinstance(table, dict) else table
-        raise InputError(f"{place}.name", f'"{got}"', f"one of {', '.join(effect_names())}")
+        raise InputError(f"{place}.name", f'"{got}"', f"one of {', '.join(effect_names(kind))}")
     return parse(find_effect(table["name"]), {key: value for key, value in table.items() if key != "name"}, place)
 
 
@@ -121,18 +161,33 @@ def _check_names(scene: Scene) -> None:
     """Names are used once and refer to something."""
     bones = [bone.name for bone in scene.bone]
     attachments = [attachment.name for attachment in scene.attachment]
-    candidates = ["reference", "candidates", *(candidate.name for candidate in scene.candidate)]
-    for key, list_of_names in (("bone", bones), ("attachment", attachments), ("candidate", candidates)):
-        twice = next((name for name in list_of_names if list_of_names.count(name) > 1), None)
-        if twice is not None:
-            raise InputError(join(scene.place, key), f'the name "{twice}" twice', "every name once")
+    _check_once(bones, join(scene.place, "bone"))
+    _check_once(attachments, join(scene.place, "attachment"))
+    candidates = ["candidates", *_candidate_names(scene)]
     traced = scene.fibres.traced
-    wanted = [(f"attachment[{i}].bone", entry.bone, bones) for i, entry in enumerate(scene.attachment)]
-    wanted += [(f"fibres.traced.{end}", getattr(traced, end), attachments) for end in ("start", "end") if traced]
-    wanted += [(f"expect[{i}].of", entry.of, candidates) for i, entry in enumerate(scene.expect)]
-    for key, name, known in wanted:
+    ends = [(f"fibres.traced.{end}", getattr(traced, end)) for end in ("start", "end") if traced]
+    _check_used(bones, [(f"attachment[{i}].bone", entry.bone) for i, entry in enumerate(scene.attachment)], scene.place)
+    _check_used(attachments, ends, scene.place)
+    _check_used(candidates, [(f"expect[{i}].of", entry.of) for i, entry in enumerate(scene.expect)], scene.place)
+
+
+def _candidate_names(scene: Scene | FieldScene) -> list[str]:
+    """What runs are called: the reference and each candidate, which have names of their own."""
+    names = ["reference", *(candidate.name for candidate in scene.candidate)]
+    _check_once([*names, "candidates"], join(scene.place, "candidate"))
+    return names
+
+
+def _check_once(names: list[str], place: str) -> None:
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise InputError(place, f'the name "{twice}" twice', "every name once")
+
+
+def _check_used(known: list[str], uses: list[tuple[str, str]], place: str) -> None:
+    for key, name in uses:
         if name not in known:
-            raise InputError(join(scene.place, key), f'"{name}"', f"one of {', '.join(known)}")
+            raise InputError(join(place, key), f'"{name}"', f"one of {', '.join(known)}")
 
 
 def _check_rest(scene: Scene) -> None:

@@ -10,11 +10,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fem_reference import __version__, casefile, files, judge, metrics, report, runs, solvers
+from fem_reference import __version__, casefile, field_verbs, files, judge, metrics, report, runs, solvers
 from fem_reference.comparison import Comparison, compare
 from fem_reference.errors import InputError, MissingSoftware
 from fem_reference.execution import Bench, complete
-from fem_reference.overview import scene_facts
+from fem_reference.field.problem import build as build_field
+from fem_reference.field.scene import FieldScene
+from fem_reference.field_verbs import Told
+from fem_reference.overview import field_scene_facts, scene_facts
 from fem_reference.records import parse
 from fem_reference.runs import Run
 from fem_reference.scene import Candidate, Scene, SolverChoice
@@ -79,6 +82,8 @@ def _parser() -> argparse.ArgumentParser:
         sub = verbs.add_parser(name, help=text, description=text)
         if case:
             sub.add_argument("case", metavar="CASE", help="a shipped case (see list), a case folder or a case.toml")
+            change = "change a key of the case, such as muscle.tet_size='8 mm'; may be repeated"
+            sub.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help=change)
         sub.add_argument("--out", type=Path, metavar="DIR", help="where pages and stored runs go (default: reports)")
         sub.add_argument("--json", type=Path, metavar="FILE", help="write what is printed as JSON")
         sub.add_argument(
@@ -99,13 +104,17 @@ def _parser() -> argparse.ArgumentParser:
         help="a candidate of the case or a folder of frames; may be repeated",
     )
     comparison.add_argument("--unit", default="mm", help="unit of length of the frames in DIR (default: mm)")
+    page = add("page", _page, "write a page over several cases", case=False)
+    page.add_argument(
+        "name", metavar="NAME", choices=sorted(field_verbs.PAGES), help=f"one of {', '.join(sorted(field_verbs.PAGES))}"
+    )
     add("list", _list, "what there is: cases, solvers, metrics, stored runs", case=False)
     add("show", _show, "what a case is made of; with --out also its meshes for ParaView")
     return parser
 
 
 def _demo(options: argparse.Namespace) -> int:
-    scene = casefile.read(MAIN_JOB)
+    scene = casefile.read_muscle(MAIN_JOB)
     return _judge(scene, options, _own_candidates(scene))
 
 
@@ -115,7 +124,9 @@ def _own_candidates(scene: Scene) -> list[tuple[Candidate, str]]:
 
 
 def _compare(options: argparse.Namespace) -> int:
-    scene = casefile.read(options.case)
+    scene = _scene(options)
+    if isinstance(scene, FieldScene):
+        return _told(field_verbs.compare(scene, options.candidate, _out(options)), options)
     wanted = options.candidate or [candidate.name for candidate in scene.candidate]
     return _judge(scene, options, [_candidate(scene, text, options.unit) for text in wanted])
 
@@ -135,7 +146,9 @@ def _candidate(scene: Scene, text: str, unit: str) -> tuple[Candidate, str]:
 
 
 def _run(options: argparse.Namespace) -> int:
-    scene = casefile.read(options.case)
+    scene = _scene(options)
+    if isinstance(scene, FieldScene):
+        return _told(field_verbs.run(scene, options.solver, _out(options)), options)
     if options.solver is None or options.solver == scene.reference.solver:
         return _judge(scene, options, [])
     bench = Bench(scene, _out(options) / "runs", options.ranks)
@@ -147,6 +160,23 @@ def _run(options: argparse.Namespace) -> int:
 def _choice(scene: Scene, solver: str) -> SolverChoice:
     """How the scene chooses ``solver``: its settings as a candidate, else no settings."""
     return next((entry for entry in scene.candidate if entry.solver == solver), SolverChoice(solver=solver))
+
+
+def _scene(options: argparse.Namespace) -> Scene | FieldScene:
+    """The scene of the case, with what ``--set`` changes of it."""
+    return casefile.read(options.case, changes=dict(map(casefile.setting, options.set)))
+
+
+def _told(told: Told, options: argparse.Namespace) -> int:
+    """Tell what came of scalar cases; returns the exit status."""
+    _tell(told.facts, told.text, options)
+    if told.word == "failed":
+        return SOLVER_FAILED
+    return VERDICT_FAIL if told.word == "fail" else DONE
+
+
+def _page(options: argparse.Namespace) -> int:
+    return _told(field_verbs.page(options.name, _out(options)), options)
 
 
 def _judge(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
@@ -236,7 +266,11 @@ def _stored(folder: Path) -> str:
 
 
 def _show(options: argparse.Namespace) -> int:
-    scene = casefile.read(options.case)
+    scene = _scene(options)
+    if isinstance(scene, FieldScene):
+        facts = field_scene_facts(scene, build_field(scene))
+        _tell(facts, "\n".join(_lines(facts)), options)
+        return DONE
     bench = _checked_bench(scene, options, _own_candidates(scene))
     facts = scene_facts(scene, bench.setup())
     if options.out is not None:

@@ -10,6 +10,7 @@ class InputError(Exception):
 
     def __init__(self, place: object, got: object, want: str) -> None:
         super().__init__(f"{place}: got {got}, want {want}")
+        self.got, self.want = got, want
 
 
 class MissingSoftware(Exception):  # noqa: N818 - it is a state of the machine, not a mistake of the caller

@@ -34,6 +34,8 @@ _AFTER_THE_RUN = (
     "cli.py",
     "__main__.py",
     "execution.py",
+    "field_execution.py",
+    "field_verbs.py",
 )
 _MACHINE_ONLY = {"ranks", "time_limit"}  # settings that change the time and not the answer
 
@@ -81,7 +83,7 @@ class Bench:
     def read(self, name: str, choice: SolverChoice, place: str) -> Run:
         """The run that somebody recorded, checked against the setup of the scene; it is read each time and not stored."""
         settings, frames, rest = self.settings(choice, place), list[Frame](), self.setup()
-        outcome = solvers.find(choice.solver, place).solve(rest, settings, frames.append)  # type: ignore[arg-type]
+        outcome = solvers.find(choice.solver, place).solve(rest, settings, frames.append)
         positions = np.stack([frame.surface for frame in frames])
         numbers = tuple(frame.number for frame in frames)
         origin = self.origin(choice.solver, settings)
@@ -103,7 +105,7 @@ class Bench:
             "effects": {type(effect).__name__: effect.model_dump(mode="json") for effect in self.scene.effects},
             "fem_reference": __version__,
             "code": code_hash(),
-            "versions": _versions(),
+            "versions": versions(),
             "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
         }
 
@@ -134,7 +136,7 @@ def _stored(folder: Path, name: str) -> Run | None:
     run = runs.finished(folder)
     if run is None:
         return None
-    now, then = _versions(), run.origin["versions"]
+    now, then = versions(), run.origin["versions"]
     other = [package for package in now if package in then and now[package] != then[package] and package != "python"]
     if other:
         log.info("%s: solved before, but with another %s; solving again", name, other[0])
@@ -154,7 +156,7 @@ def code_hash() -> str:
     return digest.hexdigest()[:16]
 
 
-def _versions() -> dict[str, str]:
+def versions() -> dict[str, str]:
     """The versions of the packages that a run may depend on, and of Python."""
     wanted = (
         "numpy",

@@ -130,6 +130,16 @@ def write_tets(path: Path, mesh: TetMesh, positions: Floats) -> None:
     _vtk_write(path, vtkXMLUnstructuredGridWriter(), data, mesh.points, positions)
 
 
+def write_field(path: Path, points: Floats, cells: Ints, data: dict[str, Floats]) -> None:
+    """VTU of ``cells`` (m, 2 or 3) between ``points`` (n, 1 to 3) with point ``data`` (n,) or (n, d) by name."""
+    import meshio
+
+    space = np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
+    kind = {2: "line", 3: "triangle"}[cells.shape[1]]
+    with _whole(path) as part:
+        meshio.Mesh(space, [(kind, cells)], point_data=data).write(part)
+
+
 def write_pvd(path: Path, frames: Sequence[tuple[int, str]]) -> None:
     """PVD index: the frame number is the time of each file, which is named relative to the index."""
     entries = "".join(f'<DataSet timestep="{number}" file={quoteattr(name)}/>\n' for number, name in frames)
@@ -189,14 +199,7 @@ def _meshio_steps(path: Path) -> list[tuple[float, Floats, Ints]]:
     with meshio.xdmf.TimeSeriesReader(path) as series:
         points, triangles = formats.arrays(_meshio_triangles(meshio.Mesh(*series.read_points_cells())))
         steps = [series.read_data(step)[:2] for step in range(series.num_steps)]
-    return [(time, points + _displacement(data, points), triangles) for time, data in steps]
-
-
-def _displacement(data: dict[str, Any], points: Floats) -> Any:
-    name = next((name for name in ("displacement", "u") if np.shape(data.get(name, 0)) == points.shape), None)
-    if name is None:
-        raise ValueError(f"point data {', '.join(data) or 'nothing'} in a step")
-    return data[name]
+    return [(time, points + formats.displacement(data, points), triangles) for time, data in steps]
 
 
 def _read_vtk(path: Path) -> Soup:

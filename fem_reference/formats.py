@@ -169,3 +169,11 @@ def read_stl(path: Path) -> Soup:
     else:
         raise ValueError(f"{len(data)} bytes that are no complete STL file")
     return points, np.arange(len(points)).reshape(-1, 3)
+
+
+def displacement(data: dict[str, Any], points: Floats) -> Any:
+    """The displacement among point ``data`` of a step; ValueError where there is none of the shape of ``points``."""
+    name = next((name for name in ("displacement", "u") if np.shape(data.get(name, 0)) == points.shape), None)
+    if name is None:
+        raise ValueError(f"point data {', '.join(data) or 'nothing'} in a step")
+    return data[name]

@@ -1,8 +1,15 @@
-"""What a case is made of, in words and numbers: what ``show`` tells."""
+"""What a case is made of and what came of a scalar one, in words and numbers: what ``show``, ``run`` and ``compare`` tell."""
 
+import math
+from collections.abc import Iterable
 from typing import Any
 
 from fem_reference.effects import Effect
+from fem_reference.field.example import Example, FieldMeasure, FieldVerdict
+from fem_reference.field.problem import FieldProblem
+from fem_reference.field.runs import FieldRun
+from fem_reference.field.scene import FieldScene
+from fem_reference.judge import overall
 from fem_reference.mesh import enclosed_volume, vertex_areas
 from fem_reference.motion import Rotation
 from fem_reference.problem import Setup
@@ -51,3 +58,82 @@ def _motion(motion: Rotation | None) -> str:
     x, y, z = motion.centre
     keys = ", ".join(f"{angle:g} at {frame:g}" for frame, angle in zip(motion.frames, motion.angles, strict=True))
     return f"turns about ({x:g}, {y:g}, {z:g}) mm along {motion.axis}, rad at frame: {keys}"
+
+
+def field_scene_facts(scene: FieldScene, problem: FieldProblem) -> dict[str, Any]:
+    """Everything that a person asks of a scalar case before solving it."""
+    return {
+        "case": scene.name,
+        "title": scene.title,
+        "proves": scene.proves,
+        "domain": f"{len(problem.mesh.cells)} cells, {len(problem.mesh.points)} vertices, size {problem.mesh.sizes.sum():.6g}",
+        "element": f"P{problem.order}, {len(problem.held)} nodes, {_held(problem)} held",
+        "form": f"{'galerkin' if problem.tau is None else 'supg'}, mesh Peclet number up to {problem.peclet:.3g}",
+        "effects": {
+            type(effect).__name__: {name: str(value) for name, value in effect.model_dump().items()}
+            for effect in scene.effects
+        },
+        "reference": scene.reference.solver,
+        "candidates": {candidate.name: candidate.solver for candidate in scene.candidate},
+        "expects": [f"{e.of} {e.measure}: {e.truth:g} within {e.within:g} ({e.kind})" for e in scene.expect],
+    }
+
+
+def _held(problem: FieldProblem) -> int:
+    return sum(not math.isnan(value) for value in problem.held)
+
+
+def field_facts(
+    scene: FieldScene, runs: Iterable[FieldRun], measures: Iterable[FieldMeasure], verdicts: Iterable[FieldVerdict]
+) -> dict[str, Any]:
+    """What came of the runs of a scalar case, the first of them in front, as JSON has it."""
+    listed, judged = list(runs), list(verdicts)
+    first = listed[0]
+    return {
+        "case": scene.name,
+        "solver": first.solver,
+        "status": first.solution.outcome.status,
+        "message": first.solution.outcome.message,
+        "statuses": {run.name: run.solution.outcome.status for run in listed},
+        "verdict": overall(verdict.word for verdict in judged),  # type: ignore[misc]
+        "cost": {run.name: run.solution.outcome.cost for run in listed},
+        "measures": [
+            {
+                "candidate": entry.of,
+                "metric": entry.measure,
+                "value": entry.value if math.isfinite(entry.value) else None,
+            }
+            for entry in measures
+        ],
+        "verdicts": [
+            {"word": v.word, "of": v.expectation.of, "metric": v.expectation.measure, "truth": v.expectation.truth}
+            | {"within": v.expectation.within, "value": v.value if math.isfinite(v.value) else None}
+            for v in judged
+        ],
+        "runs": [str(run.folder) for run in listed],
+    }
+
+
+def field_text(facts: dict[str, Any]) -> str:
+    """The same for people."""
+    lines = [f"{facts['case']}: {facts['status']}, {facts['message']}"]
+    lines += [f"{row['candidate']} {row['metric']}: {_number(row['value'])}" for row in facts["measures"]]
+    lines += [
+        f"{v['word']}: {v['of']} {v['metric']} is {_number(v['value'])}, expected {v['truth']:.6g} within {v['within']:.3g}"
+        for v in facts["verdicts"]
+    ]
+    return "\n".join([*lines, f"verdict: {facts['verdict']}", *(f"stored in {folder}" for folder in facts["runs"])])
+
+
+def field_example_facts(example: Example) -> dict[str, Any]:
+    """What came of a whole example, its convergence included."""
+    ladders = [
+        {"element": ladder.element, "cells": ladder.cells, "errors": ladder.errors, "against": ladder.against}
+        | {"order": ladder.order if math.isfinite(ladder.order) else None}
+        for ladder in example.ladders
+    ]
+    return field_facts(example.scene, example.runs, example.measures, example.verdicts) | {"convergence": ladders}
+
+
+def _number(value: float | None) -> str:
+    return "not a number" if value is None else f"{value:.6g}"

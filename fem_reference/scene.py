@@ -245,22 +245,8 @@ class Scene(SceneFile):
         return self.effect
 
     def file(self, text: str, key: str) -> Path:
-        """The file a key names: below the data folder (``data:``), below meshes (``mesh:``), or relative to the scene file."""
-        place = join(self.place, key)
-        if text.startswith("data:"):
-            root = os.environ.get(DATA_SETTING)
-            if not root:
-                raise InputError(
-                    place, f'"{text}" while {DATA_SETTING} is not set', f"the setting {DATA_SETTING}=FOLDER"
-                )
-            path = Path(root) / text.removeprefix("data:")
-        elif text.startswith("mesh:"):
-            path = HOME / "meshes" / text.removeprefix("mesh:")
-        else:
-            path = self.folder / text
-        if not path.exists():
-            raise InputError(place, f'"{text}", which is not at {path}', "a file that exists")
-        return path
+        """The file that ``key`` names; see :func:`locate`."""
+        return locate(self.folder, text, key)
 
     @property
     def key(self) -> str:
@@ -274,6 +260,25 @@ class Scene(SceneFile):
         for key, text in _files(tables):
             digest.update(self.file(text, key).read_bytes())
         return digest.hexdigest()
+
+
+def locate(folder: Path, text: str, key: str) -> Path:
+    """The file that a ``key`` of the scene in ``folder`` names: below the data folder (``data:``), below meshes (``mesh:``), or
+    relative to the scene file.
+    """
+    place = join(str(folder / "case.toml"), key)
+    if text.startswith("data:"):
+        root = os.environ.get(DATA_SETTING)
+        if not root:
+            raise InputError(place, f'"{text}" while {DATA_SETTING} is not set', f"the setting {DATA_SETTING}=FOLDER")
+        path = Path(root) / text.removeprefix("data:")
+    elif text.startswith("mesh:"):
+        path = HOME / "meshes" / text.removeprefix("mesh:")
+    else:
+        path = folder / text
+    if not path.exists():
+        raise InputError(place, f'"{text}", which is not at {path}', "a file that exists")
+    return path
 
 
 def _files(tables: Any, key: str = "") -> list[tuple[str, str]]:

@@ -162,7 +162,7 @@ def test_a_time_limit_is_a_status() -> None:
 
 def test_missing_software_is_named(bent, monkeypatch) -> None:
     problem, *_ = bent
-    monkeypatch.setattr(fenicsx.importlib.util, "find_spec", lambda _: None)
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
     with pytest.raises(fenicsx.MissingSoftware, match=r"pip install 'fem_reference\[fenicsx\]'"):
         solved(problem)
     monkeypatch.setattr(fenicsx.shutil, "which", lambda _: None)

@@ -11,6 +11,7 @@ import pytest
 
 from fem_reference.files import read_surface
 from fem_reference.geometry.distance import distances
+from fem_reference.geometry.intersections import self_intersections
 from fem_reference.mesh import Surface, check_closed, enclosed_volume, vertex_areas
 from fem_reference.motion import Rotation, apply
 from fem_reference.scene import HOME
@@ -68,6 +69,7 @@ def test_build_script_makes_the_same_bodies(folder: Path) -> None:
     for entry in CARDS[folder]:
         # Another gmsh may place its nodes otherwise: the gap between chord and arc then changes by a part of itself,
         # and with edges of 5 to 10 mm on radii of 15 to 60 mm all of it is about a hundredth of the volume.
+        # The figure spread from a start 1 mm away or from other dense points: 7e-5 and 3e-4 of its volume.
         points, triangles = made[Path(entry["name"]).stem]
         assert enclosed_volume(points, triangles) == pytest.approx(entry["volume_mm3"], rel=1e-3)
 
@@ -106,3 +108,41 @@ def test_hip_leaves_the_joint_free(hip: dict[str, Surface]) -> None:
         assert signed(femur, hip["pelvis"]).min() > 1.0
         back = apply(np.linalg.inv(pose), samples(hip["pelvis"]))
         assert signed(back, hip["femur"]).min() > 1.0
+
+
+@pytest.fixture(scope="module")
+def figure() -> Surface:
+    return outward(HOME / "meshes" / "figure" / "figure.ply")
+
+
+def test_figure_is_a_sphere_bent_into_a_person_who_stands_and_faces_z(figure: Surface) -> None:
+    edges = np.unique(np.sort(figure.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)), axis=0)
+    assert len(figure.points) - len(edges) + len(figure.triangles) == 2
+    assert len(self_intersections(figure)) == 0
+    _, y, z = figure.points.T
+    # Edges of 22 mm on feet of radius 40 mm: the lowest vertex is at most 22^2 / (8 * 40) mm above the lowest point.
+    assert y.min() == pytest.approx(0, abs=1.6)
+    assert y.max() == pytest.approx(1750, abs=5)
+    assert z[y < 50].max() > 2 * -z[y < 50].min()  # feet
+
+
+def test_figure_has_its_first_two_vertices_at_the_nose(figure: Surface) -> None:
+    head = np.flatnonzero(figure.points[:, 1] > 1500)
+    assert head[np.argmax(figure.points[head, 2])] == 0
+    assert figure.points[0, 0] == pytest.approx(0, abs=0.01)
+    assert ((figure.triangles == 0).any(axis=1) & (figure.triangles == 1).any(axis=1)).sum() == 2
+
+
+def test_figure_has_no_thin_triangle(figure: Surface) -> None:
+    corners = figure.points[figure.triangles]
+    ahead, behind = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+    sine = np.linalg.norm(np.cross(ahead, behind), axis=2)
+    assert np.degrees(np.arctan2(sine, (ahead * behind).sum(axis=2))).min() > 30
+
+
+def test_figure_lies_on_a_skin_that_is_its_own_mirror_image(figure: Surface) -> None:
+    skin = runpy.run_path(str(HOME / "meshes" / "figure" / "build.py"))["body_distance"]
+    # Both sides are the same sums in another order; lengths are below 2000 mm.
+    assert skin(figure.points * [-1, 1, 1]) == pytest.approx(skin(figure.points), abs=1e-10)
+    # Newton's method with one-sided differences over 0.01 mm: each step leaves about 0.01 mm / 15 mm of the distance.
+    assert np.abs(skin(figure.points)).max() < 1e-6

@@ -5,10 +5,11 @@ from pathlib import Path
 
 from fem_reference import files
 from fem_reference.comparison import Comparison
-from fem_reference.report import page
+from fem_reference.field.example import Example
+from fem_reference.report import field_page, page
 from fem_reference.report.tables import as_csv, summary
 
-__all__ = ["summary", "write"]
+__all__ = ["summary", "write", "write_examples"]
 
 
 def write(comparison: Comparison, folder: Path) -> Path:
@@ -26,3 +27,10 @@ def write(comparison: Comparison, folder: Path) -> Path:
     for name, text in texts.items():
         files.write_text(folder / name, text)
     return folder / "report.html"
+
+
+def write_examples(title: str, examples: tuple[Example, ...], path: Path, *, differences: bool) -> None:
+    """Write the page of scalar cases; with ``differences`` the table of where the report's listings and text part."""
+    text = field_page.render(title, examples, differences)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    files.write_text(path, text)

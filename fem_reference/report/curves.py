@@ -22,7 +22,7 @@ REFERENCE = "#222222"
 # Okabe and Ito's palette for all kinds of colour vision, without its black and yellow.
 PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 _NOT_A_NUMBER = "not a number"
-_LOOK: Any = {
+LOOK: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "fem_reference",
     "font.family": "sans-serif",
@@ -130,7 +130,7 @@ def _line(axes: Axes, numbers: tuple[int, ...], measure: Measure, label: str, **
 
 
 def _drawing(name: str, title: str, unit: str, draw: Callable[[Axes], None]) -> Curve:
-    with mpl.rc_context(_LOOK):
+    with mpl.rc_context(LOOK):
         figure = Figure(figsize=(5.4, 3.1), layout="constrained")
         FigureCanvasSVG(figure)
         axes = figure.add_subplot()
@@ -142,7 +142,7 @@ def _drawing(name: str, title: str, unit: str, draw: Callable[[Axes], None]) -> 
         _legend(figure, axes)
         text = io.StringIO()
         figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
-    return Curve(title, _inline(text.getvalue(), name, title))
+    return Curve(title, inline(text.getvalue(), name, title))
 
 
 def _legend(figure: Figure, axes: Axes) -> None:
@@ -154,7 +154,7 @@ def _legend(figure: Figure, axes: Axes) -> None:
     figure.legend(handles, labels, loc="outside upper left", ncols=columns, handlelength=2.2, columnspacing=1.2)
 
 
-def _inline(svg: str, name: str, title: str) -> str:
+def inline(svg: str, name: str, title: str) -> str:
     """The ``<svg>`` alone, as wide as its place, with ``name`` before every id."""
     svg = re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)
     svg = re.sub(r' xmlns(:\w+)?="[^"]*"', "", svg).replace("xlink:href", "href")

@@ -202,7 +202,7 @@ def _flat(table: Any, key: str = "") -> list[tuple[str, Any]]:
 def _changes(scene: Scene) -> list[tuple[str, Any, Any]]:
     """Where the scene differs from its file: key, value in the file, value here."""
     try:
-        in_file = dict(_flat(_table(casefile.read(scene.place))))
+        in_file = dict(_flat(_table(casefile.read_muscle(scene.place))))
     except InputError as error:
         return [("the scene file", "not readable any more", str(error))]
     here = dict(_flat(_table(scene)))

@@ -1,42 +1,45 @@
 """Who computes: one file per solver, named as in scene files.
 
-Contract (tests/test_solvers.py): a module has ``Settings``, a strict record of its own settings, and
-``solve(problem, settings, sink) -> Outcome``, which sinks every requested frame as it is reached. Physics that fails is a status
-with a sentence, never an exception; what was reached before stays.
+Contract (tests/test_solvers.py): a solver of muscles has ``Settings``, a strict record of its own settings, and
+``solve(problem, settings, sink) -> Outcome``, which sinks every requested frame as it is reached. A solver of scalar fields has
+``FieldSettings`` and ``solve_field(problem, settings) -> Solution``. Some are both. Physics that fails is a status with a
+sentence, never an exception; what was reached before stays.
 """
 
 import importlib
 import pkgutil
-from typing import Protocol, cast
+from typing import Any, Literal
 
 from fem_reference.errors import InputError
-from fem_reference.problem import Problem
 from fem_reference.records import Record, join, parse
-from fem_reference.runs import Outcome, Sink
 from fem_reference.scene import SolverChoice
 
-
-class Solver(Protocol):
-    """What a solver module provides."""
-
-    Settings: type[Record]
-
-    @staticmethod
-    def solve(problem: Problem, settings: Record, sink: Sink) -> Outcome:
-        """Sink each requested frame of ``problem`` and say how it ended."""
-        ...
+Task = Literal["solve", "solve_field"]
+_TASKS: dict[Task, tuple[str, str]] = {
+    "solve": ("Settings", "muscles"),
+    "solve_field": ("FieldSettings", "scalar fields"),
+}
 
 
-def names() -> list[str]:
-    """The solvers there are, as scene files name them."""
-    return sorted(module.name for module in pkgutil.iter_modules(__path__) if not module.name.endswith("_kernels"))
+def names(task: Task | None = None) -> list[str]:
+    """The solvers there are, as scene files name them: all, or those for a ``task``."""
+    found = sorted(module.name for module in pkgutil.iter_modules(__path__) if not module.name.endswith("_kernels"))
+    return [name for name in found if task is None or hasattr(_module(name), task)]
 
 
-def find(name: str, place: str) -> Solver:
-    """The solver ``name``; InputError at ``place`` where there is none."""
+def _module(name: str) -> Any:
+    return importlib.import_module(f"{__name__}.{name}")
+
+
+def find(name: str, place: str, task: Task = "solve") -> Any:
+    """The module of the solver ``name`` for a ``task``; InputError at ``place`` where there is none."""
     if name not in names():
-        raise InputError(join(place, "solver"), f'"{name}"', f"one of {', '.join(names())}")
-    return cast(Solver, importlib.import_module(f"{__name__}.{name}"))
+        raise InputError(join(place, "solver"), f'"{name}"', f"one of {', '.join(names(task))}")
+    module = _module(name)
+    if not hasattr(module, task):
+        got = f'"{name}", which does not solve {_TASKS[task][1]}'
+        raise InputError(join(place, "solver"), got, f"one of {', '.join(names(task))}")
+    return module
 
 
 def require(name: str, settings: Record, place: str) -> None:
@@ -46,6 +49,7 @@ def require(name: str, settings: Record, place: str) -> None:
         check(settings)
 
 
-def settings(choice: SolverChoice, place: str) -> Record:
+def settings(choice: SolverChoice, place: str, task: Task = "solve") -> Record:
     """The settings of a choice, checked by its solver; ``place`` is where the scene makes the choice."""
-    return parse(find(choice.solver, place).Settings, choice.settings, place)
+    record: type[Record] = getattr(find(choice.solver, place, task), _TASKS[task][0])
+    return parse(record, choice.settings, place)

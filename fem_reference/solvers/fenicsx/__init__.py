@@ -4,18 +4,11 @@ This side needs no FEniCSx: it runs ``worker`` in processes of its own (``mpiexe
 a file, and sinks frames as the worker reports them. A worker that dies is the status *crashed*, not an exception.
 """
 
-import importlib.util
-import json
 import os
 import pickle
-import re
 import shutil
-import subprocess
 import sys
 import tempfile
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,7 +16,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from fem_reference.children import command, environment
+from fem_reference.children import command
 from fem_reference.errors import MissingSoftware
 from fem_reference.geometry.embedding import Locator
 from fem_reference.mesh import Floats, Ints
@@ -31,17 +24,11 @@ from fem_reference.motion import apply
 from fem_reference.problem import Problem
 from fem_reference.records import Record
 from fem_reference.runs import Frame, Outcome, Sink
+from fem_reference.solvers.fenicsx.field import FieldSettings, solve_field
+from fem_reference.solvers.fenicsx.processes import require_installed, running
 from fem_reference.units import Time
 
-# One thread a rank. Open MPI, where it is used, refuses root and more ranks than cores unless told otherwise.
-_SETTINGS = {
-    "OMP_NUM_THREADS": "1",
-    "PYTHONUNBUFFERED": "1",
-    "OMPI_ALLOW_RUN_AS_ROOT": "1",
-    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-    "OMPI_MCA_rmaps_base_oversubscribe": "1",
-}
-MARK = "@fem_reference "  # begins each line of the worker's output that is meant for us
+__all__ = ["FieldSettings", "Settings", "require", "solve", "solve_field"]
 
 
 class Settings(Record):
@@ -61,13 +48,11 @@ class Settings(Record):
     time_limit: Time | None = None
 
 
-def require(settings: Settings) -> None:
+def require(settings: Settings | FieldSettings) -> None:
     """MissingSoftware where FEniCSx is not installed or the ranks wanted cannot be started."""
-    if not any(importlib.util.find_spec(name) for name in ("dolfinx_solver", "dolfinx")):
-        raise MissingSoftware(
-            "FEniCSx is not installed: pip install 'fem_reference[fenicsx]' (Linux x86-64), or conda's fenics-dolfinx"
-        )
-    _command(settings, Path())
+    require_installed()
+    if isinstance(settings, Settings):
+        _command(settings, Path())
 
 
 def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
@@ -120,25 +105,15 @@ def _command(settings: Settings, job: Path) -> list[str]:
 
 def _run(command_line: list[str], settings: Settings, sink: Sink) -> Outcome:
     reached: list[int] = []
-    with _process(command_line, settings.time_limit) as (process, timed_out, errors):
-        for event in _events(process):
+    with running(command_line, settings.time_limit) as worker:
+        for event in worker.events():
             if "frame" in event:
                 reached.append(event["frame"])
                 sink(_frame(event))
                 Path(event["file"]).unlink()
             else:
                 return Outcome(event["status"], event["message"], event["cost"])
-        code = process.wait()
-    kept = f"frames up to {reached[-1]} are kept" if reached else "no frame was reached"
-    if timed_out.is_set():
-        return Outcome("timed out", f"stopped after {settings.time_limit:.0f} s, the time limit; {kept}")
-    return Outcome("crashed", f"the FEniCSx process ended with exit status {code} ({_reason(errors)}); {kept}")
-
-
-def _reason(errors: list[str]) -> str:
-    """The line of a process's error output that tells most: the last that names an error, else the last."""
-    named = [line for line in errors if re.match(r"\w*(\.\w+)*(Error|Exception)\b", line)]
-    return (named or errors or ["without a word"])[-1].strip()
+        return worker.ending(f"frames up to {reached[-1]} are kept" if reached else "no frame was reached")
 
 
 def _frame(event: dict[str, Any]) -> Frame:
@@ -146,52 +121,3 @@ def _frame(event: dict[str, Any]) -> Frame:
     note = f"{scalars['newton_iterations']:.0f} Newton iterations, det F at least {scalars['min_det_F_quadrature']:.2g}"
     with np.load(event["file"]) as arrays:
         return Frame(event["frame"], arrays["surface"], arrays["fibres"], arrays["tets"], scalars, note)
-
-
-@contextmanager
-def _process(
-    command_line: list[str], time_limit: float | None
-) -> Iterator[tuple[subprocess.Popen[str], threading.Event, list[str]]]:
-    """The running worker, an event that is set when the time limit ended it, and the lines of its error output so far."""
-    process = subprocess.Popen(
-        command_line,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        errors="replace",
-        env=environment(**_SETTINGS),
-    )
-    timed_out, errors = threading.Event(), list[str]()
-
-    def stop() -> None:
-        timed_out.set()
-        process.terminate()
-
-    assert process.stderr is not None
-    listener = threading.Thread(
-        target=lambda stream: errors.extend(line for line in stream if line.strip()), args=[process.stderr]
-    )
-    listener.start()
-    timer = threading.Timer(time_limit or threading.TIMEOUT_MAX, stop)
-    timer.daemon = True
-    timer.start()
-    try:
-        yield process, timed_out, errors
-        process.wait()
-    finally:
-        timer.cancel()
-        if process.poll() is None:
-            process.terminate()
-            process.wait()
-        listener.join()
-        for stream in (process.stdout, process.stderr):
-            if stream is not None:
-                stream.close()
-
-
-def _events(process: subprocess.Popen[str]) -> Iterator[dict[str, Any]]:
-    assert process.stdout is not None
-    for line in process.stdout:
-        if line.startswith(MARK):
-            yield json.loads(line.removeprefix(MARK))

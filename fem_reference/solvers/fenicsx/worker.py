@@ -12,8 +12,9 @@ import numpy as np
 
 from fem_reference.mesh import Floats, Ints
 from fem_reference.problem import Problem
-from fem_reference.solvers.fenicsx import MARK, Settings
+from fem_reference.solvers.fenicsx import Settings
 from fem_reference.solvers.fenicsx.dolfinx_door import PETSc
+from fem_reference.solvers.fenicsx.processes import MARK
 
 from fem_reference.solvers.fenicsx.body import Body  # isort: skip - after the door
 from fem_reference.solvers.fenicsx.stepping import Attempt, Reached, march  # isort: skip

@@ -1,0 +1,26 @@
+"""Advection: what is carried along by a flow."""
+
+from typing import Any
+
+from fem_reference.effects import FieldEffect, FieldState, Place
+
+
+class Advection(FieldEffect):
+    """``v . grad psi``; on a surface only the part of v along it is felt. Report eq. 4.4: ``B = v``.
+
+    ``velocity``: v, as many components as the domain has coordinates [length / time].
+    """
+
+    velocity: tuple[float, ...]
+
+    def weak(self, psi: FieldState, test: FieldState, place: Place) -> Any:
+        """``(v . grad psi) test``."""
+        return self.strong(psi, place) * test.value
+
+    def strong(self, psi: FieldState, place: Place) -> Any:  # noqa: ARG002
+        """``v . grad psi``."""
+        return self.along(psi)
+
+    def along(self, function: FieldState) -> Any:
+        """The derivative of ``function`` along the flow, times its speed."""
+        return sum(v * slope for v, slope in zip(self.velocity, function.gradient, strict=True))

@@ -1,0 +1,24 @@
+"""Diffusion: what is conducted from high to low."""
+
+from typing import Any
+
+from pydantic import Field
+
+from fem_reference.effects import FieldEffect, FieldState, Place
+
+
+class Diffusion(FieldEffect):
+    """``-div(k grad psi)``; on a surface, the Laplace-Beltrami operator. Report eq. 4.4: ``A = -k``.
+
+    ``coefficient``: k, above zero [length^2 / time in whatever units the scene is in].
+    """
+
+    coefficient: float = Field(gt=0)
+
+    def weak(self, psi: FieldState, test: FieldState, place: Place) -> Any:  # noqa: ARG002
+        """``k grad psi . grad test``; what flows in over the boundary is a condition there."""
+        return self.coefficient * sum(a * b for a, b in zip(psi.gradient, test.gradient, strict=True))
+
+    def strong(self, psi: FieldState, place: Place) -> Any:  # noqa: ARG002
+        """``-k`` times the Laplacian."""
+        return -self.coefficient * psi.laplacian

@@ -1,0 +1,22 @@
+"""Reaction: what decays, or grows, in proportion to itself."""
+
+from typing import Any
+
+from fem_reference.effects import FieldEffect, FieldState, Place
+
+
+class Reaction(FieldEffect):
+    """``c psi``: decay for a positive, growth for a negative rate. Report eq. 4.4: ``C = c``.
+
+    ``rate``: c [1 / time].
+    """
+
+    rate: float
+
+    def weak(self, psi: FieldState, test: FieldState, place: Place) -> Any:
+        """``c psi test``."""
+        return self.strong(psi, place) * test.value
+
+    def strong(self, psi: FieldState, place: Place) -> Any:  # noqa: ARG002
+        """``c psi``."""
+        return self.rate * psi.value

@@ -1,0 +1,26 @@
+"""Source: what is brought in from outside, everywhere or in the upper half."""
+
+from typing import Any, Literal
+
+from fem_reference.effects import FieldEffect, FieldState, Place
+from fem_reference.formula import Formula, evaluate
+
+
+class Source(FieldEffect):
+    """``-f``. Report eq. 4.4: ``D f``.
+
+    ``strength``: f, a number or a formula of the coordinates [psi / time]; ``where``: everywhere, or only where y is above the
+    mean y of the mesh's vertices, as in listing 4.5, line 17. An element that this line cuts has the share of f that lies above it.
+    """
+
+    strength: Formula
+    where: Literal["everywhere", "y above average"]
+
+    def weak(self, psi: FieldState, test: FieldState, place: Place) -> Any:
+        """``-f test``."""
+        return self.strong(psi, place) * test.value
+
+    def strong(self, psi: FieldState, place: Place) -> Any:  # noqa: ARG002
+        """``-f``."""
+        strength = evaluate(self.strength, place.position, place.functions)
+        return -strength * place.upper if self.where == "y above average" else -strength

@@ -1,0 +1,276 @@
+"""Drawings of a scalar example to stand inside a page: curves as SVG, maps and views as WebP."""
+
+import base64
+import io
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from PIL import Image
+
+from fem_reference.field.example import Example, Ladder
+from fem_reference.field.mesh import FieldMesh
+from fem_reference.field.problem import at
+from fem_reference.field.runs import FieldRun
+from fem_reference.mesh import Floats
+from fem_reference.report.curves import LOOK, PALETTE, REFERENCE, inline
+
+VALUES, DIFFERENCES = "viridis", "RdBu_r"
+_DPI = 150
+_LIGHT = np.array([0.3, 0.45, 0.84])  # towards the light: above the eye, to its right
+_LISTING: Any = {"color": "blue", "linewidth": 2, "marker": "o", "markersize": 6, "markerfacecolor": "lime"}
+_MARKERS = "xd+s^v"
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """``markup`` is an ``<svg>`` or an ``<img>``, ``title`` what it shows; ``missing`` why there is none."""
+
+    title: str
+    markup: str = ""
+    missing: str = ""
+
+
+def rival(example: Example) -> FieldRun | None:
+    """The run to be shown beside the reference: the listing, else the first candidate."""
+    listings = [run for run in example.candidates if run.solver == "listing"]
+    return next(iter([*listings, *example.candidates]), None)
+
+
+def drawings(example: Example) -> list[Drawing]:
+    """What shows the solutions of an example: lines over an interval, maps and views of triangles."""
+    dimension = example.problem.mesh.points.shape[1]
+    return _lines(example) if dimension == 1 else list(_panels(example, _plate if dimension == 2 else _body))
+
+
+def convergence(example: Example) -> Drawing:
+    """Error over number of cells, a line for each element."""
+
+    def draw(axes: Axes) -> None:
+        for i, ladder in enumerate(example.ladders):
+            cells, errors = _positive(ladder)
+            axes.loglog(cells, errors, "o-", color=PALETTE[i % len(PALETTE)], label=ladder.element)
+        axes.set_xlabel("cells")
+        axes.set_ylabel("error")
+
+    title = "Error as the mesh is refined"
+    if not any(len(_positive(ladder)[0]) for ladder in example.ladders):
+        return Drawing(title, missing="no error that is a positive number")
+    return _svg(f"{example.scene.name}-convergence", title, draw)
+
+
+def _positive(ladder: Ladder) -> tuple[Floats, Floats]:
+    """Cells and errors of the meshes whose error can stand on a logarithmic axis."""
+    cells, errors = np.array(ladder.cells, float), np.array(ladder.errors, float)
+    kept = np.isfinite(errors) & (errors > 0)
+    return cells[kept], errors[kept]
+
+
+def _lines(example: Example) -> list[Drawing]:
+    name, exact = example.scene.name, example.scene.exact
+    known = [run for run in example.runs if np.isfinite(run.vertex_values).all()]
+    if not known:
+        return [Drawing("Solution", missing="no run has values that are numbers")]
+
+    def solutions(axes: Axes) -> None:
+        for i, run in sorted(enumerate(known), key=lambda entry: entry[1].solver != "listing"):
+            axes.plot(*_sorted(run, run.vertex_values), label=run.name, **_look(i, run))
+        if exact is not None:
+            ends = example.problem.mesh.points[:, 0].min(), example.problem.mesh.points[:, 0].max()
+            x = np.linspace(*ends, 300)
+            axes.plot(x, at(exact, x[:, None]), color="red", linewidth=1.2, label=f"exact, {exact}")
+        axes.set_xlabel("x")
+
+    drawn = [_svg(f"{name}-solution", "Solution at the nodes", solutions)]
+    return [*drawn, _distances(example, known)]
+
+
+def _distances(example: Example, known: list[FieldRun]) -> Drawing:
+    """The distance of every run to the exact solution at the nodes, or of the candidates to the reference."""
+    exact, runs, base = example.scene.exact, known, example.reference.vertex_values
+    if exact is not None:
+        base, title = at(exact, example.problem.mesh.points), "Distance to the exact solution at the nodes"
+    else:
+        runs, title = [run for run in known if run is not example.reference], "Distance to the reference at the nodes"
+    apart = [np.abs(run.vertex_values - base) for run in runs]
+    if not any(np.isfinite(values).all() and values.max() > 0 for values in apart):
+        return Drawing(title, missing="it is zero everywhere, or not a number")
+
+    def draw(axes: Axes) -> None:
+        for run, values in zip(runs, apart, strict=True):
+            look = _look(known.index(run), run) | {"linewidth": 0.8, "markersize": 3}
+            axes.plot(*_sorted(run, np.where(values > 0, values, np.nan)), label=run.name, **look)
+        axes.set_yscale("log")
+        axes.set_xlabel("x")
+
+    return _svg(f"{example.scene.name}-distance", title, draw)
+
+
+def _sorted(run: FieldRun, values: Floats) -> tuple[Floats, Floats]:
+    x = run.problem.mesh.points[:, 0]
+    order = np.argsort(x)
+    return x[order], values[order]
+
+
+def _look(i: int, run: FieldRun) -> dict[str, Any]:
+    """The listing as its own ``plot`` command draws it, the others by their place."""
+    if run.solver == "listing":
+        return dict(_LISTING)
+    colour = REFERENCE if i == 0 else PALETTE[i % len(PALETTE)]
+    return {"color": colour, "linewidth": 1, "linestyle": "--", "marker": _MARKERS[i % len(_MARKERS)], "markersize": 3}
+
+
+def _svg(name: str, title: str, draw: Callable[[Axes], None]) -> Drawing:
+    with mpl.rc_context(LOOK):
+        figure = Figure(figsize=(5.4, 3.6), layout="constrained")
+        FigureCanvasSVG(figure)
+        axes = figure.add_subplot()
+        draw(axes)
+        handles, labels = axes.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper left", ncols=3, handlelength=2.2, columnspacing=1.2)
+        text = io.StringIO()
+        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
+    return Drawing(title, inline(text.getvalue(), name, title))
+
+
+def _panels(example: Example, draw: Callable[[Figure, Example, Floats, str], None]) -> Iterator[Drawing]:
+    """The rival, the reference and their difference, each drawn by ``draw``."""
+    reference, other = example.reference, rival(example)
+    wanted = [(_called(reference), reference.vertex_values, VALUES)]
+    if other is not None:
+        wanted.insert(0, (_called(other), other.vertex_values, VALUES))
+        apart = other.vertex_values - reference.vertex_values
+        wanted.append((f"Difference: {other.name} minus reference", apart, DIFFERENCES))
+    for title, values, colours in wanted:
+        if np.isfinite(values).all():
+            yield _webp(title, lambda figure, v=values, c=colours: draw(figure, example, v, c))  # type: ignore[misc]
+        else:
+            yield Drawing(title, missing="its values are not a number, so that there is nothing to draw")
+
+
+def _called(run: FieldRun) -> str:
+    name = run.name.capitalize()
+    return name if run.name == run.solver else f"{name} ({run.solver})"
+
+
+def _webp(title: str, draw: Callable[[Figure], None]) -> Drawing:
+    with mpl.rc_context(LOOK | {"axes.grid": False}):
+        figure = Figure(figsize=(9.6, 4.2), dpi=_DPI, layout="constrained")
+        canvas: Any = FigureCanvasAgg(figure)
+        draw(figure)
+        canvas.draw()
+        picture, stored = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"), io.BytesIO()
+    picture.save(stored, "WEBP", quality=86, method=4)
+    source = f"data:image/webp;base64,{base64.b64encode(stored.getvalue()).decode()}"
+    width, height = picture.size
+    return Drawing(title, f'<img src="{source}" width="{width}" height="{height}" alt="">')
+
+
+def _plate(figure: Figure, example: Example, values: Floats, colours: str) -> None:
+    """A map with the triangles on it, and the values as heights above the plate."""
+    mesh, scale = example.problem.mesh, _scale(values, colours)
+    x, y = mesh.points.T
+    axes: Any = figure.add_subplot(1, 2, 1)
+    shown = axes.tripcolor(x, y, mesh.cells, values, shading="gouraud", cmap=colours, norm=scale)
+    axes.triplot(x, y, mesh.cells, color="black", linewidth=0.3, alpha=0.35)
+    axes.set_aspect("equal")
+    axes.set_xlabel("x")
+    axes.set_ylabel("y")
+    figure.colorbar(shown, ax=axes, shrink=0.8)
+    view: Any = figure.add_subplot(1, 2, 2, projection="3d")
+    surface = view.plot_trisurf(x, y, values, triangles=mesh.cells, cmap=colours, norm=scale, linewidth=0.15)
+    surface.set_edgecolor((0, 0, 0, 0.4))
+    view.set(xlabel="x", ylabel="y")
+    for axis in (view.xaxis, view.yaxis, view.zaxis):
+        axis.set_major_locator(MaxNLocator(4))
+    view.view_init(elev=28, azim=-60)
+    view.set_box_aspect((1, 1, 0.75), zoom=0.9)
+
+
+def _scale(values: Floats, colours: str) -> Normalize:
+    """From the least to the greatest value; of differences, as far below zero as above."""
+    low, high = float(values.min()), float(values.max())
+    if colours == DIFFERENCES:
+        high = max(-low, high)
+        low = -high
+    return Normalize(low, high) if high > low else Normalize(low - 0.5, low + 0.5)
+
+
+@dataclass(frozen=True)
+class _Window:
+    """What part of a surface is shown: ``low`` and ``high`` corners (3,), and how wide the ``line`` of its triangles is."""
+
+    title: str
+    low: Floats
+    high: Floats
+    line: float
+
+    @property
+    def half(self) -> tuple[float, float]:
+        """Half its width and height: a square, narrower where it is higher than wide."""
+        width, height = (float(length) for length in 0.53 * (self.high - self.low)[:2])
+        height = max(width, height)
+        return max(width, height / 2), height
+
+
+def _windows(points: Floats, anchors: Floats) -> list[_Window]:
+    """The whole surface, the belt about its mean height, and what is about its anchors (k, 3)."""
+    height, extent = float(np.ptp(points[:, 1])), float(np.ptp(points, axis=0).max())
+    windows = [_Window("whole", points.min(axis=0), points.max(axis=0), 0.0)]
+    belt = points[np.abs(points[:, 1] - points[:, 1].mean()) < 0.1 * height]
+    if len(belt):
+        windows.append(_Window("detail about the mean of y", belt.min(axis=0), belt.max(axis=0), 0.2))
+    if len(anchors):
+        room = np.array([0.06, 0.06, 1.0]) * extent
+        windows.append(
+            _Window("detail about the held vertices", anchors.min(axis=0) - room, anchors.max(axis=0) + room, 0.3)
+        )
+    return windows
+
+
+def _body(figure: Figure, example: Example, values: Floats, colours: str) -> None:
+    """A surface in space seen along z from the side of its anchors, y up, every window with its own colours."""
+    mesh = example.problem.mesh
+    anchors = mesh.points[~np.isnan(example.problem.held[: len(mesh.points)])]
+    behind = len(anchors) > 0 and anchors[:, 2].mean() < mesh.points[:, 2].mean()
+    side = np.array([-1.0, 1.0, -1.0]) if behind else np.ones(3)
+    turned = FieldMesh(mesh.points * side, mesh.cells, mesh.place)
+    windows = _windows(turned.points, anchors * side)
+    grid: Any = figure.add_gridspec(
+        1, len(windows), width_ratios=[window.half[0] / window.half[1] for window in windows]
+    )
+    for window, place in zip(windows, grid, strict=True):
+        axes = figure.add_subplot(place)
+        inside = ((turned.points >= window.low) & (turned.points <= window.high)).all(axis=1)
+        scale = ScalarMappable(_scale(values[inside], colours), colours)
+        axes.add_collection(_front(turned, values, scale, window.line))
+        (x, y, _), (width, height) = (window.low + window.high) / 2, window.half
+        axes.set(xlim=(x - width, x + width), ylim=(y - height, y + height), aspect="equal")
+        axes.set_axis_off()
+        axes.set_title(window.title, fontsize=9)
+        figure.colorbar(scale, ax=axes, orientation="horizontal", shrink=0.8, ticks=MaxNLocator(3))
+
+
+def _front(mesh: FieldMesh, values: Floats, scale: ScalarMappable, line: float) -> PolyCollection:
+    """The triangles as seen along z, the furthest first, darker the more they are turned from the light."""
+    corners = mesh.points[mesh.cells]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    light = np.abs(normals @ _LIGHT) / np.linalg.norm(normals, axis=1)
+    faces = np.asarray(scale.to_rgba(values[mesh.cells].mean(axis=1)))
+    faces[:, :3] *= (0.55 + 0.45 * light)[:, None]
+    order = np.argsort(corners[:, :, 2].mean(axis=1))
+    # Without an edge of their own colour, the white behind shows between triangles.
+    edges: Any = (0, 0, 0, 0.5) if line else faces[order]
+    return PolyCollection(
+        list(corners[order, :, :2]), facecolors=faces[order], edgecolors=edges, linewidths=line or 0.2
+    )

@@ -1,0 +1,129 @@
+"""The page of the scalar examples beside the report's section 4.6. It holds everything itself, and reads without a network."""
+
+import tomllib
+from pathlib import Path
+from typing import cast
+
+import jinja2
+import numpy as np
+
+from fem_reference.field.example import Example
+from fem_reference.field.runs import FieldRun
+from fem_reference.judge import Word, overall
+from fem_reference.records import Record, parse
+from fem_reference.report import field_figures
+from fem_reference.report.words import duration, number, words
+
+# What the report's figures show, in words: its pictures are not distributed with it. By the name of a case: figure and caption.
+FIGURES = {
+    "rod": (
+        (
+            "Figure 4.5",
+            (
+                "One-dimensional advection-diffusion problem with Dirichlet boundary condition ψ(0) = 0 and Neumann boundary "
+                "condition ψ'(1) = -1. The blue curve is calculated using FEM, the analytical function in red."
+            ),
+        ),
+    ),
+    "plate_square": (("Figure 4.6", "Tessellation of uniformly sampled 2D space with heat distribution."),),
+    "plate_spiral": (("Figure 4.7", "Tessellation of a spiral with heat distribution."),),
+    "surface_figure": (
+        ("Figure 4.8", "A heat distribution on a complex surface triangular mesh."),
+        ("Figure 4.9", "Diffusion phenomena in the belt area (detail of Fig. 4.8)."),
+    ),
+}
+AGREE = 1e-9  # of the greatest value: what only rounding differs by
+
+
+class Difference(Record):
+    """A place in a ``section`` where the report's ``text`` and its ``listing`` part, and what was ``measured`` of it."""
+
+    section: str
+    text: str
+    listing: str
+    measured: str
+
+
+def render(title: str, examples: tuple[Example, ...], differences: bool) -> str:
+    """The whole page as text; with ``differences`` the table of where the report's text and listings part."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"number": number, "duration": duration, "words": words}
+    return environment.get_template("field_page.html").render(
+        title=title,
+        examples=examples,
+        word=overall(cast(Word, example.word) for example in examples),
+        differences=read_differences() if differences else (),
+        figures_of_report=FIGURES,
+        apart=apart,
+        bounds=bounds,
+        form=form,
+        seconds=seconds,
+        pivot=pivot,
+        zip=zip,
+        drawings=field_figures.drawings,
+        convergence=field_figures.convergence,
+    )
+
+
+def read_differences() -> tuple[Difference, ...]:
+    """Where the report's text and its listings part, in the order of section 4.6."""
+    path = Path(__file__).with_name("octave_differences.toml")
+    table = tomllib.loads(path.read_text(encoding="utf-8"))
+    return tuple(parse(Difference, row, f"{path}: difference[{i}]") for i, row in enumerate(table["difference"]))
+
+
+def apart(example: Example) -> str:
+    """In one sentence, how far the listing (else the first candidate) and the equation part at the vertices."""
+    other, reference = field_figures.rival(example), example.reference
+    if other is None:
+        return "there is a reference alone, and nothing beside it."
+    name = f"the {other.name}" if other.solver == "listing" else other.name
+    for run, called in ((other, name), (reference, "the reference")):
+        if not np.isfinite(run.vertex_values).all():
+            return f"{called} is not a number, so that they cannot be compared."
+    distance = float(np.abs(other.vertex_values - reference.vertex_values).max())
+    size = float(np.abs(reference.vertex_values).max())
+    if distance <= AGREE * size:
+        return f"{name} and the equation agree; at the furthest vertex they part by {number(distance)}."
+    (low, high), (least, greatest) = bounds(other), bounds(reference)
+    compared = (
+        f"{number(distance / size)} times as far as the equation's solution gets from zero"
+        if size
+        else "and the equation gives zero"
+    )
+    return (
+        f"{name} gives {number(low)} to {number(high)}, the equation {number(least)} to {number(greatest)}; "
+        f"at the furthest vertex they part by {number(distance)}, {compared}."
+    )
+
+
+def bounds(run: FieldRun) -> tuple[float, float]:
+    """The least and the greatest value at a vertex, NaN where one is not a number."""
+    return float(run.vertex_values.min()), float(run.vertex_values.max())
+
+
+def form(run: FieldRun) -> str:
+    """Which weak form a run solved."""
+    if run.solver == "listing":
+        return "as listed"
+    return "galerkin" if run.problem.tau is None else "supg"
+
+
+def seconds(run: FieldRun) -> float | None:
+    """What a run took, None where it does not say."""
+    cost = run.solution.outcome.cost
+    parts = [value for key, value in cost.items() if key.startswith("seconds_")]
+    return cost.get("seconds", sum(parts) if parts else None)
+
+
+def pivot(example: Example) -> dict[str, list[float | None]]:
+    """By measure, its value for every run, None where there is none of that run."""
+    found = {(measure.measure, measure.of): measure.value for measure in example.measures}
+    names = dict.fromkeys(measure.measure for measure in example.measures)
+    return {name: [found.get((name, run.name)) for run in example.runs] for name in names}

@@ -1,0 +1,39 @@
+"""Scalar fields in FEniCSx, the side that needs none: Lagrange elements, assembled and solved in a process of its own."""
+
+import pickle
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from fem_reference.children import command
+from fem_reference.field.problem import FieldProblem
+from fem_reference.field.runs import Solution
+from fem_reference.records import Record
+from fem_reference.runs import Outcome
+from fem_reference.solvers.fenicsx.processes import require_installed, running
+from fem_reference.units import Time
+
+
+class FieldSettings(Record):
+    """``time_limit``: when to give up, by default never."""
+
+    time_limit: Time | None = None
+
+
+def solve_field(problem: FieldProblem, settings: FieldSettings) -> Solution:
+    """Solve in one worker process; one that dies is the status *crashed*, not an exception."""
+    require_installed()
+    with tempfile.TemporaryDirectory(prefix="fem_reference-") as folder:
+        job = Path(folder) / "job.pickle"
+        job.write_bytes(pickle.dumps(problem))
+        return _run(command("-m", f"{__package__}.field_worker", str(job)), settings, len(problem.held))
+
+
+def _run(command_line: list[str], settings: FieldSettings, count: int) -> Solution:
+    """What the worker that ``command_line`` starts makes of a problem with ``count`` nodes."""
+    with running(command_line, settings.time_limit) as worker:
+        for event in worker.events():
+            with np.load(event["file"]) as arrays:
+                return Solution(arrays["values"], Outcome(event["status"], event["message"], event["cost"]))
+        return Solution(np.full(count, np.nan), worker.ending("there are no values"))

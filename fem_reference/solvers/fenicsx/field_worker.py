@@ -1,0 +1,174 @@
+"""The process that solves for a scalar field: reads a pickled problem, writes the values and reports how it went."""
+
+import json
+import pickle
+import resource
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fem_reference.effects import FieldState, Place
+from fem_reference.field.problem import FieldProblem
+from fem_reference.formula import FUNCTIONS, evaluate
+from fem_reference.mesh import Floats, Ints
+from fem_reference.solvers.fenicsx.dolfinx_door import PETSc
+from fem_reference.solvers.fenicsx.processes import MARK
+
+import basix  # isort: skip - after the door
+import basix.ufl  # isort: skip
+import ufl  # isort: skip
+from dolfinx import fem, mesh  # isort: skip
+from dolfinx.fem.petsc import apply_lifting, assemble_matrix, assemble_vector, set_bc  # isort: skip
+from mpi4py import MPI  # isort: skip
+
+QUADRATURE_DEGREE = 8  # as in scikit_fem, and on the boundary the same rule of 3 points
+FACET_DEGREE = 5
+
+
+def equations(problem: FieldProblem) -> tuple[Any, Any, Any, Ints]:
+    """The bilinear and the linear form, compiled; the space; and the node of the problem at each of its unknowns (N,)."""
+    msh = distribute(problem)
+    space = fem.functionspace(msh, ("Lagrange", problem.order))
+    psi, test = _state(ufl.TrialFunction(space)), _state(ufl.TestFunction(space))
+    functions = {name: getattr(ufl, name) for name in FUNCTIONS}
+    place = Place(tuple(ufl.SpatialCoordinate(msh)), functions, _by_cell(msh, problem.upper))
+    weak = sum(effect.weak(psi, test, place) for effect in problem.effects)
+    if problem.tau is not None and problem.advection is not None:
+        strong = sum(effect.strong(psi, place) for effect in problem.effects)
+        weak += _by_cell(msh, problem.tau) * problem.advection.along(test) * strong
+    dx = ufl.Measure("dx", domain=msh, metadata={"quadrature_degree": QUADRATURE_DEGREE})
+    # With the zero there is a right side even where nothing acts.
+    residual = weak * dx - fem.Constant(msh, 0.0) * test.value * dx
+    for i, slope_measure in enumerate(_flux_measures(msh, problem)):
+        slope = evaluate(problem.fluxes[i].slope, place.position, functions)
+        residual -= problem.diffusion * slope * test.value * slope_measure
+    left, right = ufl.system(residual)
+    return fem.form(left), fem.form(right), space, nodes(space, problem)
+
+
+def distribute(problem: FieldProblem) -> mesh.Mesh:
+    """The problem's mesh: intervals on a line, triangles in the plane or in space."""
+    points, cells = problem.mesh.points, problem.mesh.cells
+    shape = "interval" if cells.shape[1] == 2 else "triangle"
+    element = basix.ufl.element("Lagrange", shape, 1, shape=(points.shape[1],))
+    return mesh.create_mesh(MPI.COMM_SELF, cells=np.array(cells), e=element, x=np.array(points))
+
+
+def nodes(space: Any, problem: FieldProblem) -> Ints:
+    """Which node of the problem stands at each unknown of ``space``, (N,)."""
+    msh, layout, count = space.mesh, space.dofmap.dof_layout, len(problem.mesh.points)
+    corners = np.asarray(msh.geometry.input_global_indices)[msh.geometry.dofmap]
+    found = np.empty(space.dofmap.index_map.size_local, np.int64)
+    for i in range(corners.shape[1]):
+        found[space.dofmap.list[:, layout.entity_dofs(0, i)[0]]] = corners[:, i]
+    if problem.order == 2:
+        keys = problem.mesh.edges @ [count, 1]
+        for i, ends in enumerate(basix.topology(msh.basix_cell())[1]):
+            middles = count + np.searchsorted(keys, np.sort(corners[:, ends], axis=1) @ [count, 1])
+            found[space.dofmap.list[:, layout.entity_dofs(1, i)[0]]] = middles
+    return found
+
+
+def solve(problem: FieldProblem) -> tuple[Floats, dict[str, Any]]:
+    """The values (N,) in the order of the problem, not-a-number after a failure, and what to report."""
+    begin = time.perf_counter()
+    left, right, space, node = equations(problem)
+    set_up = time.perf_counter()
+    A, b = _assembled(left, right, space, problem.held[node])
+    assembled = time.perf_counter()
+    found, failure = _solved(A, b)
+    cost = {
+        "seconds_set_up": set_up - begin,
+        "seconds_assembly": assembled - set_up,
+        "seconds_solve": time.perf_counter() - assembled,
+        "unknowns": float(np.isnan(problem.held).sum()),
+        "peak_memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    }
+    values = np.full(len(node), np.nan)
+    if failure is not None:
+        return values, {"status": "diverged", "message": failure, "cost": cost}
+    values[node] = found
+    return values, {"status": "converged", "message": f"{len(node)} nodes", "cost": cost}
+
+
+def _state(function: Any) -> FieldState:
+    gradient = ufl.grad(function)
+    return FieldState(function, tuple(gradient[i] for i in range(len(gradient))), ufl.div(gradient))
+
+
+def _by_cell(msh: mesh.Mesh, values: Floats) -> fem.Function:
+    """The function that has on each cell the value (m,) of this cell of the problem."""
+    function = fem.Function(fem.functionspace(msh, ("Discontinuous Lagrange", 0)))
+    function.x.array[function.function_space.dofmap.list[:, 0]] = values[msh.topology.original_cell_index]
+    return function
+
+
+def _flux_measures(msh: mesh.Mesh, problem: FieldProblem) -> list[Any]:
+    """A measure of the facets of each flux."""
+    boundary = msh.topology.dim - 1
+    for start, end in ((boundary, boundary + 1), (boundary + 1, boundary), (boundary, 0), (0, boundary + 1)):
+        msh.topology.create_connectivity(start, end)
+    exterior = mesh.exterior_facet_indices(msh.topology)
+    corners = mesh.entities_to_geometry(msh, boundary, exterior)
+    original = np.sort(np.asarray(msh.geometry.input_global_indices)[corners], axis=1).tolist()
+    parts = []
+    for i, flux in enumerate(problem.fluxes):
+        wanted = {tuple(facet) for facet in np.sort(flux.facets, axis=1).tolist()}
+        chosen = exterior[np.array([tuple(facet) in wanted for facet in original], bool)]
+        kind = fem.IntegralType.exterior_facet
+        parts.append((i, fem.compute_integration_domains(kind, msh.topology, chosen)))
+    ds = ufl.Measure("ds", domain=msh, subdomain_data=parts, metadata={"quadrature_degree": FACET_DEGREE})
+    return [ds(i) for i, _ in parts]
+
+
+def _assembled(left: Any, right: Any, space: Any, held: Floats) -> tuple[Any, Any]:
+    """Matrix and right side, with the equation of each unknown that is ``held`` (N,), NaN where free, replaced by its value."""
+    values = fem.Function(space)
+    values.x.array[:] = np.nan_to_num(held)
+    conditions = [fem.dirichletbc(values, np.flatnonzero(~np.isnan(held)).astype(np.int32))]
+    A = assemble_matrix(left, bcs=conditions)
+    A.assemble()
+    b = assemble_vector(right)
+    apply_lifting(b, [left], bcs=[conditions])
+    set_bc(b, conditions)
+    return A, b
+
+
+def _solved(A: Any, b: Any) -> tuple[Floats, str | None]:
+    """The solution of ``A x = b`` by MUMPS's sparse LU factorisation, and a sentence where there is none."""
+    x = A.createVecRight()
+    if not np.isfinite(A.norm() + b.norm()):
+        return x.array, "the equations hold a number that is not finite: a formula without a value somewhere?"
+    solver = PETSc.KSP().create(A.comm)
+    solver.setOperators(A)
+    solver.setType("preonly")
+    preconditioner = solver.getPC()
+    preconditioner.setType("lu")
+    preconditioner.setFactorSolverType("mumps")
+    preconditioner.setFactorSetUpSolverType()
+    factors = preconditioner.getFactorMatrix()
+    factors.setMumpsIcntl(24, 1)  # find null pivots, instead of dividing by what rounding left of them
+    solver.solve(b, x)
+    error, null_pivots = factors.getMumpsInfog(1), factors.getMumpsInfog(28)
+    if null_pivots:
+        return x.array, f"the equations have no unique solution (null pivots in their factorisation: {null_pivots})"
+    if error < 0 or not np.isfinite(x.array).all():
+        return x.array, f"the factorisation failed (INFOG(1) of MUMPS is {error})"
+    return np.array(x.array), None
+
+
+def main(job: Path) -> None:
+    """Solve the problem in the file ``job``; the values go beside it."""
+    problem: FieldProblem = pickle.loads(job.read_bytes())
+    values, report = solve(problem)
+    path = job.with_name("values.npz")
+    np.savez(path, allow_pickle=False, values=values)
+    sys.stdout.write(f"{MARK}{json.dumps(report | {'file': str(path)})}\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,55 @@
+"""What the report's Octave listings compute (4.1 on an interval, 4.5 on triangles), whatever equation the scene states."""
+
+import time
+
+import numpy as np
+from pydantic import Field
+
+from fem_reference.errors import InputError
+from fem_reference.field.problem import FieldProblem, at
+from fem_reference.field.runs import Solution
+from fem_reference.records import Record
+from fem_reference.runs import Outcome
+from fem_reference.solvers import listing_kernels
+
+
+class FieldSettings(Record):
+    """``peclet``: the argument of listing 4.1, by default 1 as in its head; listing 4.5 has none."""
+
+    peclet: float | None = Field(default=None, gt=0)
+
+
+def solve_field(problem: FieldProblem, settings: FieldSettings) -> Solution:
+    """The listing for the problem's domain, from its mesh and what is held; its effects and slopes are the listing's own.
+
+    What listing 4.5 draws is minus the norm of its vector unknown; that is the field here, and the vector its components.
+    """
+    begin = time.perf_counter()
+    mesh = problem.mesh
+    if mesh.cells.shape[1] == 2:
+        _check_ends(problem)
+        values, components = listing_kernels.fem1d(mesh.points[:, 0], settings.peclet or 1.0), None
+    else:
+        if settings.peclet is not None:
+            raise InputError("listing: peclet", settings.peclet, "no peclet: listing 4.5 has none")
+        fixed = np.flatnonzero(~np.isnan(problem.held[: len(mesh.points)]))
+        bounds = np.array([fixed, problem.held[fixed]])
+        norms, components = listing_kernels.fem2d(mesh.cells, mesh.points, bounds)
+        values = -norms
+    if problem.order == 2:  # the listings are linear between vertices
+        values = np.concatenate([values, values[mesh.edges].mean(axis=1)])
+    cost = {
+        "seconds_solve": time.perf_counter() - begin,
+        "unknowns": float(len(mesh.points) if components is None else components.size),
+    }
+    return Solution(values, Outcome("converged", "as listed", cost), components)
+
+
+def _check_ends(problem: FieldProblem) -> None:
+    """InputError where the scene wants other conditions than listing 4.1 has: 0 at the first node, slope -1 at the last."""
+    points, held = problem.mesh.points, problem.held[: len(problem.mesh.points)]
+    slopes = [(point, at(flux.slope, points[[point]])[0]) for flux in problem.fluxes for point in flux.facets[:, 0]]
+    if not (held[0] == 0 and np.isnan(held[1:]).all() and slopes == [(len(points) - 1, -1.0)]):
+        raise InputError(
+            "listing: boundary", "other conditions", "value 0 on the left and slope -1 on the right, as listing 4.1 has"
+        )

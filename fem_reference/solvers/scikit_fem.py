@@ -1,0 +1,196 @@
+"""The independent second opinion: Lagrange elements assembled by scikit-fem, solved by scipy's sparse LU factorisation.
+
+A triangle in space is laid flat, each for itself, before it is assembled: what the equations ask of a surface (lengths and areas
+within it) is not changed by that, and gradients are turned back into space.
+"""
+
+import time
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+import skfem
+from scipy.sparse.linalg import LinearOperator, norm, onenormest, splu
+from skfem.helpers import grad
+from skfem.mesh import MeshTri1DG
+
+from fem_reference.effects import FieldState, Place
+from fem_reference.field.mesh import FieldMesh
+from fem_reference.field.problem import FieldProblem, at
+from fem_reference.field.runs import Solution
+from fem_reference.mesh import Floats, Ints
+from fem_reference.records import Record
+from fem_reference.runs import Outcome
+
+QUADRATURE_DEGREE = 8
+_SINGULAR = 1e15  # condition numbers above leave no correct digit
+_ELEMENTS = {
+    (2, 1): skfem.ElementLineP1,
+    (2, 2): skfem.ElementLineP2,
+    (3, 1): skfem.ElementTriP1,
+    (3, 2): skfem.ElementTriP2,
+}
+
+
+class FieldSettings(Record):
+    """``form``: as the ``scene`` has it, or plain ``galerkin`` whatever the scene says, to show what stabilisation is for."""
+
+    form: Literal["scene", "galerkin"] = "scene"
+
+
+@dataclass(frozen=True, eq=False)
+class Flat:
+    """A mesh as scikit-fem sees it: ``mesh``, and by cell the ``frames`` (m, d, t) and ``origins`` (m, d) that take its flat
+    coordinates (t,) to the coordinates of the domain (d,).
+    """
+
+    mesh: Any
+    frames: Floats
+    origins: Floats
+
+
+def flat(mesh: FieldMesh) -> Flat:
+    """``mesh`` laid flat cell by cell where it is a surface in space, else as it is."""
+    d = mesh.points.shape[1]
+    if d < 3:
+        kind = skfem.MeshLine if d == 1 else skfem.MeshTri
+        frames = np.broadcast_to(np.eye(d), (len(mesh.cells), d, d))
+        return Flat(kind(mesh.points.T.copy(), mesh.cells.T.copy()), frames, np.zeros((len(mesh.cells), d)))
+    corners = mesh.points[mesh.cells]
+    frames, sides = np.linalg.qr((corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1))
+    points = np.concatenate([np.zeros((len(corners), 2, 1)), sides], axis=2).transpose(0, 2, 1)
+    return Flat(MeshTri1DG(points.reshape(-1, 2).T.copy(), mesh.cells.T.copy()), frames, corners[:, 0])
+
+
+def space(problem: FieldProblem) -> tuple[Any, Flat]:
+    """The basis of the problem's elements and the flat mesh that it stands on."""
+    laid = flat(problem.mesh)
+    element = _ELEMENTS[problem.mesh.cells.shape[1], problem.order]()
+    return skfem.Basis(laid.mesh, element, intorder=QUADRATURE_DEGREE), laid
+
+
+def assemble(problem: FieldProblem) -> tuple[Any, Floats]:
+    """Matrix (N, N) and right side (N,) of the weak form, without what is held; nodes in the order of the problem."""
+    basis, laid = space(problem)
+    place, slope_of = _place(problem, basis, laid), _slope_weights(basis)
+
+    def state(function: Any) -> FieldState:
+        gradient = np.einsum("mda,amq->dmq", laid.frames, grad(function))
+        return FieldState(
+            np.asarray(function), tuple(gradient), np.einsum("maq,amq->m", slope_of, grad(function))[:, None]
+        )
+
+    nothing = FieldState(0.0, (0.0,) * problem.mesh.points.shape[1])
+
+    def residual(psi: FieldState, test: FieldState) -> Any:
+        weak = sum(effect.weak(psi, test, place) for effect in problem.effects)
+        if problem.tau is None or problem.advection is None:
+            return weak
+        strong = sum(effect.strong(psi, place) for effect in problem.effects)
+        return weak + problem.tau[:, None] * problem.advection.along(test) * strong
+
+    matrix = skfem.BilinearForm(lambda u, v, _: residual(state(u), state(v)) - residual(nothing, state(v)))
+    vector = skfem.LinearForm(lambda v, _: -residual(nothing, state(v)) + 0 * np.asarray(v))
+    order = _order(problem, basis)
+    A, b = matrix.assemble(basis)[order][:, order], vector.assemble(basis)[order]
+    return A, b + _fluxes(problem)
+
+
+def solve_field(problem: FieldProblem, settings: FieldSettings) -> Solution:
+    """Assemble and solve."""
+    begin = time.perf_counter()
+    A, b = assemble(replace(problem, tau=None) if settings.form == "galerkin" else problem)
+    assembled = time.perf_counter()
+    free = np.isnan(problem.held)
+    values = np.where(free, 0.0, problem.held)
+    if not (np.isfinite(A.data).all() and np.isfinite(b).all()):
+        return _failed(len(b), "a coefficient or source has no finite value somewhere")
+    if free.any():
+        inner = A[free][:, free].tocsc()
+        try:
+            factors = splu(inner)
+        except RuntimeError:  # what SuperLU raises where a pivot is zero
+            return _failed(len(b), "the equations have no unique solution")
+        inverse = LinearOperator(
+            inner.shape, factors.solve, lambda x: factors.solve(x, "T"), factors.solve, dtype=inner.dtype
+        )
+        condition = onenormest(inverse) * norm(inner, 1)
+        if not condition < _SINGULAR:
+            return _failed(len(b), f"the equations have no unique solution (condition number {condition:.1e})")
+        values[free] = factors.solve(b[free] - A[free][:, ~free] @ values[~free])
+    cost = {"seconds_assembly": assembled - begin, "seconds_solve": time.perf_counter() - assembled}
+    return Solution(values, Outcome("converged", f"{len(b)} nodes", cost | {"unknowns": float(free.sum())}))
+
+
+def _failed(count: int, why: str) -> Solution:
+    return Solution(np.full(count, np.nan), Outcome("diverged", why))
+
+
+def errors(problem: FieldProblem, values: Floats, exact: str) -> float:
+    """The L2 norm of ``values`` (N,) minus the formula ``exact`` over the domain."""
+    basis, laid = space(problem)
+    inside = np.empty(len(values))
+    inside[_order(problem, basis)] = values
+    place = _place(problem, basis, laid)
+    wanted = at(exact, np.stack([np.ravel(entry) for entry in place.position], axis=1)).reshape(basis.dx.shape)
+    return float(np.sqrt(np.sum((np.asarray(basis.interpolate(inside)) - wanted) ** 2 * basis.dx)))
+
+
+def _place(problem: FieldProblem, basis: Any, laid: Flat) -> Place:
+    position = np.einsum("mda,amq->dmq", laid.frames, np.asarray(basis.global_coordinates()))
+    position = position + laid.origins.T[:, :, None]
+    return Place(tuple(position), vars(np), problem.upper[:, None])
+
+
+def _slope_weights(basis: Any) -> Floats:
+    """Weights (m, t, q) that give the derivative of a linear function from its values at the quadrature points of a cell.
+
+    The gradient of a quadratic function is linear, so that they give its Laplacian, which scikit-fem does not have.
+    """
+    at_points = np.asarray(basis.global_coordinates()).transpose(1, 0, 2)
+    return np.asarray(np.linalg.pinv(at_points - at_points.mean(axis=2, keepdims=True)).transpose(0, 2, 1))
+
+
+def _order(problem: FieldProblem, basis: Any) -> Any:
+    """Which of scikit-fem's unknowns stands at each node of the problem."""
+    vertices = basis.nodal_dofs[0]
+    if problem.order == 1:
+        return vertices
+    mesh, count = problem.mesh, len(problem.mesh.points)
+    if mesh.cells.shape[1] == 2:
+        ends, middles = mesh.cells, basis.interior_dofs[0]
+    else:
+        ends, middles = basis.mesh.facets.T, basis.facet_dofs[0]
+    place = np.searchsorted(mesh.edges @ [count, 1], np.sort(ends, axis=1) @ [count, 1])
+    return np.concatenate([vertices, middles[np.argsort(place)]])
+
+
+def _fluxes(problem: FieldProblem) -> Floats:
+    """What flows in over the boundary, (N,): the integral of k slope times each hat function, by Gauss's rule of 3 points."""
+    b = np.zeros(len(problem.held))
+    count = len(problem.mesh.points)
+    for flux in problem.fluxes:
+        ends = problem.mesh.points[flux.facets]
+        if flux.facets.shape[1] == 1:
+            np.add.at(b, flux.facets[:, 0], problem.diffusion * at(flux.slope, ends[:, 0]))
+            continue
+        edges = np.sort(flux.facets, axis=1)
+        ends = problem.mesh.points[edges]
+        middles = count + np.searchsorted(problem.mesh.edges @ [count, 1], edges @ [count, 1])
+        lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        for s, weight in zip(*_GAUSS, strict=True):
+            flow = weight * lengths * problem.diffusion * at(flux.slope, (1 - s) * ends[:, 0] + s * ends[:, 1])
+            if problem.order == 1:
+                hats: tuple[tuple[Ints, float], ...] = ((edges[:, 0], 1 - s), (edges[:, 1], s))
+            else:
+                hats = (
+                    (edges[:, 0], (1 - s) * (1 - 2 * s)),
+                    (edges[:, 1], s * (2 * s - 1)),
+                    (middles, 4 * s * (1 - s)),
+                )
+            for nodes, hat in hats:
+                np.add.at(b, nodes, hat * flow)
+    return b
+
+
+_GAUSS = (np.array([0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15)]), np.array([5.0, 8.0, 5.0]) / 18)
