@@ -4,10 +4,64 @@ import json
 
 import pytest
 
-from fem_reference import casefile, cli
+from fem_reference import casefile, cli, field_verbs
 
 # The way there and back in its two ends and a middle; the bulk of the time is the number of frames.
 FEW = {"frames.every": 100}
+
+
+# The scalar cases, and the candidate that their spoil turns to fail.
+FIELDS = {
+    "rod": "listing",
+    "rod_advection": "reference",
+    "plate_square": "listing",
+    "plate_spiral": "listing",
+    "surface_figure": "listing",
+}
+
+
+@pytest.mark.parametrize("name", FIELDS)
+def test_spoiled_scalar_cases_fail(name, tmp_path) -> None:
+    told = field_verbs.run(casefile.read(name, spoiled=True), solver_of(name), tmp_path)
+    assert told.word == "fail"
+    assert [v["of"] for v in told.facts["verdicts"] if v["word"] == "fail"] == [FIELDS[name]]
+
+
+def solver_of(name: str) -> str | None:
+    return None if FIELDS[name] == "reference" else FIELDS[name]
+
+
+@pytest.mark.parametrize("name", [name for name in FIELDS if name != "surface_figure"])
+def test_scalar_cases_by_the_listing_alone(name, tmp_path) -> None:
+    told = field_verbs.run(casefile.read(name), solver_of(name), tmp_path)
+    assert (told.word, told.facts["verdict"], told.facts["status"]) == ("pass", "pass", "converged")
+
+
+def test_the_page_of_the_octave_examples(tmp_path) -> None:
+    target = tmp_path / "facts.json"
+    status = cli.main(["page", "octave-examples", "--out", str(tmp_path), "--json", str(target), "--quiet"])
+    facts = json.loads(target.read_text())
+    assert status == cli.DONE
+    assert [case["case"] for case in facts["cases"]] == list(FIELDS)
+    for case in facts["cases"]:
+        assert case["verdict"] == "pass"
+        # scikit-fem and FEniCSx, the same elements on the same mesh: rounding.
+        (apart,) = [
+            row["value"] for row in case["measures"] if (row["candidate"], row["metric"]) == ("fenicsx", "difference")
+        ]
+        assert apart < 1e-9
+        folder = tmp_path / "runs" / case["case"] / "reference"
+        assert (folder / "field.vtu").is_file()
+    orders = {
+        (case["case"], ladder["element"]): ladder["order"] for case in facts["cases"] for ladder in case["convergence"]
+    }
+    # Linear elements are of order 2 in L2 where the right side is square integrable and values are held along a rim.
+    for name in ("rod", "plate_square", "plate_spiral"):
+        assert orders[name, "P1"] == pytest.approx(2, abs=0.1)
+    assert orders["rod", "P2"] is None, "a parabola lies in the space: what is left is rounding"
+    assert orders["surface_figure", "P1"] < 1.5, "a surface does not feel a value held at a point"
+    page = (tmp_path / "octave-examples.html").read_text()
+    assert page.count("<h2") >= len(FIELDS) + 1
 
 
 def run(scene, folder, monkeypatch):
@@ -23,7 +77,7 @@ def rows(facts, metric, statistic):
 
 
 def test_every_case_is_run_here() -> None:
-    assert casefile.cases() == ["gluteus_maximus", "hip_flexion"]
+    assert casefile.cases() == sorted(["gluteus_maximus", "hip_flexion", *FIELDS])
 
 
 def test_hip_flexion_spoiled_fails(tmp_path, monkeypatch) -> None:

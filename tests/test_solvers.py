@@ -37,12 +37,22 @@ def solved(name: str, given: Problem, folder) -> tuple:
 
 
 def test_every_solver_is_under_test() -> None:
-    assert sorted(SETTINGS) == solvers.names()
+    assert sorted(SETTINGS) == solvers.names("solve")
+    assert solvers.names("solve_field") == ["fenicsx", "listing", "scikit_fem"]
+    assert solvers.names() == sorted({*solvers.names("solve"), *solvers.names("solve_field")})
 
 
 def test_an_unknown_solver_is_named() -> None:
     with pytest.raises(InputError, match=r'reference\.solver: got "magic", want one of fenicsx, pbd, recorded'):
-        solvers.find("magic", "case.toml: reference")
+        solvers.find("magic", "case.toml: reference", "solve")
+
+
+@pytest.mark.parametrize(("name", "task"), [("listing", "solve"), ("pbd", "solve_field")])
+def test_a_solver_for_something_else_is_named(name, task) -> None:
+    with pytest.raises(
+        InputError, match=rf'reference\.solver: got "{name}", which does not solve (muscles|scalar fields)'
+    ):
+        solvers.find(name, "case.toml: reference", task)
 
 
 @pytest.mark.parametrize("name", SETTINGS)

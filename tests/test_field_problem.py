@@ -1,0 +1,197 @@
+"""Scalar scenes: what is read, what is held where, and that what is not usable is named."""
+
+import fields
+import numpy as np
+import pytest
+
+from fem_reference import casefile, cli
+from fem_reference.errors import InputError
+from fem_reference.field.problem import build
+from fem_reference.solvers import listing, listing_kernels
+
+DIFFUSION = {"name": "diffusion", "coefficient": 1.0}
+INTERVAL = {"interval": {"start": 0.0, "end": 1.0, "count": 5}}
+ENDS = [{"on": "left", "value": 0}, {"on": "right", "value": "x + 1"}]
+
+
+def scene(folder, **tables):
+    return fields.scene(folder, **({"domain": INTERVAL, "effect": [DIFFUSION], "boundary": ENDS} | tables))
+
+
+def test_what_ends_and_rims_hold(tmp_path) -> None:
+    held = build(scene(tmp_path)).held
+    assert held == pytest.approx([0, np.nan, np.nan, np.nan, 2], nan_ok=True)
+    for order in (1, 2):
+        plate = scene(
+            tmp_path,
+            domain=fields.square(tmp_path, 4),
+            boundary=[{"on": "rim", "where": "x - 0.999", "value": "y"}],
+            element=fields.element(order),
+        )
+        problem = build(plate, 1)
+        nodes = problem.mesh.nodes[order]
+        expected = np.where(nodes[:, 0] == 1, nodes[:, 1], np.nan)
+        assert problem.held == pytest.approx(expected, nan_ok=True)
+
+
+def test_bounds_go_along_the_rim_when_the_mesh_is_refined(tmp_path) -> None:
+    domain = fields.square(tmp_path, 3)
+    points = build(scene(tmp_path, domain=domain, boundary=[{"on": "rim", "value": 0}])).mesh.points
+    right = np.flatnonzero(points[:, 0] == 1)
+    rows = [",".join(str(vertex + 1) for vertex in right), ",".join(f"{points[vertex, 1]:.17g}" for vertex in right)]
+    (tmp_path / "bounds.csv").write_text("\n".join(rows) + "\n")
+    problem = build(scene(tmp_path, domain=domain, boundary=[{"bounds": "bounds.csv"}], element=fields.element(2)), 2)
+    nodes = problem.mesh.nodes[2]
+    assert problem.held == pytest.approx(np.where(nodes[:, 0] == 1, nodes[:, 1], np.nan), nan_ok=True)
+
+
+def test_nodes_at_random_are_those_of_the_seed(tmp_path) -> None:
+    drawn = [scene(tmp_path, domain={"interval": INTERVAL["interval"] | {"seed": seed}}) for seed in (1, 1, 2)]
+    one, again, other = (build(entry).mesh.points[:, 0] for entry in drawn)
+    assert (one == again).all()
+    assert (one != other).any()
+    assert (one[0], one[-1], len(one)) == (0, 1, 5)
+    assert (np.diff(one) > 0).all()
+
+
+def test_the_shipped_plates_are_the_report_s() -> None:
+    # Listing 4.3 on the square of listing 4.5, and eq. 4.11; Octave's linspace and cosine round otherwise in the last place.
+    square, bounds = listing_kernels.square()
+    problem = build(casefile.read("plate_square"))
+    assert problem.mesh.points == pytest.approx(square, abs=1e-15)
+    assert np.flatnonzero(~np.isnan(problem.held)).tolist() == sorted(bounds[0].astype(int).tolist())
+    problem = build(casefile.read("plate_spiral"))
+    assert problem.mesh.points == pytest.approx(listing_kernels.spiral(400), abs=1e-13)
+    assert np.flatnonzero(~np.isnan(problem.held)).tolist() == listing_kernels.rim(problem.mesh.cells).tolist()
+
+
+@pytest.mark.parametrize(
+    ("tables", "match"),
+    [
+        ({"effect": [{"name": "reaction", "rate": 1.0}]}, r"effect: got no diffusion"),
+        (
+            {"effect": [DIFFUSION, {"name": "advection", "velocity": [1.0, 2.0]}]},
+            r"effect\[1\]\.velocity: got 2 components, want 1",
+        ),
+        (
+            {"effect": [DIFFUSION, {"name": "source", "strength": "y", "where": "everywhere"}]},
+            r'strength: got "y", want a formula of x',
+        ),
+        ({"effect": [DIFFUSION, {"name": "source", "strength": "1/0", "where": "everywhere"}]}, r'strength: got "1/0"'),
+        (
+            {"effect": [DIFFUSION, {"name": "source", "strength": 1, "where": "y above average"}]},
+            r"where: got .* on an interval",
+        ),
+        ({"boundary": []}, r"boundary: got no value anywhere and no reaction"),
+        ({"boundary": [{"on": "rim", "value": 0}]}, r'boundary\[0\]\.on: got "rim", where there is nothing'),
+        (
+            {"boundary": [{"on": "left", "value": "1/x"}]},
+            r'boundary\[0\]\.value: got "1/x", which has no finite value at \(0\)',
+        ),
+        (
+            {"boundary": [{"on": "left", "value": 1}, {"on": "left", "value": 0}]},
+            r"boundary\[1\]\.value: got 0 where .* has 1",
+        ),
+        ({"boundary": [{"on": "left"}]}, r'exactly one of "value" and "slope"'),
+        ({"boundary": [{"value": 1}]}, r'exactly one of "on" and "bounds"'),
+        ({"boundary": [{"bounds": "a.csv", "value": 1}]}, r'"bounds" alone'),
+        ({"domain": {}}, r'exactly one of "interval", "nodes"'),
+        ({"domain": {"nodes": [0.0, 0.0]}}, r"nodes that increase"),
+        ({"domain": {"interval": {"start": 1.0, "end": 0.0, "count": 3}}}, r"an end beyond the start"),
+        ({"exact": "z"}, r'exact: got "z"'),
+    ],
+)
+def test_scenes_that_are_not_usable(tmp_path, tables, match) -> None:
+    with pytest.raises(InputError, match=match):
+        build(scene(tmp_path, **tables))
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "match"),
+    [
+        ("points.csv", "0,0\n1,0\n0\n", "points.csv: got .*, want rows of the same count of numbers"),
+        ("points.csv", "0,0\n1,0\n0,nan\n", "points.csv: got .*, want rows of finite numbers"),
+        ("points.csv", "0\n1\n2\n", "points.csv: got rows of 1 numbers"),
+        ("triangles.csv", "1,2\n", "triangles.csv: got rows of 2 numbers"),
+        ("triangles.csv", "1,2,2.5\n", "triangles.csv: got the vertex 2.5"),
+        ("triangles.csv", "1,2,4\n", "got a cell with a vertex outside of 1 to 3"),
+        ("bounds.csv", "1,2\n", "bounds.csv: got 1 rows"),
+        ("bounds.csv", "1,4\n0,0\n", "bounds.csv: got vertices 1 to 4, want 1 to 3"),
+        ("bounds.csv", "1,1\n0,1\n", "bounds.csv: got a vertex named twice"),
+    ],
+)
+def test_tables_that_are_not_usable(tmp_path, name, text, match) -> None:
+    domain = fields.mesh(tmp_path, np.array([[0.0, 0], [1, 0], [0, 1]]), np.array([[0, 1, 2]]))
+    (tmp_path / "bounds.csv").write_text("1\n0\n")
+    (tmp_path / name).write_text(text)
+    with pytest.raises(InputError, match=match):
+        build(scene(tmp_path, domain=domain, boundary=[{"bounds": "bounds.csv"}]))
+
+
+@pytest.mark.parametrize(
+    ("points", "match"),
+    [
+        ("0,0\n1,1\n2,2\n", "points that cannot be triangulated"),
+        ("0,0,0\n1,0,0\n0,1,0\n", '"delaunay" of points in space'),
+    ],
+)
+def test_points_that_delaunay_cannot_do(tmp_path, points, match) -> None:
+    (tmp_path / "points.csv").write_text(points)
+    domain = {"mesh": {"points": "points.csv", "triangles": "delaunay"}}
+    with pytest.raises(InputError, match=match):
+        build(scene(tmp_path, domain=domain, boundary=[{"on": "rim", "value": 0}]))
+
+
+def test_the_listings_refuse_what_they_do_not_have(tmp_path) -> None:
+    with pytest.raises(InputError, match="value 0 on the left and slope -1 on the right"):
+        listing.solve_field(build(scene(tmp_path)), listing.FieldSettings())
+    plate = build(scene(tmp_path, domain=fields.square(tmp_path, 4), boundary=[{"on": "rim", "value": 0}]))
+    with pytest.raises(InputError, match=r"listing 4\.5 has none"):
+        listing.solve_field(plate, listing.FieldSettings(peclet=1.0))
+
+
+def spoken(capsys, *arguments: str) -> tuple[int, str, str]:
+    status = cli.main(list(arguments))
+    out, err = capsys.readouterr()
+    return status, out, err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "match"),
+    [
+        (["run", "rod", "--solver", "pbd"], 'got "pbd", which does not solve scalar fields'),
+        (["run", "hip_flexion", "--solver", "listing"], 'got "listing", which does not solve muscles'),
+        (["run", "rod", "--set", "peclet"], '--set: got "peclet", want KEY=VALUE'),
+        (["run", "rod", "--set", "candidate[1].speed=2"], "candidate[1].speed: got nothing, want a key of this scene"),
+        (["run", "rod", "--set", "expect[0].measure=beauty"], 'expect[0].measure: got "beauty", want one of'),
+        (["run", "rod", "--set", "expect[0].of=nobody"], 'expect[0].of: got "nobody", want one of reference'),
+        (["run", "rod", "--set", "effect[0].name=neo_hooke"], 'got "neo_hooke", want one of advection, diffusion'),
+        (["run", "hip_flexion", "--set", "effect[0].name=diffusion"], 'got "diffusion", want one of incompressible'),
+        (["compare", "rod", "--candidate", "magic"], '--candidate: got "magic", want one of fenicsx, listing'),
+    ],
+)
+def test_what_the_command_line_refuses(tmp_path, capsys, arguments, match) -> None:
+    status, _, err = spoken(capsys, *arguments, "--out", str(tmp_path / "out"), "--quiet")
+    assert status == cli.BAD_INPUT
+    assert match in err
+    assert not (tmp_path / "out").exists()
+
+
+def test_peclet_is_a_parameter_of_the_rod(tmp_path, capsys) -> None:
+    # At 10 the listing solves 10 psi'' = 1/10, 10 psi'(1) = -1: psi(1) = 1/200 - 1/10 - 1/100 = -0.105.
+    arguments = ["run", "rod", "--solver", "listing", "--out", str(tmp_path), "--quiet"]
+    status, out, _ = spoken(capsys, *arguments, "--set", "candidate[1].peclet=10")
+    assert status == cli.VERDICT_FAIL
+    assert "listing min: -0.105\n" in out
+    for domain in ("{nodes=[0.0, 0.3, 1.0]}", "{interval={start=0.0, end=1.0, count=20}}"):  # given, and evenly spaced
+        status, out, _ = spoken(capsys, *arguments, "--set", f"domain={domain}")
+        assert status == cli.DONE
+    status, out, _ = spoken(capsys, "list", "--out", str(tmp_path))
+    assert "runs/rod/listing" in out
+
+
+def test_show_tells_what_a_scalar_case_is_made_of(capsys) -> None:
+    status, out, _ = spoken(capsys, "show", "rod_advection")
+    assert status == cli.DONE
+    assert "form: supg, mesh Peclet number up to 2.5" in out
+    assert "Advection:" in out
