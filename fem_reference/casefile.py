@@ -163,7 +163,8 @@ def _check_names(scene: Scene) -> None:
     attachments = [attachment.name for attachment in scene.attachment]
     _check_once(bones, join(scene.place, "bone"))
     _check_once(attachments, join(scene.place, "attachment"))
-    candidates = ["candidates", *_candidate_names(scene)]
+    reference, *others = _candidate_names(scene)
+    candidates = [reference, "candidates", *others]
     traced = scene.fibres.traced
     ends = [(f"fibres.traced.{end}", getattr(traced, end)) for end in ("start", "end") if traced]
     _check_used(bones, [(f"attachment[{i}].bone", entry.bone) for i, entry in enumerate(scene.attachment)], scene.place)

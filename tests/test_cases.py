@@ -65,7 +65,7 @@ def test_the_page_of_the_octave_examples(tmp_path) -> None:
 
 
 def run(scene, folder, monkeypatch):
-    monkeypatch.setattr(casefile, "read", lambda _: scene)
+    monkeypatch.setattr(casefile, "read", lambda _, **__: scene)
     target = folder / "facts.json"
     status = cli.main(["run", scene.name, "--out", str(folder), "--json", str(target), "--quiet"])
     return status, json.loads(target.read_text())

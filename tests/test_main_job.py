@@ -135,7 +135,7 @@ def test_moving_the_whole_scene_changes_no_measure(job, tmp_path) -> None:
 
 def test_the_spoil_turns_the_verdict(job, tmp_path, monkeypatch) -> None:
     spoiled = casefile.read(job.case, spoiled=True)
-    monkeypatch.setattr(casefile, "read", lambda _: spoiled)
+    monkeypatch.setattr(casefile, "read", lambda _, **__: spoiled)
     status = cli.main(["run", str(job.case), "--out", str(tmp_path), "--quiet"])
     assert status == cli.VERDICT_FAIL
 
