@@ -14,8 +14,8 @@ from fem_reference import __version__, casefile, field_verbs, files, judge, metr
 from fem_reference.comparison import Comparison, compare
 from fem_reference.errors import InputError, MissingSoftware
 from fem_reference.execution import Bench, complete
-from fem_reference.field.problem import build as build_field
 from fem_reference.field.scene import FieldScene
+from fem_reference.field_execution import FieldBench
 from fem_reference.field_verbs import Told
 from fem_reference.overview import field_scene_facts, scene_facts
 from fem_reference.records import parse
@@ -268,7 +268,7 @@ def _stored(folder: Path) -> str:
 def _show(options: argparse.Namespace) -> int:
     scene = _scene(options)
     if isinstance(scene, FieldScene):
-        facts = field_scene_facts(scene, build_field(scene))
+        facts = field_scene_facts(scene, FieldBench(scene, _out(options)).problem)
         _tell(facts, "\n".join(_lines(facts)), options)
         return DONE
     bench = _checked_bench(scene, options, _own_candidates(scene))

@@ -36,14 +36,15 @@ class FieldBench:
         self.scene, self.store = scene, store / scene.name
         self.problem = field_problem.build(scene)
         _check_expectations(scene)
-        self.settings = {name: self._settings(choice, place) for name, choice, place in _choices(scene)}
+        for _, choice, place in _choices(scene):
+            self._settings(choice, join(scene.place, place))
 
     def _settings(self, choice: SolverChoice, place: str) -> Record:
-        return solvers.settings(choice, join(self.scene.place, place), "solve_field")
+        return solvers.settings(choice, place, "solve_field")
 
     def obtain(self, name: str, choice: SolverChoice) -> FieldRun:
         """The run of a solver, solved now and stored; scalar problems take less time than it takes to look."""
-        settings = self.settings.get(name) or self._settings(choice, f"--solver {choice.solver}")
+        settings = self._settings(choice, f"--solver {choice.solver}")
         solution = solvers.find(choice.solver, self.scene.place, "solve_field").solve_field(self.problem, settings)
         folder = self.store / name
         run = FieldRun(name, choice.solver, self.problem, solution, self._origin(choice.solver, settings), folder)

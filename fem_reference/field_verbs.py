@@ -30,12 +30,18 @@ class Told:
 
 
 def run(scene: FieldScene, solver: str | None, out: Path) -> Told:
-    """A scalar case by its reference, with a page, or by another ``solver``: what can be measured without another run, judged."""
+    """A scalar case by its reference, with a page, or by another ``solver`` or the candidate of that name: what can be measured
+    without another run, judged.
+    """
     if solver is None or solver == scene.reference.solver:
         return compare(scene, [], out)
     bench = field_execution.FieldBench(scene, out / "runs")
-    named = next((entry for entry in scene.candidate if entry.solver == solver), None)
-    name, choice = (named.name, named) if named is not None else (solver, SolverChoice(solver=solver))
+    named = [entry for entry in scene.candidate if entry.solver == solver]
+    named += [entry for entry in scene.candidate if entry.name == solver]
+    if named:
+        name, choice = named[0].name, SolverChoice(solver=named[0].solver, **named[0].settings)
+    else:
+        name, choice = solver, SolverChoice(solver=solver)
     made = bench.obtain(name, choice)
     measures = field_execution.measure(scene, made, None)
     facts = field_facts(scene, [made], measures, field_execution.judged(scene, measures))

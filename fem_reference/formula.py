@@ -31,7 +31,8 @@ def _checked(value: object) -> str:
         raise ValueError(_WANT)
     try:
         with np.errstate(all="ignore"):
-            evaluate(value, (np.float64(0.5),) * 3, vars(np))
+            if np.iscomplexobj(evaluate(value, (np.float64(0.5),) * 3, vars(np))):
+                raise ValueError(_WANT)
     except (SyntaxError, InputError, RecursionError) as error:
         raise ValueError(_WANT) from error
     except ArithmeticError:

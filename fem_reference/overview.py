@@ -128,7 +128,12 @@ def field_text(facts: dict[str, Any]) -> str:
 def field_example_facts(example: Example) -> dict[str, Any]:
     """What came of a whole example, its convergence included."""
     ladders = [
-        {"element": ladder.element, "cells": ladder.cells, "errors": ladder.errors, "against": ladder.against}
+        {
+            "element": ladder.element,
+            "cells": ladder.cells,
+            "errors": [error if math.isfinite(error) else None for error in ladder.errors],
+            "against": ladder.against,
+        }
         | {"order": ladder.order if math.isfinite(ladder.order) else None}
         for ladder in example.ladders
     ]

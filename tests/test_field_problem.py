@@ -10,6 +10,7 @@ from fem_reference.field.problem import build
 from fem_reference.solvers import listing, listing_kernels
 
 DIFFUSION = {"name": "diffusion", "coefficient": 1.0}
+REACTION = {"name": "reaction", "rate": 1.0}
 INTERVAL = {"interval": {"start": 0.0, "end": 1.0, "count": 5}}
 ENDS = [{"on": "left", "value": 0}, {"on": "right", "value": "x + 1"}]
 
@@ -99,6 +100,12 @@ def test_the_shipped_plates_are_the_report_s() -> None:
         ({"domain": {"nodes": [0.0, 0.0]}}, r"nodes that increase"),
         ({"domain": {"interval": {"start": 1.0, "end": 0.0, "count": 3}}}, r"an end beyond the start"),
         ({"exact": "z"}, r'exact: got "z"'),
+        ({"exact": "(x-2)**0.5"}, r'exact: got "\(x-2\)\*\*0\.5", which has no finite value'),
+        ({"boundary": [*ENDS[:1], {"on": "right", "where": "z", "slope": 0}]}, r'boundary\[1\]\.where: got "z"'),
+        (
+            {"boundary": [*ENDS[:1], *2 * [{"on": "right", "slope": 0}]]},
+            r"boundary\[2\]\.slope: got a facet that has a slope",
+        ),
     ],
 )
 def test_scenes_that_are_not_usable(tmp_path, tables, match) -> None:
@@ -109,23 +116,26 @@ def test_scenes_that_are_not_usable(tmp_path, tables, match) -> None:
 @pytest.mark.parametrize(
     ("name", "text", "match"),
     [
-        ("points.csv", "0,0\n1,0\n0\n", "points.csv: got .*, want rows of the same count of numbers"),
+        ("points.csv", "0,0\n1,0\n0\n", "points.csv: got 1 numbers in row 3, want 2 as in row 1"),
         ("points.csv", "0,0\n1,0\n0,nan\n", "points.csv: got .*, want rows of finite numbers"),
+        ("points.csv", "0,0\n1,0\n0,a\n", "points.csv: got could not convert string to float: 'a', want numbers"),
         ("points.csv", "0\n1\n2\n", "points.csv: got rows of 1 numbers"),
         ("triangles.csv", "1,2\n", "triangles.csv: got rows of 2 numbers"),
         ("triangles.csv", "1,2,2.5\n", "triangles.csv: got the vertex 2.5"),
         ("triangles.csv", "1,2,4\n", "got a cell with a vertex outside of 1 to 3"),
         ("bounds.csv", "1,2\n", "bounds.csv: got 1 rows"),
         ("bounds.csv", "1,4\n0,0\n", "bounds.csv: got vertices 1 to 4, want 1 to 3"),
+        ("more.csv", "1\n2\n", "more.csv: got other values than another file of bounds has"),
         ("bounds.csv", "1,1\n0,1\n", "bounds.csv: got a vertex named twice"),
     ],
 )
 def test_tables_that_are_not_usable(tmp_path, name, text, match) -> None:
     domain = fields.mesh(tmp_path, np.array([[0.0, 0], [1, 0], [0, 1]]), np.array([[0, 1, 2]]))
     (tmp_path / "bounds.csv").write_text("1\n0\n")
+    (tmp_path / "more.csv").write_text("1\n0\n")
     (tmp_path / name).write_text(text)
     with pytest.raises(InputError, match=match):
-        build(scene(tmp_path, domain=domain, boundary=[{"bounds": "bounds.csv"}]))
+        build(scene(tmp_path, domain=domain, boundary=[{"bounds": "bounds.csv"}, {"bounds": "more.csv"}]))
 
 
 @pytest.mark.parametrize(
@@ -146,6 +156,11 @@ def test_the_listings_refuse_what_they_do_not_have(tmp_path) -> None:
     with pytest.raises(InputError, match="value 0 on the left and slope -1 on the right"):
         listing.solve_field(build(scene(tmp_path)), listing.FieldSettings())
     plate = build(scene(tmp_path, domain=fields.square(tmp_path, 4), boundary=[{"on": "rim", "value": 0}]))
+    sloped = scene(
+        tmp_path, domain=fields.square(tmp_path, 4), boundary=[{"on": "rim", "slope": 0}], effect=[DIFFUSION, REACTION]
+    )
+    with pytest.raises(InputError, match=r"listing 4\.5 has no slopes"):
+        listing.solve_field(build(sloped), listing.FieldSettings())
     with pytest.raises(InputError, match=r"listing 4\.5 has none"):
         listing.solve_field(plate, listing.FieldSettings(peclet=1.0))
 
@@ -195,3 +210,65 @@ def test_show_tells_what_a_scalar_case_is_made_of(capsys) -> None:
     assert status == cli.DONE
     assert "form: supg, mesh Peclet number up to 2.5" in out
     assert "Advection:" in out
+
+
+RESONATES = """
+title = "t"
+proves = "p"
+[domain]
+nodes = [0.0, 1.0, 2.0, 3.0]
+[[effect]]
+name = "diffusion"
+coefficient = 1.0
+[[effect]]
+name = "reaction"
+rate = -1.2
+[[boundary]]
+on = "left"
+value = 0
+[[boundary]]
+on = "right"
+value = 0
+[element]
+order = 1
+form = "auto"
+[reference]
+solver = "scikit_fem"
+[[candidate]]
+name = "fenicsx"
+solver = "scikit_fem"
+form = "galerkin"
+[[expect]]
+of = "reference"
+measure = "max"
+truth = 0.0
+within = 1.0
+kind = "property"
+because = "it cannot be"
+[spoil]
+key = "title"
+value = "another"
+because = "none"
+"""
+
+
+def test_a_reference_that_fails_is_told_in_full(tmp_path, capsys) -> None:
+    # Three elements of length 1 resonate at -6 / 5: no solution, which is a status and never a pass.
+    (tmp_path / "case.toml").write_text(RESONATES)
+    target = tmp_path / "facts.json"
+    status, out, _ = spoken(
+        capsys, "compare", str(tmp_path), "--out", str(tmp_path / "out"), "--json", str(target), "--quiet"
+    )
+    assert status == cli.SOLVER_FAILED
+    assert "no unique solution" in out
+    assert "fail: reference max is not a number" in out
+    assert (tmp_path / "out" / tmp_path.name / "report.html").is_file()
+    assert '"diverged"' in target.read_text()
+
+
+def test_a_candidate_can_be_run_by_its_name(tmp_path, capsys) -> None:
+    status, out, _ = spoken(
+        capsys, "run", "rod_advection", "--solver", "plain_galerkin", "--out", str(tmp_path), "--quiet"
+    )
+    assert status == cli.DONE
+    assert "pass: plain_galerkin min is -0.428571" in out

@@ -131,10 +131,13 @@ def _mesh_files(scene: FieldScene, given: MeshFiles) -> FieldMesh:
 def _numbers(path: object) -> Floats:
     """The comma separated numbers of a file as a table."""
     rows = files.read_rows(path)  # type: ignore[arg-type]
+    for i, row in enumerate(rows):
+        if len(row) != len(rows[0]):
+            raise InputError(str(path), f"{len(row)} numbers in row {i + 1}", f"{len(rows[0])} as in row 1")
     try:
         table = np.array([[float(cell) for cell in row] for row in rows])
     except ValueError as error:
-        raise InputError(str(path), str(error), "rows of the same count of numbers") from error
+        raise InputError(str(path), str(error), "numbers") from error
     if table.ndim != 2 or not np.isfinite(table).all():
         raise InputError(str(path), "an empty table or a number that is not finite", "rows of finite numbers")
     return table
@@ -185,6 +188,8 @@ def at(formula: str, points: Floats) -> Floats:
     """The values (n,) of a formula at ``points`` (n, d)."""
     with np.errstate(all="ignore"):
         values = evaluate(formula, tuple(points.T), vars(np))
+    if np.iscomplexobj(values):
+        raise InputError("formula", f'"{formula}", which is complex', "a formula with real values")
     return np.asarray(np.broadcast_to(values, len(points)), dtype=np.float64)
 
 
@@ -202,6 +207,8 @@ def _given(scene: FieldScene, mesh: FieldMesh) -> Floats:
                 raise InputError(path, f"vertices {vertices.min() + 1} to {vertices.max() + 1}", f"1 to {len(values)}")
             if len(np.unique(vertices)) < len(vertices):
                 raise InputError(path, "a vertex named twice", "one value for each vertex")
+            if (np.abs(values[vertices] - table[1]) > 0).any():
+                raise InputError(path, "other values than another file of bounds has", "one value for each vertex")
             values[vertices] = table[1]
     return values
 
@@ -220,11 +227,17 @@ def _between(mesh: FieldMesh, values: Floats) -> Floats:
 def _held(scene: FieldScene, mesh: FieldMesh, given: Floats) -> Floats:
     """The value at each node, NaN where it is free; InputError where two conditions disagree on one."""
     held = given if scene.element.order == 1 else np.concatenate([given, _between(mesh, given)])
-    nodes = mesh.nodes[scene.element.order]
+    nodes, sloped = mesh.nodes[scene.element.order], np.empty(0, np.int64)
     for i, entry in enumerate(scene.boundary):
         place = join(scene.place, f"boundary[{i}]")
         if entry.on is not None:
+            if entry.where is not None:
+                _try(entry.where, mesh.points, f"{place}.where")
             facets = _facets(entry, mesh)
+            if entry.slope is not None:
+                if np.isin(_keys(facets, mesh), sloped).any():
+                    raise InputError(f"{place}.slope", "a facet that has a slope already", "one slope for each facet")
+                sloped = np.concatenate([sloped, _keys(facets, mesh)])
             if len(facets) == 0:
                 raise InputError(
                     f"{place}.on", f'"{entry.on}", where there is nothing', "an end or a rim of the domain"
@@ -257,6 +270,11 @@ def _facets(entry: Boundary, mesh: FieldMesh) -> Ints:
     if entry.where is not None:
         facets = facets[(at(entry.where, mesh.points) > 0)[facets].all(axis=1)]
     return facets
+
+
+def _keys(facets: Ints, mesh: FieldMesh) -> Ints:
+    """A number for each facet, the same for no two."""
+    return np.asarray(facets @ [len(mesh.points), 1][-facets.shape[1] :])
 
 
 def _nodes_of(facets: Ints, mesh: FieldMesh, order: int) -> Ints:

@@ -32,10 +32,12 @@ def solve_field(problem: FieldProblem, settings: FieldSettings) -> Solution:
     else:
         if settings.peclet is not None:
             raise InputError("listing: peclet", settings.peclet, "no peclet: listing 4.5 has none")
+        if problem.fluxes:
+            raise InputError("listing: boundary", "a slope", "values only: listing 4.5 has no slopes")
         fixed = np.flatnonzero(~np.isnan(problem.held[: len(mesh.points)]))
         bounds = np.array([fixed, problem.held[fixed]])
         norms, components = listing_kernels.fem2d(mesh.cells, mesh.points, bounds)
-        values = -norms
+        values = 0.0 - norms
     if problem.order == 2:  # the listings are linear between vertices
         values = np.concatenate([values, values[mesh.edges].mean(axis=1)])
     cost = {
