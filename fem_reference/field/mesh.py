@@ -35,6 +35,11 @@ class FieldMesh:
         unique, sides = np.unique(parts, axis=0, return_counts=True)
         return np.asarray(unique[sides == 1])
 
+    def edge_numbers(self, pairs: Ints) -> Ints:
+        """Which of ``edges`` each of ``pairs`` (k, 2) of vertices is, (k,); all must be edges."""
+        key = np.array([len(self.points), 1])
+        return np.asarray(np.searchsorted(self.edges @ key, np.sort(pairs, axis=1) @ key))
+
     @property
     def nodes(self) -> dict[int, Floats]:
         """Where the nodes of Lagrange elements of order 1 and 2 are: the vertices, then the middles of the edges."""
@@ -117,7 +122,7 @@ def refined(mesh: FieldMesh) -> FieldMesh:
     """
     count, edges = len(mesh.points), mesh.edges
     points = np.concatenate([mesh.points, mesh.points[edges].mean(axis=1)])
-    middle = count + _positions(edges, _all_edges(mesh.cells), count).reshape(len(mesh.cells), -1)
+    middle = count + mesh.edge_numbers(_all_edges(mesh.cells)).reshape(len(mesh.cells), -1)
     cells: list[tuple[Ints, ...]]
     if mesh.cells.shape[1] == 2:
         (a, b), (ab,) = mesh.cells.T, middle.T
@@ -132,8 +137,3 @@ def _all_edges(cells: Ints) -> Ints:
     """The edges of every cell, cell by cell, (m or 3 m, 2), the smaller vertex first."""
     pairs = cells[:, [[0, 1]]] if cells.shape[1] == 2 else cells[:, [[0, 1], [1, 2], [2, 0]]]
     return np.asarray(np.sort(pairs.reshape(-1, 2), axis=1))
-
-
-def _positions(edges: Ints, wanted: Ints, count: int) -> Ints:
-    """Where each of ``wanted`` (k, 2) is among the ``edges`` (e, 2), which are in the order of their vertices."""
-    return np.asarray(np.searchsorted(edges @ [count, 1], wanted @ [count, 1]))

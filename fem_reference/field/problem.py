@@ -218,8 +218,7 @@ def _between(mesh: FieldMesh, values: Floats) -> Floats:
     edges = mesh.edges
     middles = np.full(len(edges), np.nan)
     if mesh.cells.shape[1] == 3:
-        count = len(mesh.points)
-        on_rim = np.isin(edges @ [count, 1], mesh.facets @ [count, 1])
+        on_rim = mesh.edge_numbers(mesh.facets)
         middles[on_rim] = values[edges[on_rim]].mean(axis=1)
     return middles
 
@@ -282,9 +281,7 @@ def _nodes_of(facets: Ints, mesh: FieldMesh, order: int) -> Ints:
     vertices = np.unique(facets)
     if order == 1 or facets.shape[1] == 1:
         return vertices
-    count = len(mesh.points)
-    key = mesh.edges @ [count, 1]
-    return np.concatenate([vertices, count + np.searchsorted(key, np.sort(facets, axis=1) @ [count, 1])])
+    return np.concatenate([vertices, len(mesh.points) + mesh.edge_numbers(facets)])
 
 
 def _flux(entry: Boundary, mesh: FieldMesh) -> Flux:

@@ -4,7 +4,6 @@ import tomllib
 from pathlib import Path
 from typing import cast
 
-import jinja2
 import numpy as np
 
 from fem_reference.field.example import Example
@@ -12,7 +11,8 @@ from fem_reference.field.runs import FieldRun
 from fem_reference.judge import Word, overall
 from fem_reference.records import Record, parse
 from fem_reference.report import field_figures
-from fem_reference.report.words import duration, number, words
+from fem_reference.report.templates import template
+from fem_reference.report.words import number
 
 # What the report's figures show, in words: its pictures are not distributed with it. By the name of a case: figure and caption.
 FIGURES = {
@@ -46,15 +46,7 @@ class Difference(Record):
 
 def render(title: str, examples: tuple[Example, ...], differences: bool) -> str:
     """The whole page as text; with ``differences`` the table of where the report's text and listings part."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {"number": number, "duration": duration, "words": words}
-    return environment.get_template("field_page.html").render(
+    return template("field_page.html").render(
         title=title,
         examples=examples,
         word=overall(cast(Word, example.word) for example in examples),

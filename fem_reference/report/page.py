@@ -8,7 +8,6 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any, get_args
 
-import jinja2
 import matplotlib as mpl
 import numpy as np
 from matplotlib.colors import to_hex
@@ -21,7 +20,8 @@ from fem_reference.metrics import Measure
 from fem_reference.report import gallery, pictures
 from fem_reference.report.curves import curves, label_of
 from fem_reference.report.tables import find, inversion, runs, seconds_per_frame
-from fem_reference.report.words import duration, exact, listed, number, ratio, words
+from fem_reference.report.templates import template
+from fem_reference.report.words import listed, ratio, words
 from fem_reference.runs import Run
 from fem_reference.scene import Scene
 
@@ -55,16 +55,8 @@ class Figure:
 
 def render(comparison: Comparison) -> str:
     """The whole page as text."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {"number": number, "duration": duration, "exact": exact, "words": words}
     figures, missing = _figures(comparison)
-    return environment.get_template("page.html").render(
+    return template("page.html").render(
         comparison=comparison,
         scene=comparison.scene,
         reference=comparison.reference,

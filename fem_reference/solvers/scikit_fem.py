@@ -156,19 +156,18 @@ def _order(problem: FieldProblem, basis: Any) -> Any:
     vertices = basis.nodal_dofs[0]
     if problem.order == 1:
         return vertices
-    mesh, count = problem.mesh, len(problem.mesh.points)
+    mesh = problem.mesh
     if mesh.cells.shape[1] == 2:
         ends, middles = mesh.cells, basis.interior_dofs[0]
     else:
         ends, middles = basis.mesh.facets.T, basis.facet_dofs[0]
-    place = np.searchsorted(mesh.edges @ [count, 1], np.sort(ends, axis=1) @ [count, 1])
+    place = mesh.edge_numbers(ends)
     return np.concatenate([vertices, middles[np.argsort(place)]])
 
 
 def _fluxes(problem: FieldProblem) -> Floats:
     """What flows in over the boundary, (N,): the integral of k slope times each hat function, by Gauss's rule of 3 points."""
     b = np.zeros(len(problem.held))
-    count = len(problem.mesh.points)
     for flux in problem.fluxes:
         ends = problem.mesh.points[flux.facets]
         if flux.facets.shape[1] == 1:
@@ -176,7 +175,7 @@ def _fluxes(problem: FieldProblem) -> Floats:
             continue
         edges = np.sort(flux.facets, axis=1)
         ends = problem.mesh.points[edges]
-        middles = count + np.searchsorted(problem.mesh.edges @ [count, 1], edges @ [count, 1])
+        middles = len(problem.mesh.points) + problem.mesh.edge_numbers(edges)
         lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         for s, weight in zip(*_GAUSS, strict=True):
             flow = weight * lengths * problem.diffusion * at(flux.slope, (1 - s) * ends[:, 0] + s * ends[:, 1])

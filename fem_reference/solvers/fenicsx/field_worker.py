@@ -65,9 +65,8 @@ def nodes(space: Any, problem: FieldProblem) -> Ints:
     for i in range(corners.shape[1]):
         found[space.dofmap.list[:, layout.entity_dofs(0, i)[0]]] = corners[:, i]
     if problem.order == 2:
-        keys = problem.mesh.edges @ [count, 1]
         for i, ends in enumerate(basix.topology(msh.basix_cell())[1]):
-            middles = count + np.searchsorted(keys, np.sort(corners[:, ends], axis=1) @ [count, 1])
+            middles = count + problem.mesh.edge_numbers(corners[:, ends])
             found[space.dofmap.list[:, layout.entity_dofs(1, i)[0]]] = middles
     return found
 

@@ -1,0 +1,20 @@
+"""The templates beside this file, with the words that they share."""
+
+from pathlib import Path
+
+import jinja2
+
+from fem_reference.report.words import duration, exact, number, words
+
+
+def template(name: str) -> jinja2.Template:
+    """The template in the file ``name``: what it is filled with is escaped, and a name that it lacks is an error."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"number": number, "duration": duration, "exact": exact, "words": words}
+    return environment.get_template(name)
