@@ -162,9 +162,7 @@ def _error(scene: FieldScene, finest: Callable[[], Solution]) -> tuple[Callable[
     """How far a solution is from the truth, and what that is."""
     exact = scene.exact
     if exact is not None:
-        return lambda built, solution: float(
-            scikit_fem.errors(built, solution.values, exact)
-        ), "the exact solution (L2)"
+        return (lambda built, solution: scikit_fem.errors(built, solution.values, exact)), "the exact solution (L2)"
     # The vertices of a mesh come first in every finer one. All of them count: where the coarsest mesh is irregular its
     # own vertices alone converge with h^2 log h, and not with h^2.
     truth = finest().values

@@ -70,7 +70,8 @@ def example_of(folder, values=None, **tables) -> Example:
     values = base if values is None else values(base)
     done = Outcome("converged", "done", {"seconds_assembly": 0.25, "seconds_solve": 0.5})
     reference = FieldRun("reference", "fenicsx", problem, Solution(base, done))
-    listing = FieldRun("listing", "listing", problem, Solution(values, Outcome("converged", "as listed")))
+    listed = Solution(values, Outcome("converged", "as listed"), form="as listed")
+    listing = FieldRun("listing", "listing", problem, listed)
     return Example(
         scene,
         problem,

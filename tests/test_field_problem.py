@@ -1,5 +1,7 @@
 """Scalar scenes: what is read, what is held where, and that what is not usable is named."""
 
+import json
+
 import fields
 import numpy as np
 import pytest
@@ -272,3 +274,5 @@ def test_a_candidate_can_be_run_by_its_name(tmp_path, capsys) -> None:
     )
     assert status == cli.DONE
     assert "pass: plain_galerkin min is -0.428571" in out
+    state = json.loads((tmp_path / "runs" / "rod_advection" / "plain_galerkin" / "run.json").read_text())
+    assert state["form"] == "galerkin", "what was solved, and not what the scene asks for"

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -128,22 +129,22 @@ def _mesh_files(scene: FieldScene, given: MeshFiles) -> FieldMesh:
     return FieldMesh(points, triangles - 1, str(path))
 
 
-def _numbers(path: object) -> Floats:
+def _numbers(path: Path) -> Floats:
     """The comma separated numbers of a file as a table."""
-    rows = files.read_rows(path)  # type: ignore[arg-type]
+    rows = files.read_rows(path)
     for i, row in enumerate(rows):
         if len(row) != len(rows[0]):
-            raise InputError(str(path), f"{len(row)} numbers in row {i + 1}", f"{len(rows[0])} as in row 1")
+            raise InputError(path, f"{len(row)} numbers in row {i + 1}", f"{len(rows[0])} as in row 1")
     try:
         table = np.array([[float(cell) for cell in row] for row in rows])
     except ValueError as error:
-        raise InputError(str(path), str(error), "numbers") from error
+        raise InputError(path, str(error), "numbers") from error
     if table.ndim != 2 or not np.isfinite(table).all():
-        raise InputError(str(path), "an empty table or a number that is not finite", "rows of finite numbers")
+        raise InputError(path, "an empty table or a number that is not finite", "rows of finite numbers")
     return table
 
 
-def _whole_numbers(path: object, values: Floats) -> Ints:
+def _whole_numbers(path: Path, values: Floats) -> Ints:
     if (values != np.round(values)).any():
         raise InputError(
             str(path), f"the vertex {values[values != np.round(values)][0]:g}", "vertices, numbered from 1"

@@ -16,12 +16,13 @@ class Solution:
     """``values`` (N,) of the field at the nodes (the vertices, then for order 2 the middles of ``mesh.edges``), and how it ended.
 
     ``components`` (n, d): the vector that the values are the norm of, where a solver computes one. After a failure the values are
-    not-a-number.
+    not-a-number. ``form``: the weak form that was solved, None where it is the problem's own.
     """
 
     values: Floats
     outcome: Outcome
     components: Floats | None = None
+    form: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +35,11 @@ class FieldRun:
     solution: Solution
     origin: dict[str, Any] = field(default_factory=dict)
     folder: Path | None = None
+
+    @property
+    def form(self) -> str:
+        """Which weak form was solved: galerkin, supg, or what the solver says."""
+        return self.solution.form or ("galerkin" if self.problem.tau is None else "supg")
 
     @property
     def vertex_values(self) -> Floats:
@@ -58,7 +64,7 @@ def write(run: FieldRun, folder: Path) -> None:
         "cost": outcome.cost,
         "nodes": len(run.solution.values),
         "mesh_peclet": run.problem.peclet,
-        "form": "galerkin" if run.problem.tau is None else "supg",
+        "form": run.form,
         "origin": run.origin,
     }
     files.write_text(folder / "run.json", json.dumps(state, indent=1, allow_nan=False))

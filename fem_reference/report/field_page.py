@@ -54,7 +54,6 @@ def render(title: str, examples: tuple[Example, ...], differences: bool) -> str:
         figures_of_report=FIGURES,
         apart=apart,
         bounds=bounds,
-        form=form,
         seconds=seconds,
         pivot=pivot,
         zip=zip,
@@ -98,13 +97,6 @@ def apart(example: Example) -> str:
 def bounds(run: FieldRun) -> tuple[float, float]:
     """The least and the greatest value at a vertex, NaN where one is not a number."""
     return float(run.vertex_values.min()), float(run.vertex_values.max())
-
-
-def form(run: FieldRun) -> str:
-    """Which weak form a run solved."""
-    if run.solver == "listing":
-        return "as listed"
-    return "galerkin" if run.problem.tau is None else "supg"
 
 
 def seconds(run: FieldRun) -> float | None:

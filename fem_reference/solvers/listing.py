@@ -44,7 +44,7 @@ def solve_field(problem: FieldProblem, settings: FieldSettings) -> Solution:
         "seconds_solve": time.perf_counter() - begin,
         "unknowns": float(len(mesh.points) if components is None else components.size),
     }
-    return Solution(values, Outcome("converged", "as listed", cost), components)
+    return Solution(values, Outcome("converged", "as listed", cost), components, form="as listed")
 
 
 def _check_ends(problem: FieldProblem) -> None:

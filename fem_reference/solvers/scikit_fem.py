@@ -98,8 +98,14 @@ def assemble(problem: FieldProblem) -> tuple[Any, Floats]:
 
 def solve_field(problem: FieldProblem, settings: FieldSettings) -> Solution:
     """Assemble and solve."""
+    if settings.form == "galerkin":
+        return replace(_solved(replace(problem, tau=None)), form="galerkin")
+    return _solved(problem)
+
+
+def _solved(problem: FieldProblem) -> Solution:
     begin = time.perf_counter()
-    A, b = assemble(replace(problem, tau=None) if settings.form == "galerkin" else problem)
+    A, b = assemble(problem)
     assembled = time.perf_counter()
     free = np.isnan(problem.held)
     values = np.where(free, 0.0, problem.held)
