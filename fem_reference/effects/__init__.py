@@ -1,40 +1,179 @@
 """What acts: one file per effect, named as in scene files. A problem sums its effects and adds nothing else.
 
-Contract (tests/test_effects.py): an effect is a frozen record of its parameters, and one expression written once, with
-operators only, so that a solver can take it symbolically and a test can evaluate it in numpy. An ``Effect`` acts in a body and
-has an energy per rest volume [MPa]; one that brings an unknown of its own names it in ``unknowns``. A ``FieldEffect`` acts on a
-scalar field psi and has a weak form.
+Contract (tests/test_effects.py): an effect is a frozen record of its parameters, and one expression written once, with operators
+and the few functions of ``Functions`` only, so that a solver can take it symbolically and a test can evaluate it in numpy. What
+acts in a body is an ``Effect`` of one of three kinds: an ``Energy`` per rest volume, a ``Load`` on a part of its surface (a
+traction, where no energy exists), or a ``Prestrain``, which changes the deformation that the energies see. A ``FieldEffect``
+acts on a scalar field psi and has a weak form.
 """
 
 import importlib
 import pkgutil
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+from pydantic import Field, model_validator
 
 from fem_reference.records import Record
 
 
+class Functions(Protocol):
+    """What an expression may call besides operators, in numpy or symbolically."""
+
+    def exp(self, x: Any) -> Any:
+        """e to the power of x."""
+
+    def log(self, x: Any) -> Any:
+        """The natural logarithm of x > 0."""
+
+    def sqrt(self, x: Any) -> Any:
+        """The square root of x > 0."""
+
+    def above(self, x: Any, limit: Any, then: Any, otherwise: Any) -> Any:
+        """``then`` where ``x > limit``, else ``otherwise``; both are evaluated everywhere and must be finite."""
+
+
+class Numpy:
+    """``Functions`` of numbers and arrays."""
+
+    exp = staticmethod(np.exp)
+    log = staticmethod(np.log)
+    sqrt = staticmethod(np.sqrt)
+
+    @staticmethod
+    def above(x: Any, limit: Any, then: Any, otherwise: Any) -> Any:
+        """``then`` where ``x > limit``, else ``otherwise``."""
+        return np.where(x > limit, then, otherwise)
+
+
 @dataclass(frozen=True)
 class State:
-    """What an energy may depend on at a point; each entry a number, an array over points or a symbolic expression.
+    """What an expression may depend on at a point; each entry a number, an array over points or a symbolic expression.
 
-    ``I1``: trace of ``C = F^T F``; ``J``: det F; ``pressure``: the mixed pressure unknown [MPa], None where no effect brings it.
+    ``F``: the deformation gradient, ``F[i][k] = dx_i / dX_k``; ``displacement``: (3,) [mm]; ``pressure``: the mixed pressure
+    unknown [MPa], None where no effect brings it; ``fibre``: the unit vector (3,) along the fibres at rest, None where there is
+    none; ``amount``: how much of the effect acts (see :meth:`Effect.amount`).
     """
 
-    I1: Any
-    J: Any
+    F: Sequence[Sequence[Any]]
+    displacement: Sequence[Any] = (0.0, 0.0, 0.0)
     pressure: Any = None
+    fibre: Sequence[Any] | None = None
+    amount: Any = 1.0
+    functions: Functions = field(default_factory=Numpy)
+
+    @property
+    def J(self) -> Any:
+        """det F."""
+        return sum(self.F[0][k] * entry for k, entry in enumerate(self.cofactors[0]))
+
+    @property
+    def cofactors(self) -> Sequence[Sequence[Any]]:
+        """``J F^-T`` (3, 3): takes an area vector at rest to where it is now (Nanson)."""
+        F = self.F
+        after = {0: (1, 2), 1: (2, 0), 2: (0, 1)}
+        return [
+            [F[i][k] * F[j][m] - F[i][m] * F[j][k] for k, m in (after[column] for column in range(3))]
+            for i, j in (after[row] for row in range(3))
+        ]
+
+    @property
+    def C(self) -> Sequence[Sequence[Any]]:
+        """``F^T F`` (3, 3)."""
+        F = self.F
+        return [[sum(F[i][k] * F[i][m] for i in range(3)) for m in range(3)] for k in range(3)]
+
+    @property
+    def I1(self) -> Any:
+        """Trace of C."""
+        return sum(self.F[i][k] ** 2 for i in range(3) for k in range(3))
+
+    @property
+    def I2(self) -> Any:
+        """``((tr C)^2 - tr C^2) / 2``, the sum of the squared cofactors."""
+        return sum(entry**2 for row in self.cofactors for entry in row)
+
+    def square_stretch(self, direction: Sequence[Any]) -> Any:
+        """``direction . C direction``: the squared stretch of a line along the unit vector ``direction`` (3,) at rest."""
+        return sum(sum(F * a for F, a in zip(row, direction, strict=True)) ** 2 for row in self.F)
+
+
+class Knot(Record):
+    """How much of an effect acts at a frame number."""
+
+    frame: float
+    amount: float
 
 
 class Effect(Record):
-    """A frozen record of parameters with an energy per rest volume."""
+    """A frozen record of parameters of what acts in a body.
+
+    ``unknowns``: names of the fields that it brings; ``needs``: what it asks of the rest state, ``"fibre"``.
+    """
 
     unknowns: ClassVar[tuple[str, ...]] = ()
+    needs: ClassVar[tuple[str, ...]] = ()
+
+    def amount(self, frame: float) -> float:  # noqa: ARG002
+        """How much of it acts at a frame: all of it, unless it has a course."""
+        return 1.0
+
+
+class Coursed(Effect):
+    """An effect that comes and goes: ``course`` says how much of it acts, linearly between its knots, constant beyond them."""
+
+    course: tuple[Knot, ...] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _check_course(self) -> "Coursed":
+        if any(late.frame <= early.frame for early, late in pairwise(self.course)):
+            raise ValueError("a course in the order of its frames")
+        return self
+
+    def amount(self, frame: float) -> float:
+        """How much of it acts at a frame."""
+        frames, amounts = zip(*((knot.frame, knot.amount) for knot in self.course), strict=True)
+        return float(np.interp(frame, frames, amounts))
+
+
+class Energy(Effect):
+    """An effect with an energy per rest volume."""
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa] at ``state``."""
         raise NotImplementedError(f"{type(self).__name__} has no energy")
+
+
+class Load(Effect):
+    """An effect that pushes or pulls on a part of the surface; ``on`` names it."""
+
+    on: str
+
+    def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:
+        """Force per rest area [MPa], (3,), where ``normal`` (3,) is the outward unit normal at rest."""
+        raise NotImplementedError(f"{type(self).__name__} has no traction")
+
+
+class Prestrain(Effect):
+    """An effect that changes what is elastic of the deformation."""
+
+    def elastic(self, state: State) -> Sequence[Sequence[Any]]:
+        """The deformation gradient (3, 3) that the energies see."""
+        raise NotImplementedError(f"{type(self).__name__} has no elastic deformation")
+
+
+def total_energy(acting: Sequence[tuple[Effect, Any]], state: State) -> Any:
+    """The sum of the energies per rest volume [MPa] of ``acting``, (effect, amount) each, at ``state``, whose F is the whole
+    deformation gradient.
+    """
+    for effect, amount in acting:
+        if isinstance(effect, Prestrain):
+            state = replace(state, F=effect.elastic(replace(state, amount=amount)))
+    energies = [(effect, amount) for effect, amount in acting if isinstance(effect, Energy)]
+    return sum(effect.energy(replace(state, amount=amount)) for effect, amount in energies)
 
 
 @dataclass(frozen=True)

@@ -2,11 +2,11 @@
 
 from typing import Any, ClassVar
 
-from fem_reference.effects import Effect, State
+from fem_reference.effects import Energy, State
 from fem_reference.units import PositivePressure
 
 
-class Incompressible(Effect):
+class Incompressible(Energy):
     """``p (J - 1) - p^2 / (2 K)``: the perturbed Lagrangian whose stationary point in p is ``p = K (J - 1)``.
 
     ``bulk``: bulk modulus K [MPa]. Source: Sussman and Bathe 1987, doi 10.1016/0045-7949(87)90265-3, with U = K/2 (J - 1)^2.

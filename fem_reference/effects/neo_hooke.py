@@ -2,11 +2,11 @@
 
 from typing import Any
 
-from fem_reference.effects import Effect, State
+from fem_reference.effects import Energy, State
 from fem_reference.units import PositivePressure
 
 
-class NeoHooke(Effect):
+class NeoHooke(Energy):
     """``mu/2 (J^(-2/3) tr C - 3)``: the isochoric neo-Hookean energy (Holzapfel 2000, Nonlinear Solid Mechanics, eq. 6.143).
 
     ``mu``: shear modulus at rest [MPa].

@@ -1,0 +1,110 @@
+"""A deformable body as finite elements see it: cells straight or curved, what is prescribed where, and what acts.
+
+It knows no solver.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from fem_reference.effects import Effect
+from fem_reference.mesh import Floats, Ints
+from fem_reference.runs import Outcome
+
+Kind = Literal["tetrahedron", "hexahedron"]
+# By element: kind of cell, degree of the displacement, and of the pressure (None: no such unknown; 0: constant in each cell).
+ELEMENTS: dict[str, tuple[Kind, int, int | None]] = {
+    "P1": ("tetrahedron", 1, None),
+    "P2": ("tetrahedron", 2, None),
+    "P2/P0": ("tetrahedron", 2, 0),
+    "P2/P1": ("tetrahedron", 2, 1),
+    "Q1": ("hexahedron", 1, None),
+    "Q2": ("hexahedron", 2, None),
+    "Q1/P0": ("hexahedron", 1, 0),
+    "Q2/Q1": ("hexahedron", 2, 1),
+}
+
+
+def reference_nodes(kind: Kind, degree: int) -> Floats:
+    """Where the nodes of a cell are in its reference cell (the unit tetrahedron or the unit cube), (k, 3): the order that
+    ``Cells.cells`` has. Corners first, in the order of (z, y, x); then for degree 2 the other nodes in the same order.
+    """
+    ticks = np.arange(3) / 2
+    x, y, z = (axis.ravel() for axis in np.meshgrid(ticks, ticks, ticks, indexing="ij"))
+    nodes = np.stack([z, y, x], axis=1)
+    if kind == "tetrahedron":
+        nodes = nodes[nodes.sum(axis=1) <= 1]
+    corner = np.isin(nodes, (0, 1)).all(axis=1)
+    return nodes[corner] if degree == 1 else np.concatenate([nodes[corner], nodes[~corner]])
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """``points`` (n, 3) [mm] and ``cells`` (m, k) of their indices, each in the order of :func:`reference_nodes` of its ``kind``
+    and ``degree`` (1 straight, 2 curved); ``facets``: by name of a region of the surface, the corners (f, 3 or 4) of its facets.
+    """
+
+    points: Floats
+    cells: Ints
+    kind: Kind
+    degree: int
+    facets: dict[str, Ints]
+
+
+@dataclass(frozen=True, eq=False)
+class Prescribed:
+    """What is prescribed on the facets ``on``: along each of ``components`` (0, 1, 2 for x, y, z) the displacement that ``course``
+    gives for rest points (n, 3) [mm] at a frame number, (n, 3) [mm]; a picklable callable. With a ``stiffness`` [MPa/mm] it is not
+    exact: springs over the area pull towards it.
+    """
+
+    name: str
+    on: str
+    components: tuple[int, ...]
+    course: Callable[[Floats, float], Floats]
+    stiffness: float | None = None
+
+
+Directions = Callable[
+    [Ints, Floats], Floats
+]  # of cells (n,) and rest points (n, 3) in them: unit vectors (n, 3); picklable
+
+
+@dataclass(frozen=True, eq=False)
+class Continuum:
+    """A body of ``mesh`` with its ``effects``; at ``frames[0]`` it rests. A load acts on the facets that its ``on`` names."""
+
+    mesh: Cells
+    effects: tuple[Effect, ...]
+    prescribed: tuple[Prescribed, ...]
+    frames: tuple[float, ...]
+    fibre: Directions | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Reached:
+    """A state of a body at a frame: ``points`` (n, 3) [mm] where the nodes of the mesh are, and by name of what is prescribed the
+    ``forces`` (3,) [N] that hold it there and their ``moments`` (3,) [N mm] about the origin; ``scalars``: min_det_F_quadrature,
+    min_det_F_vertices, volume_ratio, energy [N mm], newton_iterations, cut_backs.
+    """
+
+    frame: float
+    points: Floats
+    forces: dict[str, Floats]
+    moments: dict[str, Floats]
+    scalars: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """The states of a body that a solver reached, the rest state first, and how it ended."""
+
+    states: tuple[Reached, ...]
+    outcome: Outcome
+
+    @property
+    def last(self) -> Reached:
+        """The last state that was reached."""
+        return self.states[-1]
