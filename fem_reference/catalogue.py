@@ -5,24 +5,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
-from fem_reference.continuum import Continuum, Reached
+from fem_reference.continuum import Continuum, Solved
 from fem_reference.judge import judge
-from fem_reference.runs import Outcome
 
 Kind = Literal["closed form", "published", "second solver", "property"]
-
-
-@dataclass(frozen=True, eq=False)
-class Solved:
-    """The states of a body that a solver reached, the rest state first, and how it ended."""
-
-    states: tuple[Reached, ...]
-    outcome: Outcome
-
-    @property
-    def last(self) -> Reached:
-        """The last state that was reached."""
-        return self.states[-1]
 
 
 class Lab(Protocol):

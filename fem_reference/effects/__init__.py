@@ -5,6 +5,9 @@ and the few functions of ``Functions`` only, so that a solver can take it symbol
 acts in a body is an ``Effect`` of one of three kinds: an ``Energy`` per rest volume, a ``Load`` on a part of its surface (a
 traction, where no energy exists), or a ``Prestrain``, which changes the deformation that the energies see. A ``FieldEffect``
 acts on a scalar field psi and has a weak form.
+
+A solver may hand symbols in place of an effect's parameters (so that a compiled form serves every value of them): an expression
+never branches on a parameter and computes with it by operators and ``state.functions`` only.
 """
 
 import importlib
@@ -24,13 +27,19 @@ class Functions(Protocol):
     """What an expression may call besides operators, in numpy or symbolically."""
 
     def exp(self, x: Any) -> Any:
-        """e to the power of x."""
+        """The exponential of x."""
 
     def log(self, x: Any) -> Any:
         """The natural logarithm of x > 0."""
 
     def sqrt(self, x: Any) -> Any:
         """The square root of x > 0."""
+
+    def cos(self, x: Any) -> Any:
+        """The cosine of x [rad]."""
+
+    def sin(self, x: Any) -> Any:
+        """The sine of x [rad]."""
 
     def above(self, x: Any, limit: Any, then: Any, otherwise: Any) -> Any:
         """``then`` where ``x > limit``, else ``otherwise``; both are evaluated everywhere and must be finite."""
@@ -42,6 +51,8 @@ class Numpy:
     exp = staticmethod(np.exp)
     log = staticmethod(np.log)
     sqrt = staticmethod(np.sqrt)
+    cos = staticmethod(np.cos)
+    sin = staticmethod(np.sin)
 
     @staticmethod
     def above(x: Any, limit: Any, then: Any, otherwise: Any) -> Any:
@@ -67,7 +78,7 @@ class State:
 
     @property
     def J(self) -> Any:
-        """det F."""
+        """Determinant of F."""
         return sum(self.F[0][k] * entry for k, entry in enumerate(self.cofactors[0]))
 
     @property

@@ -2,7 +2,8 @@
 
 Contract (tests/test_solvers.py): a solver of muscles has ``Settings``, a strict record of its own settings, and
 ``solve(problem, settings, sink) -> Outcome``, which sinks every requested frame as it is reached. A solver of scalar fields has
-``FieldSettings`` and ``solve_field(problem, settings) -> Solution``. Some are both. Physics that fails is a status with a
+``FieldSettings`` and ``solve_field(problem, settings) -> Solution``; one of bodies of any shape has ``BodySettings`` and
+``solve_body(body, settings) -> Solved``. Some are more than one. Physics that fails is a status with a
 sentence, never an exception; what was reached before stays.
 """
 
@@ -14,10 +15,11 @@ from fem_reference.errors import InputError
 from fem_reference.records import Record, join, parse
 from fem_reference.scene import SolverChoice
 
-Task = Literal["solve", "solve_field"]
+Task = Literal["solve", "solve_field", "solve_body"]
 _TASKS: dict[Task, tuple[str, str]] = {
     "solve": ("Settings", "muscles"),
     "solve_field": ("FieldSettings", "scalar fields"),
+    "solve_body": ("BodySettings", "bodies of continuum mechanics"),
 }
 
 
