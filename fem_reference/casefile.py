@@ -8,13 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.effects import Effect, FieldEffect
+from fem_reference.effects import Effect, FieldEffect, Load
 from fem_reference.effects import find as find_effect
 from fem_reference.effects import names as effect_names
 from fem_reference.errors import InputError
 from fem_reference.field.scene import FieldScene, FieldSceneFile
 from fem_reference.records import Record, join, parse
 from fem_reference.scene import HOME, Scene, SceneFile, Spoil
+
+# What a load acts on, where it is no attachment: the surface that no bone holds.
+FREE = "free"
 
 
 def cases() -> list[str]:
@@ -128,7 +131,7 @@ def _scene(table: dict[str, Any], path: Path) -> Scene | FieldScene:
     else:
         inside = parse(SceneFile, {"candidate": ()} | table, place)
     if isinstance(effects, list):
-        _check_effects([entry["name"] for entry in effects], place)
+        _check_effects([entry["name"] for entry in effects], read_effects, place)
     if scalar:
         field_scene = FieldScene(name=path.parent.name, folder=path.parent, **dict(inside))
         _check_used(
@@ -143,11 +146,15 @@ def _scene(table: dict[str, Any], path: Path) -> Scene | FieldScene:
     return scene
 
 
-def _check_effects(names: list[str], place: str) -> None:
-    """An effect acts once: two of a name would share the unknowns that it brings."""
-    for i, name in enumerate(names):
-        if name in names[:i]:
-            raise InputError(join(place, f"effect[{i}].name"), f'"{name}" a second time', "every effect once")
+def _check_effects(names: list[str], effects: tuple[Record, ...], place: str) -> None:
+    """An effect acts once (two of a name would share the unknowns that it brings), a load once on each part of the surface."""
+    acting = [
+        (name, effect.on if isinstance(effect, Load) else "") for name, effect in zip(names, effects, strict=True)
+    ]
+    for i, (name, on) in enumerate(acting):
+        if (name, on) in acting[:i]:
+            again = f'"{name}" on "{on}" a second time' if on else f'"{name}" a second time'
+            raise InputError(join(place, f"effect[{i}].name"), again, "every effect once")
 
 
 def _effect(table: Any, place: str, kind: type[Record]) -> Record:
@@ -162,13 +169,15 @@ def _check_names(scene: Scene) -> None:
     bones = [bone.name for bone in scene.bone]
     attachments = [attachment.name for attachment in scene.attachment]
     _check_once(bones, join(scene.place, "bone"))
-    _check_once(attachments, join(scene.place, "attachment"))
+    _check_once([*attachments, FREE], join(scene.place, "attachment"))
     reference, *others = _candidate_names(scene)
     candidates = [reference, "candidates", *others]
     traced = scene.fibres.traced
     ends = [(f"fibres.traced.{end}", getattr(traced, end)) for end in ("start", "end") if traced]
     _check_used(bones, [(f"attachment[{i}].bone", entry.bone) for i, entry in enumerate(scene.attachment)], scene.place)
     _check_used(attachments, ends, scene.place)
+    loads = [(f"effect[{i}].on", effect.on) for i, effect in enumerate(scene.effects) if isinstance(effect, Load)]
+    _check_used([*attachments, FREE], loads, scene.place)
     _check_used(candidates, [(f"expect[{i}].of", entry.of) for i, entry in enumerate(scene.expect)], scene.place)
 
 

@@ -11,16 +11,16 @@ from pathlib import Path
 from typing import Any
 
 from fem_reference import __version__, casefile, field_verbs, files, judge, metrics, report, runs, solvers
-from fem_reference.comparison import Comparison, compare
+from fem_reference.comparison import compare
 from fem_reference.errors import InputError, MissingSoftware
 from fem_reference.execution import Bench, complete
 from fem_reference.field.scene import FieldScene
 from fem_reference.field_execution import FieldBench
 from fem_reference.field_verbs import Told
-from fem_reference.overview import field_scene_facts, scene_facts
+from fem_reference.overview import comparison_text, field_scene_facts, run_facts, run_text, scene_facts
 from fem_reference.records import parse
-from fem_reference.runs import Run
 from fem_reference.scene import Candidate, Scene, SolverChoice
+from fem_reference.verification.verb import verify
 
 DONE, VERDICT_FAIL, BAD_INPUT, SOLVER_FAILED = range(4)
 INTERRUPTED, TERMINATED = 130, 143  # what shells report for them
@@ -108,6 +108,11 @@ def _parser() -> argparse.ArgumentParser:
     page.add_argument(
         "name", metavar="NAME", choices=sorted(field_verbs.PAGES), help=f"one of {', '.join(sorted(field_verbs.PAGES))}"
     )
+    catalogue = add("verify", _verify, "measure problems whose answers are known and write the page", case=False)
+    known = "an entry, a family or a shell pattern of them (default: all)"
+    catalogue.add_argument("names", metavar="NAME", nargs="*", help=known)
+    spoil = "measure this entry with its one thing wrong, named or not: it must fail; may be repeated"
+    catalogue.add_argument("--spoil", action="append", default=[], metavar="NAME", help=spoil)
     add("list", _list, "what there is: cases, solvers, metrics, stored runs", case=False)
     add("show", _show, "what a case is made of; with --out also its meshes for ParaView")
     return parser
@@ -153,7 +158,7 @@ def _run(options: argparse.Namespace) -> int:
         return _judge(scene, options, [])
     bench = Bench(scene, _out(options) / "runs", options.ranks)
     run = bench.obtain(options.solver, _choice(scene, options.solver), f"--solver {options.solver}")
-    _tell(_run_facts(scene, run), _run_text(run), options)
+    _tell(run_facts(scene, run), run_text(run), options)
     return DONE if run.outcome.status == "converged" else SOLVER_FAILED
 
 
@@ -168,7 +173,7 @@ def _scene(options: argparse.Namespace) -> Scene | FieldScene:
 
 
 def _told(told: Told, options: argparse.Namespace) -> int:
-    """Tell what came of scalar cases; returns the exit status."""
+    """Tell what came of scalar cases or of a verification; returns the exit status."""
     _tell(told.facts, told.text, options)
     if told.word == "failed":
         return SOLVER_FAILED
@@ -177,6 +182,10 @@ def _told(told: Told, options: argparse.Namespace) -> int:
 
 def _page(options: argparse.Namespace) -> int:
     return _told(field_verbs.page(options.name, _out(options)), options)
+
+
+def _verify(options: argparse.Namespace) -> int:
+    return _told(verify(options.names, options.spoil, _out(options)), options)
 
 
 def _judge(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
@@ -197,7 +206,7 @@ def _judge(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candida
     candidates = tuple(complete((read | solved)[entry.name], numbers) for entry, _ in chosen)
     result = compare(scene, bench.setup(), complete(reference, numbers), candidates)
     page = report.write(result, _out(options) / scene.name)
-    _tell(report.summary(result), _comparison_text(result, page), options)
+    _tell(report.summary(result), comparison_text(result, page), options)
     if any(run.outcome.status != "converged" for run in (reference, *candidates)):
         return SOLVER_FAILED
     return VERDICT_FAIL if result.word == "fail" else DONE
@@ -210,41 +219,6 @@ def _checked_bench(scene: Scene, options: argparse.Namespace, chosen: list[tuple
     for choice, place in [(scene.reference, "reference"), *chosen]:
         bench.settings(choice, place)
     return bench
-
-
-def _comparison_text(result: Comparison, page: Path) -> str:
-    runs = [
-        f"{run.name}: {run.outcome.status}, {run.outcome.message}" for run in (result.reference, *result.candidates)
-    ]
-    judged = [
-        f"{verdict.word}: {verdict.expectation.of} {verdict.expectation.metric} {verdict.expectation.statistic} at frame "
-        f"{verdict.frame} is {verdict.value:.4g} {verdict.unit}, expected {verdict.truth:.4g} within {verdict.within:.4g}"
-        for verdict in result.verdicts
-    ]
-    worst = [
-        f"{name}: {measure.metric} {measure.statistic} up to {measure.values[measure.worst]:.4g} {measure.unit}"
-        f" at frame {result.reference.numbers[measure.worst]}"
-        for name, measures in result.deviations.items()
-        for measure in measures
-    ]
-    return "\n".join([*runs, *worst, *judged, f"verdict: {result.word}", f"page: {page}"])
-
-
-def _run_facts(scene: Scene, run: Run) -> dict[str, Any]:
-    return {
-        "case": scene.name,
-        "solver": run.solver,
-        "status": run.outcome.status,
-        "message": run.outcome.message,
-        "verdict": "not judged",
-        "cost": {run.name: run.outcome.cost},
-        "measures": [],
-        "folder": str(run.folder),
-    }
-
-
-def _run_text(run: Run) -> str:
-    return f"{run.name}: {run.outcome.status}, {run.outcome.message}\nstored in {run.folder}"
 
 
 def _list(options: argparse.Namespace) -> int:

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from fem_reference.effects import Effect
+from fem_reference.errors import InputError
 from fem_reference.mesh import Floats, Ints
 from fem_reference.runs import Outcome
 
@@ -25,6 +26,25 @@ ELEMENTS: dict[str, tuple[Kind, int, int | None]] = {
     "Q1/P0": ("hexahedron", 1, 0),
     "Q2/Q1": ("hexahedron", 2, 1),
 }
+
+
+def check(body: "Continuum", element: str) -> None:
+    """InputError unless ``element`` is one for the cells of ``body``, and has a pressure if and only if its effects bring one."""
+    if element not in ELEMENTS:
+        raise InputError("element", f'"{element}"', f"one of {', '.join(ELEMENTS)}")
+    kind, _, pressure = ELEMENTS[element]
+    if kind != body.mesh.kind:
+        fitting = [name for name, (other, *_) in ELEMENTS.items() if other == body.mesh.kind]
+        raise InputError("element", f'"{element}"', f"one for a {body.mesh.kind}: {', '.join(fitting)}")
+    brings = any("pressure" in effect.unknowns for effect in body.effects)
+    if brings != (pressure is not None):
+        want = (
+            "with a pressure, which the effect incompressible brings"
+            if brings
+            else "without a pressure, which no effect brings"
+        )
+        fitting = [name for name, (other, _, p) in ELEMENTS.items() if other == kind and (p is not None) == brings]
+        raise InputError("element", f'"{element}"', f"one {want}: {', '.join(fitting)}")
 
 
 def reference_nodes(kind: Kind, degree: int) -> Floats:
@@ -106,5 +126,7 @@ class Solved:
 
     @property
     def last(self) -> Reached:
-        """The last state that was reached."""
+        """The last state; ArithmeticError with the reason where not all were reached."""
+        if self.outcome.status != "converged":
+            raise ArithmeticError(f"{self.outcome.status}: {self.outcome.message}")
         return self.states[-1]

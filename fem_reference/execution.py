@@ -102,7 +102,7 @@ class Bench:
             "scene": self.scene.key,
             "solver": solver,
             "settings": settings.model_dump(mode="json"),
-            "effects": {type(effect).__name__: effect.model_dump(mode="json") for effect in self.scene.effects},
+            "effects": {effect.title: effect.model_dump(mode="json") for effect in self.scene.effects},
             "fem_reference": __version__,
             "code": code_hash(),
             "versions": versions(),

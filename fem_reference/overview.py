@@ -2,8 +2,10 @@
 
 import math
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
+from fem_reference.comparison import Comparison
 from fem_reference.effects import Effect
 from fem_reference.field.example import Example, FieldMeasure, FieldVerdict
 from fem_reference.field.problem import FieldProblem
@@ -13,7 +15,8 @@ from fem_reference.judge import overall
 from fem_reference.mesh import enclosed_volume, vertex_areas
 from fem_reference.motion import Rotation
 from fem_reference.problem import Setup
-from fem_reference.report.page import effect_parameters
+from fem_reference.report.words import exact
+from fem_reference.runs import Run
 from fem_reference.scene import Scene
 
 
@@ -37,7 +40,7 @@ def scene_facts(scene: Scene, setup: Setup) -> dict[str, Any]:
             held.attachment: f"{len(held.vertices)} vertices, {areas[held.vertices].sum():.0f} mm2, held by {held.bone.name}"
             for held in setup.held
         },
-        "effects": {type(effect).__name__: _parameters(effect) for effect in scene.effects},
+        "effects": {effect.title: _parameters(effect) for effect in scene.effects},
         "frames": f"{scene.frames.first} to {scene.frames.last}, every {scene.frames.every}",
         "reference": scene.reference.solver,
         "candidates": {candidate.name: candidate.solver for candidate in scene.candidate},
@@ -49,7 +52,7 @@ def scene_facts(scene: Scene, setup: Setup) -> dict[str, Any]:
 
 
 def _parameters(effect: Effect) -> dict[str, str]:
-    return {name: f"{value:g} {unit}" for name, value, unit in effect_parameters(effect)}
+    return {name: f"{exact(value)} {unit}".rstrip() for name, value, unit in effect.parameters}
 
 
 def _motion(motion: Rotation | None) -> str:
@@ -142,3 +145,41 @@ def field_example_facts(example: Example) -> dict[str, Any]:
 
 def _number(value: float | None) -> str:
     return "not a number" if value is None else f"{value:.6g}"
+
+
+def comparison_text(result: Comparison, page: Path) -> str:
+    """What came of a comparison, line by line: its runs, its worst numbers, its verdicts and its ``page``."""
+    runs = [
+        f"{run.name}: {run.outcome.status}, {run.outcome.message}" for run in (result.reference, *result.candidates)
+    ]
+    judged = [
+        f"{verdict.word}: {verdict.expectation.of} {verdict.expectation.metric} {verdict.expectation.statistic} at frame "
+        f"{verdict.frame} is {verdict.value:.4g} {verdict.unit}, expected {verdict.truth:.4g} within {verdict.within:.4g}"
+        for verdict in result.verdicts
+    ]
+    worst = [
+        f"{name}: {measure.metric} {measure.statistic} up to {measure.values[measure.worst]:.4g} {measure.unit}"
+        f" at frame {result.reference.numbers[measure.worst]}"
+        for name, measures in result.deviations.items()
+        for measure in measures
+    ]
+    return "\n".join([*runs, *worst, *judged, f"verdict: {result.word}", f"page: {page}"])
+
+
+def run_facts(scene: Scene, run: Run) -> dict[str, Any]:
+    """What came of a run that nothing was compared with."""
+    return {
+        "case": scene.name,
+        "solver": run.solver,
+        "status": run.outcome.status,
+        "message": run.outcome.message,
+        "verdict": "not judged",
+        "cost": {run.name: run.outcome.cost},
+        "measures": [],
+        "folder": str(run.folder),
+    }
+
+
+def run_text(run: Run) -> str:
+    """The same in words."""
+    return f"{run.name}: {run.outcome.status}, {run.outcome.message}\nstored in {run.folder}"

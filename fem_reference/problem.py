@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fem_reference import files
+from fem_reference.continuum import Cells, Continuum, Prescribed
 from fem_reference.effects import Effect
 from fem_reference.errors import InputError
 from fem_reference.geometry.attachments import facets_under, pick
@@ -21,6 +22,7 @@ from fem_reference.mesh import (
     Polylines,
     Surface,
     TetMesh,
+    boundary,
     check_closed,
     check_finite,
     fingerprint,
@@ -29,7 +31,7 @@ from fem_reference.mesh import (
     triangle_areas,
     vertex_areas,
 )
-from fem_reference.motion import Rotation
+from fem_reference.motion import Rotation, apply
 from fem_reference.records import join
 from fem_reference.scene import Scene
 
@@ -82,6 +84,31 @@ class Problem(Setup):
     fibres: Polylines
     mesh_facts: dict[str, float | str]
     seconds: float
+
+
+@dataclass(frozen=True)
+class Follows:
+    """The displacement of what ``bone`` holds."""
+
+    bone: Body
+
+    def __call__(self, points: Floats, frame: float) -> Floats:
+        """The displacement (n, 3) [mm] of rest points (n, 3) at a frame number."""
+        return apply(self.bone.pose(frame), points) - points
+
+
+def as_continuum(problem: Problem) -> Continuum:
+    """The muscle as a body: its bones prescribe where the facets that they hold are; the rest of its skin is ``"free"``."""
+    mesh = problem.mesh
+    held = np.concatenate([np.sort(mesh.facets[entry.attachment], axis=1) for entry in problem.held])
+    skin, _ = boundary(mesh.tets)
+    taken = {tuple(facet) for facet in held.tolist()}
+    free = skin[[tuple(facet) not in taken for facet in np.sort(skin, axis=1).tolist()]]
+    cells = Cells(mesh.points, mesh.tets, "tetrahedron", 1, {**mesh.facets, "free": free})
+    prescribed = tuple(
+        Prescribed(entry.attachment, entry.attachment, (0, 1, 2), Follows(entry.bone)) for entry in problem.held
+    )
+    return Continuum(cells, problem.effects, prescribed, problem.frames)
 
 
 def setup(scene: Scene) -> Setup:

@@ -1,4 +1,4 @@
-"""Text with a unit -> a number in mm, N, MPa, s, rad: the only place where a unit is text.
+"""Text with a unit -> a number in mm, N, MPa, s, rad, tonne: the only place where a unit is text.
 
 The annotated types are what scene records are made of: a field of type ``Pressure`` takes ``"30 kPa"`` and holds 0.03.
 """
@@ -6,6 +6,7 @@ The annotated types are what scene records are made of: a field of type ``Pressu
 import math
 import re
 import sys
+from collections.abc import Sequence
 from functools import cache, partial
 from typing import Annotated
 
@@ -19,10 +20,14 @@ _INSIDE = {
     "a pressure": "MPa",
     "a fraction": "",
     "a time": "s",
-    "a volume": "mm**3",
+    "a volume": "mm^3",
+    "a density": "tonne/mm^3",
+    "an acceleration": "mm/s^2",
 }
 # A number, then what may be a unit.
 _NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.ASCII)
+# Where an exponent follows a unit without a sign for it, as in m3.
+_EXPONENT = re.compile(r"(?<=[A-Za-z])(?=[23](?!\w))")
 
 
 @cache
@@ -40,6 +45,7 @@ def quantity(text: object, kind: str) -> float:
     """
     wrong = ValueError(f"{kind} with its unit, such as {_EXAMPLE[kind]}")
     number, unit = _split(text)
+    unit = _EXPONENT.sub("^", unit)
     if not number or (kind == "a fraction" and unit not in ("", "%", "percent")):
         raise wrong
     try:
@@ -66,17 +72,29 @@ _EXAMPLE = {
     "a fraction": '"0.5 %"',
     "a time": '"0.01 s"',
     "a volume": '"3 ml"',
+    "a density": '"1060 kg/m3"',
+    "an acceleration": '"9.81 m/s^2"',
+}
+_EXAMPLE_OF_THREE = {
+    "a length": '"146, 238, -431 mm"',
+    "a pressure": '"0, 6.25, 0 kPa"',
+    "an acceleration": '"0, 0, -9.81 m/s^2"',
 }
 
 
-def point(text: object) -> tuple[float, float, float]:
-    """Three lengths that share one unit: ``"146, 238, -431 mm"`` -> (146.0, 238.0, -431.0) [mm]."""
+def three(text: object, kind: str) -> tuple[float, float, float]:
+    """Three quantities of ``kind`` that share one unit.
+
+    >>> three("146, 238, -431 mm", "a length"), three("0, 6.25, 0 kPa", "a pressure")
+    ((146.0, 238.0, -431.0), (0.0, 0.00625, 0.0))
+    """
     parts = [_split(part) for part in text.split(",")] if isinstance(text, str) else []
     shared = parts[-1][1] if parts else ""
     try:
-        x, y, z = (quantity(f"{number} {shared}", "a length") for number, unit in parts if unit in ("", shared))
+        x, y, z = (quantity(f"{number} {shared}", kind) for number, unit in parts if unit in ("", shared))
     except ValueError as error:
-        raise ValueError('three lengths with one unit, such as "146, 238, -431 mm"') from error
+        noun = kind.split()[1]
+        raise ValueError(f"three {noun}s with one unit, such as {_EXAMPLE_OF_THREE[kind]}") from error
     return x, y, z
 
 
@@ -87,20 +105,32 @@ def length_unit(text: object) -> float:
     return quantity(f"1 {text}", "a length")
 
 
-def _positive(value: float) -> float:
+def positive(text: object, kind: str) -> float:
+    """A :func:`quantity` above zero."""
+    value = quantity(text, kind)
     if not value >= sys.float_info.min:  # below it numbers lose their digits
         raise ValueError("more than zero")
     return value
 
 
-def _kind(kind: str) -> BeforeValidator:
-    return BeforeValidator(partial(quantity, kind=kind))
-
-
-Length = Annotated[float, _kind("a length")]
-PositiveLength = Annotated[float, BeforeValidator(lambda text: _positive(quantity(text, "a length")))]
-Angle = Annotated[float, _kind("an angle")]
-PositivePressure = Annotated[float, BeforeValidator(lambda text: _positive(quantity(text, "a pressure")))]
-Time = Annotated[float, BeforeValidator(lambda text: _positive(quantity(text, "a time")))]
-Point = Annotated[tuple[float, float, float], BeforeValidator(point)]
+Length = Annotated[float, BeforeValidator(partial(quantity, kind="a length"))]
+PositiveLength = Annotated[float, BeforeValidator(partial(positive, kind="a length"))]
+Angle = Annotated[float, BeforeValidator(partial(quantity, kind="an angle"))]
+Pressure = Annotated[float, BeforeValidator(partial(quantity, kind="a pressure"))]
+PositivePressure = Annotated[float, BeforeValidator(partial(positive, kind="a pressure"))]
+PressureVector = Annotated[tuple[float, float, float], BeforeValidator(partial(three, kind="a pressure"))]
+Density = Annotated[float, BeforeValidator(partial(positive, kind="a density"))]
+AccelerationVector = Annotated[tuple[float, float, float], BeforeValidator(partial(three, kind="an acceleration"))]
+Time = Annotated[float, BeforeValidator(partial(positive, kind="a time"))]
+Point = Annotated[tuple[float, float, float], BeforeValidator(partial(three, kind="a length"))]
 LengthUnit = Annotated[float, BeforeValidator(length_unit)]
+
+
+def unit_of(metadata: Sequence[object]) -> str:
+    """The unit inside of a field with the ``metadata`` of a type of this module; empty where it has none.
+
+    >>> unit_of(Density.__metadata__), unit_of(())
+    ('tonne/mm^3', '')
+    """
+    readers = [entry.func for entry in metadata if isinstance(entry, BeforeValidator)]
+    return next((_INSIDE[reader.keywords["kind"]] for reader in readers if isinstance(reader, partial)), "")

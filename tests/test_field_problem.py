@@ -183,7 +183,7 @@ def spoken(capsys, *arguments: str) -> tuple[int, str, str]:
         (["run", "rod", "--set", "expect[0].measure=beauty"], 'expect[0].measure: got "beauty", want one of'),
         (["run", "rod", "--set", "expect[0].of=nobody"], 'expect[0].of: got "nobody", want one of reference'),
         (["run", "rod", "--set", "effect[0].name=neo_hooke"], 'got "neo_hooke", want one of advection, diffusion'),
-        (["run", "hip_flexion", "--set", "effect[0].name=diffusion"], 'got "diffusion", want one of incompressible'),
+        (["run", "hip_flexion", "--set", "effect[0].name=diffusion"], 'got "diffusion", want one of active_tension'),
         (["compare", "rod", "--candidate", "magic"], '--candidate: got "magic", want one of fenicsx, listing'),
     ],
 )

@@ -1,4 +1,4 @@
-"""The built wheel: it carries cases and meshes, and works where no checkout is near."""
+"""The built wheel: it carries cases, meshes and truths, and works where no checkout is near."""
 
 import subprocess
 import sys
@@ -30,7 +30,7 @@ def call(installed: Path, folder: Path, *words: str) -> subprocess.CompletedProc
 
 
 def test_carries_everything_that_is_shipped(installed) -> None:
-    for top in ("cases", "meshes"):
+    for top in ("cases", "meshes", "validation"):
         for path in (ROOT / top).rglob("*"):
             if path.is_file() and "__pycache__" not in path.parts:
                 assert (installed / "fem_reference" / path.relative_to(ROOT)).read_bytes() == path.read_bytes()
@@ -47,3 +47,9 @@ def test_solves_outside_the_checkout(installed, tmp_path) -> None:
     done = call(installed, tmp_path, "run", "hip_flexion", "--solver", "pbd", "--out", "here")
     assert done.returncode == 0, done.stderr
     assert list((tmp_path / "here" / "runs" / "hip_flexion").glob("pbd-*/run.json"))
+
+
+def test_finds_its_truths_outside_the_checkout(installed, tmp_path) -> None:
+    done = call(installed, tmp_path, "verify", "nobody")
+    assert done.returncode == 2, done.stderr
+    assert 'got "nobody", want an entry' in done.stderr

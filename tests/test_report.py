@@ -320,7 +320,8 @@ def test_least_of_nothing_known_is_not_a_number():
 
 
 def test_effects_are_told_with_their_units(comparison):
-    assert page.effect_parameters(comparison.scene.effects[0]) == [("mu", 0.01, "MPa")]
+    assert comparison.scene.effects[0].parameters == [("mu", 0.01, "MPa")]
+    assert "<tr><th>NeoHooke</th><td>mu = 0.01 MPa</td></tr>" in page.render(comparison)
 
 
 def test_time_per_frame_counts_the_frames_that_were_reached(comparison):

@@ -93,6 +93,8 @@ because = "it is compressible then"
 OPTIONAL = ("interval", "newton_iterations", "stretch")
 NEEDED = list(dict.fromkeys(line for line in SCENE.splitlines() if " = " in line and not line.startswith(OPTIONAL)))
 FILES = ("bar.ply", "wall.ply", "lever.ply", "end.csv")
+COURSE = [{"frame": 0, "amount": 0}, {"frame": 10, "amount": 1}]
+PRESSURE = {"name": "pressure", "on": "free", "pressure": "1 kPa", "course": COURSE}
 POLYLINES = {"file": "fibres.vtk", "unit": "mm"}
 OUTLINE = {"file": "marks.csv", "unit": "mm", "clouds": ["a", "b"], "reach": "3 mm"}
 
@@ -138,6 +140,13 @@ def test_folder_and_file_are_the_same_scene(bar: Path) -> None:
     assert casefile.read(bar) == casefile.read(bar / "case.toml") == casefile.read(str(bar))
 
 
+def test_loads_of_a_kind_act_on_different_parts(bar: Path) -> None:
+    tables = [{"name": "neo_hooke", "mu": "1 kPa"}, PRESSURE, PRESSURE | {"on": "end"}]
+    scene = changed(bar, "effect", tables)
+    assert [effect.title for effect in scene.effects] == ["NeoHooke", "Pressure on free", "Pressure on end"]
+    assert scene.key != changed(bar, "effect", tables[:2]).key
+
+
 def test_candidates_may_be_none(bar: Path) -> None:
     start, end = SCENE.index("[[candidate]]"), SCENE.index("[[expect]]")
     assert casefile.read(edited(bar, SCENE[start:end], "")).candidate == ()
@@ -152,11 +161,14 @@ WRONG = [
     ("muscle.tet_size", 2.0, "muscle.tet_size: got 2.0, want a length"),
     ("effect[0].mu", "30 mm", 'effect[0].mu: got "30 mm", want a pressure with its unit, such as "30 kPa"'),
     ("effect[0].mu", "-30 kPa", 'effect[0].mu: got "-30 kPa", want more than zero'),
-    ("effect[0].name", "hooke", 'effect[0].name: got "hooke", want one of incompressible, neo_hooke'),
-    ("effect", ["hooke"], 'effect[0].name: got "hooke", want one of incompressible, neo_hooke'),
+    ("effect[0].name", "hooke", 'effect[0].name: got "hooke", want one of active_tension, fibre_active'),
+    ("effect", ["hooke"], 'effect[0].name: got "hooke", want one of active_tension, fibre_active'),
     ("effect", "hooke", 'effect: got "hooke", want'),
     ("effect", [], "effect: got [], want"),
     ("effect[1]", {"name": "neo_hooke", "mu": "1 kPa"}, 'effect[1].name: got "neo_hooke" a second time, want every'),
+    ("effect[1]", PRESSURE | {"on": "top"}, 'effect[1].on: got "top", want one of start, end, free'),
+    ("effect", [PRESSURE, PRESSURE], 'effect[1].name: got "pressure" on "free" a second time, want every effect once'),
+    ("attachment[0].name", "free", 'attachment: got the name "free" twice, want every name once'),
     ("bone[1].motion.axis", [0, 0, 0], "bone[1].motion.axis: got [0, 0, 0], want an axis that is not zero"),
     ("bone[1].motion.axis", [1e-320, 0, 0], "bone[1].motion.axis: got [1e-320, 0, 0], want an axis that is not zero"),
     ("bone[1].motion.axis", [1e200, 0, 0], "want an axis that is not zero, with a length from 1e-9 to 1e9"),

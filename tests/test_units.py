@@ -1,4 +1,4 @@
-"""Text with a unit becomes a number in mm, MPa, s, rad, and text that is no such quantity is refused.
+"""Text with a unit becomes a number in mm, MPa, s, rad, tonne, and text that is no such quantity is refused.
 
 Conversions are powers of ten and pi / 180, so that only rounding separates them from the numbers here.
 """
@@ -7,7 +7,8 @@ import math
 
 import pytest
 
-from fem_reference.units import length_unit, point, quantity
+from fem_reference import units
+from fem_reference.units import length_unit, quantity, three, unit_of
 
 
 @pytest.mark.parametrize(
@@ -24,6 +25,13 @@ from fem_reference.units import length_unit, point, quantity
         ("0.5", "a fraction", 0.5),
         ("10 ms", "a time", 0.01),
         ("3 ml", "a volume", 3000.0),
+        ("3 cm3", "a volume", 3000.0),
+        ("1060 kg/m3", "a density", 1.06e-9),
+        ("1.06 g/cm^3", "a density", 1.06e-9),
+        ("9.81 m/s^2", "an acceleration", 9810.0),
+        ("9.81 m/s2", "an acceleration", 9810.0),
+        ("2 N/mm2", "a pressure", 2.0),
+        ("10 cmH2O", "a pressure", 980.665e-6),
         ("1e1 mm", "a length", 10.0),
         (".5mm", "a length", 0.5),
         ("0.01", "a fraction", 0.01),
@@ -59,6 +67,10 @@ def test_quantity_is_in_inside_units(text: str, kind: str, value: float) -> None
         ("1 deg", "a fraction"),
         ("1 rad^2", "an angle"),
         ("1 kPa*rad", "a pressure"),
+        ("1060 kg", "a density"),
+        ("1060", "a density"),
+        ("9.81 m/s", "an acceleration"),
+        ("1 m23", "a length"),
     ],
 )
 def test_quantity_refuses_what_is_none(text: object, kind: str) -> None:
@@ -66,10 +78,12 @@ def test_quantity_refuses_what_is_none(text: object, kind: str) -> None:
         quantity(text, kind)
 
 
-def test_point_shares_one_unit() -> None:
-    assert point("1, -2, 3.5 cm") == pytest.approx((10.0, -20.0, 35.0), rel=1e-14)
-    assert point("1,2,3cm") == pytest.approx((10.0, 20.0, 30.0), rel=1e-14)
-    assert point("1 cm, 2 cm, 3 cm") == pytest.approx((10.0, 20.0, 30.0), rel=1e-14)
+def test_three_share_one_unit() -> None:
+    assert three("1, -2, 3.5 cm", "a length") == pytest.approx((10.0, -20.0, 35.0), rel=1e-14)
+    assert three("1,2,3cm", "a length") == pytest.approx((10.0, 20.0, 30.0), rel=1e-14)
+    assert three("1 cm, 2 cm, 3 cm", "a length") == pytest.approx((10.0, 20.0, 30.0), rel=1e-14)
+    assert three("0, 6.25, 0 kPa", "a pressure") == pytest.approx((0.0, 0.00625, 0.0), rel=1e-14)
+    assert three("0, 0, -9.81 m/s2", "an acceleration") == pytest.approx((0.0, 0.0, -9810.0), rel=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -87,9 +101,42 @@ def test_point_shares_one_unit() -> None:
         "nan, 2, 3 mm",
     ],
 )
-def test_point_refuses_what_is_none(text: object) -> None:
+def test_three_refuses_what_are_none(text: object) -> None:
     with pytest.raises(ValueError, match=r'^three lengths with one unit, such as "146, 238, -431 mm"$'):
-        point(text)
+        three(text, "a length")
+
+
+@pytest.mark.parametrize(
+    ("kind", "want"),
+    [
+        ("a pressure", r'three pressures with one unit, such as "0, 6\.25, 0 kPa"'),
+        ("an acceleration", r'three accelerations with one unit, such as "0, 0, -9\.81 m/s\^2"'),
+    ],
+)
+def test_three_names_its_kind(kind: str, want: str) -> None:
+    with pytest.raises(ValueError, match=f"^{want}$"):
+        three("1, 2, 3 mm", kind)
+
+
+def test_types_say_their_unit() -> None:
+    told = {
+        name: unit_of(kind.__metadata__)
+        for name, kind in vars(units).items()
+        if hasattr(kind, "__metadata__") and kind is not units.LengthUnit
+    }
+    assert told == {
+        "Length": "mm",
+        "PositiveLength": "mm",
+        "Angle": "rad",
+        "Pressure": "MPa",
+        "PositivePressure": "MPa",
+        "PressureVector": "MPa",
+        "Density": "tonne/mm^3",
+        "AccelerationVector": "mm/s^2",
+        "Time": "s",
+        "Point": "mm",
+    }
+    assert unit_of(units.LengthUnit.__metadata__) == ""
 
 
 def test_length_unit() -> None:

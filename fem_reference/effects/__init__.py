@@ -21,6 +21,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from fem_reference.records import Record
+from fem_reference.units import unit_of
 
 
 class Functions(Protocol):
@@ -72,7 +73,7 @@ class State:
     F: Sequence[Sequence[Any]]
     displacement: Sequence[Any] = (0.0, 0.0, 0.0)
     pressure: Any = None
-    fibre: Sequence[Any] | None = None
+    fibre: Any = None
     amount: Any = 1.0
     functions: Functions = field(default_factory=Numpy)
 
@@ -111,12 +112,25 @@ class State:
         """``direction . C direction``: the squared stretch of a line along the unit vector ``direction`` (3,) at rest."""
         return sum(sum(F * a for F, a in zip(row, direction, strict=True)) ** 2 for row in self.F)
 
+    @property
+    def fibre_stretch(self) -> Any:
+        """``J^(-1/3) |F fibre|``: how far the fibre is stretched, without its share in the change of volume."""
+        return self.J ** (-1 / 3) * self.functions.sqrt(self.square_stretch(self.fibre))
+
+    def between(self, low: Any, high: Any, x: Any) -> Any:
+        """``x``, or the bound that it lies beyond."""
+        above = self.functions.above
+        return above(x, high, high, above(x, low, x, low))
+
 
 class Knot(Record):
     """How much of an effect acts at a frame number."""
 
     frame: float
     amount: float
+
+    def __str__(self) -> str:
+        return f"{self.amount:g} at frame {self.frame:g}"
 
 
 class Effect(Record):
@@ -131,6 +145,16 @@ class Effect(Record):
     def amount(self, frame: float) -> float:  # noqa: ARG002
         """How much of it acts at a frame: all of it, unless it has a course."""
         return 1.0
+
+    @property
+    def title(self) -> str:
+        """What it is called beside the other effects of a scene."""
+        return type(self).__name__
+
+    @property
+    def parameters(self) -> list[tuple[str, Any, str]]:
+        """Name, value and unit of each parameter."""
+        return [(name, getattr(self, name), unit_of(entry.metadata)) for name, entry in type(self).model_fields.items()]
 
 
 class Coursed(Effect):
@@ -162,6 +186,11 @@ class Load(Effect):
     """An effect that pushes or pulls on a part of the surface; ``on`` names it."""
 
     on: str
+
+    @property
+    def title(self) -> str:
+        """What it is called beside the other effects of a scene, other loads of its kind among them."""
+        return f"{type(self).__name__} on {self.on}"
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:
         """Force per rest area [MPa], (3,), where ``normal`` (3,) is the outward unit normal at rest."""

@@ -6,10 +6,11 @@ from pathlib import Path
 from fem_reference import files
 from fem_reference.comparison import Comparison
 from fem_reference.field.example import Example
-from fem_reference.report import field_page, page
+from fem_reference.report import field_page, page, verify_page
 from fem_reference.report.tables import as_csv, summary
+from fem_reference.report.verify_page import Verification
 
-__all__ = ["summary", "write", "write_examples"]
+__all__ = ["summary", "write", "write_examples", "write_verification"]
 
 
 def write(comparison: Comparison, folder: Path) -> Path:
@@ -34,3 +35,15 @@ def write_examples(title: str, examples: tuple[Example, ...], path: Path, *, dif
     text = field_page.render(title, examples, differences)
     path.parent.mkdir(parents=True, exist_ok=True)
     files.write_text(path, text)
+
+
+def write_verification(verification: Verification, folder: Path) -> Path:
+    """Write ``verify.json`` and ``verify.html`` into ``folder``; the path of the page."""
+    texts = {
+        "verify.json": json.dumps(verify_page.facts(verification), indent=1, allow_nan=False),
+        "verify.html": verify_page.render(verification),
+    }
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in texts.items():
+        files.write_text(folder / name, text)
+    return folder / "verify.html"

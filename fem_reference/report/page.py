@@ -6,15 +6,14 @@ import math
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.colors import to_hex
 
-from fem_reference import casefile, units
+from fem_reference import casefile
 from fem_reference.comparison import Comparison
-from fem_reference.effects import Effect
 from fem_reference.errors import InputError, MissingSoftware
 from fem_reference.metrics import Measure
 from fem_reference.report import gallery, pictures
@@ -35,12 +34,6 @@ COLUMNS = (
     ("surface_deviation", "max", "Surface", "worst vertex", "mm"),
     ("surface_deviation", "hausdorff", "Surface", "Hausdorff", "mm"),
 )
-_UNITS = {
-    "mm": (units.Length, units.PositiveLength),
-    "rad": (units.Angle,),
-    "MPa": (units.PositivePressure,),
-    "s": (units.Time,),
-}
 
 
 @dataclass(frozen=True)
@@ -78,7 +71,6 @@ def render(comparison: Comparison) -> str:
         ticks=ticks,
         curves=curves(comparison),
         costs=_costs(comparison),
-        effects=[(type(effect).__name__, effect_parameters(effect)) for effect in comparison.scene.effects],
         changes=_changes(comparison.scene),
         origins=[(run, _flat(run.origin)) for run in runs(comparison)],
         scene_text=_scene_text(comparison.scene),
@@ -124,19 +116,6 @@ def ticks(top: float) -> list[tuple[float, float]]:
     step = next(power * factor for factor in (1, 2, 5, 10) if top / (power * factor) <= 6)
     values = [k * step for k in range(int(top / step) + 1) if k * step < 0.86 * top]
     return [(round(value / top, 3), value) for value in values] + [(1.0, top)]
-
-
-def effect_parameters(effect: Effect) -> list[tuple[str, float, str]]:
-    """Name, value and unit of each parameter of an effect."""
-    return [(name, getattr(effect, name), _unit(field.metadata)) for name, field in type(effect).model_fields.items()]
-
-
-def _unit(metadata: list[Any]) -> str:
-    """The unit that numbers of an annotated type of ``units`` have inside."""
-    for unit, kinds in _UNITS.items():
-        if any(get_args(kind)[1] in metadata for kind in kinds):
-            return unit
-    return ""
 
 
 def _sentence(comparison: Comparison) -> str:

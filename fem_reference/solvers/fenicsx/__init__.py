@@ -14,41 +14,34 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import Field
 
 from fem_reference.children import command
+from fem_reference.continuum import check
 from fem_reference.errors import MissingSoftware
 from fem_reference.geometry.embedding import Locator
 from fem_reference.mesh import Floats, Ints
 from fem_reference.motion import apply
-from fem_reference.problem import Problem
-from fem_reference.records import Record
+from fem_reference.problem import Problem, as_continuum
 from fem_reference.runs import Frame, Outcome, Sink
 from fem_reference.solvers.fenicsx.field import FieldSettings, solve_field
+from fem_reference.solvers.fenicsx.jobs import Job
 from fem_reference.solvers.fenicsx.processes import require_installed, running
-from fem_reference.units import Time
+from fem_reference.solvers.fenicsx.session import session, solve_body
+from fem_reference.solvers.fenicsx.settings import BodySettings, Settings
 
-__all__ = ["FieldSettings", "Settings", "require", "solve", "solve_field"]
-
-
-class Settings(Record):
-    """Numerics of the reference; steps are in frame numbers.
-
-    ``first_step`` and ``smallest_step`` bound the load step: it grows by half after an easy step (at most 5 Newton iterations)
-    and is halved when Newton needs more than ``newton_iterations`` or an element inverts. ``residual`` [N, mm3] ends Newton's
-    iteration: the norm of out-of-balance nodal forces and of the volume equation. ``ranks``: MPI processes, by default two where
-    the machine has them; they change the time, not the answer.
-    """
-
-    first_step: float = Field(default=10.0, gt=0)
-    smallest_step: float = Field(default=0.02, gt=0)
-    newton_iterations: int = Field(default=14, gt=0)
-    residual: float = Field(default=1e-8, gt=0)
-    ranks: int | None = Field(default=None, gt=0)
-    time_limit: Time | None = None
+__all__ = [
+    "BodySettings",
+    "FieldSettings",
+    "Settings",
+    "require",
+    "session",
+    "solve",
+    "solve_body",
+    "solve_field",
+]
 
 
-def require(settings: Settings | FieldSettings) -> None:
+def require(settings: BodySettings | FieldSettings) -> None:
     """MissingSoftware where FEniCSx is not installed or the ranks wanted cannot be started."""
     require_installed()
     if isinstance(settings, Settings):
@@ -58,10 +51,13 @@ def require(settings: Settings | FieldSettings) -> None:
 def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
     """Solve every requested frame in worker processes; frames carry surface, fibres and tets."""
     require(settings)
+    body = as_continuum(problem)
+    check(body, settings.element)
     with tempfile.TemporaryDirectory(prefix="fem_reference-") as folder:
         job = Path(folder) / "job.pickle"
-        job.write_bytes(pickle.dumps((problem, settings, _samples(problem))))
-        return _run(_command(settings, job), settings, lambda frame: sink(_with_held(problem, frame)))
+        job.write_bytes(pickle.dumps(Job(body, settings, _samples(problem))))
+        outcome = _run(_command(settings, job), settings, lambda frame: sink(_with_held(problem, frame)))
+    return replace(outcome, cost={"seconds_mesh": problem.seconds} | outcome.cost)
 
 
 def _with_held(problem: Problem, frame: Frame) -> Frame:
@@ -85,7 +81,7 @@ def _with_held(problem: Problem, frame: Frame) -> Frame:
 def _samples(problem: Problem) -> dict[str, tuple[Ints, Floats]]:
     """Where displacement is wanted: by name, the tet of each point and the point at rest, as the tet's own map places it."""
     locator = Locator(problem.mesh)
-    wanted = {"tets": problem.mesh.points, "surface": problem.surface.points, "fibres": problem.fibres.points}
+    wanted = {"surface": problem.surface.points, "fibres": problem.fibres.points}
     return {name: (locator.embed(points).tets, np.asarray(points)) for name, points in wanted.items()}
 
 
@@ -118,6 +114,12 @@ def _run(command_line: list[str], settings: Settings, sink: Sink) -> Outcome:
 
 def _frame(event: dict[str, Any]) -> Frame:
     scalars = event["scalars"]
-    note = f"{scalars['newton_iterations']:.0f} Newton iterations, det F at least {scalars['min_det_F_quadrature']:.2g}"
+    smallest = min(scalars["min_det_F_quadrature"], scalars["min_det_F_vertices"])
+    note = f"{scalars['newton_iterations']:.0f} Newton iterations, det F at least {smallest:.2g}"
     with np.load(event["file"]) as arrays:
-        return Frame(event["frame"], arrays["surface"], arrays["fibres"], arrays["tets"], scalars, note)
+        pulls = {
+            name.replace("force ", "force_"): float(np.linalg.norm(arrays[name]))
+            for name in arrays
+            if name.startswith("force ")
+        }
+        return Frame(event["frame"], arrays["surface"], arrays["fibres"], arrays["nodes"], scalars | pulls, note)

@@ -6,7 +6,7 @@ import re
 import subprocess
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -63,6 +63,13 @@ class Worker:
         named = [line for line in self.errors if re.match(r"\w*(\.\w+)*(Error|Exception)\b", line)]
         return (named or self.errors or ["without a word"])[-1].strip()
 
+    def feed(self, line: str) -> None:
+        """Write a line to its standard input; one that died does not read it, which its ending tells."""
+        assert self.process.stdin is not None
+        with suppress(BrokenPipeError):
+            self.process.stdin.write(f"{line}\n")
+            self.process.stdin.flush()
+
     def stop(self) -> None:
         """End it for the time limit."""
         self.timed_out.set()
@@ -70,11 +77,11 @@ class Worker:
 
 
 @contextmanager
-def running(command_line: list[str], time_limit: float | None) -> Iterator[Worker]:
-    """The worker that ``command_line`` starts; it has ended when this does."""
+def running(command_line: list[str], time_limit: float | None, *, fed: bool = False) -> Iterator[Worker]:
+    """The worker that ``command_line`` starts; it has ended when this does. One that is ``fed`` reads lines from us until then."""
     process = subprocess.Popen(
         command_line,
-        stdin=subprocess.DEVNULL,
+        stdin=subprocess.PIPE if fed else subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -92,6 +99,9 @@ def running(command_line: list[str], time_limit: float | None) -> Iterator[Worke
     timer.start()
     try:
         yield worker
+        if process.stdin is not None:
+            with suppress(BrokenPipeError):
+                process.stdin.close()
         process.wait()
     finally:
         timer.cancel()
@@ -99,6 +109,6 @@ def running(command_line: list[str], time_limit: float | None) -> Iterator[Worke
             process.terminate()
             process.wait()
         listener.join()
-        for stream in (process.stdout, process.stderr):
+        for stream in (process.stdin, process.stdout, process.stderr):
             if stream is not None:
                 stream.close()

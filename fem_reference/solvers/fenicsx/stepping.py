@@ -22,7 +22,7 @@ class Attempt:
 class Reached:
     """A requested frame was reached, or (``failed``) could not be: steps, Newton iterations and cut-backs since the last one."""
 
-    frame: int
+    frame: float
     steps: int
     iterations: int
     cutbacks: int
@@ -31,7 +31,7 @@ class Reached:
 
 
 def march(
-    attempt: Callable[[float], Attempt], frames: tuple[int, ...], first_step: float, smallest_step: float
+    attempt: Callable[[float], Attempt], frames: tuple[float, ...], first_step: float, smallest_step: float
 ) -> Iterator[Reached]:
     """Go from ``frames[0]`` (where the body rests) through every frame; ``attempt`` solves at a load, from the last state that
     converged, and must leave that state untouched where it fails. Ends after the first frame that cannot be reached.

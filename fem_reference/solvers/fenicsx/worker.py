@@ -1,5 +1,6 @@
-"""The process that solves: reads a pickled job, marches through its frames, and reports each as a line of JSON."""
+"""The process that solves: reads pickled jobs, marches each through its frames, and reports every frame as a line of JSON."""
 
+import gc
 import json
 import pickle
 import resource
@@ -10,38 +11,33 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.mesh import Floats, Ints
-from fem_reference.problem import Problem
-from fem_reference.solvers.fenicsx import Settings
 from fem_reference.solvers.fenicsx.dolfinx_door import PETSc
+from fem_reference.solvers.fenicsx.jobs import Job
 from fem_reference.solvers.fenicsx.processes import MARK
 
 from fem_reference.solvers.fenicsx.body import Body  # isort: skip - after the door
 from fem_reference.solvers.fenicsx.stepping import Attempt, Reached, march  # isort: skip
 
-Samples = dict[str, tuple[Ints, Floats]]
+_PHASES = ("SNESFunctionEval", "SNESJacobianEval", "MatSolve", "MatLUFactorSym", "MatLUFactorNum")
 
 
 class Worker:
     """One job on all ranks; the first rank reports."""
 
-    def __init__(self, job: Path) -> None:
-        self.begin = time.perf_counter()
-        problem, settings, samples = pickle.loads(job.read_bytes())
-        self.problem: Problem = problem
-        self.settings: Settings = settings
-        self.samples: Samples = samples
-        self.folder = job.parent
+    def __init__(self, job: Job, folder: Path) -> None:
+        """``folder``: where the frames are written."""
+        begin = time.perf_counter()
+        self.job, self.folder, self.settings = job, folder, job.settings
         PETSc.Log.begin()
-        self.body = Body(problem, settings.residual, settings.newton_iterations)
-        self.rest_volume = self.body.integral(self.body.volume_form)
-        self.set_up = time.perf_counter() - self.begin
+        self.before = _spent()
+        self.body = Body(job.body, job.settings)
+        self.set_up = time.perf_counter() - begin
         self.solving = 0.0
         self.counts = {"newton_iterations": 0, "load_steps": 0, "cut_backs": 0}
 
     def run(self) -> None:
         """March through the frames and report how it ended."""
-        frames, settings = self.problem.frames, self.settings
+        frames, settings = self.job.body.frames, self.settings
         self.report_frame(Reached(frames[0], 0, 0, 0))
         for reached in march(self.attempt, frames, settings.first_step, settings.smallest_step):
             for name, count in (
@@ -58,40 +54,32 @@ class Worker:
 
     def attempt(self, frame: float) -> Attempt:
         """Solve at ``frame`` from the last state; on failure go back to it."""
-        before, begin = self.body.state(), time.perf_counter()
-        converged, iterations = self.body.solve(frame)
+        begin = time.perf_counter()
+        result = self.body.attempt(frame)
         self.solving += time.perf_counter() - begin
-        smallest = self.body.smallest_determinant("quadrature points")
-        if converged and smallest.value > 0:
-            return Attempt(None, iterations)
-        self.body.restore(before)
-        if converged:
-            return Attempt("inverted", iterations, f"det F fell to {smallest}")
-        return Attempt("diverged", iterations, f"Newton's method did not converge in {iterations} iterations")
+        return result
 
     def sentence(self, reached: Reached) -> str:
         """Why a frame could not be reached, where, and what to try."""
         assert reached.failed is not None
-        smallest = self.body.smallest_determinant("vertices")
         return (
             f"{reached.failed.sentence} beyond frame {reached.at:.2f} with steps down to {self.settings.smallest_step}; "
-            f"in the last good state det F is smallest, {smallest}; try smaller tetrahedra (muscle.tet_size) or a smaller motion"
+            f"in the last good state det F is smallest, {self.body.determinants.smallest()}; "
+            "try smaller cells (muscle.tet_size) or a smaller motion"
         )
 
     def report_frame(self, reached: Reached) -> None:
-        """Write the frame's positions beside the job and tell of it."""
-        positions = {name: self.body.positions(*sample) for name, sample in self.samples.items()}
-        scalars = {
-            "min_det_F_quadrature": self.body.smallest_determinant("quadrature points").value,
-            "min_det_F_vertices": self.body.smallest_determinant("vertices").value,
-            "volume_ratio": self.body.integral(self.body.volume_form) / self.rest_volume,
-            "energy": self.body.integral(self.body.energy_form),
-            "newton_iterations": float(reached.iterations),
-            "cut_backs": float(reached.cutbacks),
-        }
+        """Write the frame's positions and forces beside the job and tell of it."""
+        forces, moments = self.body.forces()
+        arrays = {name: self.body.positions(*sample) for name, sample in self.job.samples.items()}
+        arrays |= {"nodes": self.body.node_positions()}
+        arrays |= {f"force {name}": force for name, force in forces.items()}
+        arrays |= {f"moment {name}": moment for name, moment in moments.items()}
+        counts = {"newton_iterations": float(reached.iterations), "cut_backs": float(reached.cutbacks)}
         path = self.folder / f"frame_{reached.frame}.npz"
+        scalars = self.body.scalars() | counts
         if self.body.comm.rank == 0:
-            np.savez(path, allow_pickle=False, **positions)
+            np.savez(path, allow_pickle=False, **arrays)
         self.report(frame=reached.frame, file=str(path), scalars=scalars)
 
     def report(self, **event: Any) -> None:
@@ -102,19 +90,15 @@ class Worker:
 
     def cost(self) -> dict[str, float]:
         """Seconds by phase as the first rank sees them, counts, and memory over all ranks."""
-        spent = {
-            name: PETSc.Log.Event(name).getPerfInfo() for name in ("SNESFunctionEval", "SNESJacobianEval", "MatSolve")
-        }
-        factor = [PETSc.Log.Event(name).getPerfInfo() for name in ("MatLUFactorSym", "MatLUFactorNum")]
+        seconds = {name: now - self.before[name] for name, now in _spent().items()}
         memory = self.body.comm.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
         return {
-            "seconds_mesh": self.problem.seconds,
             "seconds_set_up": self.set_up,
             "seconds_solve": self.solving,
-            "seconds_assembly": spent["SNESFunctionEval"]["time"] + spent["SNESJacobianEval"]["time"],
-            "seconds_factorisation": sum(event["time"] for event in factor),
-            "seconds_back_substitution": spent["MatSolve"]["time"],
-            "factorisations": float(factor[1]["count"]),
+            "seconds_assembly": seconds["SNESFunctionEval"] + seconds["SNESJacobianEval"],
+            "seconds_factorisation": seconds["MatLUFactorSym"] + seconds["MatLUFactorNum"],
+            "seconds_back_substitution": seconds["MatSolve"],
+            "factorisations": seconds["count"],
             **{name: float(count) for name, count in self.counts.items()},
             "unknowns": float(self.body.size),
             "peak_memory_mb": memory / 1024,
@@ -123,5 +107,20 @@ class Worker:
         }
 
 
+def _spent() -> dict[str, float]:
+    """Seconds by PETSc's events so far, and under ``count`` the number of factorisations."""
+    events = {name: PETSc.Log.Event(name).getPerfInfo() for name in _PHASES}
+    count = {"count": float(events["MatLUFactorNum"]["count"])}
+    return {name: float(event["time"]) for name, event in events.items()} | count
+
+
+def main(argument: str) -> None:
+    """Solve the job in a file; or, for ``-``, one after the other those whose files standard input names."""
+    for line in sys.stdin if argument == "-" else [argument]:
+        path = Path(line.strip())
+        Worker(pickle.loads(path.read_bytes()), path.parent).run()
+        gc.collect()
+
+
 if __name__ == "__main__":
-    Worker(Path(sys.argv[1])).run()
+    main(sys.argv[1])

@@ -1,4 +1,4 @@
-"""The independent second opinion: Lagrange elements assembled by scikit-fem, solved by scipy's sparse LU factorisation.
+"""Scalar fields: Lagrange elements assembled by scikit-fem, solved by scipy's sparse LU factorisation.
 
 A triangle in space is laid flat, each for itself, before it is assembled: what the equations ask of a surface (lengths and areas
 within it) is not changed by that, and gradients are turned back into space.

@@ -1,0 +1,20 @@
+"""A tension along the fibres that does not depend on their stretch."""
+
+from typing import Any, ClassVar
+
+from fem_reference.effects import Coursed, Energy, State
+from fem_reference.units import PositivePressure
+
+
+class ActiveTension(Coursed, Energy):
+    """``amount T/2 (fibre . C fibre - 1)``: a second Piola-Kirchhoff stress of ``amount T`` along the fibre.
+
+    ``tension``: T [MPa]. Source: Land et al. 2015, problem 3, doi 10.1098/rspa.2015.0641.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("fibre",)
+    tension: PositivePressure
+
+    def energy(self, state: State) -> Any:
+        """Energy per rest volume [MPa]."""
+        return state.amount * self.tension / 2 * (state.square_stretch(state.fibre) - 1)

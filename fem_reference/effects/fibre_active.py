@@ -1,0 +1,34 @@
+"""Muscle fibres that pull as they are activated, most at their optimal length."""
+
+from typing import Any, ClassVar
+
+from pydantic import Field
+
+from fem_reference.effects import Coursed, Energy, State
+from fem_reference.units import PositivePressure
+
+
+class FibreActive(Coursed, Energy):
+    """``dW/dl = amount stress g(l)`` of ``l``, the isochoric fibre stretch over the optimal one: ``g = 9 (l - 0.4)^2`` from 0.4,
+    ``1 - 4 (1 - l)^2`` from 0.6, ``9 (l - 1.6)^2`` from 1.4, and 0 below 0.4 and above 1.6.
+
+    ``stress`` [MPa]: the peak active stress; ``optimal_stretch``: the fibre stretch at optimal length; ``course``: the activation.
+    Source: Blemker, Pinsky and Delp 2005, doi 10.1016/j.jbiomech.2004.04.009.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("fibre",)
+    stress: PositivePressure
+    optimal_stretch: float = Field(gt=0)
+
+    def energy(self, state: State) -> Any:
+        """Energy per rest volume [MPa], zero at rest."""
+        now, rest = state.fibre_stretch / self.optimal_stretch, 1 / self.optimal_stretch
+        return state.amount * self.stress * (_area(now, state) - _area(rest, state))
+
+
+def _area(stretch: Any, state: State) -> Any:
+    """The integral of g from 1 to ``stretch``: the pieces at both ends cancel there, as g is symmetric about 1."""
+    rising = state.between(0.4, 0.6, stretch) - 0.4
+    middle = state.between(0.6, 1.4, stretch) - 1
+    falling = state.between(1.4, 1.6, stretch) - 1.6
+    return 3 * rising**3 + middle - 4 / 3 * middle**3 + 3 * falling**3

@@ -1,0 +1,35 @@
+"""Muscle fibres that resist being stretched beyond their optimal length: a toe, then a line."""
+
+from typing import Any, ClassVar
+
+from pydantic import Field
+
+from fem_reference.effects import Energy, State
+from fem_reference.units import PositivePressure
+
+
+class FibrePassive(Energy):
+    """``dW/dl = stress f(l)`` of ``l``, the isochoric fibre stretch over the optimal one: ``f = 0`` up to 1,
+    ``p1 (exp(p2 (l - 1)) - 1)`` up to ``linear_from``, and beyond it the line that goes on from there.
+
+    ``stress`` [MPa]: the peak active stress, by which Blemker normalises; ``p1``, ``p2``: without unit; ``optimal_stretch``: the
+    fibre stretch at optimal length; ``linear_from``: in ``l``. Source: Blemker, Pinsky and Delp 2005,
+    doi 10.1016/j.jbiomech.2004.04.009.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("fibre",)
+    stress: PositivePressure
+    p1: float = Field(gt=0)
+    p2: float = Field(gt=0)
+    optimal_stretch: float = Field(gt=0)
+    linear_from: float = Field(gt=1)
+
+    def energy(self, state: State) -> Any:
+        """Energy per rest volume [MPa], zero in slack fibres."""
+        p1, p2, exp = self.p1, self.p2, state.functions.exp
+        stretch = state.fibre_stretch / self.optimal_stretch
+        toe = state.between(1, self.linear_from, stretch) - 1
+        beyond = state.functions.above(stretch, self.linear_from, stretch - self.linear_from, 0)
+        end = p1 * exp(p2 * (self.linear_from - 1))
+        curved = p1 * ((exp(p2 * toe) - 1) / p2 - toe)
+        return self.stress * (curved + (end - p1) * beyond + p2 * end / 2 * beyond**2)

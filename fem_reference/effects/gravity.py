@@ -1,0 +1,21 @@
+"""Weight, or any other steady acceleration."""
+
+from typing import Any
+
+from fem_reference.effects import Coursed, Energy, State
+from fem_reference.units import AccelerationVector, Density
+
+
+class Gravity(Coursed, Energy):
+    """``-amount rho g . u``, with u the displacement.
+
+    ``density``: rho at rest [tonne/mm^3]; ``acceleration``: g (3,) [mm/s^2].
+    """
+
+    density: Density
+    acceleration: AccelerationVector
+
+    def energy(self, state: State) -> Any:
+        """Energy per rest volume [MPa], zero at rest."""
+        work = sum(g * u for g, u in zip(self.acceleration, state.displacement, strict=True))
+        return -state.amount * self.density * work

@@ -1,0 +1,35 @@
+"""Heart muscle: stiffer the more it is strained, and most along its fibres."""
+
+from typing import Any, ClassVar
+
+from pydantic import Field
+
+from fem_reference.effects import Energy, State
+from fem_reference.units import PositivePressure
+
+
+class Guccione(Energy):
+    """``c/2 (exp(Q) - 1)``, ``Q = bf Eff^2 + bt (Ess^2 + Enn^2 + 2 Esn^2) + 2 bfs (Efs^2 + Efn^2)``, with ``E = (C - 1) / 2`` in
+    axes along the fibre (f) and any two across it (s, n).
+
+    ``c`` [MPa]; ``bf``, ``bt``, ``bfs`` without unit. Source: Guccione, McCulloch and Waldman 1991, doi 10.1115/1.2894084, as in
+    Land et al. 2015, doi 10.1098/rspa.2015.0641.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("fibre",)
+    c: PositivePressure
+    bf: float = Field(gt=0)
+    bt: float = Field(gt=0)
+    bfs: float = Field(gt=0)
+
+    def energy(self, state: State) -> Any:
+        """Energy per rest volume [MPa]; ``|E fibre|^2`` and ``|E|^2`` give the sums over s and n."""
+        C, f = state.C, state.fibre
+        E = [[(C[i][k] - (i == k)) / 2 for k in range(3)] for i in range(3)]
+        along = [sum(E[i][k] * f[k] for k in range(3)) for i in range(3)]
+        square = sum(entry**2 for row in E for entry in row)
+        Eff = sum(a * b for a, b in zip(f, along, strict=True))
+        shear = sum(entry**2 for entry in along) - Eff**2
+        transverse = square - Eff**2 - 2 * shear
+        Q = self.bf * Eff**2 + self.bt * transverse + 2 * self.bfs * shear
+        return self.c / 2 * (state.functions.exp(Q) - 1)

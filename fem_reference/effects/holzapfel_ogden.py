@@ -1,0 +1,49 @@
+"""Two families of fibres at an angle to the fibre direction that stiffen as they are stretched, as in arteries and fascia."""
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+from pydantic import Field, field_validator
+
+from fem_reference.effects import Energy, State
+from fem_reference.units import Angle, PositivePressure
+
+
+class HolzapfelOgden(Energy):
+    """``k1/(2 k2) (exp(k2 (I - 1)^2) - 1)`` of each family while it is stretched, with ``I = J^(-2/3) a . C a``.
+
+    ``k1`` [MPa], ``k2`` without unit; ``angle`` [rad]: the unit vectors ``a`` are the fibre turned by plus and minus it;
+    ``normal``: the axis of that turn, of any length and not along a fibre, of which the part across the fibre counts.
+    Source: Holzapfel, Gasser and Ogden 2000, doi 10.1023/A:1010835316564.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("fibre",)
+    k1: PositivePressure
+    k2: float = Field(gt=0)
+    angle: Angle
+    normal: tuple[float, float, float]
+
+    @field_validator("normal")
+    @classmethod
+    def _check_normal(cls, normal: tuple[float, float, float]) -> tuple[float, float, float]:
+        if not 1e-9 < max(abs(entry) for entry in normal) < 1e9:
+            raise ValueError("a normal that is not zero, with a largest entry from 1e-9 to 1e9")
+        return normal
+
+    def energy(self, state: State) -> Any:
+        """Energy per rest volume [MPa], zero in slack families."""
+        f, functions = state.fibre, state.functions
+        across = _cross(self.normal, f)
+        length = functions.sqrt(sum(entry**2 for entry in across))
+        cosine, sine = functions.cos(self.angle), functions.sin(self.angle)
+        energy = 0
+        for sign in (1, -1):
+            family = [cosine * a + sign * sine * b / length for a, b in zip(f, across, strict=True)]
+            square = state.J ** (-2 / 3) * state.square_stretch(family)
+            strain = functions.above(square, 1, square - 1, 0)
+            energy += self.k1 / (2 * self.k2) * (functions.exp(self.k2 * strain**2) - 1)
+        return energy
+
+
+def _cross(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:
+    return [a[i] * b[k] - a[k] * b[i] for i, k in ((1, 2), (2, 0), (0, 1))]

@@ -1,0 +1,19 @@
+"""Near-incompressibility by a penalty on volume change, without an unknown of its own: it locks where the mixed form does not."""
+
+from typing import Any
+
+from fem_reference.effects import Energy, State
+from fem_reference.units import PositivePressure
+
+
+class IncompressiblePenalty(Energy):
+    """``K/2 (J - 1)^2``: what ``incompressible`` is where its pressure is free at every point.
+
+    ``bulk``: bulk modulus K [MPa].
+    """
+
+    bulk: PositivePressure
+
+    def energy(self, state: State) -> Any:
+        """Energy per rest volume [MPa]."""
+        return self.bulk / 2 * (state.J - 1) ** 2

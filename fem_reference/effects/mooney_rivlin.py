@@ -1,0 +1,29 @@
+"""Isotropic elastic matrix that resists shear and area change apart, without its resistance to volume change."""
+
+from typing import Any
+
+from pydantic import model_validator
+
+from fem_reference.effects import Energy, State
+from fem_reference.units import Pressure
+
+
+class MooneyRivlin(Energy):
+    """``c1 (J^(-2/3) I1 - 3) + c2 (J^(-4/3) I2 - 3)`` (Mooney 1940, doi 10.1063/1.1712836; Rivlin 1948).
+
+    ``c1``, ``c2`` [MPa]: the shear modulus at rest is ``2 (c1 + c2)``.
+    """
+
+    c1: Pressure
+    c2: Pressure
+
+    @model_validator(mode="after")
+    def _check_modulus(self) -> "MooneyRivlin":
+        if self.c1 + self.c2 <= 0:
+            raise ValueError("c1 + c2 above zero")
+        return self
+
+    def energy(self, state: State) -> Any:
+        """Energy per rest volume [MPa]."""
+        J = state.J
+        return self.c1 * (J ** (-2 / 3) * state.I1 - 3) + self.c2 * (J ** (-4 / 3) * state.I2 - 3)

@@ -1,0 +1,21 @@
+"""A fluid that presses on a part of the surface and stays perpendicular to it."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from fem_reference import units
+from fem_reference.effects import Coursed, Load, State
+
+
+class Pressure(Coursed, Load):
+    """``-amount p J F^-T N``, with N the outward normal at rest: a pressure on the surface as it is now, by Nanson's formula.
+
+    ``on``: the part of the surface; ``pressure``: p [MPa], which pushes inwards where it is positive.
+    """
+
+    pressure: units.Pressure
+
+    def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:
+        """Force per rest area [MPa], (3,)."""
+        pushed = -state.amount * self.pressure
+        return [pushed * sum(c * n for c, n in zip(row, normal, strict=True)) for row in state.cofactors]

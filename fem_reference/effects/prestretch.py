@@ -1,0 +1,36 @@
+"""Fibres that are already stretched in the rest state of the mesh, as those of living muscle are."""
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+from pydantic import Field, model_validator
+
+from fem_reference.effects import Coursed, Prestrain, State
+
+
+class Prestretch(Coursed, Prestrain):
+    """The energies see ``F Fp``, ``Fp = l f f^T + l^(-1/2) (1 - f f^T)``: stretched by ``l = 1 + amount (stretch - 1)`` along the
+    fibre f, at the same volume.
+
+    ``stretch``: without unit, above 1 where fibres are taut at rest.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("fibre",)
+    stretch: float = Field(gt=0)
+
+    @model_validator(mode="after")
+    def _check_stretch(self) -> "Prestretch":
+        if any(1 + knot.amount * (self.stretch - 1) <= 0 for knot in self.course):
+            raise ValueError("a course whose stretches 1 + amount (stretch - 1) are above zero")
+        return self
+
+    def elastic(self, state: State) -> Sequence[Sequence[Any]]:
+        """The deformation gradient (3, 3) that the energies see."""
+        f = state.fibre
+        along = 1 + state.amount * (self.stretch - 1)
+        across = 1 / state.functions.sqrt(along)
+        stretched = [sum(F * a for F, a in zip(row, f, strict=True)) for row in state.F]
+        return [
+            [across * F + (along - across) * Ff * a for F, a in zip(row, f, strict=True)]
+            for row, Ff in zip(state.F, stretched, strict=True)
+        ]

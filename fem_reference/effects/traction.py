@@ -1,0 +1,20 @@
+"""A dead load: a force on a part of the surface that keeps its direction and its size as the surface moves."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from fem_reference.effects import Coursed, Load, State
+from fem_reference.units import PressureVector
+
+
+class Traction(Coursed, Load):
+    """``amount t``.
+
+    ``on``: the part of the surface; ``force``: t, the force per area at rest (3,) [MPa].
+    """
+
+    force: PressureVector
+
+    def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:  # noqa: ARG002
+        """Force per rest area [MPa], (3,)."""
+        return [state.amount * entry for entry in self.force]

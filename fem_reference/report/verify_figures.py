@@ -1,0 +1,145 @@
+"""Drawings of the verification catalogue as SVG to stand inside its page."""
+
+import io
+import math
+from collections.abc import Callable
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FixedLocator, LogLocator, NullFormatter, NullLocator
+
+from fem_reference.catalogue import Result
+from fem_reference.mesh import Floats
+from fem_reference.report.curves import LOOK, PALETTE, Curve, inline
+from fem_reference.report.words import number, words
+
+PASS, FAIL = "#14713a", "#b3261e"
+LEAST, GREATEST = 1e-8, 1e3  # shares of the tolerance that the overview can show; what is beyond stands at its edge
+_ROW = 0.175  # height of a row of the overview [in]
+
+
+def share(one: Result) -> float:
+    """The error as a share of its bound, NaN where nothing was measured; infinite where no error is allowed and there is one."""
+    if one.within > 0:
+        return one.error / one.within
+    return one.error * math.inf if one.error else 0.0
+
+
+def overview(families: dict[str, list[Result]]) -> Curve:
+    """The error of every result as a share of its tolerance, family by family."""
+    results = [one for family in families.values() for one in family]
+    shown = [share(one) for one in results if LEAST <= share(one) <= GREATEST]
+    low = 10.0 ** math.floor(math.log10(min([0.1, *shown]))) / 3
+    high = 10.0 ** math.ceil(math.log10(max([3.0, *shown])))
+
+    def draw(axes: Axes) -> None:
+        row = 0
+        for family, members in families.items():
+            axes.text(
+                -0.01, row, words(family), transform=axes.get_yaxis_transform(), ha="right", va="center", weight="bold"
+            )
+            axes.axhline(row - 0.7, color="#dddddd", linewidth=0.8)
+            for place, one in enumerate(members, row + 1):
+                label = axes.text(
+                    -0.01, place, one.entry.name, transform=axes.get_yaxis_transform(), ha="right", va="center"
+                )
+                label.set_color("#1d1d1f" if one.word == "pass" else FAIL)
+                _dot(axes, place, one, (low, high))
+            row += len(members) + 1
+        axes.set_ylim(row - 0.3, -0.7)
+        _style_overview(axes, (low, high))
+
+    rows = len(results) + len(families)
+    title = "Error as a share of what is allowed"
+    return _drawing("verify-overview", title, (9.6, 0.9 + _ROW * rows), draw)
+
+
+def _dot(axes: Axes, row: int, one: Result, limits: tuple[float, float]) -> None:
+    """A result at its share; a hollow triangle at the edge beyond which it is, a cross where it is not a number."""
+    low, high = limits
+    value = share(one)
+    look: dict[str, Any] = {"color": PASS if one.word == "pass" else FAIL, "clip_on": False, "markersize": 5.5}
+    if math.isnan(value):
+        axes.plot([high], [row], "x", **look)
+    elif low < value <= high:
+        axes.plot([value], [row], "s" if one.spoiled else "o", **look)
+    else:
+        axes.plot([min(max(value, low), high)], [row], "<" if value <= low else ">", markerfacecolor="white", **look)
+
+
+def _style_overview(axes: Axes, limits: tuple[float, float]) -> None:
+    axes.axvspan(1.0, limits[1], color=FAIL, alpha=0.05, linewidth=0)
+    axes.axvline(1.0, color=FAIL, linewidth=1.4)
+    axes.set_xscale("log")
+    axes.set_xlim(*limits)
+    axes.xaxis.set_major_locator(LogLocator(numticks=12))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.set_yticks([])
+    axes.grid(visible=True, axis="x")
+    axes.tick_params(top=True, labeltop=True)
+    axes.set_xlabel("error / tolerance")
+    marks = {
+        "passes": ("o", PASS, PASS),
+        "fails": ("o", FAIL, FAIL),
+        "fails, spoiled on purpose": ("s", FAIL, FAIL),
+        "smaller than shown, or exactly zero": ("<", PASS, "white"),
+        "greater than shown": (">", FAIL, "white"),
+        "not a number": ("x", FAIL, FAIL),
+    }
+    handles = [
+        Line2D([], [], linestyle="", marker=mark, color=colour, markerfacecolor=inner, label=label, markersize=5.5)
+        for label, (mark, colour, inner) in marks.items()
+    ]
+    figure = axes.get_figure()
+    assert isinstance(figure, Figure)
+    figure.legend(handles=handles, loc="outside upper left", ncols=6, handlelength=1, columnspacing=1.4)
+
+
+def drawable(one: Result) -> bool:
+    """Whether there are two meshes or more whose errors can stand on a logarithmic axis."""
+    return len(_errors(one)[0]) > 1
+
+
+def convergence(one: Result) -> Curve:
+    """Error over mesh size on logarithmic axes, beside the whole power that is nearest to its order."""
+    sizes, errors = _errors(one)
+    order = one.finding.order
+
+    def draw(axes: Axes) -> None:
+        known = order is not None and math.isfinite(order)
+        axes.loglog(sizes, errors, "o-", color=PALETTE[0], label=f"order {number(order)}" if known else "no order")
+        if known and order is not None and round(order) > 0:
+            power = round(order)
+            guide = errors[-1] * (sizes / sizes[-1]) ** power
+            axes.loglog(sizes, guide, "--", color="#888888", linewidth=1, label=f"slope {power}", zorder=1)
+        axes.xaxis.set_major_locator(FixedLocator(list(sizes)))
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.xaxis.set_major_formatter(lambda size, _: number(size))
+        axes.set_xlabel("mesh size [mm]")
+        axes.set_ylabel(f"error [{one.entry.unit}]")
+        axes.legend(handlelength=2)
+
+    return _drawing(f"ladder-{one.entry.name}", one.entry.name, (3.7, 2.7), draw)
+
+
+def _errors(one: Result) -> tuple[Floats, Floats]:
+    """Sizes and errors of the meshes whose error is a positive number."""
+    sizes, values = np.array(one.finding.ladder, float).reshape(-1, 2).T
+    errors = np.abs(values - one.truth)
+    kept = np.isfinite(errors) & (errors > 0)
+    return sizes[kept], errors[kept]
+
+
+def _drawing(name: str, title: str, size: tuple[float, float], draw: Callable[[Axes], None]) -> Curve:
+    with mpl.rc_context(LOOK):
+        figure = Figure(figsize=size, layout="constrained")
+        FigureCanvasSVG(figure)
+        draw(figure.add_subplot())
+        text = io.StringIO()
+        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
+    return Curve(title, inline(text.getvalue(), name, title))

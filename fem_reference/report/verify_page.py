@@ -1,0 +1,98 @@
+"""The page of the verification catalogue. It holds everything itself, and reads without a network."""
+
+import math
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from fem_reference.catalogue import Result
+from fem_reference.report import verify_figures
+from fem_reference.report.tables import finite
+from fem_reference.report.templates import template
+from fem_reference.report.words import duration
+
+
+@dataclass(frozen=True, eq=False)
+class Verification:
+    """What came of entries of the catalogue: ``results`` in its order, the wall time in ``seconds``, and ``versions`` of what
+    they were made with.
+    """
+
+    results: tuple[Result, ...]
+    seconds: float
+    versions: dict[str, str]
+
+    @property
+    def failed(self) -> tuple[Result, ...]:
+        """The results that do not pass."""
+        return tuple(one for one in self.results if one.word != "pass")
+
+    @property
+    def word(self) -> str:
+        """Pass or fail."""
+        return "fail" if self.failed else "pass"
+
+    @property
+    def summary(self) -> str:
+        """The verdict in one line."""
+        passed, spoiled = len(self.results) - len(self.failed), sum(one.spoiled for one in self.results)
+        told = f", {spoiled} measured with their spoil" if spoiled else ""
+        return f"verdict: {self.word}, {passed} of {len(self.results)} pass{told}, {self.seconds:.0f} s"
+
+    @property
+    def families(self) -> dict[str, list[Result]]:
+        """The results by family, in the order of the catalogue."""
+        found: dict[str, list[Result]] = {}
+        for one in self.results:
+            found.setdefault(one.entry.family, []).append(one)
+        return found
+
+
+def render(verification: Verification) -> str:
+    """The whole page as text."""
+    results = verification.results
+    return template("verify_page.html").render(
+        verification=verification,
+        kinds=Counter(one.entry.kind for one in results),
+        share=verify_figures.share,
+        spent=duration(math.fsum(one.seconds for one in results)),
+        overview=verify_figures.overview(verification.families),
+        ladders=[verify_figures.convergence(one) for one in results if verify_figures.drawable(one)],
+    )
+
+
+def facts(verification: Verification) -> dict[str, Any]:
+    """All of it as valid JSON: a number that is not finite is None."""
+    return {
+        "verdict": verification.word,
+        "passed": len(verification.results) - len(verification.failed),
+        "of": len(verification.results),
+        "seconds": verification.seconds,
+        "versions": verification.versions,
+        "entries": rows(verification.results),
+    }
+
+
+def rows(results: Iterable[Result]) -> list[dict[str, Any]]:
+    """Each result with its entry as names, numbers and sentences."""
+    return [
+        {
+            **{name: getattr(one.entry, name) for name in ("name", "family", "title", "unit", "kind")},
+            "verdict": one.word,
+            "value": finite(one.finding.value),
+            "truth": finite(one.truth),
+            "error": finite(one.error),
+            "within": finite(one.within),
+            "relative": one.entry.relative,
+            "order": None if one.finding.order is None else finite(one.finding.order),
+            "ladder": [[finite(size), finite(value)] for size, value in one.finding.ladder],
+            "seconds": one.seconds,
+            "because": one.entry.because,
+            "source": one.entry.source,
+            "note": one.finding.note,
+            "spoil": one.entry.spoil,
+            "spoiled": one.spoiled,
+        }
+        for one in results
+    ]

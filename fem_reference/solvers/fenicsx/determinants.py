@@ -1,0 +1,53 @@
+"""Where det F is smallest: the check that a converged state is one that matter can be in."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from dolfinx import fem, mesh
+
+from fem_reference.continuum import Kind, reference_nodes
+from fem_reference.mesh import Floats, Ints
+from fem_reference.solvers.fenicsx import meshes
+
+
+@dataclass(frozen=True)
+class Smallest:
+    """The smallest det F over a set of points of the cells, and where: which kind of point, cell and rest position [mm]."""
+
+    value: float
+    where: str
+    cell: int
+    at: tuple[float, float, float]
+
+    def __str__(self) -> str:
+        x, y, z = self.at
+        return f"{self.value:.3f} at a {self.where} of cell {self.cell} at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
+
+
+class Determinants:
+    """Det F at the quadrature points and the vertices of this rank's cells."""
+
+    def __init__(self, msh: mesh.Mesh, cells: Ints, determinant: Any, rule: Floats, kind: Kind) -> None:
+        """``cells``: which cell of the body each of this rank's is; ``rule``: quadrature points (q, 3) of a ``kind`` of cell."""
+        self.mesh, self.cells = msh, cells
+        self.points = {"quadrature point": rule, "vertex": reference_nodes(kind, 1)}
+        # Compiled here and by all ranks together: one without cells evaluates none of them.
+        self.values = {where: fem.Expression(determinant, points) for where, points in self.points.items()}
+        self.places = {where: meshes.coordinates(msh, points) for where, points in self.points.items()}
+
+    def smallest(self, where: str | None = None) -> Smallest:
+        """The smallest det F at points of one kind, ``"quadrature point"`` or ``"vertex"``, or at both; NaN counts as smallest."""
+        mine = [self._mine(name) for name in ([where] if where else self.points)]
+        everywhere: list[Smallest] = [found for rank in self.mesh.comm.allgather(mine) for found in rank]
+        return min(everywhere, key=lambda found: (not np.isnan(found.value), found.value))
+
+    def _mine(self, where: str) -> Smallest:
+        if len(self.cells) == 0:  # a rank without cells
+            return Smallest(float("inf"), where, -1, (0.0, 0.0, 0.0))
+        values = self.values[where].eval(self.mesh, np.arange(len(self.cells), dtype=np.int32))
+        values = values.reshape(len(self.cells), -1)
+        cell, point = np.unravel_index(np.argmin(np.where(np.isnan(values), -np.inf, values)), values.shape)
+        at = self.places[where].eval(self.mesh, np.array([cell], np.int32))
+        x, y, z = at.reshape(-1, 3)[point]
+        return Smallest(float(values[cell, point]), where, int(self.cells[cell]), (float(x), float(y), float(z)))

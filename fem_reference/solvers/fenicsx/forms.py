@@ -1,0 +1,110 @@
+"""The weak form of a body, summed from its effects; symbols stand for their parameters, so that a compiled form serves many."""
+
+from dataclasses import replace
+from typing import Any
+
+import basix
+import basix.ufl
+import numpy as np
+import ufl
+from dolfinx import fem, mesh
+
+from fem_reference.continuum import Continuum
+from fem_reference.effects import Effect, Load, State, total_energy
+from fem_reference.mesh import Floats, Ints
+from fem_reference.solvers.fenicsx import meshes
+
+
+class UflFunctions:
+    """``effects.Functions`` of UFL expressions."""
+
+    exp = staticmethod(ufl.exp)
+    log = staticmethod(ufl.ln)
+    sqrt = staticmethod(ufl.sqrt)
+    cos = staticmethod(ufl.cos)
+    sin = staticmethod(ufl.sin)
+
+    @staticmethod
+    def above(x: Any, limit: Any, then: Any, otherwise: Any) -> Any:
+        """``then`` where ``x > limit``, else ``otherwise``."""
+        return ufl.conditional(ufl.gt(x, limit), then, otherwise)
+
+
+class Form:
+    """``energy`` and ``volume`` as integrals, ``residual`` as what vanishes in equilibrium, det F as ``determinant``; ``amounts``
+    by effect, constants to be set; ``rule``: the points (q, 3) of the quadrature; ``regions``: this rank's facets by name.
+    """
+
+    def __init__(self, msh: mesh.Mesh, body: Continuum, unknowns: fem.Function, degree: int, cells: Ints) -> None:
+        """``cells``: which cell of the body each of this rank's is."""
+        self.mesh, self.regions = msh, meshes.local_facets(msh, body.mesh.facets)
+        self.rule: Floats = basix.make_quadrature(basix.CellType[body.mesh.kind], degree)[0]
+        self.dx, self.ds = _measures(msh, self.regions, degree)
+        self.amounts = [fem.Constant(msh, 1.0) for _ in body.effects]
+        effects = [_symbolic(effect, msh) for effect in body.effects]
+        acting = list(zip(effects, self.amounts, strict=True))
+        state = _state(unknowns, self._fibre(body, degree, cells))
+        self.determinant = state.J
+        self.volume, self.energy = state.J * self.dx, total_energy(acting, state) * self.dx
+        test = ufl.TestFunction(unknowns.function_space)
+        self.residual = ufl.derivative(self.energy, unknowns, test)
+        for effect, amount in acting:
+            if isinstance(effect, Load):
+                traction = effect.traction(replace(state, amount=amount), list(ufl.FacetNormal(msh)))
+                work = sum(a * b for a, b in zip(traction, ufl.split(test)[0], strict=True))
+                self.residual -= work * self.measure(effect.on)
+
+    def measure(self, region: str) -> Any:
+        """The measure of the facets of ``region``."""
+        return self.ds(list(self.regions).index(region))
+
+    def _fibre(self, body: Continuum, degree: int, cells: Ints) -> list[Any] | None:
+        """The fibre direction at the quadrature points, where an effect asks for it."""
+        if not any("fibre" in effect.needs for effect in body.effects):
+            return None
+        if body.fibre is None:
+            raise ValueError("an effect needs fibre directions, the body has none")
+        element = basix.ufl.quadrature_element(body.mesh.kind, value_shape=(3,), degree=degree)
+        function = fem.Function(fem.functionspace(self.mesh, element))
+        mine = np.arange(len(cells), dtype=np.int32)
+        points = meshes.coordinates(self.mesh, self.rule).eval(self.mesh, mine).reshape(-1, 3)
+        directions = body.fibre(np.repeat(cells, len(self.rule)), points)
+        function.x.array[: directions.size] = directions.ravel()
+        function.x.scatter_forward()
+        return [function[i] for i in range(3)]
+
+
+def _measures(msh: mesh.Mesh, regions: dict[str, Ints], degree: int) -> tuple[Any, Any]:
+    """The measures of the cells and of the facets, the latter by number of region."""
+    metadata, kind = {"quadrature_degree": degree}, fem.IntegralType.exterior_facet
+    parts = [
+        (i, fem.compute_integration_domains(kind, msh.topology, facets)) for i, facets in enumerate(regions.values())
+    ]
+    return (
+        ufl.Measure("dx", domain=msh, metadata=metadata),
+        ufl.Measure("ds", domain=msh, subdomain_data=parts, metadata=metadata),
+    )
+
+
+def _state(unknowns: fem.Function, fibre: list[Any] | None) -> State:
+    displacement, *others = ufl.split(unknowns)
+    F = ufl.Identity(3) + ufl.grad(displacement)
+    return State(
+        F=[[F[i, k] for k in range(3)] for i in range(3)],
+        displacement=[displacement[i] for i in range(3)],
+        pressure=others[0] if others else None,
+        fibre=fibre,
+        functions=UflFunctions(),
+    )
+
+
+def _symbolic(effect: Effect, msh: mesh.Mesh) -> Effect:
+    """The effect with a constant of the mesh in place of each number among its parameters."""
+    values = {name: getattr(effect, name) for name in type(effect).model_fields}
+    symbols: dict[str, Any] = {
+        name: fem.Constant(msh, value) for name, value in values.items() if isinstance(value, float)
+    }
+    for name, value in values.items():
+        if isinstance(value, tuple) and all(isinstance(entry, float) for entry in value):
+            symbols[name] = tuple(fem.Constant(msh, entry) for entry in value)
+    return effect.model_copy(update=symbols)

@@ -1,0 +1,81 @@
+"""A body's mesh in DOLFINx: distributed over the ranks, with its regions found again, and its nodes' positions."""
+
+from typing import Any
+
+import basix
+import basix.ufl
+import numpy as np
+import ufl
+from dolfinx import fem, mesh
+from mpi4py import MPI
+
+from fem_reference.continuum import Cells, reference_nodes
+from fem_reference.mesh import Floats, Ints
+
+
+def distribute(comm: MPI.Comm, cells: Cells) -> mesh.Mesh:
+    """The mesh over the ranks; the first one brings it."""
+    element = basix.ufl.element("Lagrange", cells.kind, cells.degree, shape=(3,))
+    nodes = basix.create_element(basix.ElementFamily.P, basix.CellType[cells.kind], cells.degree, _VARIANT).points
+    ours = reference_nodes(cells.kind, cells.degree)
+    order = [int(np.argmin(np.linalg.norm(ours - node, axis=1))) for node in nodes]
+    brings = slice(None) if comm.rank == 0 else slice(0)
+    return mesh.create_mesh(
+        comm, cells=np.array(cells.cells[brings][:, order]), e=element, x=np.array(cells.points[brings])
+    )
+
+
+_VARIANT = basix.LagrangeVariant.gll_warped
+
+
+def local_facets(msh: mesh.Mesh, facets: dict[str, Ints]) -> dict[str, Ints]:
+    """This rank's facets of each region, among corners (f, 3 or 4) given by the points of the body's mesh."""
+    for start, end in ((2, 3), (2, 0), (0, 3), (3, 0), (3, 2)):
+        msh.topology.create_connectivity(start, end)
+    exterior = mesh.exterior_facet_indices(msh.topology)
+    original = np.sort(_original_points(msh)[_corners(msh, exterior)], axis=1).tolist()
+    found = {}
+    for name, wanted in facets.items():
+        corners = {tuple(facet) for facet in np.sort(wanted, axis=1).tolist()}
+        found[name] = exterior[np.array([tuple(facet) in corners for facet in original], bool)]
+    return found
+
+
+def _corners(msh: mesh.Mesh, facets: Ints) -> Ints:
+    """The vertices (f, 3 or 4) of facets."""
+    connected = msh.topology.connectivity(2, 0)
+    count = 3 if msh.topology.cell_name() == "tetrahedron" else 4
+    return np.array([connected.links(facet) for facet in facets], np.int64).reshape(len(facets), count)
+
+
+def _original_points(msh: mesh.Mesh) -> Ints:
+    """By vertex of this rank, the point of the body's mesh."""
+    connected = msh.topology.connectivity(3, 0)
+    corners = connected.array.reshape(connected.num_nodes, 4 if msh.topology.cell_name() == "tetrahedron" else 8)
+    points = np.full(msh.topology.index_map(0).size_local + msh.topology.index_map(0).num_ghosts, -1, np.int64)
+    points[corners] = np.asarray(msh.geometry.input_global_indices)[msh.geometry.dofmap[:, : corners.shape[1]]]
+    return points
+
+
+class Nodes:
+    """The nodes of the body's mesh and where a displacement takes them."""
+
+    def __init__(self, cells: Cells, own: Ints, displacement: Any) -> None:
+        """``own``: the cells of the body's mesh that are this rank's, in the rank's order."""
+        self.cells, self.own = cells, own
+        self.moves = fem.Expression(displacement, reference_nodes(cells.kind, cells.degree))
+
+    def positions(self, msh: mesh.Mesh) -> Floats:
+        """Where the nodes are now (n, 3) [mm], on every rank."""
+        points = np.array(self.cells.points)
+        mine = np.arange(len(self.own), dtype=np.int32)
+        moves = self.moves.eval(msh, mine).reshape(len(mine), -1, 3) if len(mine) else np.zeros((0, 1, 3))
+        for own, moved in msh.comm.allgather((self.own, moves)):
+            if len(own):
+                points[self.cells.cells[own]] = self.cells.points[self.cells.cells[own]] + moved
+        return points
+
+
+def coordinates(msh: mesh.Mesh, points: Floats) -> Any:
+    """An expression that is a rest position at reference ``points``."""
+    return fem.Expression(ufl.SpatialCoordinate(msh), points)

@@ -1,0 +1,71 @@
+"""One process of FEniCSx that solves bodies one after the other: what it has compiled and loaded serves the next."""
+
+import pickle
+import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fem_reference.children import command
+from fem_reference.continuum import Continuum, Reached, Solved, check
+from fem_reference.runs import Outcome
+from fem_reference.solvers.fenicsx.jobs import Job
+from fem_reference.solvers.fenicsx.processes import Worker, require_installed, running
+from fem_reference.solvers.fenicsx.settings import BodySettings
+
+
+class Session:
+    """Solves bodies in a process of its own, which is started anew after it died."""
+
+    def __init__(self, folder: Path, stack: ExitStack) -> None:
+        """``folder``: where jobs and states are passed; ``stack`` ends the processes."""
+        self.folder, self.stack = folder, stack
+        self.worker: Worker | None = None
+
+    def solve(self, body: Continuum, settings: BodySettings) -> Solved:
+        """The states of ``body``; a process that dies is the status *crashed*, not an exception."""
+        check(body, settings.element)
+        job = self.folder / "job.pickle"
+        job.write_bytes(pickle.dumps(Job(body, settings, {})))
+        if self.worker is None:
+            self.worker = self.stack.enter_context(running(command("-m", _WORKER, "-"), None, fed=True))
+        self.worker.feed(str(job))
+        states: list[Reached] = []
+        for event in self.worker.events():
+            if "frame" not in event:
+                return Solved(tuple(states), Outcome(event["status"], event["message"], event["cost"]))
+            states.append(_state(event))
+        dead, self.worker = self.worker, None
+        return Solved(tuple(states), dead.ending(f"{len(states)} states are kept"))
+
+
+_WORKER = "fem_reference.solvers.fenicsx.worker"
+
+
+def _state(event: dict[str, Any]) -> Reached:
+    path = Path(event["file"])
+    with np.load(path) as arrays:
+        forces, moments = (
+            {name.removeprefix(kind): arrays[name] for name in arrays if name.startswith(kind)}
+            for kind in ("force ", "moment ")
+        )
+        state = Reached(event["frame"], arrays["nodes"], forces, moments, event["scalars"])
+    path.unlink()
+    return state
+
+
+@contextmanager
+def session() -> Iterator[Session]:
+    """A session; its process ends with it. MissingSoftware where FEniCSx is not installed."""
+    require_installed()
+    with tempfile.TemporaryDirectory(prefix="fem_reference-") as folder, ExitStack() as stack:
+        yield Session(Path(folder), stack)
+
+
+def solve_body(body: Continuum, settings: BodySettings) -> Solved:
+    """The states of ``body`` by a session of its own."""
+    with session() as own:
+        return own.solve(body, settings)

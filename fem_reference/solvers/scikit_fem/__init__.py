@@ -1,0 +1,9 @@
+"""The independent second opinion: Lagrange elements of scikit-fem, solved by scipy's sparse LU factorisation.
+
+``field`` has scalar fields; ``body`` has bodies, whose stress and stiffness are the derivatives that ``jets`` carry along.
+"""
+
+from fem_reference.solvers.scikit_fem.body import BodySettings, solve_body
+from fem_reference.solvers.scikit_fem.field import FieldSettings, assemble, errors, solve_field, space
+
+__all__ = ["BodySettings", "FieldSettings", "assemble", "errors", "solve_body", "solve_field", "space"]

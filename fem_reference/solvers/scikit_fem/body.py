@@ -1,0 +1,176 @@
+"""Bodies: equilibrium by Newton's method, with the stress and stiffness that jets differentiate from the effects' energies."""
+
+import logging
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+from scipy.sparse.linalg import splu
+
+from fem_reference.continuum import Continuum, Prescribed, Reached, Solved, check
+from fem_reference.mesh import Floats, Ints
+from fem_reference.records import Record
+from fem_reference.runs import Outcome
+from fem_reference.solvers.fenicsx import stepping
+from fem_reference.solvers.fenicsx.stepping import Attempt, march
+from fem_reference.solvers.scikit_fem.equations import Equations
+
+log = logging.getLogger(__name__)
+
+_HALVINGS = 10
+_GROWTH = 10.0  # of the out-of-balance forces, above which a Newton step is halved
+
+
+class BodySettings(Record):
+    """Numerics of a body; steps are in frame numbers.
+
+    ``element``: one of ``continuum.ELEMENTS``. ``first_step`` and ``smallest_step`` bound the load step, by default one to each
+    frame: it grows by half after an easy step (at most 5 Newton iterations) and is halved when Newton needs more than
+    ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3] ends Newton's iteration: the norm of out-of-balance nodal forces
+    and of the volume equation. ``quadrature_degree``: of the polynomials that are integrated exactly on a straight cell, by
+    default what the element needs.
+    """
+
+    element: str = "P2/P1"
+    first_step: float = Field(default=1e9, gt=0)
+    smallest_step: float = Field(default=0.02, gt=0)
+    newton_iterations: int = Field(default=14, gt=0)
+    residual: float = Field(default=1e-8, gt=0)
+    quadrature_degree: int | None = Field(default=None, gt=0)
+
+
+def solve_body(body: Continuum, settings: BodySettings) -> Solved:
+    """The states of ``body`` at its frames, as far as they can be reached."""
+    check(body, settings.element)
+    begin = time.perf_counter()
+    march_of = _March(body, settings)
+    states = [march_of.state(stepping.Reached(body.frames[0], 0, 0, 0))]
+    counts = {"newton_iterations": 0.0, "load_steps": 0.0, "cut_backs": 0.0}
+
+    def cost() -> dict[str, float]:
+        return counts | {"seconds": time.perf_counter() - begin, "unknowns": float(march_of.equations.space.size)}
+
+    for reached in march(march_of.attempt, body.frames, settings.first_step, settings.smallest_step):
+        for name, count in zip(counts, (reached.iterations, reached.steps, reached.cutbacks), strict=True):
+            counts[name] += count
+        if reached.failed is not None and reached.failed.failure is not None:
+            sentence = f"{reached.failed.sentence} beyond frame {reached.at:.4g}; try other cells or a smaller motion"
+            return Solved(tuple(states), Outcome(reached.failed.failure, sentence, cost()))
+        states.append(march_of.state(reached))
+        log.debug("frame %g: %d Newton iterations", reached.frame, reached.iterations)
+    return Solved(tuple(states), Outcome("converged", f"all {len(states)} frames reached", cost()))
+
+
+@dataclass(frozen=True, eq=False)
+class _Tangent:
+    """The equations at ``unknowns`` (N,): the out-of-balance forces ``residual`` (N,) and their derivative ``matrix`` (N, N)."""
+
+    unknowns: Floats
+    residual: Floats
+    matrix: Any
+
+    def step(self, free: Ints, held: Ints, gap: Floats) -> Floats:
+        """The Newton step, where the ``held`` unknowns change by ``gap``; RuntimeError where there is no unique one."""
+        step = np.zeros_like(self.unknowns)
+        step[held] = gap
+        rows = self.matrix[free]
+        step[free] = splu(rows[:, free].tocsc()).solve(-self.residual[free] - rows[:, held] @ gap)
+        return step
+
+
+class _March:
+    """The unknowns of a body on their way through its frames."""
+
+    def __init__(self, body: Continuum, settings: BodySettings) -> None:
+        self.body, self.settings = body, settings
+        self.equations = Equations(body, settings.element, settings.quadrature_degree)
+        self.unknowns = np.zeros(self.equations.space.size)
+        self.nodes = {entry.name: self.equations.space.nodes_on(entry.on) for entry in body.prescribed}
+
+    def attempt(self, frame: float) -> Attempt:
+        """Solve at ``frame`` from the last state, which stays where it fails. A state in which det F is not positive, at a
+        quadrature point or a vertex, is inverted whatever Newton's method says.
+        """
+        with np.errstate(all="ignore"):  # what is not finite is a failed step
+            attempt, unknowns = self._newton(frame)
+        if attempt.failure is not None:
+            return attempt
+        smallest = min(self.equations.smallest_determinants(unknowns))
+        if not smallest > 0:
+            why = f"Newton's method converged, but det F fell to {smallest:.3g}"
+            return Attempt("inverted", attempt.iterations, why)
+        self.unknowns = unknowns
+        return attempt
+
+    def _newton(self, frame: float) -> tuple[Attempt, Floats]:
+        held, wanted = self._held(frame)
+        free = np.setdiff1d(np.arange(len(self.unknowns)), held)
+        now, allowed = self._tangent(self.unknowns, frame), self.settings.newton_iterations
+        for iteration in range(allowed + 1):
+            gap = wanted - now.unknowns[held]
+            size = float(np.linalg.norm(now.residual[free]))
+            if size < self.settings.residual and not gap.any():
+                return Attempt(None, iteration), now.unknowns
+            if iteration == allowed:
+                break
+            try:
+                step = now.step(free, held, gap)
+            except RuntimeError:  # what SuperLU raises where a pivot is zero
+                return Attempt("diverged", iteration, "the equations have no unique solution"), now.unknowns
+            for halvings in range(_HALVINGS):
+                trial = now.unknowns + 0.5**halvings * step
+                if halvings == 0:
+                    trial[held] = wanted
+                then = self._tangent(trial, frame)
+                if np.linalg.norm(then.residual[free]) < (np.inf if gap.any() else _GROWTH * size):
+                    break
+            else:
+                return Attempt("diverged", iteration, "no part of a Newton step has bounded forces"), now.unknowns
+            now = then
+        why = f"Newton's method did not converge in {allowed} iterations"
+        return Attempt("diverged", allowed, why), now.unknowns
+
+    def _tangent(self, unknowns: Floats, frame: float) -> "_Tangent":
+        return _Tangent(unknowns, *self.equations.assembled(unknowns, frame))
+
+    def _held(self, frame: float) -> tuple[Ints, Floats]:
+        """The unknowns that are prescribed exactly, each once, and their values at ``frame``."""
+        values: dict[int, float] = {}
+        for entry in self.body.prescribed:
+            if entry.stiffness is None:
+                nodes = self.nodes[entry.name]
+                moved = entry.course(self.equations.space.rest[nodes], frame)
+                for i in entry.components:
+                    values |= dict(zip((3 * nodes + i).tolist(), moved[:, i].tolist(), strict=True))
+        return np.array(list(values), np.int64), np.array(list(values.values()))
+
+    def state(self, reached: stepping.Reached) -> Reached:
+        """What is to be told of the present unknowns."""
+        equations, unknowns = self.equations, self.unknowns
+        places = equations.space.rest + unknowns[: equations.space.rest.size].reshape(-1, 3)
+        residual, _ = equations.assembled(unknowns, reached.frame, springs=False)
+        held = {entry.name: self._force(entry, places, residual) for entry in self.body.prescribed}
+        inside, vertices = equations.smallest_determinants(unknowns)
+        return Reached(
+            reached.frame,
+            places[equations.space.nodes],
+            {name: force for name, (force, _) in held.items()},
+            {name: moment for name, (_, moment) in held.items()},
+            {
+                "min_det_F_quadrature": inside,
+                "min_det_F_vertices": vertices,
+                "volume_ratio": equations.volume_ratio(unknowns),
+                "energy": equations.energy(unknowns, reached.frame),
+                "newton_iterations": float(reached.iterations),
+                "cut_backs": float(reached.cutbacks),
+            },
+        )
+
+    def _force(self, entry: Prescribed, places: Floats, residual: Floats) -> tuple[Floats, Floats]:
+        """The force (3,) [N] on the nodes of ``entry`` along its components, and its moment (3,) [N mm] about the origin."""
+        nodes, components = self.nodes[entry.name], list(entry.components)
+        forces = np.zeros((len(nodes), 3))
+        forces[:, components] = residual[: places.size].reshape(-1, 3)[nodes][:, components]
+        return forces.sum(axis=0), np.cross(places[nodes], forces).sum(axis=0)

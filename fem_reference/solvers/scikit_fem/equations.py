@@ -1,0 +1,181 @@
+"""The equations of a body: out-of-balance forces and their tangent, summed from what acts, each differentiated by jets."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from scipy.sparse import coo_array
+
+from fem_reference.continuum import Continuum, Prescribed
+from fem_reference.effects import Effect, Load, State, total_energy
+from fem_reference.errors import InputError
+from fem_reference.mesh import Floats
+from fem_reference.solvers.scikit_fem.jets import Jet, JetFunctions, constant, variables
+from fem_reference.solvers.scikit_fem.spaces import DISPLACEMENT, PRESSURE, VARIABLES, Points, Space
+
+# By element: exact for what its displacement gives on a straight cell with a law of second degree in the strain.
+QUADRATURE_DEGREE = {"P1": 2, "P2": 4, "P2/P0": 4, "P2/P1": 4, "Q1": 3, "Q2": 5, "Q1/P0": 3, "Q2/Q1": 5}
+_AT_ONCE = 1024  # points, so that their jets fit in a cache
+
+Acting = list[tuple[Effect, float]]
+# Of some points, their variables (n,) and a frame: the rates (p, n) of the work with the variables, and theirs (p, n, n).
+Law = Callable[[Points, list[Any], float], tuple[Floats, Floats]]
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A ``law`` at ``points``, which depends on the variables ``felt`` only."""
+
+    points: Points
+    law: Law
+    felt: list[int]
+
+
+class Equations:
+    """The equations of ``body`` in the unknowns of ``space``."""
+
+    def __init__(self, body: Continuum, element: str, quadrature_degree: int | None) -> None:
+        self.body, self.space = body, Space(body.mesh, element, quadrature_degree or QUADRATURE_DEGREE[element])
+        inside = self.space.inside
+        if any("fibre" in effect.needs for effect in body.effects):
+            if body.fibre is None:
+                raise InputError("fibre", "nothing", "fibre directions, which an effect needs")
+            inside = inside.with_fibre(body.fibre)
+        self.inside = inside
+        self.parts = [_Part(inside, self._energy_law, self._felt())]
+        loads = [effect for effect in body.effects if isinstance(effect, Load)]
+        self.parts += [part for load in loads for part in self._surface(load.on, partial(_load_law, load))]
+        self.springs = [
+            part
+            for entry in body.prescribed
+            if entry.stiffness is not None
+            for part in self._surface(entry.on, partial(_spring_law, entry))
+        ]
+
+    def assembled(self, unknowns: Floats, frame: float, springs: bool = True) -> tuple[Floats, Any]:
+        """The out-of-balance forces (N,) [N, mm3] and their tangent (N, N), with the pull of ``springs`` or without."""
+        residual = np.zeros(len(unknowns))
+        blocks = []
+        for part in self.parts + (self.springs if springs else []):
+            for points in _chunks(part.points):
+                forces, stiffness = _of_cells(part, points, unknowns, frame)
+                np.add.at(residual, points.dofs, forces)
+                rows, columns = np.broadcast_arrays(points.dofs[:, :, None], points.dofs[:, None, :])
+                blocks.append((stiffness.ravel(), rows.ravel(), columns.ravel()))
+        values, rows, columns = (np.concatenate(entries) for entries in zip(*blocks, strict=True))
+        return residual, coo_array((values, (rows, columns)), shape=(len(unknowns),) * 2).tocsr()
+
+    def smallest_determinants(self, unknowns: Floats) -> tuple[float, float]:
+        """The smallest det F at quadrature points and at the vertices of the cells; NaN where one is not a number."""
+        inside, vertices = (_determinant(points, unknowns).min() for points in (self.inside, self.space.vertices))
+        return float(inside), float(vertices)
+
+    def volume_ratio(self, unknowns: Floats) -> float:
+        """V / V0."""
+        return float((_determinant(self.inside, unknowns) * self.inside.weights).sum() / self.inside.weights.sum())
+
+    def energy(self, unknowns: Floats, frame: float) -> float:
+        """The energy [N mm]."""
+        values = np.moveaxis(self.inside.variables(unknowns), -1, 0)
+        energy = total_energy(self._acting(frame), _state(list(values), self.inside.fibre))
+        return float((energy * self.inside.weights).sum())
+
+    def _acting(self, frame: float) -> Acting:
+        return [(effect, effect.amount(frame)) for effect in self.body.effects]
+
+    def _felt(self) -> list[int]:
+        """The variables that the energies depend on: those of the displacement are costly and seldom needed."""
+        deformed = np.append(np.eye(3).ravel(), np.ones(4)) + 0.1 * np.sin(np.arange(VARIABLES))
+        jets = variables(deformed[:, None])
+        fibre = None if self.inside.fibre is None else self.inside.fibre[:1, 0]
+        energy = total_energy([(effect, 1.0) for effect in self.body.effects], _state(jets, fibre))
+        felt = list(range(9)) + ([] if self.space.pressure is None else [PRESSURE])
+        if not isinstance(energy, Jet):
+            return felt
+        needed = energy.slope[DISPLACEMENT].any() or energy.curvature[DISPLACEMENT].any()
+        return list(range(12)) + felt[9:] if needed else felt
+
+    def _energy_law(self, points: Points, jets: list[Any], frame: float) -> tuple[Floats, Floats]:
+        fibre = None if points.fibre is None else points.fibre.reshape(-1, 3)
+        energy = _jet(total_energy(self._acting(frame), _state(jets, fibre)), jets[0])
+        return energy.slope, energy.curvature
+
+    def _surface(self, region: str, law: Law) -> list[_Part]:
+        return [_Part(points, law, list(range(VARIABLES))) for points in self.space.surface(region)]
+
+
+def _of_cells(part: _Part, points: Points, unknowns: Floats, frame: float) -> tuple[Floats, Floats]:
+    """The forces (m, d) and stiffness (m, d, d) of cells."""
+    (m, q), n = points.weights.shape, len(part.felt)
+    values: list[Any] = list(points.variables(unknowns).reshape(-1, VARIABLES).T)
+    for place, jet in zip(part.felt, variables(np.stack([values[i] for i in part.felt])), strict=True):
+        values[place] = jet
+    slope, curvature = part.law(points, values, frame)
+    slope = np.broadcast_to(slope, (n, m * q)).T.reshape(m, q * n, 1)
+    curvature = np.ascontiguousarray(np.moveaxis(np.broadcast_to(curvature, (n, n, m * q)), -1, 0)).reshape(m, q, n, n)
+    rates = np.ascontiguousarray(points.rates[:, :, part.felt])
+    weighted = np.swapaxes((rates * points.weights[:, :, None, None]).reshape(m, q * n, -1), 1, 2)
+    return (weighted @ slope)[:, :, 0], weighted @ (curvature @ rates).reshape(m, q * n, -1)
+
+
+def _load_law(load: Load, points: Points, jets: list[Any], frame: float) -> tuple[Floats, Floats]:
+    """The virtual work of a load: minus its traction, along the displacement."""
+    assert points.normals is not None
+    state = _state(jets, None, load.amount(frame))
+    return _along_displacement(
+        [-_jet(entry, jets[0]) for entry in load.traction(state, _columns(points.normals.reshape(-1, 3)))]
+    )
+
+
+def _spring_law(entry: Prescribed, points: Points, jets: list[Any], frame: float) -> tuple[Floats, Floats]:
+    """The virtual work of springs that pull towards what is prescribed."""
+    wanted = entry.course(points.places.reshape(-1, 3), frame)
+    pull = [
+        entry.stiffness * (jets[9 + i] - wanted[:, i]) if i in entry.components else constant(0.0, jets[0])
+        for i in range(3)
+    ]
+    return _along_displacement(pull)
+
+
+def _along_displacement(forces: Sequence[Jet]) -> tuple[Floats, Floats]:
+    """Forces (3,) as rates of work with the variables of a surface."""
+    along = np.broadcast_shapes(*(force.value.shape for force in forces))
+    slope, curvature = np.zeros((VARIABLES, *along)), np.zeros((VARIABLES, VARIABLES, *along))
+    for i, force in enumerate(forces):
+        slope[9 + i], curvature[9 + i] = force.value, force.slope
+    return slope, curvature
+
+
+def _state(entries: Sequence[Any], fibre: Floats | None, amount: float = 1.0) -> State:
+    """The 13 variables as a state."""
+    return State(
+        F=[entries[0:3], entries[3:6], entries[6:9]],
+        displacement=entries[DISPLACEMENT],
+        pressure=entries[PRESSURE],
+        fibre=None if fibre is None else _columns(fibre),
+        amount=amount,
+        functions=JetFunctions(),
+    )
+
+
+def _columns(vectors: Floats) -> list[Floats]:
+    """The components of vectors (..., 3), each at all points."""
+    return [vectors[..., i] for i in range(3)]
+
+
+def _jet(value: Any, like: Jet) -> Jet:
+    return value if isinstance(value, Jet) else constant(value, like)
+
+
+def _determinant(points: Points, unknowns: Floats) -> Floats:
+    F = points.variables(unknowns)[..., :9]
+    return np.asarray(np.linalg.det(F.reshape(*F.shape[:2], 3, 3)))
+
+
+def _chunks(points: Points) -> Iterator[Points]:
+    """The points a few cells at a time."""
+    m, q = points.weights.shape
+    size = max(1, _AT_ONCE // q)
+    return (points.part(slice(start, start + size)) for start in range(0, m, size))

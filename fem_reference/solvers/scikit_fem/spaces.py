@@ -1,0 +1,201 @@
+"""Elements of scikit-fem on the cells of a body, evaluated at points of its cells and facets.
+
+What an effect may depend on at a point are 13 variables: the entries of F row by row, the displacement and the pressure. Each is
+linear in the unknowns: the three components of the displacement node by node, then the pressure.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import skfem
+from scipy.spatial.distance import cdist
+from skfem.quadrature import get_quadrature
+
+from fem_reference.continuum import ELEMENTS, Cells, Directions, reference_nodes
+from fem_reference.errors import InputError
+from fem_reference.mesh import Floats, Ints
+
+VARIABLES = 13
+DISPLACEMENT = slice(9, 12)
+PRESSURE = 12
+_REST = np.append(np.eye(3).ravel(), np.zeros(4))
+_MESHES = {
+    ("tetrahedron", 1): skfem.MeshTet1,
+    ("tetrahedron", 2): skfem.MeshTet2,
+    ("hexahedron", 1): skfem.MeshHex1,
+    ("hexahedron", 2): skfem.MeshHex2,
+}
+_ELEMENTS = {
+    ("tetrahedron", 0): skfem.ElementTetP0,
+    ("tetrahedron", 1): skfem.ElementTetP1,
+    ("tetrahedron", 2): skfem.ElementTetP2,
+    ("hexahedron", 0): skfem.ElementHex0,
+    ("hexahedron", 1): skfem.ElementHex1,
+    ("hexahedron", 2): skfem.ElementHex2,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Points of integration, q in each of m ``cells`` (m,): where they are, ``places`` (m, q, 3) [mm], their ``weights`` (m, q)
+    [mm3 or mm2], the ``values`` (m, q, k) and ``slopes`` (m, q, 3, k) of the k functions of the displacement and ``pressures``
+    (m, q, l) of the pressure, the unknowns ``dofs`` (m, 3 k + l); on facets the outward unit ``normals`` (m, q, 3), and in a body
+    with fibres their directions ``fibre`` (m, q, 3).
+    """
+
+    cells: Ints
+    places: Floats
+    weights: Floats
+    values: Floats
+    slopes: Floats
+    pressures: Floats
+    dofs: Ints
+    normals: Floats | None = None
+    fibre: Floats | None = None
+
+    def part(self, chosen: slice) -> "Points":
+        """The points of some of the cells."""
+        return replace(self, **{name: entry[chosen] for name, entry in vars(self).items() if entry is not None})
+
+    def with_fibre(self, fibre: Directions) -> "Points":
+        """The same points in a body with fibres."""
+        cells = np.repeat(self.cells, self.places.shape[1])
+        return replace(self, fibre=fibre(cells, self.places.reshape(-1, 3)).reshape(self.places.shape))
+
+    @property
+    def rates(self) -> Floats:
+        """How the variables at each point change with the unknowns of its cell, (m, q, 13, 3 k + l)."""
+        m, q, k = self.values.shape
+        rates = np.zeros((m, q, VARIABLES, 3 * k + self.pressures.shape[2]))
+        for i in range(3):
+            rates[:, :, 3 * i : 3 * i + 3, i : 3 * k : 3] = self.slopes
+            rates[:, :, 9 + i, i : 3 * k : 3] = self.values
+        rates[:, :, PRESSURE, 3 * k :] = self.pressures
+        return rates
+
+    def variables(self, unknowns: Floats) -> Floats:
+        """The 13 variables at each point, (m, q, 13)."""
+        m, q, k = self.values.shape
+        inside = unknowns[self.dofs]
+        nodal = inside[:, : 3 * k].reshape(m, 1, k, 3)
+        gradient = np.swapaxes(self.slopes @ nodal, 2, 3).reshape(m, q, 9)
+        displacement = (self.values[:, :, None] @ nodal)[:, :, 0]
+        pressure = self.pressures @ inside[:, 3 * k :, None]
+        return np.asarray(_REST + np.concatenate([gradient, displacement, pressure], axis=2))
+
+
+class Space:
+    """The unknowns of an element of ``ELEMENTS`` on ``cells``."""
+
+    def __init__(self, cells: Cells, element: str, degree: int) -> None:
+        """``degree`` of the polynomials that are integrated exactly on a straight cell."""
+        kind, displacement, pressure = ELEMENTS[element]
+        if displacement < cells.degree:
+            raise InputError("element", f'"{element}"', "one of degree 2, as the cells are curved")
+        self.cells, self.degree = cells, degree
+        self.nodal = _ELEMENTS[kind, displacement]()
+        self.order = cdist(self.nodal.doflocs, reference_nodes(kind, displacement)).argmin(axis=1)
+        here = cells.cells[:, self.order[: cells.cells.shape[1]]]
+        self.corners = here[:, : self.nodal.refdom.nnodes]
+        self.mesh = _MESHES[kind, cells.degree](cells.points.T.copy(), here.T.astype(np.int32))
+        rule = get_quadrature(self.nodal.refdom, degree)
+        self.basis = skfem.Basis(self.mesh, self.nodal, quadrature=rule)
+        self.rest: Floats = np.asarray(self.basis.doflocs.T)  # (N, 3) [mm] of the nodes of the displacement
+        self.nodes: Ints = np.empty(len(cells.points), np.int64)  # of the displacement, those of the mesh
+        self.nodes[here] = self.basis.element_dofs[: here.shape[1]].T
+        self.pressure = None
+        if pressure is not None:
+            element = _ELEMENTS[kind, pressure]()
+            self.pressure = skfem.Basis(self.mesh, element, quadrature=rule, disable_doflocs=True)
+        self.size = self.rest.size + (0 if self.pressure is None else self.pressure.N)
+
+    @cached_property
+    def inside(self) -> Points:
+        """The points of the quadrature of all cells."""
+        X, W = get_quadrature(self.nodal.refdom, self.degree)
+        return self._points(X, W, np.arange(len(self.corners)))
+
+    @cached_property
+    def vertices(self) -> Points:
+        """The corners of all cells; they have no weight that means anything."""
+        corners = self.nodal.refdom.p
+        return self._points(corners, np.ones(corners.shape[1]), np.arange(len(self.corners)))
+
+    def sides(self, region: str) -> list[tuple[Ints, Ints]]:
+        """By number of the side in the reference cell: its corners there, and the cells that have it in ``region``."""
+        facets = self.cells.facets.get(region)
+        if facets is None:
+            raise InputError("on", f'"{region}"', f"one of {', '.join(self.cells.facets)}")
+        wanted = np.unique(np.sort(facets, axis=1), axis=0)
+        found = []
+        for side in self.nodal.refdom.facets:
+            own = np.sort(self.corners[:, side], axis=1)
+            same = np.concatenate([wanted, own])
+            _, number = np.unique(same, axis=0, return_inverse=True)
+            inside = np.isin(number[len(wanted) :], number[: len(wanted)])
+            found.append((np.asarray(side, np.int64), np.flatnonzero(inside)))
+        if sum(len(cells) for _, cells in found) != len(wanted):
+            raise InputError(f"facets.{region}", "facets that are not of one cell each", "facets of the surface")
+        return [(side, cells) for side, cells in found if len(cells)]
+
+    def nodes_on(self, region: str) -> Ints:
+        """The nodes of the displacement on ``region``, each once."""
+        found = []
+        for side, cells in self.sides(region):
+            start, _, _, across = self._plane(side)
+            on = np.abs((self.nodal.doflocs - start) @ across) < 1e-12  # of the unit cell
+            found.append(self.basis.element_dofs[on][:, cells].ravel())
+        return np.unique(np.concatenate(found))
+
+    def surface(self, region: str) -> list[Points]:
+        """The points of the quadrature of the facets of ``region``, one entry for each side of the reference cell."""
+        flat, weights = get_quadrature(self.nodal.refdom.brefdom, self.degree)
+        found = []
+        for side, cells in self.sides(region):
+            start, along, up, across = self._plane(side)
+            X = start[:, None] + along[:, None] * flat[0] + up[:, None] * flat[1]
+            points = self._points(X, weights, cells)
+            # Nanson: an area vector goes over with the cofactors of the map.
+            mapping = self.mesh.mapping()
+            size = np.abs(np.broadcast_to(mapping.detDF(X, cells), points.weights.shape))
+            areas = size[..., None] * np.einsum("ikmq,i->mqk", mapping.invDF(X, cells), across)
+            lengths = np.linalg.norm(areas, axis=2)
+            found.append(replace(points, weights=lengths * weights, normals=areas / lengths[..., None]))
+        return found
+
+    def _plane(self, side: Ints) -> tuple[Floats, Floats, Floats, Floats]:
+        """A side of the reference cell: a corner, its two edges and its outward area vector, (3,) each."""
+        corners = self.nodal.refdom.p.T
+        start, along, up = corners[side[0]], corners[side[1]] - corners[side[0]], corners[side[-1]] - corners[side[0]]
+        across = np.cross(along, up)
+        return start, along, up, across * np.sign(across @ (start - corners.mean(axis=0)))
+
+    def _points(self, X: Floats, W: Floats, cells: Ints) -> Points:
+        """Points of ``cells`` at ``X`` (3, q) of the reference cell with weights ``W`` (q,)."""
+
+        def basis(like: Any) -> Any:
+            return skfem.Basis(
+                self.mesh, like.elem, quadrature=(X, W), elements=cells, dofs=like.dofs, disable_doflocs=True
+            )
+
+        own = basis(self.basis)
+        shape = (len(cells), len(W))
+        values = [np.broadcast_to(np.asarray(function[0]), shape) for function in own.basis]
+        slopes = [np.broadcast_to(function[0].grad, (3, *shape)) for function in own.basis]
+        dofs = (3 * self.basis.element_dofs.T[cells, :, None] + np.arange(3)).reshape(len(cells), -1)
+        pressures = np.zeros((*shape, 0))
+        if self.pressure is not None:
+            entries = [np.broadcast_to(np.asarray(entry[0]), shape) for entry in basis(self.pressure).basis]
+            pressures = np.stack(entries, axis=-1)
+            dofs = np.concatenate([dofs, self.rest.size + self.pressure.element_dofs.T[cells]], axis=1)
+        return Points(
+            cells=cells,
+            places=np.moveaxis(np.asarray(own.global_coordinates()), 0, -1),
+            weights=np.asarray(own.dx),
+            values=np.stack(values, axis=-1),
+            slopes=np.moveaxis(np.stack(slopes), (0, 1), (3, 2)),
+            pressures=pressures,
+            dofs=dofs.astype(np.int64),
+        )

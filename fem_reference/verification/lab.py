@@ -1,0 +1,31 @@
+"""Where entries are measured: one process of FEniCSx, and scikit-fem."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from fem_reference.continuum import Continuum, Solved
+from fem_reference.solvers import fenicsx, scikit_fem
+from fem_reference.solvers.fenicsx.session import Session
+
+
+class FemLab:
+    """Solves bodies by the reference in a ``session``, and by the second opinion."""
+
+    def __init__(self, session: Session) -> None:
+        self.session = session
+
+    def solve(self, body: Continuum, element: str, **settings: Any) -> Solved:
+        """The states of ``body`` by the reference, FEniCSx."""
+        return self.session.solve(body, fenicsx.BodySettings(element=element, **settings))
+
+    def second(self, body: Continuum, element: str, **settings: Any) -> Solved:
+        """The states of ``body`` by the second opinion, scikit-fem."""
+        return scikit_fem.solve_body(body, scikit_fem.BodySettings(element=element, **settings))
+
+
+@contextmanager
+def lab() -> Iterator[FemLab]:
+    """A lab; its process ends with it. MissingSoftware where FEniCSx is not installed."""
+    with fenicsx.session() as session:
+        yield FemLab(session)

@@ -1,0 +1,112 @@
+"""Finds the entries of the catalogue, and measures them."""
+
+import importlib
+import logging
+import math
+import os
+import pkgutil
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from contextlib import AbstractContextManager, ExitStack
+from fnmatch import fnmatchcase
+from types import ModuleType
+
+from fem_reference import verification
+from fem_reference.catalogue import Entry, Finding, Lab, Result, result
+from fem_reference.errors import InputError
+
+log = logging.getLogger(__name__)
+
+# What fails one entry and lets the others go on; anything else is a mistake of ours, or the wish to stop.
+FAILURES = (InputError, ValueError, ArithmeticError, LookupError, RuntimeError, OSError)
+
+
+def entries() -> dict[str, Entry]:
+    """The catalogue: every entry by its name, in the order of the files and in each of its ``ENTRIES``."""
+    names = sorted(module.name for module in pkgutil.iter_modules(verification.__path__))
+    return collect(importlib.import_module(f"{verification.__name__}.{name}") for name in names)
+
+
+def collect(modules: Iterable[ModuleType]) -> dict[str, Entry]:
+    """The ``ENTRIES`` of ``modules`` by their names; a module without them has none."""
+    found: dict[str, Entry] = {}
+    for module in modules:
+        for entry in getattr(module, "ENTRIES", ()):
+            if entry.name in found:
+                raise ValueError(f'{module.__name__}: a second entry "{entry.name}"')
+            found[entry.name] = entry
+    return found
+
+
+def choose(catalogue: dict[str, Entry], wanted: Iterable[str], place: str) -> tuple[str, ...]:
+    """The names of the entries that ``wanted`` means, in the order of the catalogue: names of entries or families, or shell
+    patterns of them. InputError naming ``place`` where one means none.
+    """
+    chosen: set[str] = set()
+    for text in wanted:
+        meant = {
+            name for name, entry in catalogue.items() if fnmatchcase(name, text) or fnmatchcase(entry.family, text)
+        }
+        if not meant:
+            families = dict.fromkeys(entry.family for entry in catalogue.values())
+            known = f"an entry ({', '.join(catalogue)}), a family ({', '.join(families)}) or a pattern of them"
+            raise InputError(place, f'"{text}"', known)
+        chosen |= meant
+    return tuple(name for name in catalogue if name in chosen)
+
+
+def run(
+    wanted: Sequence[Entry],
+    make_lab: Callable[[], AbstractContextManager[Lab]],
+    spoiled: frozenset[str] = frozenset(),
+) -> tuple[Result, ...]:
+    """What came of the entries, in their order; those whose names are in ``spoiled`` are measured with their spoil.
+
+    Two at a time where there are two cores, each thread with a lab of its own. However this ends, its labs are closed.
+    """
+    waiting, found = deque(enumerate(wanted)), dict[int, Result]()
+    telling, begin = threading.Lock(), time.perf_counter()
+
+    def work(lab: Lab) -> None:
+        for place, entry in _taken(waiting):
+            last = _measured(entry, lab, spoiled=entry.name in spoiled)
+            with telling:
+                found[place] = last
+                _log_progress(last, len(found), len(wanted), time.perf_counter() - begin)
+
+    count = min(2, os.cpu_count() or 1, len(wanted))
+    with ThreadPoolExecutor(max(count, 1)) as pool, ExitStack() as stack:
+        labs = [stack.enter_context(make_lab()) for _ in range(count)]
+        stack.callback(waiting.clear)  # so that no thread goes on to the next entry while the labs close
+        threads = [pool.submit(work, lab) for lab in labs]
+        for thread in wait(threads, return_when=FIRST_EXCEPTION).done:
+            thread.result()
+    return tuple(found[place] for place in range(len(wanted)))
+
+
+def _taken(waiting: deque[tuple[int, Entry]]) -> Iterator[tuple[int, Entry]]:
+    """Takes what is waiting, one after the other, until nothing is."""
+    while True:
+        try:
+            taken = waiting.popleft()
+        except IndexError:
+            return
+        yield taken
+
+
+def _measured(entry: Entry, lab: Lab, *, spoiled: bool) -> Result:
+    """What came of an entry; where it raised, a finding that is not a number and says why."""
+    begin = time.perf_counter()
+    try:
+        finding = (entry.spoiled if spoiled else entry.measure)(lab)
+    except FAILURES as error:
+        finding = Finding(math.nan, note=f"{type(error).__name__}: {error}")
+    return result(entry, finding, time.perf_counter() - begin, spoiled=spoiled)
+
+
+def _log_progress(last: Result, done: int, wanted: int, passed: float) -> None:
+    left = f", about {passed / done * (wanted - done):.0f} s left" if done < wanted else ""
+    log.info("verify: %d of %d, %s %s, %.0f s%s", done, wanted, last.entry.name, last.word, passed, left)

@@ -1,0 +1,89 @@
+"""Effects of all kinds with parameters, states to meet them in, and what they do there."""
+
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from fem_reference import effects
+from fem_reference.effects import Coursed, Effect, Energy, Load, State
+from fem_reference.records import parse
+
+COURSE = [{"frame": 0, "amount": 0.0}, {"frame": 10, "amount": 1.0}, {"frame": 30, "amount": 0.5}]
+PARAMETERS: dict[str, dict[str, Any]] = {
+    "neo_hooke": {"mu": "10 kPa"},
+    "mooney_rivlin": {"c1": "10 kPa", "c2": "4 kPa"},
+    "incompressible": {"bulk": "10 MPa"},
+    "incompressible_penalty": {"bulk": "10 MPa"},
+    "fibre_passive": {"stress": "300 kPa", "p1": 0.05, "p2": 6.6, "optimal_stretch": 1.1, "linear_from": 1.4},
+    "fibre_passive_febio": {"c3": "10 kPa", "c4": 12.0, "c5": "3 MPa", "linear_from": 1.3},
+    "fibre_active": {"stress": "300 kPa", "optimal_stretch": 1.1, "course": COURSE},
+    "active_tension": {"tension": "60 kPa", "course": COURSE},
+    "holzapfel_ogden": {"k1": "20 kPa", "k2": 1.5, "angle": "30 deg", "normal": [0.2, 0.5, 2.0]},
+    "guccione": {"c": "2 kPa", "bf": 8.0, "bt": 2.0, "bfs": 4.0},
+    "gravity": {"density": "1060 kg/m3", "acceleration": "0, 0, -9.81 m/s^2", "course": COURSE},
+    "pressure": {"on": "top", "pressure": "8 kPa", "course": COURSE},
+    "traction": {"on": "top", "force": "0, 6.25, 1 kPa", "course": COURSE},
+    "prestretch": {"stretch": 1.1, "course": COURSE},
+}
+OTHER: dict[str, Any] = {
+    "p1": 0.06,
+    "p2": 6.0,
+    "optimal_stretch": 1.05,
+    "linear_from": 1.15,
+    "c4": 11.0,
+    "k2": 1.0,
+    "angle": "40 deg",
+    "normal": [2.0, 0.5, 0.2],
+    "bf": 7.0,
+    "bt": 3.0,
+    "bfs": 5.0,
+    "density": "1000 kg/m3",
+    "acceleration": "0, 1, -9.81 m/s^2",
+    "force": "1, 6.25, 1 kPa",
+    "stretch": 1.2,
+    "course": [{"frame": 0, "amount": 0.2}],
+    "on": "bottom",
+}  # of other parameters it is 7 MPa
+POSITIVE = ["mu", "bulk", "stress", "c3", "c5", "tension", "k1", "c", "density"]
+KINDS = {"MPa": "pressure", "rad": "an angle", "tonne/mm^3": "a density", "mm/s^2": "acceleration"}
+ENERGIES = [name for name in PARAMETERS if issubclass(effects.find(name), Energy)]
+ELASTIC = [name for name in ENERGIES if name != "gravity"]
+COURSED = [name for name in PARAMETERS if issubclass(effects.find(name), Coursed)]
+SLACK = ["fibre_passive", "fibre_passive_febio", "holzapfel_ogden"]
+
+
+TURN = Rotation.from_rotvec([0.4, -1.1, 0.7]).as_matrix()
+FIBRE = np.array([2.0, 3.0, 6.0]) / 7
+ALONG = np.array([1.0, 0.0, 0.0])
+
+
+def state(F: np.ndarray, pressure: float = 0.3, fibre: np.ndarray = FIBRE, amount: float = 1.0) -> State:
+    return State(F=F, displacement=(0.3, -0.2, 0.5), pressure=pressure, fibre=fibre, amount=amount)
+
+
+def make(name: str, **changes: Any) -> Any:
+    return parse(effects.find(name), PARAMETERS[name] | changes, name)
+
+
+def deformations() -> list[np.ndarray]:
+    """Twenty, some of which stretch the fibre and some of which shorten it."""
+    rng = np.random.default_rng(20)
+    return [np.eye(3) + 0.4 * rng.uniform(-1, 1, (3, 3)) for _ in range(20)]
+
+
+def uniaxial(stretch: float) -> np.ndarray:
+    return np.diag([stretch, stretch**-0.5, stretch**-0.5])
+
+
+def slope(effect: Energy, stretch: float, step: float = 1e-5) -> float:
+    """The derivative of the energy with the stretch along the fibre, at constant volume, by central differences."""
+    after, before = (effect.energy(state(uniaxial(stretch + sign * step), 0.0, ALONG)) for sign in (1, -1))
+    return (after - before) / (2 * step)
+
+
+def outcome(effect: Effect, at: State) -> Any:
+    """What an effect does: its energy, its traction, or what is elastic."""
+    if isinstance(effect, Load):
+        return effect.traction(at, (0.6, 0.0, 0.8))
+    return effect.energy(at) if isinstance(effect, Energy) else effect.elastic(at)

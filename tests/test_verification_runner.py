@@ -1,0 +1,335 @@
+"""The catalogue is found, chosen from and measured: in its order, two at a time, and whatever an entry does."""
+
+import json
+import logging
+import math
+import sys
+import threading
+import time
+from contextlib import contextmanager
+from types import ModuleType
+from typing import get_args
+
+import pytest
+
+from fem_reference import cli, truths
+from fem_reference.catalogue import Entry, Finding, Kind
+from fem_reference.errors import InputError, MissingSoftware
+from fem_reference.verification import runner
+
+
+def entry(name, measure=1.0, family="blocks", **changes) -> Entry:
+    """An entry whose truth is 1, within 0.1; ``measure`` is its value, or what is done with the lab."""
+    told = {"title": f"The {name}", "unit": "mm", "because": "rounding", "source": "by hand", "spoil": "twice as much"}
+    numbers = {"truth": lambda: 1.0, "within": 0.1, "relative": False, "kind": "closed form"}
+    measure = measure if callable(measure) else lambda _, value=measure: Finding(value)
+    table = told | numbers | {"measure": measure, "spoiled": lambda _: Finding(2.0)} | changes
+    return Entry(name=name, family=family, **table)
+
+
+def raising(error) -> Entry:
+    def measure(_):
+        raise error
+
+    return entry("raising", measure)
+
+
+class Labs:
+    """Makes labs, and knows how many were made and how many are open."""
+
+    def __init__(self) -> None:
+        self.made, self.open = 0, 0
+
+    @contextmanager
+    def __call__(self):
+        self.made, self.open = self.made + 1, self.open + 1
+        try:
+            yield self.made
+        finally:
+            self.open -= 1
+
+
+def catalogue(*entries) -> dict[str, Entry]:
+    return {one.name: one for one in entries}
+
+
+def module(name, *entries) -> ModuleType:
+    made = ModuleType(name)
+    if entries:
+        made.ENTRIES = entries
+    return made
+
+
+def test_modules_give_their_entries_in_order() -> None:
+    found = runner.collect([module("one", entry("b"), entry("a")), module("shapes"), module("two", entry("c"))])
+    assert list(found) == ["b", "a", "c"]
+
+
+def test_a_name_is_given_once() -> None:
+    with pytest.raises(ValueError, match='two: a second entry "a"'):
+        runner.collect([module("one", entry("a")), module("two", entry("a"))])
+
+
+def test_every_entry_there_is_says_what_a_reader_needs() -> None:
+    for name, one in runner.entries().items():
+        assert one.name == name
+        assert one.kind in get_args(Kind)
+        assert one.within > 0, name
+        assert all(getattr(one, key).strip() for key in ("family", "title", "because", "source", "spoil")), name
+
+
+@pytest.mark.parametrize(
+    ("wanted", "names"),
+    [
+        (["bar_end"], "bar_end"),
+        (["tip", "bar_end"], "bar_end tip"),
+        (["bars"], "bar_end bar_middle"),
+        (["*_end", "beams"], "bar_end tip beam_end"),
+        (["bar_[!e]*"], "bar_middle"),
+        ([], ""),
+    ],
+)
+def test_names_families_and_patterns_choose_in_the_order_of_the_catalogue(wanted, names) -> None:
+    bars = [entry("bar_end", family="bars"), entry("bar_middle", family="bars")]
+    known = catalogue(*bars, entry("tip", family="beams"), entry("beam_end", family="beams"))
+    assert runner.choose(known, wanted, "NAME") == tuple(names.split())
+
+
+def test_a_name_that_is_not_there_is_told_with_those_that_are() -> None:
+    known = catalogue(entry("bar"), entry("tip", family="beams"))
+    want = r'NAME: got "Bar", want an entry \(bar, tip\), a family \(blocks, beams\) or a pattern of them'
+    with pytest.raises(InputError, match=want):
+        runner.choose(known, ["tip", "Bar"], "NAME")
+
+
+def test_results_keep_their_order_and_every_thread_its_lab(monkeypatch) -> None:
+    monkeypatch.setattr(runner.os, "cpu_count", lambda: 8)
+    both, used = threading.Barrier(2, timeout=5), []
+
+    def meet(lab):
+        both.wait()  # passes only when two entries are under way at once
+        used.append((lab, threading.get_ident()))
+        return Finding(1.0)
+
+    def last(_):
+        time.sleep(0.05)
+        return Finding(1.05)
+
+    labs = Labs()
+    results = runner.run([entry("slow", meet), entry("first", meet), entry("late", last), entry("done")], labs)
+    assert [one.entry.name for one in results] == ["slow", "first", "late", "done"]
+    assert [one.word for one in results] == ["pass"] * 4
+    assert results[2].error == pytest.approx(0.05, abs=1e-12)
+    assert 0.05 <= results[2].seconds < 5
+    assert len(set(used)) == len({lab for lab, _ in used}) == labs.made == 2
+    assert labs.open == 0
+
+
+def test_no_more_labs_than_work_or_cores(monkeypatch) -> None:
+    labs = Labs()
+    assert runner.run([], labs) == ()
+    assert labs.made == 0
+    runner.run([entry("one")], labs)
+    assert labs.made == 1
+    monkeypatch.setattr(runner.os, "cpu_count", lambda: 1)
+    runner.run([entry("one"), entry("two")], labs)
+    assert labs.made == 2
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        InputError("mesh", "none", "one"),
+        ValueError("no root"),
+        FloatingPointError("overflow"),
+        KeyError("end"),
+        RuntimeError("it ended"),
+        OSError("pipe"),
+    ],
+)
+def test_an_entry_that_raises_fails_alone(error) -> None:
+    failed, other = runner.run([raising(error), entry("other")], Labs())
+    assert (failed.word, other.word) == ("fail", "pass")
+    assert math.isnan(failed.finding.value)
+    assert failed.finding.note == f"{type(error).__name__}: {error}"
+
+
+@pytest.mark.parametrize("error", [TypeError("ours"), KeyboardInterrupt("stop"), MissingSoftware("FEniCSx")])
+def test_what_is_no_failure_of_an_entry_ends_everything(error, monkeypatch) -> None:
+    monkeypatch.setattr(runner.os, "cpu_count", lambda: 1)
+    labs, measured = Labs(), []
+    with pytest.raises(type(error), match=str(error)):
+        runner.run([raising(error), entry("next", lambda _: measured.append(1))], labs)
+    assert labs.open == 0
+    assert measured == []
+
+
+def test_a_thread_stops_after_its_entry_when_the_other_met_a_mistake(monkeypatch) -> None:
+    monkeypatch.setattr(runner.os, "cpu_count", lambda: 2)
+    closed, measured = threading.Event(), []
+
+    @contextmanager
+    def make_lab():
+        try:
+            yield
+        finally:
+            closed.set()
+
+    def slow(_):
+        assert closed.wait(5)  # the labs close while this is still under way
+        measured.append("slow")
+        return Finding(1.0)
+
+    later = [entry(f"later_{i}", lambda _: measured.append("later")) for i in range(3)]
+    with pytest.raises(TypeError, match="ours"):
+        runner.run([entry("slow", slow), raising(TypeError("ours")), *later], make_lab)
+    assert measured == ["slow"]
+
+
+def test_a_lab_that_cannot_be_made_closes_the_others(monkeypatch) -> None:
+    monkeypatch.setattr(runner.os, "cpu_count", lambda: 2)
+    labs = Labs()
+
+    def second_fails():
+        if labs.made:
+            raise MissingSoftware("no second FEniCSx")
+        return labs()
+
+    with pytest.raises(MissingSoftware, match="no second"):
+        runner.run([entry("one"), entry("two")], second_fails)
+    assert (labs.made, labs.open) == (1, 0)
+
+
+def test_a_spoiled_entry_is_measured_with_its_spoil() -> None:
+    good, bad = runner.run([entry("good"), entry("bad")], Labs(), frozenset({"bad"}))
+    assert (good.word, good.spoiled, good.finding.value) == ("pass", False, 1.0)
+    assert (bad.word, bad.spoiled, bad.finding.value) == ("fail", True, 2.0)
+
+
+def test_progress_says_how_far_it_is(caplog, monkeypatch) -> None:
+    monkeypatch.setattr(runner.os, "cpu_count", lambda: 1)
+    with caplog.at_level(logging.INFO, "fem_reference"):
+        runner.run([entry("bar"), entry("tip", 3.0)], Labs())
+    assert caplog.messages == ["verify: 1 of 2, bar pass, 0 s, about 0 s left", "verify: 2 of 2, tip fail, 0 s"]
+
+
+# The verb
+
+
+@pytest.fixture
+def verify(monkeypatch, tmp_path, capsys):
+    """Calls the verb on a small catalogue: the exit status, what is printed and the JSON."""
+    known = catalogue(entry("bar", family="bars"), entry("rod", family="bars", unit="N"), entry("tip", 3.0, "beams"))
+    made = ModuleType("fem_reference.verification.lab")
+    made.lab = Labs()
+    monkeypatch.setattr(runner, "entries", lambda: known)
+    monkeypatch.setitem(sys.modules, made.__name__, made)
+
+    def call(*words):
+        status = cli.main(["verify", *words, "--out", str(tmp_path / "out"), "--quiet"])
+        stored = tmp_path / "out" / "verify.json"
+        return status, capsys.readouterr(), json.loads(stored.read_text()) if stored.exists() else None
+
+    call.made, call.folder = made, tmp_path
+    return call
+
+
+def test_all_pass(verify) -> None:
+    target = verify.folder / "below" / "facts.json"
+    status, told, facts = verify("bars", "--json", str(target))
+    assert status == cli.DONE
+    head, *lines, summary, page = told.out.splitlines()
+    assert head.split() == ["entry", "value", "truth", "unit", "error", "within", "order", "seconds", "verdict"]
+    assert [line.split() for line in lines] == [
+        [name, "1", "1", unit, "0", "0.1", "0.0", "pass"] for name, unit in (("bar", "mm"), ("rod", "N"))
+    ]
+    assert {line.index("pass") for line in lines} == {head.index("verdict")}
+    assert summary == "verdict: pass, 2 of 2 pass, 0 s"
+    assert page == f"page: {verify.folder / 'out' / 'verify.html'}"
+    assert (verify.folder / "out" / "verify.html").read_text().startswith("<!DOCTYPE html>")
+    assert json.loads(target.read_text()) == facts
+    assert (facts["verdict"], facts["passed"], facts["of"]) == ("pass", 2, 2)
+    assert {"fem_reference", "python", "numpy"} <= set(facts["versions"])
+
+
+def test_without_names_all_are_measured_and_one_that_fails_tells(verify) -> None:
+    status, told, facts = verify()
+    assert status == cli.VERDICT_FAIL
+    assert [row["name"] for row in facts["entries"]] == ["bar", "rod", "tip"]
+    assert "verdict: fail, 2 of 3 pass" in told.out
+
+
+@pytest.mark.parametrize(
+    ("words", "names"), [(["--spoil", "bar"], ["bar"]), (["rod", "--spoil", "b*r"], ["bar", "rod"])]
+)
+def test_what_is_spoiled_is_measured_and_fails(verify, words, names) -> None:
+    status, told, facts = verify(*words)
+    assert status == cli.VERDICT_FAIL
+    assert [row["name"] for row in facts["entries"]] == names
+    assert [row["spoiled"] for row in facts["entries"]] == [name == "bar" for name in names]
+    assert "fail (spoiled)" in told.out
+    assert f"verdict: fail, {len(names) - 1} of {len(names)} pass, 1 measured with their spoil" in told.out
+
+
+@pytest.mark.parametrize(("words", "place"), [(["nobody"], "NAME"), (["--spoil", "nobody"], "--spoil")])
+def test_an_unknown_name_is_bad_input(verify, words, place) -> None:
+    status, told, facts = verify(*words)
+    assert status == cli.BAD_INPUT
+    assert f'{place}: got "nobody", want an entry (bar, rod, tip), a family (bars, beams)' in told.err
+    assert facts is None
+    assert verify.made.lab.made == 0
+
+
+def test_without_fenicsx_it_says_so(verify) -> None:
+    def lab():
+        raise MissingSoftware("FEniCSx is not installed")
+
+    verify.made.lab = lab
+    status, told, _ = verify("bar")
+    assert status == cli.SOLVER_FAILED
+    assert "FEniCSx is not installed" in told.err
+
+
+# Truths
+
+
+@pytest.fixture
+def unloaded(monkeypatch):
+    """As if no truth had been loaded yet."""
+    for name in [name for name in sys.modules if name.split(".")[0] == "validation"]:
+        monkeypatch.delitem(sys.modules, name)
+    yield
+    for name in [name for name in sys.modules if name.split(".")[0] == "validation"]:
+        del sys.modules[name]
+
+
+@pytest.mark.usefixtures("unloaded")
+def test_truths_are_found_wherever_python_looks(monkeypatch) -> None:
+    monkeypatch.setattr(
+        sys, "path", [path for path in sys.path if path.endswith(("site-packages", "python3.12", "zip"))]
+    )
+    # Timoshenko and Goodier give 0.1406 with four digits.
+    assert truths.find("torsion").square_bar_stiffness(2.0, 1.0) == pytest.approx(2 * 0.1406, abs=1e-4)
+    with pytest.raises(ModuleNotFoundError, match="nothing_of_the_kind"):
+        truths.find("nothing_of_the_kind")
+
+
+@pytest.mark.usefixtures("unloaded")
+def test_truths_may_import_each_other(monkeypatch, tmp_path) -> None:
+    folder = tmp_path / "validation"
+    folder.mkdir()
+    (folder / "__init__.py").write_text("")
+    (folder / "base.py").write_text("three = 3\n")
+    (folder / "top.py").write_text("from validation.base import three\n\nsix = 2 * three\n")
+    monkeypatch.setattr(truths, "FOLDER", folder.resolve())
+    assert truths.find("top").six == 6
+    assert truths.find("base") is truths.find("base")
+
+
+@pytest.mark.usefixtures("unloaded")
+def test_another_package_of_that_name_is_refused(monkeypatch, tmp_path) -> None:
+    other = ModuleType("validation")
+    other.__path__ = [str(tmp_path)]
+    monkeypatch.setitem(sys.modules, "validation", other)
+    with pytest.raises(ImportError, match='another package "validation" is loaded'):
+        truths.find("torsion")

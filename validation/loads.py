@@ -1,0 +1,84 @@
+"""Neo-Hookean blocks under plates, weights and pressure: ``mu/2 (I1bar - 3) + K/2 (J - 1)^2`` with a finite bulk modulus K.
+
+Derived here from the energy by hand (Holzapfel 2000, Nonlinear Solid Mechanics, ch. 6.4: stress of a decoupled energy), as scalar
+equations; roots to rounding. No reading error. ``mu`` and ``bulk`` [MPa].
+"""
+
+import numpy as np
+from scipy.optimize import brentq
+
+
+def squeezed_volume(mu: float, bulk: float, stretch: float) -> float:
+    """J of a block between frictionless plates at ``stretch`` of its height, free at its sides:
+    ``mu/3 J^(-2/3) (J/stretch - stretch^2) + K J (J - 1) = 0``.
+    """
+
+    def lateral(J: float) -> float:
+        return float(mu / 3 * J ** (-2 / 3) * (J / stretch - stretch**2) + bulk * J * (J - 1))
+
+    inner, outer = (stretch**3, 1.0) if stretch < 1 else (1.0, stretch**3)
+    return float(brentq(lateral, inner, outer, xtol=1e-15, rtol=1e-15)) if stretch != 1 else 1.0
+
+
+def squeeze_force(mu: float, bulk: float, stretch: float, area: float) -> float:
+    """Of a plate on the block [N], above zero where it pulls: ``mu J^(-2/3) (stretch - J / stretch^2) area``, ``area`` at rest
+    [mm2]; J from :func:`squeezed_volume`.
+    """
+    J = squeezed_volume(mu, bulk, stretch)
+    return float(mu * J ** (-2 / 3) * (stretch - J / stretch**2) * area)
+
+
+def hanging_stretch(mu: float, bulk: float, area: float, weight: float) -> float:
+    """Of a bar of no weight of its own, ``area`` at rest [mm2], that carries ``weight`` [N]; below 1 where it stands under one.
+
+    ``squeeze_force(stretch) = weight``.
+    """
+
+    def unbalanced(stretch: float) -> float:
+        return squeeze_force(mu, bulk, stretch, area) - weight
+
+    reach = 2.0
+    while unbalanced(1 / reach) > 0 or unbalanced(reach) < 0:
+        reach *= 2
+    return float(brentq(unbalanced, 1 / reach, reach, xtol=1e-15, rtol=1e-15))
+
+
+def confined_stress(mu: float, bulk: float, stretch: float) -> float:
+    """Nominal stress [MPa] along the only direction that stretches, ``F = diag(1, 1, l)``:
+    ``2/3 mu (l^(1/3) - l^(-5/3)) + K (l - 1)``.
+    """
+    return float(2 / 3 * mu * (stretch ** (1 / 3) - stretch ** (-5 / 3)) + bulk * (stretch - 1))
+
+
+def confined_stretch(mu: float, bulk: float, stress: float) -> float:
+    """The stretch at which :func:`confined_stress` is ``stress`` [MPa], by root finding."""
+    reach = 1 + abs(stress) / bulk
+    low = min(0.5, (mu / (mu + 3 * abs(stress))) ** 0.6)
+    return float(
+        brentq(lambda stretch: confined_stress(mu, bulk, stretch) - stress, low, reach, xtol=1e-15, rtol=1e-15)
+    )
+
+
+def column_top(mu: float, bulk: float, weight: float, height: float) -> float:
+    """Displacement [mm] of the top of a column in a smooth rigid box that stands under its own ``weight`` per rest volume
+    [N/mm3]; ``height`` H [mm] at rest.
+
+    Balance ``P(Z) = -weight (H - Z)``; the displacement, the integral of ``l - 1`` over Z, is by parts
+    ``H (l0 - 1) + W(l0) / weight`` with l0 at the bottom and ``W = mu/2 (l^(4/3) + 2 l^(-2/3) - 3) + K/2 (l - 1)^2``.
+    A column that hangs, ``weight`` below zero, has the same form.
+    """
+    bottom = confined_stretch(mu, bulk, -weight * height)
+    stored = mu / 2 * (bottom ** (4 / 3) + 2 * bottom ** (-2 / 3) - 3) + bulk / 2 * (bottom - 1) ** 2
+    return float(height * (bottom - 1) + stored / weight)
+
+
+def pressed_volume(bulk: float, pressure: float) -> float:
+    """V / V0 of a body in a fluid of ``pressure`` P [MPa] on all its faces: ``1 - P / K``, as Cauchy's pressure is ``-U'(J)``; an
+    isochoric law adds nothing. P below K.
+    """
+    return 1 - pressure / bulk
+
+
+def pressed_lengths(bulk: float, pressure: float, rest: float) -> float:
+    """An edge [mm] of the body of :func:`pressed_volume`, ``rest`` [mm] at rest."""
+    return float(rest * np.cbrt(pressed_volume(bulk, pressure)))
