@@ -20,6 +20,7 @@ from fem_reference.solvers.scikit_fem.equations import Equations
 log = logging.getLogger(__name__)
 
 _HALVINGS = 10
+_ROUNDING = 1e-14  # of what is prescribed, over the size of the body
 _GROWTH = 10.0  # of the out-of-balance forces, above which a Newton step is halved
 
 
@@ -97,7 +98,7 @@ class _March:
             attempt, unknowns = self._newton(frame)
         if attempt.failure is not None:
             return attempt
-        smallest = min(self.equations.smallest_determinants(unknowns))
+        smallest = np.min(self.equations.smallest_determinants(unknowns))
         if not smallest > 0:
             why = f"Newton's method converged, but det F fell to {smallest:.3g}"
             return Attempt("inverted", attempt.iterations, why)
@@ -107,11 +108,14 @@ class _March:
     def _newton(self, frame: float) -> tuple[Attempt, Floats]:
         held, wanted = self._held(frame)
         free = np.setdiff1d(np.arange(len(self.unknowns)), held)
-        now, allowed = self._tangent(self.unknowns, frame), self.settings.newton_iterations
+        now, allowed = self._tangent(self.unknowns.copy(), frame), self.settings.newton_iterations
+        rounding = _ROUNDING * np.ptp(self.equations.space.rest, axis=0).max()
         for iteration in range(allowed + 1):
             gap = wanted - now.unknowns[held]
+            gap[np.abs(gap) < rounding] = 0
             size = float(np.linalg.norm(now.residual[free]))
             if size < self.settings.residual and not gap.any():
+                now.unknowns[held] = wanted
                 return Attempt(None, iteration), now.unknowns
             if iteration == allowed:
                 break
@@ -119,18 +123,20 @@ class _March:
                 step = now.step(free, held, gap)
             except RuntimeError:  # what SuperLU raises where a pivot is zero
                 return Attempt("diverged", iteration, "the equations have no unique solution"), now.unknowns
-            for halvings in range(_HALVINGS):
-                trial = now.unknowns + 0.5**halvings * step
-                if halvings == 0:
-                    trial[held] = wanted
-                then = self._tangent(trial, frame)
-                if np.linalg.norm(then.residual[free]) < (np.inf if gap.any() else _GROWTH * size):
-                    break
-            else:
+            then = self._along(now, step, free, np.inf if gap.any() else _GROWTH * size, frame)
+            if then is None:
                 return Attempt("diverged", iteration, "no part of a Newton step has bounded forces"), now.unknowns
             now = then
         why = f"Newton's method did not converge in {allowed} iterations"
         return Attempt("diverged", allowed, why), now.unknowns
+
+    def _along(self, now: "_Tangent", step: Floats, free: Ints, limit: float, frame: float) -> "_Tangent | None":
+        """The equations after as much of ``step`` as leaves the forces on ``free`` unknowns below ``limit``."""
+        for halvings in range(_HALVINGS):
+            then = self._tangent(now.unknowns + 0.5**halvings * step, frame)
+            if np.linalg.norm(then.residual[free]) < limit:
+                return then
+        return None
 
     def _tangent(self, unknowns: Floats, frame: float) -> "_Tangent":
         return _Tangent(unknowns, *self.equations.assembled(unknowns, frame))
