@@ -93,6 +93,17 @@ Directions = Callable[
 
 
 @dataclass(frozen=True, eq=False)
+class ByCell:
+    """Fibre directions that are constant in each cell: unit vectors (m, 3)."""
+
+    vectors: Floats
+
+    def __call__(self, cells: Ints, points: Floats) -> Floats:  # noqa: ARG002
+        """The directions (n, 3) in ``cells`` (n,)."""
+        return np.asarray(self.vectors[cells])
+
+
+@dataclass(frozen=True, eq=False)
 class Continuum:
     """A body of ``mesh`` with its ``effects``; at ``frames[0]`` it rests. A load acts on the facets that its ``on`` names."""
 

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fem_reference import files
-from fem_reference.continuum import Cells, Continuum, Prescribed
+from fem_reference.continuum import ByCell, Cells, Continuum, Prescribed
 from fem_reference.effects import Effect
 from fem_reference.errors import InputError
 from fem_reference.geometry.attachments import facets_under, pick
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.embedding import Locator
-from fem_reference.geometry.fibres import trace
+from fem_reference.geometry.fibres import directions, nearest_directions, trace
 from fem_reference.geometry.intersections import self_intersections
 from fem_reference.geometry.tetrahedra import tetrahedralise
 from fem_reference.mesh import (
@@ -53,11 +53,14 @@ class Body:
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """An attachment: the ``vertices`` (k,) of the muscle surface that ``bone`` holds."""
+    """An attachment: the ``vertices`` (k,) of the muscle surface that ``bone`` holds, by springs of ``stiffness`` [MPa/mm] or
+    (None) exactly.
+    """
 
     attachment: str
     bone: Body
     vertices: Ints
+    stiffness: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,8 +78,9 @@ class Setup:
 
 @dataclass(frozen=True, eq=False)
 class Problem(Setup):
-    """A setup filled with tetrahedra (``mesh.facets`` by attachment), with its effects and fibres; ``mesh_facts`` are what the
-    mesh is like, ``seconds`` how long it took to make.
+    """A setup filled with tetrahedra (``mesh.facets`` by attachment), with its effects and fibres; ``directions`` (k, 3), the unit
+    vector along the fibres in each tet, where an effect needs it; ``mesh_facts`` are what the mesh is like, ``seconds`` how long
+    it took to make.
     """
 
     mesh: TetMesh
@@ -84,6 +88,7 @@ class Problem(Setup):
     fibres: Polylines
     mesh_facts: dict[str, float | str]
     seconds: float
+    directions: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -106,9 +111,11 @@ def as_continuum(problem: Problem) -> Continuum:
     free = skin[[tuple(facet) not in taken for facet in np.sort(skin, axis=1).tolist()]]
     cells = Cells(mesh.points, mesh.tets, "tetrahedron", 1, {**mesh.facets, "free": free})
     prescribed = tuple(
-        Prescribed(entry.attachment, entry.attachment, (0, 1, 2), Follows(entry.bone)) for entry in problem.held
+        Prescribed(entry.attachment, entry.attachment, (0, 1, 2), Follows(entry.bone), entry.stiffness)
+        for entry in problem.held
     )
-    return Continuum(cells, problem.effects, prescribed, problem.frames)
+    fibre = None if problem.directions is None else ByCell(problem.directions)
+    return Continuum(cells, problem.effects, prescribed, problem.frames, fibre)
 
 
 def setup(scene: Scene) -> Setup:
@@ -130,6 +137,7 @@ def build(scene: Scene, rest: Setup) -> Problem:
             place = join(scene.place, f"attachment[{i}]")
             raise InputError(place, "an area smaller than the tetrahedra resolve", "a smaller muscle.tet_size")
     mesh = replace(bare, facets=facets)
+    fibres = _fibres(scene, mesh)
     return Problem(
         rest.surface,
         rest.bones,
@@ -138,9 +146,10 @@ def build(scene: Scene, rest: Setup) -> Problem:
         rest.interval,
         mesh=mesh,
         effects=scene.effects,
-        fibres=_fibres(scene, mesh),
+        fibres=fibres,
         mesh_facts=_mesh_facts(rest, mesh),
         seconds=time.perf_counter() - begin,
+        directions=_directions(scene, mesh, fibres),
     )
 
 
@@ -165,7 +174,7 @@ def _held(scene: Scene, surface: Surface, bones: tuple[Body, ...]) -> tuple[Held
                 place, f"vertex {vertices[taken[vertices]][0]}, which another attachment holds", "each vertex once"
             )
         taken[vertices] = True
-        held.append(Held(attachment.name, by_name[attachment.bone], vertices))
+        held.append(Held(attachment.name, by_name[attachment.bone], vertices, attachment.stiffness))
     return tuple(held)
 
 
@@ -176,6 +185,14 @@ def _fibres(scene: Scene, mesh: TetMesh) -> Polylines:
     traced = scene.fibres.traced
     assert traced is not None  # a Fibres record has one of the two
     return trace(mesh, traced.start, traced.end, traced.count)
+
+
+def _directions(scene: Scene, mesh: TetMesh, fibres: Polylines) -> Floats | None:
+    """Where an effect needs it, the fibre direction in each tet: of the field that fibres are traced in, or of the nearest one."""
+    if not any("fibre" in effect.needs for effect in scene.effects):
+        return None
+    traced = scene.fibres.traced
+    return directions(mesh, traced.start, traced.end) if traced else nearest_directions(mesh, fibres)
 
 
 def _inside(mesh: TetMesh, fibres: Polylines) -> Polylines:

@@ -17,7 +17,7 @@ from fem_reference.effects import Effect
 from fem_reference.errors import InputError
 from fem_reference.motion import Rotation
 from fem_reference.records import Record, join
-from fem_reference.units import Angle, LengthUnit, Point, PositiveLength, Time
+from fem_reference.units import Angle, AreaStiffness, LengthUnit, Point, PositiveLength, Time
 
 DATA_SETTING = "FEM_REFERENCE_DATA"
 MOST_FRAMES = 100_000
@@ -100,10 +100,13 @@ class Outline(Record):
 
 
 class Attachment(Record):
-    """Which part of the muscle surface is held by a bone: exactly one of ``vertices``, ``within`` (of the bone), ``outline``."""
+    """Which part of the muscle surface a bone holds: exactly one of ``vertices``, ``within`` (of the bone), ``outline``; and how:
+    by springs of a ``stiffness`` over its area, without it exactly.
+    """
 
     name: str
     bone: str
+    stiffness: AreaStiffness | None = None
     vertices: VertexList | None = None
     within: PositiveLength | None = None
     outline: Outline | None = None

@@ -23,6 +23,7 @@ _INSIDE = {
     "a volume": "mm^3",
     "a density": "tonne/mm^3",
     "an acceleration": "mm/s^2",
+    "a stiffness per area": "MPa/mm",
 }
 # A number, then what may be a unit.
 _NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.ASCII)
@@ -74,6 +75,7 @@ _EXAMPLE = {
     "a volume": '"3 ml"',
     "a density": '"1060 kg/m3"',
     "an acceleration": '"9.81 m/s^2"',
+    "a stiffness per area": '"100 kPa/mm"',
 }
 _EXAMPLE_OF_THREE = {
     "a length": '"146, 238, -431 mm"',
@@ -119,6 +121,7 @@ Angle = Annotated[float, BeforeValidator(partial(quantity, kind="an angle"))]
 Pressure = Annotated[float, BeforeValidator(partial(quantity, kind="a pressure"))]
 PositivePressure = Annotated[float, BeforeValidator(partial(positive, kind="a pressure"))]
 PressureVector = Annotated[tuple[float, float, float], BeforeValidator(partial(three, kind="a pressure"))]
+AreaStiffness = Annotated[float, BeforeValidator(partial(positive, kind="a stiffness per area"))]
 Density = Annotated[float, BeforeValidator(partial(positive, kind="a density"))]
 AccelerationVector = Annotated[tuple[float, float, float], BeforeValidator(partial(three, kind="an acceleration"))]
 Time = Annotated[float, BeforeValidator(partial(positive, kind="a time"))]

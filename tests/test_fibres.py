@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from fem_reference.errors import InputError
 from fem_reference.geometry.embedding import embed
-from fem_reference.geometry.fibres import trace
+from fem_reference.geometry.fibres import directions, nearest_directions, trace
 from fem_reference.mesh import Polylines, TetMesh, boundary
 
 INNER, OUTER = 20.0, 30.0  # radii of the ring [mm]
@@ -132,3 +132,46 @@ def test_nothing_between_the_attachments() -> None:
     skin, _ = boundary(bar.tets)
     with pytest.raises(InputError, match=r'fibres\.traced: got nothing between "all" and "all", want two attachments'):
         trace(TetMesh(bar.points, bar.tets, {"all": skin}), "all", "all", 1)
+
+
+def test_directions_follow_the_bar_and_the_ring() -> None:
+    # Along a bar exactly; around a ring the field's gradient is linear elements' on the cells: 5 degrees at worst here.
+    assert_allclose(directions(_bar(), "bottom", "top"), np.tile([0, 0, 1.0], (len(_bar().tets), 1)), atol=1e-8)
+    ring = _ring(1)
+    x, _, z = ring.points[ring.tets].mean(axis=1).T
+    around = np.stack([-z, np.zeros_like(x), x], axis=1) / np.hypot(x, z)[:, None]
+    along = directions(ring, "bottom", "top")
+    assert_allclose(np.linalg.norm(along, axis=1), 1, atol=1e-12)
+    assert np.einsum("ij,ij->i", along, around).min() > np.cos(np.radians(5))
+
+
+def test_where_all_is_held_by_one_bone_fibres_go_the_mean_way() -> None:
+    # The lowest layer of tets has all its corners on "bottom": the field has no slope there.
+    bar = _bar()
+    low = bar.points[bar.tets][:, :, 2].max(axis=1) < 6
+    faces, _ = boundary(bar.tets)
+    held = TetMesh(
+        bar.points,
+        bar.tets,
+        bar.facets | {"bottom": np.concatenate([faces, bar.tets[low][:, :3], bar.tets[low][:, 1:]])},
+    )
+    held = TetMesh(
+        bar.points,
+        bar.tets,
+        {
+            "bottom": held.facets["bottom"][(bar.points[held.facets["bottom"]][:, :, 2] < 6).all(axis=1)],
+            "top": bar.facets["top"],
+        },
+    )
+    found = directions(held, "bottom", "top")
+    assert_allclose(np.linalg.norm(found, axis=1), 1, atol=1e-9)
+    assert found[low][:, 2].min() > 0.9
+
+
+def test_nearest_directions_are_those_of_the_nearest_line() -> None:
+    # One line along x low in the bar, one along y high in it; the ends of the first and the start of the second are no segment.
+    lines = Polylines(np.array([[0.0, 10, 5], [20, 10, 5], [10, 0, 55], [10, 20, 55]]), np.array([0, 2, 4]))
+    found = nearest_directions(_bar(), lines)
+    heights = _bar().points[_bar().tets].mean(axis=1)[:, 2]
+    assert_allclose(found[heights < 25], np.tile([1.0, 0, 0], ((heights < 25).sum(), 1)))
+    assert_allclose(found[heights > 35], np.tile([0, 1.0, 0], ((heights > 35).sum(), 1)))

@@ -7,7 +7,8 @@ import small
 from fem_reference import casefile, files, problem
 from fem_reference.errors import InputError
 from fem_reference.geometry.embedding import embed
-from fem_reference.mesh import Polylines, enclosed_volume
+from fem_reference.mesh import Polylines, boundary, enclosed_volume
+from fem_reference.motion import apply
 
 
 def build(case):
@@ -91,3 +92,49 @@ def test_an_attachment_that_tets_cannot_resolve_is_named(bar) -> None:
             build(bar)
     finally:
         (bar / "case.toml").write_text(text)
+
+
+FIBRE = """
+[[effect]]
+name = "active_tension"
+tension = "60 kPa"
+course = [{ frame = 0, amount = 0.0 }, { frame = 20, amount = 1.0 }]
+"""
+
+
+def test_directions_only_where_an_effect_needs_them(bar, built) -> None:
+    assert built.directions is None
+    assert problem.as_continuum(built).fibre is None
+    text = (bar / "case.toml").read_text()
+    (bar / "case.toml").write_text(text.replace("[fibres]", f"{FIBRE}\n[fibres]"))
+    along = build(bar).directions
+    (bar / "case.toml").write_text(text)
+    # From one end of the bar to the other; at its ends the field bends by what the cells resolve.
+    assert along.shape == (len(built.mesh.tets), 3)
+    assert np.linalg.norm(along, axis=1) == pytest.approx(1, abs=1e-12)
+    assert along[:, 2].mean() > 0.95
+
+
+def test_as_a_continuum_its_bones_hold_their_facets_and_the_rest_is_free(bar, built) -> None:
+    body = problem.as_continuum(built)
+    skin, _ = boundary(built.mesh.tets)
+    parts = [tuple(sorted(facet)) for facets in body.mesh.facets.values() for facet in facets.tolist()]
+    assert sorted(parts) == sorted(tuple(sorted(facet)) for facet in skin.tolist())
+    assert set(body.mesh.facets) == {"origin", "insertion", "free"}
+    points = built.mesh.points[:5]
+    for entry, held in zip(body.prescribed, built.held, strict=True):
+        assert (entry.name, entry.on, entry.components, entry.stiffness) == (
+            held.attachment,
+            held.attachment,
+            (0, 1, 2),
+            None,
+        )
+        assert entry.course(points, 7.0) == pytest.approx(apply(held.bone.pose(7.0), points) - points)
+
+
+def test_a_stiffness_of_an_attachment_reaches_the_body(bar) -> None:
+    scene = casefile.read(bar)
+    soft = scene.attachment[1].model_copy(update={"stiffness": 0.1})
+    scene = scene.model_copy(update={"attachment": (scene.attachment[0], soft)})
+    body = problem.as_continuum(problem.build(scene, problem.setup(scene)))
+    assert [entry.stiffness for entry in body.prescribed] == [None, 0.1]

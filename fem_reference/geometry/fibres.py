@@ -6,6 +6,7 @@ import igl
 import numpy as np
 import skfem
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 from skfem.models.poisson import laplace
 
 from fem_reference.errors import InputError
@@ -62,6 +63,25 @@ def trace(mesh: TetMesh, start: str, end: str, count: int) -> Polylines:
         raise InputError("fibres.traced.count", count, want)
     lines = [_resample(np.concatenate([back[i][::-1], ahead[i][1:]])) for i in whole]
     return Polylines(np.concatenate(lines), np.arange(count + 1) * _POINTS)
+
+
+def directions(mesh: TetMesh, start: str, end: str) -> Floats:
+    """Unit vectors (k, 3) along the fibres that :func:`trace` follows, one for each tet: the field's direction at its middle."""
+    field = _field(mesh, mesh.facets[start], mesh.facets[end])
+    found = field.directions(mesh.points[mesh.tets].mean(axis=1))
+    flat = np.linalg.norm(found, axis=1) < 0.5  # no slope: all around is one attachment
+    found[flat] = found[~flat].mean(axis=0) / np.linalg.norm(found[~flat].mean(axis=0))
+    return found
+
+
+def nearest_directions(mesh: TetMesh, lines: Polylines) -> Floats:
+    """Unit vectors (k, 3), one for each tet: along the segment of ``lines`` whose middle is nearest to the tet's."""
+    starts = np.setdiff1d(np.arange(len(lines.points) - 1), lines.offsets[1:] - 1)
+    ways = lines.points[starts + 1] - lines.points[starts]
+    lengths = np.linalg.norm(ways, axis=1)
+    middles = (lines.points[starts] + ways / 2)[lengths > 0]
+    _, nearest = cKDTree(middles).query(mesh.points[mesh.tets].mean(axis=1))
+    return np.asarray((ways[lengths > 0] / lengths[lengths > 0][:, None])[nearest])
 
 
 def _field(mesh: TetMesh, start: Ints, end: Ints) -> _Field:

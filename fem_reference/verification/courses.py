@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fem_reference.mesh import Floats
+from fem_reference.mesh import Floats, Ints
 
 Matrix = tuple[tuple[float, float, float], ...]
 ONCE = ((0.0, 0.0), (1.0, 1.0))  # from rest at frame 0 to all of it at frame 1
@@ -36,7 +36,7 @@ class Affine:
 
     def __call__(self, points: Floats, frame: float) -> Floats:
         """The displacement (n, 3) [mm] of rest points (n, 3)."""
-        return amount(self.knots, frame) * (points @ np.array(self.gradient).T + np.array(self.shift))
+        return np.asarray(amount(self.knots, frame) * (points @ np.array(self.gradient).T + np.array(self.shift)))
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,8 @@ class Turn:
         arms = points - np.array(self.centre)
         along = arms @ way if self.per_length else np.ones(len(points))
         angles = amount(self.knots, frame) * self.angle * along
-        turned: Floats = Rotation.from_rotvec(angles[:, None] * way).apply(arms)
-        return turned - arms
+        turned = Rotation.from_rotvec(angles[:, None] * way).apply(arms)
+        return np.asarray(turned - arms)
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Radial:
 
     def __call__(self, points: Floats, frame: float) -> Floats:
         """The displacement (n, 3) [mm] of rest points (n, 3)."""
-        return amount(self.knots, frame) * self.share * points * np.array(self.along)
+        return np.asarray(amount(self.knots, frame) * self.share * points * np.array(self.along))
 
 
 @dataclass(frozen=True)
@@ -80,6 +80,6 @@ class Along:
 
     direction: tuple[float, float, float]
 
-    def __call__(self, cells: Floats, points: Floats) -> Floats:  # noqa: ARG002
+    def __call__(self, cells: Ints, points: Floats) -> Floats:  # noqa: ARG002
         """The direction (n, 3) at rest points (n, 3)."""
         return np.tile(np.array(self.direction), (len(points), 1))

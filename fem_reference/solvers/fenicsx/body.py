@@ -20,15 +20,11 @@ from fem_reference.solvers.fenicsx.holds import Hold
 from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.stepping import Attempt
 
-# By element: exact for what its displacement gives on a straight cell with a law of second degree in the strain.
-QUADRATURE_DEGREE = {"P1": 2, "P2": 4, "P2/P0": 4, "P2/P1": 4, "Q1": 3, "Q2": 5, "Q1/P0": 3, "Q2/Q1": 5}
-
 
 class Body:
     """The unknowns of a body, made of an element of ``ELEMENTS``, and their equations."""
 
     def __init__(self, body: Continuum, settings: BodySettings) -> None:
-        element, degree = settings.element, settings.quadrature_degree or QUADRATURE_DEGREE[settings.element]
         self.comm = MPI.COMM_WORLD
         self.effects = body.effects
         self.mesh = meshes.distribute(self.comm, body.mesh)
@@ -36,16 +32,16 @@ class Body:
         own = self.mesh.topology.index_map(3).size_local
         self.cells: Ints = np.asarray(self.mesh.topology.original_cell_index, np.int64)[:own]
         self.local = {int(cell): i for i, cell in enumerate(self.cells)}
-        self.unknowns = _unknowns(self.mesh, element)
+        self.unknowns = _unknowns(self.mesh, settings.element)
         self.displacement_space, self.displacement_dofs = self.unknowns.function_space.sub(0).collapse()
         self.displacement = fem.Function(self.displacement_space)
-        form = forms.Form(self.mesh, body, self.unknowns, degree, self.cells)
+        form = forms.Form(self.mesh, body, self.unknowns, settings, self.cells)
         self.amounts = form.amounts
         self.volume_form, self.energy_form = fem.form(form.volume), fem.form(form.energy)
         self.rest_volume = self.integral(self.volume_form)
         self.internal = fem.form(form.residual)
         self.held = [Hold(self.unknowns, entry, form.regions[entry.on]) for entry in body.prescribed]
-        self.determinants = Determinants(self.mesh, self.cells, form.determinant, form.rule, body.mesh.kind)
+        self.determinants = Determinants(self.mesh, self.cells, form.determinant, form.rule[0], body.mesh.kind)
         springs = sum((hold.springs(form.measure(hold.entry.on)) for hold in self.held if hold.entry.stiffness), 0)
         self.newton = self._newton(form.residual + springs, settings)
         self.nodes = meshes.Nodes(body.mesh, self.cells, ufl.split(self.unknowns)[0])
@@ -54,7 +50,7 @@ class Body:
         """Newton's method with a backtracking line search, each step by a sparse LU factorisation (MUMPS)."""
         options = {
             "snes_type": "newtonls",
-            "snes_linesearch_type": "bt",
+            "snes_linesearch_type": "basic",
             "snes_atol": settings.residual,
             "snes_rtol": 0.0,
             "snes_stol": 0.0,

@@ -3,7 +3,6 @@
 from dataclasses import replace
 from typing import Any
 
-import basix
 import basix.ufl
 import numpy as np
 import ufl
@@ -12,7 +11,10 @@ from dolfinx import fem, mesh
 from fem_reference.continuum import Continuum
 from fem_reference.effects import Effect, Load, State, total_energy
 from fem_reference.mesh import Floats, Ints
-from fem_reference.solvers.fenicsx import meshes
+from fem_reference.solvers.fenicsx import meshes, quadrature
+from fem_reference.solvers.fenicsx.settings import BodySettings
+
+Rule = tuple[Floats, Floats]
 
 
 class UflFunctions:
@@ -32,18 +34,22 @@ class UflFunctions:
 
 class Form:
     """``energy`` and ``volume`` as integrals, ``residual`` as what vanishes in equilibrium, det F as ``determinant``; ``amounts``
-    by effect, constants to be set; ``rule``: the points (q, 3) of the quadrature; ``regions``: this rank's facets by name.
+    by effect, constants to be set; ``rule``: points (q, 3) and weights (q,) of the quadrature; ``regions``: by name, this rank's
+    facets.
     """
 
-    def __init__(self, msh: mesh.Mesh, body: Continuum, unknowns: fem.Function, degree: int, cells: Ints) -> None:
+    def __init__(
+        self, msh: mesh.Mesh, body: Continuum, unknowns: fem.Function, settings: BodySettings, cells: Ints
+    ) -> None:
         """``cells``: which cell of the body each of this rank's is."""
         self.mesh, self.regions = msh, meshes.local_facets(msh, body.mesh.facets)
-        self.rule: Floats = basix.make_quadrature(basix.CellType[body.mesh.kind], degree)[0]
-        self.dx, self.ds = _measures(msh, self.regions, degree)
+        self.rule = quadrature.rule(settings.element, settings.quadrature_degree)
+        degree = settings.quadrature_degree or quadrature.DEGREE[settings.element]
+        self.dx, self.ds = _measures(msh, self.regions, self.rule, degree)
         self.amounts = [fem.Constant(msh, 1.0) for _ in body.effects]
         effects = [_symbolic(effect, msh) for effect in body.effects]
         acting = list(zip(effects, self.amounts, strict=True))
-        state = _state(unknowns, self._fibre(body, degree, cells))
+        state = _state(unknowns, self._fibre(body, cells))
         self.determinant = state.J
         self.volume, self.energy = state.J * self.dx, total_energy(acting, state) * self.dx
         test = ufl.TestFunction(unknowns.function_space)
@@ -58,31 +64,34 @@ class Form:
         """The measure of the facets of ``region``."""
         return self.ds(list(self.regions).index(region))
 
-    def _fibre(self, body: Continuum, degree: int, cells: Ints) -> list[Any] | None:
+    def _fibre(self, body: Continuum, cells: Ints) -> list[Any] | None:
         """The fibre direction at the quadrature points, where an effect asks for it."""
         if not any("fibre" in effect.needs for effect in body.effects):
             return None
         if body.fibre is None:
             raise ValueError("an effect needs fibre directions, the body has none")
-        element = basix.ufl.quadrature_element(body.mesh.kind, value_shape=(3,), degree=degree)
+        points, weights = self.rule
+        element = basix.ufl.quadrature_element(body.mesh.kind, value_shape=(3,), points=points, weights=weights)
         function = fem.Function(fem.functionspace(self.mesh, element))
         mine = np.arange(len(cells), dtype=np.int32)
-        points = meshes.coordinates(self.mesh, self.rule).eval(self.mesh, mine).reshape(-1, 3)
-        directions = body.fibre(np.repeat(cells, len(self.rule)), points)
+        places = meshes.coordinates(self.mesh, points).eval(self.mesh, mine).reshape(-1, 3)
+        directions = body.fibre(np.repeat(cells, len(points)), places)
         function.x.array[: directions.size] = directions.ravel()
         function.x.scatter_forward()
         return [function[i] for i in range(3)]
 
 
-def _measures(msh: mesh.Mesh, regions: dict[str, Ints], degree: int) -> tuple[Any, Any]:
-    """The measures of the cells and of the facets, the latter by number of region."""
-    metadata, kind = {"quadrature_degree": degree}, fem.IntegralType.exterior_facet
+def _measures(msh: mesh.Mesh, regions: dict[str, Ints], rule: Rule, degree: int) -> tuple[Any, Any]:
+    """The measures of the cells, by a rule, and of the facets, by number of region and of a degree."""
+    points, weights = rule
+    inside = {"quadrature_rule": "custom", "quadrature_points": points, "quadrature_weights": weights}
+    kind = fem.IntegralType.exterior_facet
     parts = [
         (i, fem.compute_integration_domains(kind, msh.topology, facets)) for i, facets in enumerate(regions.values())
     ]
     return (
-        ufl.Measure("dx", domain=msh, metadata=metadata),
-        ufl.Measure("ds", domain=msh, subdomain_data=parts, metadata=metadata),
+        ufl.Measure("dx", domain=msh, metadata={"quadrature_degree": degree} | inside),
+        ufl.Measure("ds", domain=msh, subdomain_data=parts, metadata={"quadrature_degree": degree}),
     )
 
 

@@ -24,9 +24,12 @@ class Session:
         """``folder``: where jobs and states are passed; ``stack`` ends the processes."""
         self.folder, self.stack = folder, stack
         self.worker: Worker | None = None
+        self.closed = False
 
     def solve(self, body: Continuum, settings: BodySettings) -> Solved:
-        """The states of ``body``; a process that dies is the status *crashed*, not an exception."""
+        """The states of ``body``; a process that dies is the status *crashed*, not an exception. RuntimeError once it is closed."""
+        if self.closed:
+            raise RuntimeError("the session is closed")
         check(body, settings.element)
         job = self.folder / "job.pickle"
         job.write_bytes(pickle.dumps(Job(body, settings, {})))
@@ -62,7 +65,11 @@ def session() -> Iterator[Session]:
     """A session; its process ends with it. MissingSoftware where FEniCSx is not installed."""
     require_installed()
     with tempfile.TemporaryDirectory(prefix="fem_reference-") as folder, ExitStack() as stack:
-        yield Session(Path(folder), stack)
+        own = Session(Path(folder), stack)
+        try:
+            yield own
+        finally:
+            own.closed = True
 
 
 def solve_body(body: Continuum, settings: BodySettings) -> Solved:
