@@ -131,6 +131,7 @@ def test_types_say_their_unit() -> None:
         "Pressure": "MPa",
         "PositivePressure": "MPa",
         "PressureVector": "MPa",
+        "AreaStiffness": "MPa/mm",
         "Density": "tonne/mm^3",
         "AccelerationVector": "mm/s^2",
         "Time": "s",

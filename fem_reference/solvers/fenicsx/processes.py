@@ -36,13 +36,14 @@ def require_installed() -> None:
 @dataclass(frozen=True, eq=False)
 class Worker:
     """A running ``process``; ``timed_out`` is set when the ``time_limit`` [s] ended it, ``errors`` are the lines of its error
-    output so far.
+    output so far, which the ``listener`` reads.
     """
 
     process: subprocess.Popen[str]
     time_limit: float | None
+    errors: list[str]
+    listener: threading.Thread
     timed_out: threading.Event = field(default_factory=threading.Event)
-    errors: list[str] = field(default_factory=list)
 
     def events(self) -> Iterator[dict[str, Any]]:
         """What it reports, until its output ends."""
@@ -54,6 +55,7 @@ class Worker:
     def ending(self, kept: str) -> Outcome:
         """How it ended without a report; ``kept`` says what there is all the same."""
         code = self.process.wait()
+        self.listener.join(timeout=5)  # its last words may still be under way
         if self.timed_out.is_set():
             return Outcome("timed out", f"stopped after {self.time_limit:.0f} s, the time limit; {kept}")
         return Outcome("crashed", f"the FEniCSx process ended with exit status {code} ({self._reason()}); {kept}")
@@ -71,9 +73,12 @@ class Worker:
             self.process.stdin.flush()
 
     def stop(self) -> None:
-        """End it for the time limit."""
+        """End it for the time limit: mpiexec ignores a signal that comes before its own processes."""
         self.timed_out.set()
-        self.process.terminate()
+        while self.process.poll() is None:
+            self.process.terminate()
+            with suppress(subprocess.TimeoutExpired):
+                self.process.wait(timeout=0.5)
 
 
 @contextmanager
@@ -88,11 +93,12 @@ def running(command_line: list[str], time_limit: float | None, *, fed: bool = Fa
         errors="replace",
         env=environment(**_SETTINGS),
     )
-    worker = Worker(process, time_limit)
     assert process.stderr is not None
+    errors: list[str] = []
     listener = threading.Thread(
-        target=lambda stream: worker.errors.extend(line for line in stream if line.strip()), args=[process.stderr]
+        target=lambda stream: errors.extend(line for line in stream if line.strip()), args=[process.stderr]
     )
+    worker = Worker(process, time_limit, errors, listener)
     listener.start()
     timer = threading.Timer(time_limit or threading.TIMEOUT_MAX, worker.stop)
     timer.daemon = True

@@ -1,0 +1,179 @@
+"""The reference solves bodies: what it refuses, springs, balance, the order of nodes, and processes that die."""
+
+import importlib.util
+
+import numpy as np
+import pytest
+
+from fem_reference import effects
+from fem_reference.continuum import ELEMENTS, Cells, Continuum, Prescribed, check
+from fem_reference.effects import Effect
+from fem_reference.errors import InputError, MissingSoftware
+from fem_reference.records import parse
+from fem_reference.solvers import fenicsx
+from fem_reference.solvers.fenicsx import BodySettings
+from fem_reference.verification import shapes
+from fem_reference.verification.courses import Affine, Rest, Turn
+
+ALL = (0, 1, 2)
+ONCE = [{"frame": 0, "amount": 0.0}, {"frame": 1, "amount": 1.0}]
+BOTH = pytest.mark.parametrize("element", ["P2/P1", "Q1/P0"])
+
+
+@pytest.fixture(scope="module")
+def session():
+    if not any(importlib.util.find_spec(name) for name in ("dolfinx_solver", "dolfinx")):
+        pytest.skip("FEniCSx is not installed")
+    with fenicsx.session() as opened:
+        yield opened
+
+
+def effect(name: str, **parameters) -> Effect:
+    return parse(effects.find(name), parameters, name)
+
+
+FLESH = (effect("neo_hooke", mu="10 kPa"), effect("incompressible", bulk="1 MPa"))
+PENALTY = (effect("neo_hooke", mu="10 kPa"), effect("incompressible_penalty", bulk="1 MPa"))
+
+
+def box(element: str, counts=(2, 2, 2), size=(1.0, 1.0, 1.0)) -> Cells:
+    return shapes.box(counts, size, ELEMENTS[element][0])
+
+
+def turned(mesh: Cells, top, bottom=None) -> Continuum:
+    held = (Prescribed("bottom", "z0", ALL, bottom or Rest()), Prescribed("top", "z1", ALL, top))
+    return Continuum(mesh, FLESH, held, (0.0, 1.0))
+
+
+def settings(element: str, **changes) -> BodySettings:
+    return BodySettings(**{"element": element, "first_step": 0.5, "residual": 1e-12} | changes)
+
+
+def test_an_element_must_exist_and_fit_the_cells_and_the_effects() -> None:
+    body = Continuum(box("P1"), FLESH, (), (0.0, 1.0))
+    with pytest.raises(InputError, match='element: got "P3", want one of P1, P2, P2/P0, P2/P1, Q1, Q2, Q1/P0, Q2/Q1'):
+        check(body, "P3")
+    with pytest.raises(InputError, match='element: got "Q1/P0", want one for a tetrahedron: P1, P2, P2/P0, P2/P1'):
+        check(body, "Q1/P0")
+    with pytest.raises(InputError, match=r'got "P1", want one with a pressure, which .* brings: P2/P0, P2/P1'):
+        check(body, "P1")
+    free = Continuum(box("Q1"), PENALTY, (), (0.0, 1.0))
+    with pytest.raises(InputError, match='got "Q2/Q1", want one without a pressure, which no effect brings: Q1, Q2'):
+        check(free, "Q2/Q1")
+    for element in ELEMENTS:
+        check(Continuum(box(element), PENALTY if ELEMENTS[element][2] is None else FLESH, (), (0.0, 1.0)), element)
+
+
+def test_a_session_checks_the_element(session) -> None:
+    with pytest.raises(InputError, match="want one for a tetrahedron"):
+        session.solve(Continuum(box("P1"), FLESH, (), (0.0, 1.0)), settings("Q1/P0"))
+
+
+@BOTH
+def test_a_block_on_springs_moves_by_the_load_over_their_stiffness(element, session) -> None:
+    stiffness, load = 0.05, 0.004  # [MPa/mm], [MPa]
+    acting = (*FLESH, effect("traction", on="z1", force=f"0, 0, -{load} MPa", course=ONCE))
+    springs = Prescribed("springs", "z0", (2,), Rest(), stiffness)
+    held = (Prescribed("x0", "x0", (0,), Rest()), Prescribed("y0", "y0", (1,), Rest()), springs)
+    mesh = box(element, size=(2.0, 1.0, 1.0))
+    state = session.solve(Continuum(mesh, acting, held, (0.0, 1.0)), settings(element)).last
+    # Homogeneous, so that every element has it; Newton's residual of 1e-12 N over 0.05 N/mm.
+    assert state.points[mesh.points[:, 2] == 0, 2] == pytest.approx(-load / stiffness, abs=1e-10)
+    assert state.forces["springs"] == pytest.approx([0, 0, load * 2.0], abs=1e-11)
+    assert state.forces["x0"] == pytest.approx(np.zeros(3), abs=1e-11)
+
+
+@BOTH
+def test_stiff_springs_come_near_to_what_they_stand_for(element, session) -> None:
+    stretch, forces = Affine(((0.0, 0.0, 0.0),) * 3, (0.0, 0.0, 0.2)), []
+    held = tuple(Prescribed(face, face, (axis,), Rest()) for axis, face in enumerate(("x0", "y0", "z0")))
+    for stiffness in (None, 1e2, 1e3):
+        pulled = Prescribed("top", "z1", (2,), stretch, stiffness)
+        state = session.solve(Continuum(box(element), FLESH, (*held, pulled), (0.0, 1.0)), settings(element)).last
+        forces.append(state.forces["top"][2])
+    # Ten times stiffer, ten times nearer, up to what the body's 0.03 N/mm are of the springs' 100 N/mm.
+    assert (forces[1] - forces[0]) / (forces[2] - forces[0]) == pytest.approx(10, rel=1e-3)
+
+
+@BOTH
+def test_forces_and_moments_of_a_turned_bar_are_in_balance(element, session) -> None:
+    turn = Turn((1.0, 0.0, 2.0), 0.5, (0.5, 0.5, 2.0))
+    state = session.solve(turned(box(element, (2, 2, 4), (1.0, 1.0, 2.0)), turn), settings(element)).last
+    assert np.linalg.norm(state.forces["top"]) > 1e-4
+    assert np.linalg.norm(state.moments["top"]) > 1e-4
+    # Rigid velocities are in the space, so that both sums are the work of 1e-12 N out of balance along them.
+    assert sum(state.forces.values()) == pytest.approx(np.zeros(3), abs=1e-11)
+    assert sum(state.moments.values()) == pytest.approx(np.zeros(3), abs=1e-11)
+
+
+@BOTH
+def test_both_ends_turned_alike_is_a_rigid_motion(element, session) -> None:
+    mesh, turn = box(element, (2, 2, 4), (1.0, 1.0, 2.0)), Turn((1.0, 2.0, 3.0), 1.0, (3.0, 0.0, 1.0))
+    state = session.solve(turned(mesh, turn, turn), settings(element)).last
+    # A rigid motion is in the space: Newton's residual of 1e-12 N over a stiffness of 1e-2 N/mm.
+    assert state.points == pytest.approx(mesh.points + turn(mesh.points, 1.0), abs=1e-9)
+    assert state.scalars["energy"] == pytest.approx(0, abs=1e-12)
+    assert state.scalars["volume_ratio"] == pytest.approx(1, abs=1e-9)
+
+
+@BOTH
+def test_the_order_of_nodes_and_cells_does_not_matter(element, session) -> None:
+    mesh, random = box(element, (1, 2, 2)), np.random.default_rng(4)
+    new = random.permutation(len(mesh.points))  # where each node goes
+    points = np.empty_like(mesh.points)
+    points[new] = mesh.points
+    cells = new[mesh.cells][random.permutation(len(mesh.cells))]
+    facets = {name: new[region] for name, region in mesh.facets.items()}
+    other = Cells(points, cells, mesh.kind, mesh.degree, facets)
+    turn = Turn((1.0, 0.0, 2.0), 0.5, (0.5, 0.5, 1.0))
+    first, second = (session.solve(turned(one, turn), settings(element)).last for one in (mesh, other))
+    # Both end within Newton's residual of 1e-12 N, over a stiffness of 1e-3 N/mm.
+    assert second.points[new] == pytest.approx(first.points, abs=1e-9)
+    assert second.forces["top"] == pytest.approx(first.forces["top"], abs=1e-10)
+
+
+def test_what_was_reached_is_kept_where_a_body_inverts(session) -> None:
+    # All corners are prescribed, so that there is nothing to solve but the pressure: past half the way the top is below the bottom.
+    push = Affine(((0.0, 0.0, 0.0),) * 3, (0.0, 0.0, -2.0))
+    frames = (0.0, 0.25, 1.0)
+    body = Continuum(box("Q1/P0", (1, 1, 1)), FLESH, turned(box("Q1/P0"), push).prescribed, frames)
+    solved = session.solve(body, settings("Q1/P0", first_step=0.25))
+    assert solved.outcome.status == "inverted"
+    assert "Newton's method converged, but det F fell to" in solved.outcome.message
+    assert [state.frame for state in solved.states] == [0.0, 0.25]
+    with pytest.raises(ArithmeticError, match=r"inverted: Newton's method converged, but det F fell to"):
+        _ = solved.last
+
+
+def test_a_session_outlives_its_process(session) -> None:
+    body = turned(box("Q1/P0"), Turn((0.0, 0.0, 1.0), 0.3))
+    before = session.solve(body, settings("Q1/P0")).last
+    session.worker.process.kill()
+    dead = session.solve(body, settings("Q1/P0"))
+    assert (dead.outcome.status, dead.states) == ("crashed", ())
+    assert "the FEniCSx process ended with exit status -9" in dead.outcome.message
+    with pytest.raises(ArithmeticError, match="crashed: the FEniCSx process ended"):
+        _ = dead.last
+    assert session.solve(body, settings("Q1/P0")).last.points == pytest.approx(before.points, abs=1e-12)
+
+
+def test_a_process_that_fails_says_why(session) -> None:
+    active = effect("fibre_active", stress="10 kPa", optimal_stretch=1.0, course=ONCE)
+    body = turned(box("Q1/P0"), Rest())
+    lost = session.solve(Continuum(body.mesh, (*FLESH, active), body.prescribed, (0.0, 1.0)), settings("Q1/P0"))
+    assert lost.outcome.status == "crashed"
+    assert "ValueError: an effect needs fibre directions, the body has none" in lost.outcome.message
+    assert session.solve(body, settings("Q1/P0")).outcome.status == "converged"
+
+
+def test_a_closed_session_raises(session) -> None:  # noqa: ARG001 - it skips where there is no FEniCSx
+    with fenicsx.session() as short:
+        pass
+    with pytest.raises(RuntimeError, match="the session is closed"):
+        short.solve(turned(box("Q1/P0"), Rest()), settings("Q1/P0"))
+
+
+def test_without_fenicsx_there_is_no_session(monkeypatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
+    with pytest.raises(MissingSoftware, match="FEniCSx is not installed"), fenicsx.session():
+        pass
