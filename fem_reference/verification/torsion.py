@@ -1,0 +1,212 @@
+"""Bars that are twisted: a cylinder by a finite angle, and a square bar by a small one, free to warp."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from fem_reference import catalogue, effects, truths
+from fem_reference.catalogue import Entry, Finding, Lab
+from fem_reference.continuum import ELEMENTS, Continuum, Prescribed, Reached
+from fem_reference.effects import Effect
+from fem_reference.records import parse
+from fem_reference.verification import shapes
+from fem_reference.verification.courses import Rest, Turn
+
+Matter = Callable[[], tuple[Effect, ...]]
+Value = Callable[[Lab, int], float]  # of so many cells
+
+# [MPa]; C1 and C2 make a Mooney-Rivlin law of the shear modulus MU. The truths are of incompressible matter.
+MU, BULK = 0.01, 1e4
+C1, C2 = 0.003, 0.002
+# Radius and length of the cylinder [mm], and its twist [rad/mm]: 0.5 rad from end to end, a shear of 0.5 at its side.
+RADIUS, LENGTH, TWIST = 10.0, 10.0, 0.05
+# Side and length of the square bar [mm], and its twist [rad/mm]: a shear of 0.0007 at its edges.
+SIDE, SHORT, SMALL_TWIST = 10.0, 2.5, 1e-4
+
+
+def neo_hooke(mu: float, bulk: float) -> tuple[Effect, ...]:
+    """Matter of the moduli ``mu`` and ``bulk`` [MPa], the latter in mixed form."""
+    return effect("neo_hooke", mu=f"{mu} MPa"), effect("incompressible", bulk=f"{bulk} MPa")
+
+
+def mooney_rivlin(c1: float, c2: float, bulk: float) -> tuple[Effect, ...]:
+    """Matter of ``c1``, ``c2`` and the modulus ``bulk`` [MPa], the latter in mixed form."""
+    return effect("mooney_rivlin", c1=f"{c1} MPa", c2=f"{c2} MPa"), effect("incompressible", bulk=f"{bulk} MPa")
+
+
+def effect(name: str, **parameters: Any) -> Effect:
+    """The effect ``name`` with its parameters as scene files write them."""
+    found = parse(effects.find(name), parameters, name)
+    assert isinstance(found, Effect)
+    return found
+
+
+def once(lab: Lab, value: Value, count: int) -> Finding:
+    """The ``value`` with ``count`` cells."""
+    return Finding(value(lab, count))
+
+
+def ladder(lab: Lab, value: Value, counts: tuple[int, ...], size: float, truth: Callable[[], float]) -> Finding:
+    """The ``value`` with the last of ``counts`` cells, of size ``size / count`` [mm], and its way there."""
+    steps = tuple((size / count, value(lab, count)) for count in counts)
+    return Finding(steps[-1][1], catalogue.order(steps, truth()), steps)
+
+
+def twisted(lab: Lab, rings: int, element: str, matter: Matter, degree: int = 2) -> Reached:
+    """The cylinder, both ends turned by TWIST times their height and held there; with ``degree`` 1 its cells are straight."""
+    mesh = shapes.cylinder(RADIUS, LENGTH, rings, rings, ELEMENTS[element][0], degree)
+    turn = Turn((0.0, 0.0, 1.0), TWIST, per_length=True)
+    held = tuple(Prescribed(end, end, (0, 1, 2), turn) for end in ("bottom", "top"))
+    return lab.solve(Continuum(mesh, matter(), held, (0.0, 1.0)), element, first_step=0.5, residual=1e-9).last
+
+
+def _moment(lab: Lab, rings: int, element: str, matter: Matter, degree: int = 2) -> float:
+    return float(twisted(lab, rings, element, matter, degree).moments["top"][2])
+
+
+def _axial_force(lab: Lab, rings: int, element: str, matter: Matter) -> float:
+    return float(twisted(lab, rings, element, matter).forces["top"][2])
+
+
+def _square_bar(lab: Lab, cells: int, element: str, *, warps: bool = True) -> float:
+    """Torque per twist [N mm2]. A quarter of the bar, as small displacements are antisymmetric about the planes of its axis."""
+    half = SIDE / 2
+    mesh = shapes.box((cells, cells, 1), (half, half, SHORT), ELEMENTS[element][0])
+    turn = Turn((0.0, 0.0, 1.0), SMALL_TWIST, per_length=True)
+    turned = (0, 1) if warps else (0, 1, 2)
+    held = (
+        Prescribed("x0", "x0", (1, 2), Rest()),
+        Prescribed("y0", "y0", (0, 2), Rest()),
+        Prescribed("bottom", "z0", turned, turn),
+        Prescribed("top", "z1", turned, turn),
+    )
+    body = Continuum(mesh, neo_hooke(MU, BULK), held, (0.0, 1.0))
+    top = lab.solve(body, element, first_step=1.0, residual=1e-12).last.moments["top"]
+    return float(4 * top[2] / SMALL_TWIST)
+
+
+def _true_moment(c1: float, c2: float) -> float:
+    return float(truths.find("rivlin").Torsion(c1, c2, RADIUS, TWIST).moment())
+
+
+def _true_axial_force(c1: float, c2: float) -> float:
+    return float(truths.find("rivlin").Torsion(c1, c2, RADIUS, TWIST).axial_force())
+
+
+def _true_square_bar() -> float:
+    return float(truths.find("torsion").square_bar_stiffness(MU, SIDE))
+
+
+_NEO_HOOKE = partial(neo_hooke, MU, BULK)
+_MOONEY_RIVLIN = partial(mooney_rivlin, C1, C2, BULK)
+_CYLINDER = partial(
+    Entry,
+    family="torsion",
+    relative=True,
+    kind="closed form",
+    source="Rivlin 1949, doi 10.1098/rsta.1949.0009; validation/rivlin.py Torsion",
+)
+_MOMENT = partial(_CYLINDER, unit="N mm")
+_FORCE = partial(_CYLINDER, unit="N")
+_SQUARE = partial(
+    Entry,
+    family="torsion",
+    unit="N mm2",
+    truth=_true_square_bar,
+    relative=True,
+    kind="closed form",
+    source="Timoshenko and Goodier 1970, art. 109; validation/torsion.py",
+    spoil="the ends are kept plane, as a round bar would keep them",
+)
+_UP_THE_SQUARE = partial(ladder, counts=(2, 4, 8), size=SIDE / 2, truth=_true_square_bar)
+
+ENTRIES: tuple[Entry, ...] = (
+    _MOMENT(
+        name="torsion_moment_tetrahedra",
+        title="Twisting a cylinder by half a radian: the moment, by curved tetrahedra (P2/P1)",
+        truth=partial(_true_moment, MU / 2, 0.0),
+        within=5e-4,
+        because="discretisation of order 4, 8e-5 with 8 cells along the radius; the matter's K/mu of 1e6 adds 1e-6",
+        measure=partial(
+            ladder,
+            value=partial(_moment, element="P2/P1", matter=_NEO_HOOKE),
+            counts=(1, 2, 4),
+            size=RADIUS / 2,
+            truth=partial(_true_moment, MU / 2, 0.0),
+        ),
+        spoil="straight cells, whose surface has flat facets, on the mesh in the middle of the ladder",
+        spoiled=partial(once, value=partial(_moment, element="P2/P1", matter=_NEO_HOOKE, degree=1), count=2),
+    ),
+    _MOMENT(
+        name="torsion_moment_hexahedra",
+        title="Twisting a cylinder by half a radian: the moment, by curved hexahedra (Q2/Q1)",
+        truth=partial(_true_moment, MU / 2, 0.0),
+        within=1e-4,
+        because="discretisation of order 4, 1.6e-5 with 6 cells along the radius; the matter's K/mu of 1e6 adds 1e-6",
+        measure=partial(
+            ladder,
+            value=partial(_moment, element="Q2/Q1", matter=_NEO_HOOKE),
+            counts=(1, 2, 3),
+            size=RADIUS / 2,
+            truth=partial(_true_moment, MU / 2, 0.0),
+        ),
+        spoil="straight cells, whose surface has flat facets, on the mesh in the middle of the ladder",
+        spoiled=partial(once, value=partial(_moment, element="Q2/Q1", matter=_NEO_HOOKE, degree=1), count=2),
+    ),
+    _FORCE(
+        name="torsion_axial_force",
+        title="Twisting a cylinder by half a radian: the force that keeps it from growing longer (Poynting effect)",
+        truth=partial(_true_axial_force, MU / 2, 0.0),
+        within=1e-3,
+        because="discretisation of order 4, 1.7e-4 with 6 cells along the radius: a force of second order in the twist",
+        measure=partial(
+            ladder,
+            value=partial(_axial_force, element="Q2/Q1", matter=_NEO_HOOKE),
+            counts=(1, 2, 3),
+            size=RADIUS / 2,
+            truth=partial(_true_axial_force, MU / 2, 0.0),
+        ),
+        spoil="Mooney-Rivlin matter of the same shear modulus, which turns with the same moment",
+        spoiled=partial(once, value=partial(_axial_force, element="Q2/Q1", matter=_MOONEY_RIVLIN), count=1),
+    ),
+    _MOMENT(
+        name="torsion_moment_mooney_rivlin",
+        title="Twisting a Mooney-Rivlin cylinder by half a radian: the moment",
+        truth=partial(_true_moment, C1, C2),
+        within=5e-4,
+        because="discretisation of order 4, 8e-5 with 4 cells along the radius (Q2/Q1)",
+        measure=partial(once, value=partial(_moment, element="Q2/Q1", matter=_MOONEY_RIVLIN), count=2),
+        spoil="c2 is 1 % too large",
+        spoiled=partial(
+            once,
+            value=partial(_moment, element="Q2/Q1", matter=partial(mooney_rivlin, C1, 1.01 * C2, BULK)),
+            count=2,
+        ),
+    ),
+    _FORCE(
+        name="torsion_axial_force_mooney_rivlin",
+        title="Twisting a Mooney-Rivlin cylinder by half a radian: the force that keeps it from growing longer",
+        truth=partial(_true_axial_force, C1, C2),
+        within=2e-3,
+        because="discretisation of order 4, 4e-4 with 4 cells along the radius (Q2/Q1)",
+        measure=partial(once, value=partial(_axial_force, element="Q2/Q1", matter=_MOONEY_RIVLIN), count=2),
+        spoil="neo-Hookean matter of the same shear modulus, which turns with the same moment",
+        spoiled=partial(once, value=partial(_axial_force, element="Q2/Q1", matter=_NEO_HOOKE), count=1),
+    ),
+    _SQUARE(
+        name="torsion_square_bar_tetrahedra",
+        title="Twisting a square bar a little, free to warp: the torsional stiffness, by tetrahedra (P2/P1)",
+        within=1e-4,
+        because="discretisation of order 3.7, 1.9e-5 with 16 cells across; the finite twist adds 1e-6",
+        measure=partial(_UP_THE_SQUARE, value=partial(_square_bar, element="P2/P1")),
+        spoiled=partial(once, value=partial(_square_bar, element="P2/P1", warps=False), count=4),
+    ),
+    _SQUARE(
+        name="torsion_square_bar_hexahedra",
+        title="Twisting a square bar a little, free to warp: the torsional stiffness, by hexahedra (Q2/Q1)",
+        within=5e-5,
+        because="discretisation of order 3.7, 7e-6 with 16 cells across; the finite twist adds 1e-6",
+        measure=partial(_UP_THE_SQUARE, value=partial(_square_bar, element="Q2/Q1")),
+        spoiled=partial(once, value=partial(_square_bar, element="Q2/Q1", warps=False), count=4),
+    ),
+)
