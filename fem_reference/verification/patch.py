@@ -1,0 +1,139 @@
+"""What every element must hold exactly, whatever the shape of its cells: linear functions, and turns of any size."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fem_reference.catalogue import Entry, Finding, Lab
+from fem_reference.continuum import ELEMENTS, Continuum, Prescribed, Reached
+from fem_reference.verification import shapes
+from fem_reference.verification.courses import Along, Matrix, Turn
+from fem_reference.verification.fibres import active
+from fem_reference.verification.homogeneous import NEO, SIZE, STEPS, Material, X, everywhere, resistance
+
+# Of displacement: stretch, shear and a turn at once; it takes the volume to 1.2 times that at rest.
+GRADIENT: Matrix = ((0.2, 0.35, -0.1), (-0.15, 0.05, 0.3), (0.1, -0.2, -0.15))
+COUNTS, BUMP = (2, 2, 3), 0.1
+AXIS, ANGLE, CENTRE = (1.0, 2.0, 3.0), 1.0, (1.0, -2.0, 0.5)  # rad, mm
+ENDS, SURFACE = ("z0", "z1"), ("x0", "x1", "y0", "y1", "z0", "z1")
+AT_ONCE = {"first_step": 1.0, "smallest_step": 0.9, "residual": 1e-13}  # a step that fails is not cut
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """A warped box whose whole surface follows ``share`` of ``GRADIENT``, by an ``element`` on straight (1) or curved (2) cells."""
+
+    element: str
+    degree: int = 1
+    share: float = 1.0
+
+    def error(self, lab: Lab) -> Finding:
+        """How far a node is at most from where the whole gradient takes it [mm]."""
+        mesh = shapes.warped_box(COUNTS, SIZE, ELEMENTS[self.element][0], self.degree, BUMP)
+        body = Continuum(mesh, (*NEO.effects, resistance(self.element)), everywhere(_times(self.share)), (0, 1))
+        points = lab.solve(body, self.element, first_step=0.5, residual=1e-13).last.points
+        exact = mesh.points @ (np.eye(3) + np.array(GRADIENT)).T
+        return Finding(float(np.linalg.norm(points - exact, axis=1).max()))
+
+
+def _times(share: float) -> Matrix:
+    """``GRADIENT`` times a number."""
+    a, b, c = ((share * x, share * y, share * z) for x, y, z in GRADIENT)
+    return a, b, c
+
+
+@dataclass(frozen=True, eq=False)
+class Turned:
+    """A warped box, at frame 1 at rest or contracted, as its material is; from 1 to 2 its ``faces`` are turned by 1 rad about an
+    oblique axis, but z1 by ``further`` times as much: the whole surface in one step, two ends in as many as it takes.
+    """
+
+    material: Material
+    element: str
+    faces: tuple[str, ...]
+    further: float = 1.0
+
+    def states(self, lab: Lab) -> tuple[Reached, Reached]:
+        """Before and after the turn."""
+        mesh = shapes.warped_box(COUNTS, SIZE, ELEMENTS[self.element][0], 1, BUMP)
+        prescribed = tuple(
+            Prescribed(face, face, (0, 1, 2), _turn(self.further if face == "z1" else 1.0)) for face in self.faces
+        )
+        acting = (*self.material.effects, resistance(self.element))
+        steps = AT_ONCE if self.faces == SURFACE else STEPS
+        solved = lab.solve(Continuum(mesh, acting, prescribed, (0, 1, 2), Along(X)), self.element, **steps)
+        return solved.states[1], solved.last
+
+    def error(self, lab: Lab) -> Finding:
+        """How far a node is at most from where the turn takes it [mm]."""
+        before, after = self.states(lab)
+        exact = before.points + _turn(1.0)(before.points, 2)
+        return Finding(float(np.linalg.norm(after.points - exact, axis=1).max()))
+
+    def energy(self, lab: Lab) -> Finding:
+        """What the turn stores [N mm]."""
+        before, after = self.states(lab)
+        return Finding(after.scalars["energy"] - before.scalars["energy"])
+
+
+def _turn(share: float) -> Turn:
+    return Turn(AXIS, share * ANGLE, CENTRE, knots=((1.0, 0.0), (2.0, 1.0)))
+
+
+def _patch(element: str, degree: int = 1) -> Entry:
+    """Of an element, on straight or curved cells."""
+    patch, shape = Patch(element, degree), "curved" if degree == 2 else "distorted"
+    return Entry(
+        name=f"patch_{element.lower().replace('/', '_')}{'_curved' if degree == 2 else ''}",
+        family="patch tests",
+        title=f"{element} on {shape} cells holds a stretch, a shear and a turn at once: largest error of a node",
+        unit="mm",
+        truth=lambda: 0.0,
+        within=5e-13,
+        relative=False,
+        because="Linear functions are in the space of every element, on curved (isoparametric) cells too: rounding is left.",
+        kind="property",
+        source="The patch test: Irons and Razzaque 1972; Bathe 2014, Finite Element Procedures, ch. 4.2.4",
+        measure=patch.error,
+        spoil="The surface is moved 1 % too far.",
+        spoiled=replace(patch, share=1.01).error,
+    )
+
+
+_STRAIGHT = ("P1", "P2", "P2/P1", "P2/P0", "Q1/P0", "Q2/Q1")
+_BLOCK = Entry(
+    name="turned_block",
+    family="rigid motion",
+    title="Block whose surface is turned by 1 rad about an oblique axis in one step: largest error of a node",
+    unit="mm",
+    truth=lambda: 0.0,
+    within=5e-13,
+    relative=False,
+    because="A turned body is a linear function of the body at rest: rounding and the residual of 1e-13 N are left.",
+    kind="property",
+    source="Objectivity: a law sees C = F^T F only.",
+    measure=Turned(NEO, "Q2/Q1", SURFACE).error,
+    spoil="One face is turned 1 % further.",
+    spoiled=Turned(NEO, "Q2/Q1", SURFACE, 1.01).error,
+)
+_ENERGY = replace(
+    _BLOCK,
+    name="turned_block_energy",
+    title="Block whose ends are turned by 1 rad about an oblique axis: stored energy",
+    unit="N mm",
+    within=1e-16,
+    measure=Turned(NEO, "P2/P1", ENDS).energy,
+    spoil="One end is turned 1 % further.",
+    spoiled=Turned(NEO, "P2/P1", ENDS, 1.01).energy,
+)
+_MUSCLE = replace(
+    _BLOCK,
+    name="turned_muscle",
+    title="Contracting block whose ends are turned by 1 rad: largest difference to itself turned",
+    because="Fibres turn with the body: rounding and the residual of 1e-13 N are left.",
+    measure=Turned(NEO + active(0.03), "P2/P1", ENDS).error,
+    spoil="One end is turned 1 % further.",
+    spoiled=Turned(NEO + active(0.03), "P2/P1", ENDS, 1.01).error,
+)
+
+ENTRIES = (*(_patch(element) for element in _STRAIGHT), _patch("Q2/Q1", 2), _BLOCK, _ENERGY, _MUSCLE)
