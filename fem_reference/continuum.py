@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from fem_reference.effects import Effect
+from fem_reference.effects import Effect, Load
 from fem_reference.errors import InputError
 from fem_reference.mesh import Floats, Ints
 from fem_reference.runs import Outcome
@@ -29,22 +29,28 @@ ELEMENTS: dict[str, tuple[Kind, int, int | None]] = {
 
 
 def check(body: "Continuum", element: str) -> None:
-    """InputError unless ``element`` is one for the cells of ``body``, and has a pressure if and only if its effects bring one."""
+    """InputError unless ``element`` is one for the cells of ``body``, has a pressure if and only if its effects bring one, and the
+    body has every region and fibre direction that it speaks of.
+    """
     if element not in ELEMENTS:
         raise InputError("element", f'"{element}"', f"one of {', '.join(ELEMENTS)}")
-    kind, _, pressure = ELEMENTS[element]
-    if kind != body.mesh.kind:
-        fitting = [name for name, (other, *_) in ELEMENTS.items() if other == body.mesh.kind]
-        raise InputError("element", f'"{element}"', f"one for a {body.mesh.kind}: {', '.join(fitting)}")
     brings = any("pressure" in effect.unknowns for effect in body.effects)
-    if brings != (pressure is not None):
-        want = (
-            "with a pressure, which the effect incompressible brings"
-            if brings
-            else "without a pressure, which no effect brings"
-        )
-        fitting = [name for name, (other, _, p) in ELEMENTS.items() if other == kind and (p is not None) == brings]
-        raise InputError("element", f'"{element}"', f"one {want}: {', '.join(fitting)}")
+    fitting = [name for name in ELEMENTS if _fits(name, body.mesh, brings=brings)]
+    if element not in fitting:
+        cells = f"{'curved ' if body.mesh.degree > 1 else ''}{body.mesh.kind} cells"
+        pressure = "with a pressure, which an effect brings" if brings else "without a pressure, which no effect brings"
+        raise InputError("element", f'"{element}"', f"one for {cells} {pressure}: {', '.join(fitting)}")
+    held = [entry.on for entry in body.prescribed]
+    for on in [*held, *(effect.on for effect in body.effects if isinstance(effect, Load))]:
+        if on not in body.mesh.facets:
+            raise InputError("on", f'"{on}"', f"a region of the body: {', '.join(body.mesh.facets)}")
+    if body.fibre is None and any("fibre" in effect.needs for effect in body.effects):
+        raise InputError("fibre", "nothing", "fibre directions, which an effect needs")
+
+
+def _fits(element: str, mesh: "Cells", *, brings: bool) -> bool:
+    kind, degree, pressure = ELEMENTS[element]
+    return kind == mesh.kind and degree >= mesh.degree and (pressure is not None) == brings
 
 
 def reference_nodes(kind: Kind, degree: int) -> Floats:
@@ -117,7 +123,8 @@ class Continuum:
 @dataclass(frozen=True, eq=False)
 class Reached:
     """A state of a body at a frame: ``points`` (n, 3) [mm] where the nodes of the mesh are, and by name of what is prescribed the
-    ``forces`` (3,) [N] that hold it there and their ``moments`` (3,) [N mm] about the origin; ``scalars``: min_det_F_quadrature,
+    ``forces`` (3,) [N] that hold it there, along the prescribed components, and their ``moments`` (3,) [N mm] about the origin (at
+    nodes of two regions that prescribe the same component, the force counts in both); ``scalars``: min_det_F_quadrature,
     min_det_F_vertices, volume_ratio, energy [N mm], newton_iterations, cut_backs.
     """
 

@@ -115,7 +115,7 @@ def test_directions_only_where_an_effect_needs_them(bar, built) -> None:
     assert along[:, 2].mean() > 0.95
 
 
-def test_as_a_continuum_its_bones_hold_their_facets_and_the_rest_is_free(bar, built) -> None:
+def test_as_a_continuum_its_bones_hold_their_facets_and_the_rest_is_free(built) -> None:
     body = problem.as_continuum(built)
     skin, _ = boundary(built.mesh.tets)
     parts = [tuple(sorted(facet)) for facets in body.mesh.facets.values() for facet in facets.tolist()]

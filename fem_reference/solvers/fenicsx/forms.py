@@ -66,10 +66,8 @@ class Form:
 
     def _fibre(self, body: Continuum, cells: Ints) -> list[Any] | None:
         """The fibre direction at the quadrature points, where an effect asks for it."""
-        if not any("fibre" in effect.needs for effect in body.effects):
+        if body.fibre is None or not any("fibre" in effect.needs for effect in body.effects):
             return None
-        if body.fibre is None:
-            raise ValueError("an effect needs fibre directions, the body has none")
         points, weights = self.rule
         element = basix.ufl.quadrature_element(body.mesh.kind, value_shape=(3,), points=points, weights=weights)
         function = fem.Function(fem.functionspace(self.mesh, element))

@@ -10,7 +10,6 @@ from scipy.sparse import coo_array
 
 from fem_reference.continuum import Continuum, Prescribed
 from fem_reference.effects import Effect, Load, State, total_energy
-from fem_reference.errors import InputError
 from fem_reference.mesh import Floats
 from fem_reference.solvers.scikit_fem.jets import Jet, JetFunctions, constant, variables
 from fem_reference.solvers.scikit_fem.spaces import DISPLACEMENT, PRESSURE, VARIABLES, Points, Space
@@ -39,9 +38,7 @@ class Equations:
     def __init__(self, body: Continuum, element: str, quadrature_degree: int | None) -> None:
         self.body, self.space = body, Space(body.mesh, element, quadrature_degree or QUADRATURE_DEGREE[element])
         inside = self.space.inside
-        if any("fibre" in effect.needs for effect in body.effects):
-            if body.fibre is None:
-                raise InputError("fibre", "nothing", "fibre directions, which an effect needs")
+        if body.fibre is not None and any("fibre" in effect.needs for effect in body.effects):
             inside = inside.with_fibre(body.fibre)
         self.inside = inside
         self.parts = [_Part(inside, self._energy_law, self._felt())]
