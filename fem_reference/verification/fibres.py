@@ -14,11 +14,10 @@ from fem_reference.verification.homogeneous import (
     Material,
     Specimen,
     Y,
-    course,
-    effect,
     force_entry,
     stretch_entry,
 )
+from fem_reference.verification.parts import course, effect
 
 FAMILY = "fibres"
 STRESS, OPTIMUM = 0.3, 1.05  # the peak active stress [MPa] and the fibre stretch at which it is reached

@@ -12,7 +12,7 @@ from fem_reference.continuum import ELEMENTS, Continuum, Prescribed, Reached
 from fem_reference.mesh import Floats
 from fem_reference.verification import shapes
 from fem_reference.verification.courses import Rest
-from fem_reference.verification.torsion import ladder, neo_hooke, once
+from fem_reference.verification.parts import ladder, neo_hooke, once
 
 MU, BULK = 0.01, 1e4  # [MPa]; the truth is of incompressible matter
 THICKNESS, LENGTH, WIDTH = 10.0, 20.0, 2.5  # [mm]

@@ -5,38 +5,23 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
-from fem_reference import effects, truths
+from fem_reference import truths
 from fem_reference.catalogue import Entry, Finding, Lab
 from fem_reference.continuum import ELEMENTS, Continuum, Prescribed, Solved
 from fem_reference.effects import Effect
 from fem_reference.verification import shapes
-from fem_reference.verification.courses import Affine, Along, Matrix, Radial, Rest
+from fem_reference.verification.courses import Affine, Along, Matrix, Radial
+from fem_reference.verification.parts import SYMMETRY, effect, resistance
 
 Vector = tuple[float, float, float]
 X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 MU, BULK = 0.01, 10.0  # MPa
 SIZE = (3.0, 2.0, 1.5)  # mm
 STEPS = {"first_step": 0.25, "residual": 1e-13}
-
-
-def effect(name: str, **parameters: Any) -> Effect:
-    """The effect ``name``, its parameters as in a scene file."""
-    return cast(Effect, effects.find(name).model_validate(parameters))
-
-
-def course(full: float = 1.0) -> tuple[dict[str, float], ...]:
-    """From nothing at frame 0 to ``full`` at frame 1, as in a scene file."""
-    return ({"frame": 0.0, "amount": 0.0}, {"frame": 1.0, "amount": full})
-
-
-def resistance(element: str, bulk: float = BULK) -> Effect:
-    """The effect that resists volume change, for an ``element``; ``bulk``: K [MPa]."""
-    name = "incompressible_penalty" if ELEMENTS[element][2] is None else "incompressible"
-    return effect(name, bulk=f"{bulk} MPa")
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,9 +53,6 @@ def guccione(c: float) -> Material:
     """``c`` [MPa], with the exponents of Land et al. 2015, problem 1."""
     acting = effect("guccione", c=f"{c} MPa", bf=8.0, bt=2.0, bfs=4.0)
     return Material((acting,), lambda: truths.find("laws").Guccione(c, 8.0, 2.0, 4.0))
-
-
-SYMMETRY = tuple(Prescribed(face, face, (axis,), Rest()) for axis, face in enumerate(("x0", "y0", "z0")))
 
 
 def stretched(face: str, stretch: float) -> Prescribed:

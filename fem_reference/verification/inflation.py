@@ -17,10 +17,10 @@ from fem_reference.catalogue import Entry, Lab
 from fem_reference.continuum import ELEMENTS, Cells, Continuum, Prescribed, Solved
 from fem_reference.verification import shapes
 from fem_reference.verification.courses import Radial, Rest
-from fem_reference.verification.torsion import Matter, effect, ladder, mooney_rivlin, neo_hooke, once
+from fem_reference.verification.parts import SYMMETRY, course, effect, ladder, mooney_rivlin, neo_hooke, once
+from fem_reference.verification.torsion import Matter
 
-# [MPa]; C1 and C2 make a Mooney-Rivlin law of the shear modulus MU. Pressures are proportional to the moduli; these
-# are large as Newton's line search weighs forces [N] against volumes [mm3], and a pressed soft sphere takes it ten times the steps.
+# [MPa]; C1 and C2 make a Mooney-Rivlin law of the shear modulus MU. Pressures are proportional to the moduli.
 MU, BULK = 1.0, 1e4
 C1, C2 = 0.3, 0.2
 NEARLY = 1e6  # [MPa], the bulk modulus where the truth is of incompressible matter
@@ -30,9 +30,6 @@ PRESSED = 0.7  # [MPa], of 0.82 that the sphere can bear
 RESIDUAL = 1e-8  # [N, mm3], where forces are some 100 N
 
 Pressures = Callable[[float], float]  # [MPa] by the stretch a / A of the inner face
-
-_PLANES = (Prescribed("x0", "x0", (0,), Rest()), Prescribed("y0", "y0", (1,), Rest()))
-_OCTANT = (*_PLANES, Prescribed("z0", "z0", (2,), Rest()))
 
 
 def stretches(largest: float, count: int) -> tuple[float, ...]:
@@ -57,7 +54,7 @@ def _blown(lab: Lab, n: int, element: str, matter: Matter, degree: int = 2, larg
     """The pressures of the sphere whose inner face is moved out up to the largest stretch: it encloses ``pi a^3 / 6``."""
     grown = Prescribed("inner", "inner", (0, 1, 2), Radial(1.0, knots=((1.0, 0.0), (2.0, 1.0), (3.0, 2.0))))
     frames = stretches(largest, 8 if largest < 2 else 10)
-    body = Continuum(sphere(element, n, degree), matter(), (*_OCTANT, grown), frames)
+    body = Continuum(sphere(element, n, degree), matter(), (*SYMMETRY, grown), frames)
     curve = slope(lab.solve(body, element, first_step=0.2, residual=RESIDUAL))
     return lambda stretch: float(curve(stretch) / (np.pi / 2 * INNER**3 * stretch**2))
 
@@ -92,9 +89,8 @@ def _top(pressures: Pressures) -> float:
 def _pressed(lab: Lab, n: int, mu: float) -> float:
     """The mean stretch of the sphere's inner face, over its nodes, where a fluid of the pressure PRESSED is in it."""
     mesh = sphere("P2/P1", n, 2)
-    course = [{"frame": 0, "amount": 0.0}, {"frame": 1, "amount": 1.0}]
-    fluid = effect("pressure", on="inner", pressure=f"{PRESSED} MPa", course=course)
-    body = Continuum(mesh, (*neo_hooke(mu, BULK), fluid), _OCTANT, (0.0, 1.0))
+    fluid = effect("pressure", on="inner", pressure=f"{PRESSED} MPa", course=course())
+    body = Continuum(mesh, (*neo_hooke(mu, BULK), fluid), SYMMETRY, (0.0, 1.0))
     state = lab.solve(body, "P2/P1", first_step=0.25, residual=RESIDUAL).last
     inside = np.linalg.norm(mesh.points, axis=1) < INNER * (1 + 1e-9)
     return float(np.linalg.norm(state.points[inside], axis=1).mean() / INNER)
@@ -105,7 +101,7 @@ def _tube(lab: Lab, n: int, element: str, ends: tuple[str, ...] = ("bottom", "to
     mesh = shapes.tube_quarter(INNER, OUTER, LENGTH, (2 * n, 2 * n, 1), ELEMENTS[element][0], degree)
     held = [Prescribed(end, end, (2,), Rest()) for end in ends]
     grown = Prescribed("inner", "inner", (0, 1), Radial(1.0, (1.0, 1.0, 0.0), ((1.0, 0.0), (2.0, 1.0))))
-    body = Continuum(mesh, neo_hooke(MU, BULK), (*_PLANES, *held, grown), stretches(STRETCH, 8))
+    body = Continuum(mesh, neo_hooke(MU, BULK), (*SYMMETRY[:2], *held, grown), stretches(STRETCH, 8))
     return lab.solve(body, element, first_step=0.2, residual=RESIDUAL)
 
 

@@ -11,17 +11,15 @@ from fem_reference.effects import Effect
 from fem_reference.verification import shapes
 from fem_reference.verification.courses import Rest, Turn
 from fem_reference.verification.homogeneous import (
+    BULK,
     MU,
     NEO,
     SIZE,
     STEPS,
-    SYMMETRY,
     Specimen,
-    course,
-    effect,
-    resistance,
     stretch_entry,
 )
+from fem_reference.verification.parts import SYMMETRY, course, effect, resistance, zero
 
 FAMILY = "loads"
 MUSCLE, FAT = 1.06e-9, 0.92e-9  # densities [tonne/mm3]
@@ -57,7 +55,7 @@ _LARGE = (100.0, 50.0, 60.0)
 def _reaction(density: float, lab: Lab) -> Finding:
     """Of a block of muscle of 300 ml that stands, stuck to its base [N]."""
     mesh = shapes.box((3, 2, 2), _LARGE, "tetrahedron")
-    acting = (*NEO.effects, resistance("P2/P1"), weight(density))
+    acting = (*NEO.effects, resistance("P2/P1", BULK), weight(density))
     last = lab.solve(Continuum(mesh, acting, HELD, (0, 1)), "P2/P1", first_step=0.25, residual=1e-10).last
     return Finding(float(last.forces["z0"][2]))
 
@@ -153,7 +151,7 @@ _TILT = Prescribed("z1", "z1", (0, 1, 2), Turn((0.0, 1.0, 0.0), 0.3, (SIZE[0] / 
 def _left_over(faces: tuple[str, ...], lab: Lab) -> Finding:
     """The sum of the forces [N] on both ends of a block, its top tilted by 0.3 rad, in a fluid that wets ``faces``."""
     mesh = wet(shapes.box((2, 2, 2), SIZE, "tetrahedron"), faces)
-    acting = (*NEO.effects, resistance("P2/P1"), pressed(2 * MU))
+    acting = (*NEO.effects, resistance("P2/P1", BULK), pressed(2 * MU))
     forces = lab.solve(Continuum(mesh, acting, (*HELD, _TILT), (0, 1)), "P2/P1", **STEPS).last.forces
     return Finding(float(np.linalg.norm(forces["z0"] + forces["z1"])))
 
@@ -163,7 +161,7 @@ _CLOSED = Entry(
     family=FAMILY,
     title="Tilted block in a fluid that presses all round: what its two holders carry together",
     unit="N",
-    truth=lambda: 0.0,
+    truth=zero,
     within=1e-15,
     relative=False,
     because="A pressure on a closed surface has no resultant, on a discrete one either: rounding and Newton's residual are left.",
@@ -181,7 +179,7 @@ def _turned(load: Effect, lab: Lab) -> Finding:
     """A block leans under a ``load``, then its base is turned by a quarter circle: how far it is from itself turned [mm]."""
     mesh = wet(shapes.box((2, 2, 2), SIZE, "tetrahedron"), ("x1",))
     base = (Prescribed("z0", "z0", (0, 1, 2), _QUARTER),)
-    acting = (*NEO.effects, resistance("P2/P1"), load)
+    acting = (*NEO.effects, resistance("P2/P1", BULK), load)
     solved = lab.solve(Continuum(mesh, acting, base, (0, 1, 2)), "P2/P1", **STEPS)
     after, before = solved.last.points, solved.states[1].points
     return Finding(float(np.linalg.norm(after - before - _QUARTER(before, 2), axis=1).max()))
@@ -192,7 +190,7 @@ _FOLLOWER = Entry(
     family=FAMILY,
     title="Block that leans under a pressure on one side, turned by a quarter circle: largest difference to itself turned",
     unit="mm",
-    truth=lambda: 0.0,
+    truth=zero,
     within=1e-13,
     relative=False,
     because="A pressure turns with the surface: rounding and Newton's residual are left.",

@@ -9,7 +9,8 @@ from fem_reference.continuum import ELEMENTS, Continuum, Prescribed, Reached
 from fem_reference.verification import shapes
 from fem_reference.verification.courses import Along, Matrix, Turn
 from fem_reference.verification.fibres import active
-from fem_reference.verification.homogeneous import NEO, SIZE, STEPS, Material, X, everywhere, resistance
+from fem_reference.verification.homogeneous import BULK, NEO, SIZE, STEPS, Material, X, everywhere
+from fem_reference.verification.parts import resistance, zero
 
 # Of displacement: stretch, shear and a turn at once; it takes the volume to 1.2 times that at rest.
 GRADIENT: Matrix = ((0.2, 0.35, -0.1), (-0.15, 0.05, 0.3), (0.1, -0.2, -0.15))
@@ -30,7 +31,7 @@ class Patch:
     def error(self, lab: Lab) -> Finding:
         """How far a node is at most from where the whole gradient takes it [mm]."""
         mesh = shapes.warped_box(COUNTS, SIZE, ELEMENTS[self.element][0], self.degree, BUMP)
-        body = Continuum(mesh, (*NEO.effects, resistance(self.element)), everywhere(_times(self.share)), (0, 1))
+        body = Continuum(mesh, (*NEO.effects, resistance(self.element, BULK)), everywhere(_times(self.share)), (0, 1))
         points = lab.solve(body, self.element, first_step=0.5, residual=1e-13).last.points
         exact = mesh.points @ (np.eye(3) + np.array(GRADIENT)).T
         return Finding(float(np.linalg.norm(points - exact, axis=1).max()))
@@ -59,7 +60,7 @@ class Turned:
         prescribed = tuple(
             Prescribed(face, face, (0, 1, 2), _turn(self.further if face == "z1" else 1.0)) for face in self.faces
         )
-        acting = (*self.material.effects, resistance(self.element))
+        acting = (*self.material.effects, resistance(self.element, BULK))
         steps = AT_ONCE if self.faces == SURFACE else STEPS
         solved = lab.solve(Continuum(mesh, acting, prescribed, (0, 1, 2), Along(X)), self.element, **steps)
         return solved.states[1], solved.last
@@ -88,7 +89,7 @@ def _patch(element: str, degree: int = 1) -> Entry:
         family="patch tests",
         title=f"{element} on {shape} cells holds a stretch, a shear and a turn at once: largest error of a node",
         unit="mm",
-        truth=lambda: 0.0,
+        truth=zero,
         within=5e-13,
         relative=False,
         because="Linear functions are in the space of every element, on curved (isoparametric) cells too: rounding is left.",
@@ -106,7 +107,7 @@ _BLOCK = Entry(
     family="rigid motion",
     title="Block whose surface is turned by 1 rad about an oblique axis in one step: largest error of a node",
     unit="mm",
-    truth=lambda: 0.0,
+    truth=zero,
     within=5e-13,
     relative=False,
     because="A turned body is a linear function of the body at rest: rounding and the residual of 1e-13 N are left.",

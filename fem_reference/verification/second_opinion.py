@@ -11,20 +11,18 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference import effects
 from fem_reference.catalogue import Entry, Finding, Lab
 from fem_reference.continuum import ELEMENTS, Cells, Continuum, Prescribed, Reached
-from fem_reference.effects import Effect
 from fem_reference.mesh import Floats
-from fem_reference.records import parse
 from fem_reference.verification import shapes
 from fem_reference.verification.courses import Affine, Along, Rest, Turn
+from fem_reference.verification.parts import course, effect, zero
 
 RESIDUAL = 1e-14  # [N, mm3]
 FIBRE = Along((2 / 7, 3 / 7, 6 / 7))
 # Bends and twists at once: an axis between that of the bar, z, and one across it.
 TURN = Turn((1.0, 0.0, 2.0), 0.5, (0.5, 0.5, 2.0))
-RAMP = [{"frame": 0, "amount": 0.0}, {"frame": 1, "amount": 1.0}]
+RAMP = course()
 MIXED = ("incompressible", {"bulk": "1 MPa"})
 PENALTY = ("incompressible_penalty", {"bulk": "1 MPa"})
 NEO_HOOKE = ("neo_hooke", {"mu": "10 kPa"})
@@ -45,12 +43,6 @@ FLUID = ("pressure", {"on": "x1", "pressure": "1 kPa", "course": RAMP})
 Named = tuple[str, dict[str, Any]]  # an effect and its parameters as scene files write them
 
 
-def _effect(name: str, parameters: dict[str, Any]) -> Effect:
-    found = parse(effects.find(name), parameters, name)
-    assert isinstance(found, Effect)
-    return found
-
-
 @dataclass(frozen=True, eq=False)
 class Sample:
     """A body to be solved twice: what acts, the mesh by kind of its cells, what is prescribed, and the element with the
@@ -65,7 +57,7 @@ class Sample:
 
     def body(self, error: float = 0.0) -> Continuum:
         """The body; ``error``: of the first parameter of the first effect, a modulus, relative."""
-        first, *others = (_effect(*named) for named in self.acting)
+        first, *others = (effect(name, **parameters) for name, parameters in self.acting)
         name, value, _ = first.parameters[0]
         wrong = first.model_copy(update={name: value * (1 + error)})
         return Continuum(
@@ -117,17 +109,13 @@ def _difference(first: dict[str, Floats], second: dict[str, Floats]) -> float:
     return float(np.abs(theirs - ours).max() / np.abs(ours).max())
 
 
-def _zero() -> float:
-    return 0.0
-
-
 def _entry(name: str, title: str, sample: Sample, within: float, because: str) -> Entry:
     return Entry(
         name=f"second_opinion_{name}",
         family="second opinion",
         title=f"{title} by {sample.element}: how far FEniCSx and scikit-fem differ",
         unit="1",
-        truth=_zero,
+        truth=zero,
         within=within,
         relative=False,
         because=because,

@@ -6,18 +6,15 @@ turned by half a turn, through its planes of symmetry.
 """
 
 from functools import partial
-from typing import Any
 
 import numpy as np
 
-from fem_reference import effects
 from fem_reference.catalogue import Entry, Finding, Lab
 from fem_reference.continuum import ELEMENTS, Continuum, Prescribed, Solved
-from fem_reference.effects import Effect
-from fem_reference.records import parse
 from fem_reference.truths import find
 from fem_reference.verification import shapes
 from fem_reference.verification.courses import Affine, Rest
+from fem_reference.verification.parts import neo_hooke, zero
 
 MU = 0.01  # [MPa]
 HEIGHT = 0.1  # of the squeezed block over that at rest
@@ -26,18 +23,6 @@ STEPS = 5  # each way
 RESIDUAL = 1e-11  # [N, mm3]
 GLUED_TO, GLUED_STEPS = 0.4, 12
 _NOT_MOVING = ((0.0, 0.0, 0.0),) * 3
-
-
-def effect(name: str, **parameters: Any) -> Effect:
-    """The effect ``name`` with its parameters as scene files write them."""
-    found = parse(effects.find(name), parameters, name)
-    assert isinstance(found, Effect)
-    return found
-
-
-def flesh(bulk: float) -> tuple[Effect, ...]:
-    """A neo-Hookean matrix of 10 kPa with a pressure unknown; ``bulk`` [MPa]."""
-    return effect("neo_hooke", mu=f"{MU} MPa"), effect("incompressible", bulk=f"{bulk} MPa")
 
 
 def _smooth(lab: Lab, element: str, bulk: float, *, growing: bool = False) -> Solved:
@@ -50,7 +35,7 @@ def _smooth(lab: Lab, element: str, bulk: float, *, growing: bool = False) -> So
         Prescribed("plate", "z1", (2,), Affine(_NOT_MOVING, (0.0, 0.0, HEIGHT - 1), THERE_AND_BACK)),
     )
     frames = (0.0, 1.0, 2.0) if growing else tuple(np.linspace(0, 2, 2 * STEPS + 1).tolist())
-    body = Continuum(mesh, flesh(bulk), prescribed, frames)
+    body = Continuum(mesh, neo_hooke(MU, bulk), prescribed, frames)
     return lab.solve(body, element, first_step=0.05, smallest_step=1e-3, residual=RESIDUAL)
 
 
@@ -90,7 +75,7 @@ def _glued(lab: Lab, element: str, count: int, height: float, **settings: float)
         Prescribed("top", "z1", (0, 1, 2), Affine(_NOT_MOVING, (0.0, 0.0, height - 1))),
     )
     frames = tuple(np.linspace(0, 1, GLUED_STEPS + 1).tolist())
-    body = Continuum(mesh, flesh(10.0), prescribed, frames)
+    body = Continuum(mesh, neo_hooke(MU, 10.0), prescribed, frames)
     return lab.solve(body, element, first_step=1.0, smallest_step=0.005, residual=RESIDUAL, **settings)
 
 
@@ -125,10 +110,6 @@ def _force_truth(bulk: float) -> float:
 
 def _volume_truth(bulk: float) -> float:
     return float(find("loads").squeezed_volume(MU, bulk, HEIGHT))
-
-
-def _zero() -> float:
-    return 0.0
 
 
 def _one() -> float:
@@ -181,7 +162,7 @@ def _return_entry(name: str, element: str, bulk: float) -> Entry:
         family="squeeze",
         title=f"How far that block is from its rest state when the plates are back, K/mu = {bulk / MU:.0e}, {element}",
         unit="mm",
-        truth=_zero,
+        truth=zero,
         within=1e-10,
         relative=False,
         because=f"{_EXACT}; of an elastic body nothing remembers the squeeze",

@@ -2,18 +2,16 @@
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
-from fem_reference import catalogue, effects, truths
-from fem_reference.catalogue import Entry, Finding, Lab
+from fem_reference import truths
+from fem_reference.catalogue import Entry, Lab
 from fem_reference.continuum import ELEMENTS, Continuum, Prescribed, Reached
 from fem_reference.effects import Effect
-from fem_reference.records import parse
 from fem_reference.verification import shapes
 from fem_reference.verification.courses import Rest, Turn
+from fem_reference.verification.parts import ladder, mooney_rivlin, neo_hooke, once
 
 Matter = Callable[[], tuple[Effect, ...]]
-Value = Callable[[Lab, int], float]  # of so many cells
 
 # [MPa]; C1 and C2 make a Mooney-Rivlin law of the shear modulus MU. The truths are of incompressible matter.
 MU, BULK = 0.01, 1e4
@@ -22,34 +20,6 @@ C1, C2 = 0.003, 0.002
 RADIUS, LENGTH, TWIST = 10.0, 10.0, 0.05
 # Side and length of the square bar [mm], and its twist [rad/mm]: a shear of 0.0007 at its edges.
 SIDE, SHORT, SMALL_TWIST = 10.0, 2.5, 1e-4
-
-
-def neo_hooke(mu: float, bulk: float) -> tuple[Effect, ...]:
-    """Matter of the moduli ``mu`` and ``bulk`` [MPa], the latter in mixed form."""
-    return effect("neo_hooke", mu=f"{mu} MPa"), effect("incompressible", bulk=f"{bulk} MPa")
-
-
-def mooney_rivlin(c1: float, c2: float, bulk: float) -> tuple[Effect, ...]:
-    """Matter of ``c1``, ``c2`` and the modulus ``bulk`` [MPa], the latter in mixed form."""
-    return effect("mooney_rivlin", c1=f"{c1} MPa", c2=f"{c2} MPa"), effect("incompressible", bulk=f"{bulk} MPa")
-
-
-def effect(name: str, **parameters: Any) -> Effect:
-    """The effect ``name`` with its parameters as scene files write them."""
-    found = parse(effects.find(name), parameters, name)
-    assert isinstance(found, Effect)
-    return found
-
-
-def once(lab: Lab, value: Value, count: int) -> Finding:
-    """The ``value`` with ``count`` cells."""
-    return Finding(value(lab, count))
-
-
-def ladder(lab: Lab, value: Value, counts: tuple[int, ...], size: float, truth: Callable[[], float]) -> Finding:
-    """The ``value`` with the last of ``counts`` cells, of size ``size / count`` [mm], and its way there."""
-    steps = tuple((size / count, value(lab, count)) for count in counts)
-    return Finding(steps[-1][1], catalogue.order(steps, truth()), steps)
 
 
 def twisted(lab: Lab, rings: int, element: str, matter: Matter, degree: int = 2) -> Reached:
