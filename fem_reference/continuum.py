@@ -29,17 +29,10 @@ ELEMENTS: dict[str, tuple[Kind, int, int | None]] = {
 
 
 def check(body: "Continuum", element: str) -> None:
-    """InputError unless ``element`` is one for the cells of ``body``, has a pressure if and only if its effects bring one, and the
-    body has every region and fibre direction that it speaks of.
+    """InputError unless ``element`` suits the cells and effects of ``body``, which has every region and fibre direction that it
+    speaks of.
     """
-    if element not in ELEMENTS:
-        raise InputError("element", f'"{element}"', f"one of {', '.join(ELEMENTS)}")
-    brings = any("pressure" in effect.unknowns for effect in body.effects)
-    fitting = [name for name in ELEMENTS if _fits(name, body.mesh, brings=brings)]
-    if element not in fitting:
-        cells = f"{'curved ' if body.mesh.degree > 1 else ''}{body.mesh.kind} cells"
-        pressure = "with a pressure, which an effect brings" if brings else "without a pressure, which no effect brings"
-        raise InputError("element", f'"{element}"', f"one for {cells} {pressure}: {', '.join(fitting)}")
+    check_element(element, body.mesh.kind, body.mesh.degree, body.effects, "element")
     held = [entry.on for entry in body.prescribed]
     for on in [*held, *(effect.on for effect in body.effects if isinstance(effect, Load))]:
         if on not in body.mesh.facets:
@@ -48,9 +41,22 @@ def check(body: "Continuum", element: str) -> None:
         raise InputError("fibre", "nothing", "fibre directions, which an effect needs")
 
 
-def _fits(element: str, mesh: "Cells", *, brings: bool) -> bool:
-    kind, degree, pressure = ELEMENTS[element]
-    return kind == mesh.kind and degree >= mesh.degree and (pressure is not None) == brings
+def check_element(element: str, kind: Kind, degree: int, effects: tuple[Effect, ...], place: str) -> None:
+    """InputError at ``place`` unless ``element`` is one for cells of a ``kind`` and ``degree``, and has a pressure if and only if
+    the effects bring one.
+    """
+    if element not in ELEMENTS:
+        raise InputError(place, f'"{element}"', f"one of {', '.join(ELEMENTS)}")
+    brings = any("pressure" in effect.unknowns for effect in effects)
+    fitting = [
+        name
+        for name, (other, order, pressure) in ELEMENTS.items()
+        if other == kind and order >= degree and (pressure is not None) == brings
+    ]
+    if element not in fitting:
+        cells = f"{'curved ' if degree > 1 else ''}{kind} cells"
+        pressure = "with a pressure, which an effect brings" if brings else "without a pressure, which no effect brings"
+        raise InputError(place, f'"{element}"', f"one for {cells} {pressure}: {', '.join(fitting)}")
 
 
 def reference_nodes(kind: Kind, degree: int) -> Floats:

@@ -30,6 +30,9 @@ _AFTER_THE_RUN = (
     "report",
     "judge.py",
     "comparison.py",
+    "catalogue.py",
+    "truths.py",
+    "verification",
     "overview.py",
     "cli.py",
     "__main__.py",
@@ -54,7 +57,10 @@ class Bench:
             choice = choice.model_copy(update={"folder": str(self.scene.file(folder, f"{place}.folder"))})
         if self.ranks is not None and choice.solver == "fenicsx":
             choice = choice.model_copy(update={"ranks": self.ranks})
-        return solvers.settings(choice, f"{self.scene.place}: {place}")
+        where = f"{self.scene.place}: {place}"
+        settings = solvers.settings(choice, where)
+        solvers.check(choice.solver, settings, self.scene.effects, where)
+        return settings
 
     def obtain(self, name: str, choice: SolverChoice, place: str) -> Run:
         """The run of a solver of our own, by the name that pages give it; ``place`` is where the scene chooses it."""

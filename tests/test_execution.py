@@ -5,12 +5,15 @@ import threading
 from pathlib import Path
 
 import numpy as np
+import pytest
 import shapes
 import small
 
 from fem_reference import casefile, execution
+from fem_reference.errors import InputError
 from fem_reference.execution import Bench, complete
 from fem_reference.runs import Outcome, Run
+from fem_reference.scene import SolverChoice
 
 
 def bench(folder: Path, **changes) -> Bench:
@@ -89,3 +92,13 @@ def test_frames_that_were_not_reached_are_not_numbers() -> None:
     assert whole.fibre_positions is None
     assert np.array_equal(whole.scalars["energy"], [1, np.nan, 2], equal_nan=True)
     assert complete(run, (0, 10)) is run
+
+
+def test_an_element_that_does_not_suit_the_effects_is_named(tmp_path) -> None:
+    scene = casefile.read_muscle(small.write(tmp_path / "bar"))
+    bench = Bench(scene, tmp_path / "runs")
+    for element, want in (("Q2/Q1", "P2/P0, P2/P1"), ("P1", "P2/P0, P2/P1")):
+        with pytest.raises(
+            InputError, match=rf'case.toml: reference.element: got "{element}", want one for .*: {want}'
+        ):
+            bench.settings(SolverChoice(solver="fenicsx", element=element), "reference")

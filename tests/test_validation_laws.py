@@ -122,10 +122,13 @@ def test_slack_fibres_carry_exactly_nothing() -> None:
     assert not HOLZAPFEL.stress(shortened, X).any()
 
 
-def test_active_tension_is_a_constant_second_stress() -> None:
+def test_active_tension_is_a_constant_second_stress_and_a_pressure() -> None:
+    # At J = 1; a pressure is a multiple of C^-1.
     for F in deformations():
+        F = F / np.cbrt(np.linalg.det(F))
         second = np.linalg.solve(F, ActiveTension(0.06).stress(F, FIBRE))
-        assert np.allclose(second, 0.06 * np.outer(FIBRE, FIBRE), rtol=0, atol=1e-15)
+        rest = (second - 0.06 * np.outer(FIBRE, FIBRE)) @ (F.T @ F)
+        assert np.allclose(rest, np.trace(rest) / 3 * np.eye(3), rtol=0, atol=1e-15)
 
 
 def test_guccione_has_no_preferred_direction_across_the_fibre() -> None:
@@ -135,13 +138,16 @@ def test_guccione_has_no_preferred_direction_across_the_fibre() -> None:
 
 
 def test_guccione_along_across_and_between() -> None:
-    law, E = LAWS["guccione"], (1.2**2 - 1) / 2
-    for place, b in ((0, 8.0), (1, 2.0)):
-        F = np.eye(3)
-        F[place, place] = 1.2
-        assert law.energy(F, X) == pytest.approx(0.001 * (np.exp(b * E**2) - 1), rel=1e-12)
-    F = np.linalg.cholesky(np.eye(3) + 0.2 * (np.eye(3)[[1, 0, 2]] - np.diag([0, 0, 1]))).T  # E_fs = 0.1 alone
-    assert law.energy(F, X) == pytest.approx(0.001 * (np.exp(2 * 4.0 * 0.1**2) - 1), rel=1e-12)
+    # At J = 1: longer one way and shorter the other, E = (l^2 - 1)/2 in both; sheared along the fibre, E_fs = g/2, E_ss = g^2/2.
+    law = LAWS["guccione"]
+    longer, shorter = ((stretch**2 - 1) / 2 for stretch in (1.2, 1 / 1.2))
+    along = 8 * longer**2 + 2 * shorter**2
+    assert law.energy(np.diag([1.2, 1 / 1.2, 1]), X) == pytest.approx(0.001 * (np.exp(along) - 1), rel=1e-12)
+    across = 2 * longer**2 + 2 * shorter**2
+    assert law.energy(np.diag([1, 1.2, 1 / 1.2]), X) == pytest.approx(0.001 * (np.exp(across) - 1), rel=1e-12)
+    sheared = np.eye(3) + 0.2 * np.outer(X, [0, 1, 0])
+    between = 2 * 4 * 0.1**2 + 2 * 0.02**2
+    assert law.energy(sheared, X) == pytest.approx(0.001 * (np.exp(between) - 1), rel=1e-12)
 
 
 def test_the_families_lie_at_their_angle_to_the_fibre_and_across_the_normal() -> None:

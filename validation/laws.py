@@ -66,9 +66,17 @@ def neo_hooke(mu: float) -> MooneyRivlin:
     return MooneyRivlin(mu / 2, 0.0)
 
 
+def isochoric(F: Floats, slope: Floats) -> Floats:
+    """First Piola-Kirchhoff stress (3, 3) [MPa] of an energy of ``Ebar = (J^(-2/3) C - I)/2`` whose ``slope`` in Ebar is S (3, 3):
+    ``J^(-2/3) (F S - (S : C)/3 F^-T)``. Source: Holzapfel 2000, Nonlinear Solid Mechanics, section 6.4.
+    """
+    part = np.sum(slope * (F.T @ F)) / 3
+    return np.asarray(np.linalg.det(F) ** (-2 / 3) * (F @ slope - part * np.linalg.inv(F).T))
+
+
 @dataclass(frozen=True)
 class ActiveTension:
-    """``T/2 (|F a|^2 - 1)``: a constant second Piola-Kirchhoff stress T [MPa] along the fibre; not isochoric.
+    """``T/2 (J^(-2/3) |F a|^2 - 1)``: at J = 1 a constant second Piola-Kirchhoff stress T [MPa] along the fibre, and a pressure.
 
     Source: Land et al. 2015, problem 3, doi 10.1098/rspa.2015.0641.
     """
@@ -77,11 +85,11 @@ class ActiveTension:
 
     def energy(self, F: Floats, fibre: Floats) -> float:
         """Energy per rest volume [MPa]."""
-        return float(self.tension / 2 * (np.sum((F @ fibre) ** 2) - 1))
+        return float(self.tension / 2 * (np.linalg.det(F) ** (-2 / 3) * np.sum((F @ fibre) ** 2) - 1))
 
     def stress(self, F: Floats, fibre: Floats) -> Floats:
         """First Piola-Kirchhoff stress (3, 3) [MPa]."""
-        return np.asarray(self.tension * np.outer(F @ fibre, fibre))
+        return isochoric(F, self.tension * np.outer(fibre, fibre))
 
 
 @dataclass(frozen=True)
@@ -121,8 +129,8 @@ class HolzapfelOgden:
 
 @dataclass(frozen=True)
 class Guccione:
-    """``c/2 (exp(Q) - 1)``, ``Q = bf Eff^2 + bt (Ess^2 + Enn^2 + 2 Esn^2) + 2 bfs (Efs^2 + Efn^2)``, ``E = (C - I)/2`` in axes
-    along the fibre f and two across; c [MPa]; not isochoric.
+    """``c/2 (exp(Q) - 1)``, ``Q = bf Eff^2 + bt (Ess^2 + Enn^2 + 2 Esn^2) + 2 bfs (Efs^2 + Efn^2)``, ``E = (J^(-2/3) C - I)/2``
+    in axes along the fibre f and two across; c [MPa].
 
     Source: Guccione, McCulloch, Waldman 1991, doi 10.1115/1.2894084; as in Land et al. 2015, doi 10.1098/rspa.2015.0641.
     """
@@ -137,7 +145,7 @@ class Guccione:
         axes = np.linalg.qr(np.column_stack([fibre, np.eye(3)]))[0]
         b = np.full((3, 3), self.bt)
         b[0, :], b[:, 0], b[0, 0] = self.bfs, self.bfs, self.bf
-        return axes, axes.T @ (F.T @ F - np.eye(3)) @ axes / 2, b
+        return axes, axes.T @ (np.linalg.det(F) ** (-2 / 3) * F.T @ F - np.eye(3)) @ axes / 2, b
 
     def energy(self, F: Floats, fibre: Floats) -> float:
         """Energy per rest volume [MPa]."""
@@ -145,9 +153,9 @@ class Guccione:
         return float(self.c / 2 * np.expm1(np.sum(b * E**2)))
 
     def stress(self, F: Floats, fibre: Floats) -> Floats:
-        """First Piola-Kirchhoff stress (3, 3) [MPa]: F times the second, ``c exp(Q) b E``."""
+        """First Piola-Kirchhoff stress (3, 3) [MPa]; the slope of the energy in E is ``c exp(Q) b E``."""
         axes, E, b = self._along_axes(F, fibre)
-        return np.asarray(F @ axes @ (self.c * np.exp(np.sum(b * E**2)) * b * E) @ axes.T)
+        return isochoric(F, axes @ (self.c * np.exp(np.sum(b * E**2)) * b * E) @ axes.T)
 
 
 @dataclass(frozen=True)

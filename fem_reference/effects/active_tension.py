@@ -7,9 +7,10 @@ from fem_reference.units import PositivePressure
 
 
 class ActiveTension(Coursed, Energy):
-    """``amount T/2 (fibre . C fibre - 1)``: a second Piola-Kirchhoff stress of ``amount T`` along the fibre.
+    """``amount T/2 (J^(-2/3) fibre . C fibre - 1)``: at constant volume a second Piola-Kirchhoff stress of ``amount T`` along the
+    fibre and a pressure, which the resistance to volume change takes.
 
-    ``tension``: T [MPa]. Source: Land et al. 2015, problem 3, doi 10.1098/rspa.2015.0641.
+    ``tension``: T [MPa]. Source: Land et al. 2015, problem 3, doi 10.1098/rspa.2015.0641, of incompressible matter.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
@@ -17,4 +18,4 @@ class ActiveTension(Coursed, Energy):
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa]."""
-        return state.amount * self.tension / 2 * (state.square_stretch(state.fibre) - 1)
+        return state.amount * self.tension / 2 * (state.J ** (-2 / 3) * state.square_stretch(state.fibre) - 1)

@@ -9,11 +9,12 @@ from fem_reference.units import PositivePressure
 
 
 class Guccione(Energy):
-    """``c/2 (exp(Q) - 1)``, ``Q = bf Eff^2 + bt (Ess^2 + Enn^2 + 2 Esn^2) + 2 bfs (Efs^2 + Efn^2)``, with ``E = (C - 1) / 2`` in
-    axes along the fibre (f) and any two across it (s, n).
+    """``c/2 (exp(Q) - 1)``, ``Q = bf Eff^2 + bt (Ess^2 + Enn^2 + 2 Esn^2) + 2 bfs (Efs^2 + Efn^2)``, with
+    ``E = (J^(-2/3) C - 1) / 2`` in axes along the fibre (f) and any two across it (s, n).
 
     ``c`` [MPa]; ``bf``, ``bt``, ``bfs`` without unit. Source: Guccione, McCulloch and Waldman 1991, doi 10.1115/1.2894084, as in
-    Land et al. 2015, doi 10.1098/rspa.2015.0641.
+    Land et al. 2015, doi 10.1098/rspa.2015.0641, both of incompressible matter. Without the factor the pressure unknown has to
+    balance the whole of a large tension, and mixed elements of two layers lose their balance in the ventricle of Land et al.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
@@ -24,8 +25,8 @@ class Guccione(Energy):
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa]; ``|E fibre|^2`` and ``|E|^2`` give the sums over s and n."""
-        C, f = state.C, state.fibre
-        E = [[(C[i][k] - (i == k)) / 2 for k in range(3)] for i in range(3)]
+        C, f, factor = state.C, state.fibre, state.J ** (-2 / 3)
+        E = [[(factor * C[i][k] - (i == k)) / 2 for k in range(3)] for i in range(3)]
         along = [sum(E[i][k] * f[k] for k in range(3)) for i in range(3)]
         square = sum(entry**2 for row in E for entry in row)
         Eff = sum(a * b for a, b in zip(f, along, strict=True))

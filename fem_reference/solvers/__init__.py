@@ -11,6 +11,7 @@ import importlib
 import pkgutil
 from typing import Any, Literal
 
+from fem_reference.effects import Effect
 from fem_reference.errors import InputError
 from fem_reference.records import Record, join, parse
 from fem_reference.scene import SolverChoice
@@ -49,6 +50,13 @@ def require(name: str, settings: Record, place: str) -> None:
     check = getattr(find(name, place), "require", None)
     if check is not None:
         check(settings)
+
+
+def check(name: str, settings: Record, effects: tuple[Effect, ...], place: str) -> None:
+    """InputError below ``place`` where ``settings`` do not suit the ``effects``; a module says so in ``check_effects``."""
+    suits = getattr(find(name, place), "check_effects", None)
+    if suits is not None:
+        suits(settings, effects, place)
 
 
 def settings(choice: SolverChoice, place: str, task: Task = "solve") -> Record:

@@ -16,12 +16,14 @@ from typing import Any
 import numpy as np
 
 from fem_reference.children import command
-from fem_reference.continuum import check
+from fem_reference.continuum import check_element
+from fem_reference.effects import Effect
 from fem_reference.errors import MissingSoftware
 from fem_reference.geometry.embedding import Locator
 from fem_reference.mesh import Floats, Ints
 from fem_reference.motion import apply
 from fem_reference.problem import Problem, as_continuum
+from fem_reference.records import join
 from fem_reference.runs import Frame, Outcome, Sink
 from fem_reference.solvers.fenicsx.field import FieldSettings, solve_field
 from fem_reference.solvers.fenicsx.jobs import Job
@@ -33,6 +35,7 @@ __all__ = [
     "BodySettings",
     "FieldSettings",
     "Settings",
+    "check_effects",
     "require",
     "session",
     "solve",
@@ -48,11 +51,15 @@ def require(settings: BodySettings | FieldSettings) -> None:
         _command(settings, Path())
 
 
+def check_effects(settings: Settings, effects: tuple[Effect, ...], place: str) -> None:
+    """InputError below ``place`` unless the element suits tetrahedra and the effects."""
+    check_element(settings.element, "tetrahedron", 1, effects, join(place, "element"))
+
+
 def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
     """Solve every requested frame in worker processes; frames carry surface, fibres and tets."""
     require(settings)
     body = as_continuum(problem)
-    check(body, settings.element)
     with tempfile.TemporaryDirectory(prefix="fem_reference-") as folder:
         job = Path(folder) / "job.pickle"
         job.write_bytes(pickle.dumps(Job(body, settings, _samples(problem))))
