@@ -149,7 +149,7 @@ def _published(name: str, place: int | None = None) -> float:
     return float((found if place is None else found[place]).value)
 
 
-_BEAM = Heart("Q2/Q1", degree=1)
+_BEAM = Heart("P2/P1", degree=1)
 _TETRAHEDRA, _HEXAHEDRA = Heart("P2/P1"), Heart("Q2/Q1")
 _AGREE = "the codes of the benchmark agree within half a per cent"
 
@@ -188,13 +188,13 @@ def _active_entry(place: int, because: str) -> Entry:
 ENTRIES = (
     _entry(
         "beam_follower",
-        "A beam of heart muscle under a pressure that stays normal to it: height of its end",
+        "A beam of heart muscle under a pressure that stays normal to it: height of its end, by quadratic tetrahedra",
         partial(_published, "TIP_OF_BEAM"),
         0.003,
-        because="the published number has three digits (0.1 %); the mesh leaves 0.1 %, the bulk modulus less",
-        measure=partial(_ladder, value=_BEAM.beam_tip, counts=(1, 2), size=1.0),
+        because="the published number has three digits (0.1 %); the mesh leaves 0.2 %, as its clamped edges are singular",
+        measure=partial(_ladder, value=_BEAM.beam_tip, counts=(2, 3), size=1.0),
         spoil="5 % stiffer",
-        spoiled=partial(once, value=replace(_BEAM, stiff=1.05).beam_tip, count=1),
+        spoiled=partial(once, value=replace(_BEAM, stiff=1.05).beam_tip, count=2),
     ),
     *(_passive_entry(_TETRAHEDRA, place, "the mesh leaves 0.1 %") for place in (0, 1)),
     *(_passive_entry(_HEXAHEDRA, place, "the mesh leaves 0.1 %") for place in (0, 1)),
