@@ -1,5 +1,6 @@
 """Fixtures that several test files share."""
 
+import importlib.util
 import os
 from pathlib import Path
 
@@ -13,3 +14,14 @@ def data() -> Path:
     if not folder:
         pytest.skip("the report's data is not here: FEM_REFERENCE_DATA is not set")
     return Path(folder)
+
+
+@pytest.fixture(scope="session")
+def fem_lab():
+    """Where entries of the catalogue are measured."""
+    if not any(importlib.util.find_spec(name) for name in ("dolfinx_solver", "dolfinx")):
+        pytest.skip("FEniCSx is not installed")
+    from fem_reference.verification.lab import lab
+
+    with lab() as opened:
+        yield opened
