@@ -20,6 +20,8 @@ from fem_reference.solvers.fenicsx.holds import Hold
 from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.stepping import Attempt
 
+_NOT_A_NUMBER = -4  # how PETSc's SNES ends there; the name of the constant depends on its version
+
 
 class Body:
     """The unknowns of a body, made of an element of ``ELEMENTS``, and their equations."""
@@ -47,7 +49,10 @@ class Body:
         self.nodes = meshes.Nodes(body.mesh, self.cells, ufl.split(self.unknowns)[0])
 
     def _newton(self, equations: Any, settings: BodySettings) -> NonlinearProblem:
-        """Newton's method with a backtracking line search, each step by a sparse LU factorisation (MUMPS)."""
+        """Newton's method, each step whole and by a sparse LU factorisation (MUMPS).
+
+        A line search would weigh out-of-balance forces [N] against volumes [mm3]: it stalls where bodies bend or are soft.
+        """
         options = {
             "snes_type": "newtonls",
             "snes_linesearch_type": "basic",
@@ -77,23 +82,25 @@ class Body:
         quadrature point or a vertex, is inverted whatever Newton's method says.
         """
         before = np.array(self.unknowns.x.array)
-        converged, iterations = self._solve(frame)
+        reason, iterations = self._solve(frame)
         smallest = self.determinants.smallest()
-        if converged and smallest.value > 0:
+        if reason > 0 and smallest.value > 0:
             return Attempt(None, iterations)
         self.unknowns.x.array[:] = before
-        if converged:
+        if reason > 0:
             return Attempt("inverted", iterations, f"Newton's method converged, but det F fell to {smallest}")
-        return Attempt("diverged", iterations, f"Newton's method did not converge in {iterations} iterations")
+        how = "went where a law has no value" if reason == _NOT_A_NUMBER else "did not converge"
+        return Attempt("diverged", iterations, f"Newton's method {how} in {iterations} iterations")
 
-    def _solve(self, frame: float) -> tuple[bool, int]:
+    def _solve(self, frame: float) -> tuple[int, int]:
+        """Newton's method with what acts and is prescribed at ``frame``: how it ended (above 0: converged) and its iterations."""
         for effect, amount in zip(self.effects, self.amounts, strict=True):
             amount.value = effect.amount(frame)
         for hold in self.held:
             hold.move_to(frame)
         self.newton.solve()
         snes = self.newton.solver
-        return bool(snes.getConvergedReason() > 0), int(snes.getIterationNumber())
+        return int(snes.getConvergedReason()), int(snes.getIterationNumber())
 
     def scalars(self) -> dict[str, float]:
         """The smallest det F at quadrature points and vertices, V/V0, and the energy [N mm]."""
