@@ -103,12 +103,13 @@ class Bench:
 
     def origin(self, solver: str, settings: Record) -> dict[str, Any]:
         """Where a run comes from, for people and for doubt."""
+        acting = self.scene.effects if solvers.takes_effects(solver) else ()
         return {
             "case": self.scene.name,
             "scene": self.scene.key,
             "solver": solver,
             "settings": settings.model_dump(mode="json"),
-            "effects": {effect.title: effect.model_dump(mode="json") for effect in self.scene.effects},
+            "effects": {effect.title: effect.model_dump(mode="json") for effect in acting} or "none",
             "fem_reference": __version__,
             "code": code_hash(),
             "versions": versions(),

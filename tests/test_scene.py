@@ -167,6 +167,11 @@ WRONG = [
     ("effect", [], "effect: got [], want"),
     ("effect[1]", {"name": "neo_hooke", "mu": "1 kPa"}, 'effect[1].name: got "neo_hooke" a second time, want every'),
     ("effect[1]", PRESSURE | {"on": "top"}, 'effect[1].on: got "top", want one of start, end, free'),
+    (
+        "effect[0]",
+        PRESSURE | {"course": [{"frame": 0, "amount": 0.5}]},
+        "effect[0].course: got an amount of 0.5 at frame 0, the first, want 0 there, where the muscle rests",
+    ),
     ("effect", [PRESSURE, PRESSURE], 'effect[1].name: got "pressure" on "free" a second time, want every effect once'),
     ("attachment[0].name", "free", 'attachment: got the name "free" twice, want every name once'),
     ("bone[1].motion.axis", [0, 0, 0], "bone[1].motion.axis: got [0, 0, 0], want an axis that is not zero"),

@@ -18,7 +18,7 @@ from itertools import pairwise
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator
 
 from fem_reference.records import Record
 from fem_reference.units import unit_of
@@ -162,11 +162,12 @@ class Coursed(Effect):
 
     course: tuple[Knot, ...] = Field(min_length=1)
 
-    @model_validator(mode="after")
-    def _check_course(self) -> "Coursed":
-        if any(late.frame <= early.frame for early, late in pairwise(self.course)):
-            raise ValueError("a course in the order of its frames")
-        return self
+    @field_validator("course")
+    @classmethod
+    def _check_course(cls, course: tuple[Knot, ...]) -> tuple[Knot, ...]:
+        if any(late.frame <= early.frame for early, late in pairwise(course)):
+            raise ValueError("knots whose frames are each later than the one before")
+        return course
 
     def amount(self, frame: float) -> float:
         """How much of it acts at a frame."""

@@ -52,6 +52,11 @@ def require(name: str, settings: Record, place: str) -> None:
         check(settings)
 
 
+def takes_effects(name: str) -> bool:
+    """Whether the solver ``name`` simulates the effects of a scene; one that does says which in ``check_effects``."""
+    return hasattr(_module(name), "check_effects")
+
+
 def check(name: str, settings: Record, effects: tuple[Effect, ...], place: str) -> None:
     """InputError below ``place`` where ``settings`` do not suit the ``effects``; a module says so in ``check_effects``."""
     suits = getattr(find(name, place), "check_effects", None)

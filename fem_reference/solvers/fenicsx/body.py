@@ -14,7 +14,7 @@ from mpi4py import MPI
 
 from fem_reference.continuum import ELEMENTS, Continuum
 from fem_reference.mesh import Floats, Ints
-from fem_reference.solvers.fenicsx import forms, meshes
+from fem_reference.solvers.fenicsx import compiling, forms, meshes
 from fem_reference.solvers.fenicsx.determinants import Determinants
 from fem_reference.solvers.fenicsx.holds import Hold
 from fem_reference.solvers.fenicsx.settings import BodySettings
@@ -39,9 +39,9 @@ class Body:
         self.displacement = fem.Function(self.displacement_space)
         form = forms.Form(self.mesh, body, self.unknowns, settings, self.cells)
         self.amounts = form.amounts
-        self.volume_form, self.energy_form = fem.form(form.volume), fem.form(form.energy)
+        self.volume_form, self.energy_form = compiling.form(form.volume), compiling.form(form.energy)
         self.rest_volume = self.integral(self.volume_form)
-        self.internal = fem.form(form.residual)
+        self.internal = compiling.form(form.residual)
         self.held = [Hold(self.unknowns, entry, form.regions[entry.on]) for entry in body.prescribed]
         self.determinants = Determinants(self.mesh, self.cells, form.determinant, form.rule[0], body.mesh.kind)
         springs = sum((hold.springs(form.measure(hold.entry.on)) for hold in self.held if hold.entry.stiffness), 0)
@@ -69,6 +69,7 @@ class Body:
             self.unknowns,
             bcs=[condition for hold in self.held for condition in hold.conditions],
             petsc_options=options,
+            jit_options=compiling.OPTIONS,
             petsc_options_prefix="fem_reference_",
         )
 

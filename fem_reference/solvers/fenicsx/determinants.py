@@ -4,11 +4,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from dolfinx import fem, mesh
+from dolfinx import mesh
 
 from fem_reference.continuum import Kind, reference_nodes
 from fem_reference.mesh import Floats, Ints
-from fem_reference.solvers.fenicsx import meshes
+from fem_reference.solvers.fenicsx import compiling, meshes
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Determinants:
         self.mesh, self.cells = msh, cells
         self.points = {"quadrature point": rule, "vertex": reference_nodes(kind, 1)}
         # Compiled here and by all ranks together: one without cells evaluates none of them.
-        self.values = {where: fem.Expression(determinant, points) for where, points in self.points.items()}
+        self.values = {where: compiling.expression(determinant, points) for where, points in self.points.items()}
         self.places = {where: meshes.coordinates(msh, points) for where, points in self.points.items()}
 
     def smallest(self, where: str | None = None) -> Smallest:

@@ -23,6 +23,7 @@ import ufl  # isort: skip
 from dolfinx import fem, mesh  # isort: skip
 from dolfinx.fem.petsc import apply_lifting, assemble_matrix, assemble_vector, set_bc  # isort: skip
 from mpi4py import MPI  # isort: skip
+from fem_reference.solvers.fenicsx import compiling  # isort: skip
 
 QUADRATURE_DEGREE = 8  # as in scikit_fem, and on the boundary the same rule of 3 points
 FACET_DEGREE = 5
@@ -46,7 +47,7 @@ def equations(problem: FieldProblem) -> tuple[Any, Any, Any, Ints]:
         slope = evaluate(problem.fluxes[i].slope, place.position, functions)
         residual -= problem.diffusion * slope * test.value * slope_measure
     left, right = ufl.system(residual)
-    return fem.form(left), fem.form(right), space, nodes(space, problem)
+    return compiling.form(left), compiling.form(right), space, nodes(space, problem)
 
 
 def distribute(problem: FieldProblem) -> mesh.Mesh:
@@ -161,6 +162,7 @@ def _solved(A: Any, b: Any) -> tuple[Floats, str | None]:
 
 def main(job: Path) -> None:
     """Solve the problem in the file ``job``; the values go beside it."""
+    compiling.prepare()
     problem: FieldProblem = pickle.loads(job.read_bytes())
     values, report = solve(problem)
     path = job.with_name("values.npz")

@@ -6,11 +6,12 @@ import basix
 import basix.ufl
 import numpy as np
 import ufl
-from dolfinx import fem, mesh
+from dolfinx import mesh
 from mpi4py import MPI
 
 from fem_reference.continuum import Cells, reference_nodes
 from fem_reference.mesh import Floats, Ints
+from fem_reference.solvers.fenicsx import compiling
 
 
 def distribute(comm: MPI.Comm, cells: Cells) -> mesh.Mesh:
@@ -63,7 +64,7 @@ class Nodes:
     def __init__(self, cells: Cells, own: Ints, displacement: Any) -> None:
         """``own``: the cells of the body's mesh that are this rank's, in the rank's order."""
         self.cells, self.own = cells, own
-        self.moves = fem.Expression(displacement, reference_nodes(cells.kind, cells.degree))
+        self.moves = compiling.expression(displacement, reference_nodes(cells.kind, cells.degree))
 
     def positions(self, msh: mesh.Mesh) -> Floats:
         """Where the nodes are now (n, 3) [mm], on every rank."""
@@ -78,4 +79,4 @@ class Nodes:
 
 def coordinates(msh: mesh.Mesh, points: Floats) -> Any:
     """An expression that is a rest position at reference ``points``."""
-    return fem.Expression(ufl.SpatialCoordinate(msh), points)
+    return compiling.expression(ufl.SpatialCoordinate(msh), points)

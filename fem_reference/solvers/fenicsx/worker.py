@@ -15,7 +15,8 @@ from fem_reference.solvers.fenicsx.dolfinx_door import PETSc
 from fem_reference.solvers.fenicsx.jobs import Job
 from fem_reference.solvers.fenicsx.processes import MARK
 
-from fem_reference.solvers.fenicsx.body import Body  # isort: skip - after the door
+from fem_reference.solvers.fenicsx import compiling  # isort: skip - after the door
+from fem_reference.solvers.fenicsx.body import Body  # isort: skip
 from fem_reference.solvers.fenicsx.stepping import Attempt, Reached, march  # isort: skip
 
 _PHASES = ("SNESFunctionEval", "SNESJacobianEval", "MatSolve", "MatLUFactorSym", "MatLUFactorNum")
@@ -116,6 +117,7 @@ def _spent() -> dict[str, float]:
 
 def main(argument: str) -> None:
     """Solve the job in a file; or, for ``-``, one after the other those whose files standard input names."""
+    compiling.prepare()
     for line in sys.stdin if argument == "-" else [argument]:
         path = Path(line.strip())
         Worker(pickle.loads(path.read_bytes()), path.parent).run()

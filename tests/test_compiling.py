@@ -1,0 +1,34 @@
+"""What an interrupted compilation leaves behind does not stop the next one."""
+
+import os
+import signal
+import time
+
+import pytest
+
+pytest.importorskip("fem_reference.solvers.fenicsx.dolfinx_door", reason="FEniCSx is not installed")
+
+from fem_reference.solvers.fenicsx import compiling
+
+
+def test_only_what_was_left_half_done_long_ago_goes(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(compiling.jit, "get_options", lambda: {"cache_dir": str(tmp_path)})
+    handlers = {}
+    monkeypatch.setattr(compiling.signal, "signal", handlers.__setitem__)
+    long_ago = time.time() - 2 * compiling.PATIENCE
+    for name in ("done.c", "done.c.cached", "left.c", "under_way.c"):
+        (tmp_path / name).write_text("")
+    for name in ("done.c", "left.c"):
+        os.utime(tmp_path / name, (long_ago, long_ago))
+    compiling.prepare()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["done.c", "done.c.cached", "under_way.c"]
+    assert handlers[signal.SIGINT] is signal.SIG_IGN
+    with pytest.raises(RuntimeError, match="told to stop"):  # FFCx cleans up after an Exception
+        handlers[signal.SIGTERM](signal.SIGTERM, None)
+
+
+def test_without_a_cache_there_is_nothing_to_clean(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(compiling.jit, "get_options", lambda: {"cache_dir": str(tmp_path / "none")})
+    monkeypatch.setattr(compiling.signal, "signal", lambda *_: None)
+    compiling.prepare()
+    assert not (tmp_path / "none").exists()
