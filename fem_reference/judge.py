@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from math import pi
 from typing import Literal
 
 from fem_reference.errors import InputError
@@ -11,7 +12,12 @@ from fem_reference.scene import Expectation, Scene
 from fem_reference.units import quantity
 
 Word = Literal["pass", "fail", "cannot say", "not judged"]
-_KINDS = {"mm": ("a length", 1.0), "%": ("a fraction", 100.0), "mm3": ("a volume", 1.0)}
+_KINDS = {
+    "mm": ("a length", 1.0),
+    "%": ("a fraction", 100.0),
+    "mm3": ("a volume", 1.0),
+    "deg": ("an angle", 180 / pi),
+}
 
 
 @dataclass(frozen=True)

@@ -94,7 +94,7 @@ def test_main_job(tmp_path) -> None:
     frames = {row["frame"] for row in facts["measures"] if row["candidate"] == "pbd"}
     assert frames == set(range(0, 201, 10))
     metrics = {row["metric"] for row in facts["measures"] if row["candidate"] == "pbd"}
-    assert metrics == {"volume", "fibre_length", "surface_deviation"}
+    assert metrics == {"dihedral_angle", "edge_extension", "fibre_length", "inversion", "surface_deviation", "volume"}
     page = (tmp_path / "hip_flexion" / "report.html").read_text()
     assert page.count("data:image/webp") >= 4, "the pictures are missing"
 

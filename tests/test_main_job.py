@@ -64,9 +64,9 @@ def test_json_has_the_documented_keys(job) -> None:
         set(row) == {"candidate", "metric", "statistic", "frame", "value", "unit"} for row in job.facts["measures"]
     )
     metrics = {row["metric"] for row in rows(job.facts, "pbd")}
-    assert metrics == {"volume", "fibre_length", "surface_deviation"}
+    assert metrics == {"dihedral_angle", "edge_extension", "fibre_length", "inversion", "surface_deviation", "volume"}
     assert {row["frame"] for row in rows(job.facts, "pbd")} == {0, 5, 10, 15, 20}
-    assert {row["unit"] for row in rows(job.facts, "pbd")} == {"mm", "mm3", "%"}
+    assert {row["unit"] for row in rows(job.facts, "pbd")} == {"mm", "mm3", "%", "deg"}
 
 
 def test_reference_keeps_its_volume_and_comes_back(job) -> None:
@@ -113,8 +113,8 @@ def test_shifted_by_one_mm_scores_one_mm(job, tmp_path) -> None:
     for row in rows(facts, "shifted"):
         if row["metric"] == "surface_deviation" and row["statistic"] in ("rms", "p95", "max"):
             assert row["value"] == pytest.approx(1.0, abs=1e-9)
-        if row["metric"] in ("volume", "fibre_length"):
-            # A translation changes no volume and no length; rounding of 1e5 mm3 sums.
+        if row["metric"] != "surface_deviation":
+            # A translation changes no volume, length or angle; rounding of 1e5 mm3 sums.
             assert row["value"] == pytest.approx(0, abs=1e-6)
         if row["statistic"] == "hausdorff":
             assert 0.7 < row["value"] <= 1 + 1e-9

@@ -78,3 +78,17 @@ def at_rest(run: Run) -> Run:
     still = np.broadcast_to(run.surface.points, (frames, *run.surface.points.shape))
     fibres = None if run.fibres is None else np.broadcast_to(run.fibres.points, (frames, *run.fibres.points.shape))
     return Run("rest", "rest", run.outcome, run.numbers, run.surface, still, run.fibres, fibres)
+
+
+def rms(deviations: Floats, weights: Floats) -> Floats:
+    """Root of the weighted mean square of each row of ``deviations`` (f, n), (f,)."""
+    return np.asarray(np.sqrt(deviations**2 @ weights / weights.sum()))
+
+
+def percentile(values: Floats, weights: Floats, share: float) -> float:
+    """The least of ``values`` (n,) that ``share`` of the weight does not exceed; NaN where one is not finite."""
+    if not np.isfinite(values).all():
+        return float("nan")
+    order = np.argsort(values)
+    below = np.cumsum(weights[order])
+    return float(values[order[np.searchsorted(below, share * below[-1])]])

@@ -8,7 +8,7 @@ import numpy as np
 
 from fem_reference.geometry.distance import distances
 from fem_reference.mesh import Floats
-from fem_reference.metrics import Measure, Yardstick
+from fem_reference.metrics import Measure, Yardstick, percentile, rms
 from fem_reference.runs import Run
 
 _STATISTICS = ("rms", "p95", "max", "distance_mean", "distance_rms", "hausdorff")
@@ -27,11 +27,11 @@ def measure(run: Run, reference: Run, yardstick: Yardstick) -> tuple[Measure, ..
     geometric = np.array([_both_ways(run, reference, frame) for frame in range(len(reference.positions))])
     areas, twice = yardstick.areas, np.concatenate([yardstick.areas, yardstick.areas])
     values = {
-        "rms": _rms(material, areas),
-        "p95": np.array([_percentile(each, areas, 0.95) for each in material]),
+        "rms": rms(material, areas),
+        "p95": np.array([percentile(each, areas, 0.95) for each in material]),
         "max": material.max(axis=1),
         "distance_mean": geometric @ twice / twice.sum(),
-        "distance_rms": _rms(geometric, twice),
+        "distance_rms": rms(geometric, twice),
         "hausdorff": geometric.max(axis=1),
     }
     values |= {f"{name}_percent": _percent(each, yardstick.travel) for name, each in values.items()}
@@ -51,20 +51,6 @@ def _both_ways(run: Run, reference: Run, frame: int) -> Floats:
     if not (np.isfinite(here.points).all() and np.isfinite(there.points).all()):
         return np.full(len(here.points) + len(there.points), np.nan)
     return np.concatenate([distances(here.points, there).distance, distances(there.points, here).distance])
-
-
-def _rms(deviations: Floats, areas: Floats) -> Floats:
-    """Root of the area-weighted mean square of each row of (f, n), (f,)."""
-    return np.asarray(np.sqrt(deviations**2 @ areas / areas.sum()))
-
-
-def _percentile(values: Floats, weights: Floats, share: float) -> float:
-    """The least of ``values`` (n,) that ``share`` of the weight does not exceed; NaN where one is not finite."""
-    if not np.isfinite(values).all():
-        return float("nan")
-    order = np.argsort(values)
-    below = np.cumsum(weights[order])
-    return float(values[order[np.searchsorted(below, share * below[-1])]])
 
 
 def _percent(values: Floats, travel: float) -> Floats:

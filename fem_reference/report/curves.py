@@ -58,6 +58,8 @@ def curves(comparison: Comparison) -> list[Curve]:
     changes = comparison.changes
     volume = {run.name: find(changes[run.name], "volume", "deviation") for run in runs(comparison)}
     fibres = {run.name: find(changes[run.name], "fibre_length", "mean") for run in runs(comparison)}
+    edges = {run.name: find(changes[run.name], "edge_extension", "mean") for run in runs(comparison)}
+    angles = {run.name: find(changes[run.name], "dihedral_angle", "mean_magnitude") for run in runs(comparison)}
     drawn = [
         _of_runs(comparison, "volume", "Change of volume from rest", volume),
         _of_runs(comparison, "fibres", "Change of fibre length from rest, mean over the fibres", fibres),
@@ -66,6 +68,8 @@ def curves(comparison: Comparison) -> list[Curve]:
         drawn.append(_surface(comparison, i, f"Surface of {run.name}: distance to the reference"))
     smallest = inversion(comparison.reference)
     drawn.append(_inversion(comparison, smallest, "Smallest det F of the reference (inside out below 0)"))
+    drawn.append(_of_runs(comparison, "edges", "Extension of the surface's edges from rest, mean by area", edges))
+    drawn.append(_of_runs(comparison, "angles", "Bending at the edges from rest, mean magnitude by area", angles))
     return [curve for curve in drawn if curve is not None]
 
 

@@ -1,0 +1,53 @@
+"""The edges of a closed surface: how long each is, and the angle of the two triangles that meet there."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fem_reference.mesh import Floats, Ints, Surface, triangle_areas
+
+
+@dataclass(frozen=True, eq=False)
+class Edges:
+    """``ends`` (e, 2) of each edge, in the direction of its left triangle seen from outside; ``opposite`` (e, 2), the third
+    corner of its left and of its right triangle; ``areas`` (e,) [mm2], a third of its two triangles at rest.
+    """
+
+    ends: Ints
+    opposite: Ints
+    areas: Floats
+
+    @classmethod
+    def of(cls, surface: Surface) -> "Edges":
+        """The edges of a closed, consistently oriented surface at rest; their areas sum to its own."""
+        triangles = surface.triangles
+        ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
+        left, right = np.lexsort(np.sort(ends, axis=1).T).reshape(-1, 2).T
+        third = np.roll(triangles, -2, axis=1).ravel()
+        areas = triangle_areas(surface.points, triangles) / 3
+        return cls(ends[left], np.stack([third[left], third[right]], axis=1), areas[left // 3] + areas[right // 3])
+
+    def lengths(self, points: Floats) -> Floats:
+        """Length of each edge (e,) [mm] with the surface's vertices at ``points`` (n, 3) [mm]."""
+        return np.asarray(np.linalg.norm(points[self.ends[:, 1]] - points[self.ends[:, 0]], axis=1))
+
+    @np.errstate(over="ignore", invalid="ignore")
+    def angles(self, points: Floats) -> Floats:
+        """Angle (e,) [rad] from the normal of the left triangle to that of the right, in (-pi, pi].
+
+        0 where the two are flat, pi / 2 at the edges of a box, below 0 where the surface is hollow; NaN where a triangle
+        has no normal. It is atan2((n x m) . d, n . m) of the unit normals n, m and the direction d of the edge:
+        report eq. 5.23 without its arccos, which has neither a sign nor digits for small angles.
+        """
+        start, end = (points[corner] for corner in self.ends.T)
+        along = end - start
+        left = _unit(np.cross(along, points[self.opposite[:, 0]] - start))
+        right = _unit(np.cross(points[self.opposite[:, 1]] - start, along))
+        sine = np.einsum("ij,ij->i", np.cross(left, right), _unit(along))
+        return np.asarray(np.arctan2(sine, np.einsum("ij,ij->i", left, right)))
+
+
+def _unit(vectors: Floats) -> Floats:
+    """Vectors (e, 3) of length 1; NaN for one whose length is zero or not finite."""
+    lengths = np.linalg.norm(vectors, axis=1)
+    return np.asarray(vectors / np.where(np.isfinite(lengths), lengths, np.nan)[:, None])

@@ -1,0 +1,182 @@
+"""Signed distance to rigid bodies of closed form: what an obstacle is asked, and the obstacles that need no mesh.
+
+Each body answers in its own rest frame. Distances are negative inside; gradients are unit vectors that point away from the
+nearest part of the surface, curvatures the second derivatives. On ridges, where two parts are equally near, one of them
+is taken; a curvature that would be infinite (on a sharp edge, at a centre, on an axis) is zero.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_reference.errors import InputError
+from fem_reference.mesh import Floats
+
+Vector = tuple[float, float, float]
+
+
+class Sampled(NamedTuple):
+    """At n points: signed ``distance`` (n,) [mm], its ``gradient`` (n, 3), and its ``curvature`` (n, 3, 3) [1/mm]."""
+
+    distance: Floats
+    gradient: Floats
+    curvature: Floats
+
+
+class Obstacle(Protocol):
+    """A rigid body that knows how far away it is."""
+
+    def sample(self, points: Floats) -> Sampled:
+        """Distance and its two derivatives at ``points`` (n, 3) [mm] of the body's rest frame; NaN for NaN."""
+        ...
+
+
+@dataclass(frozen=True)
+class HalfSpace:
+    """All that lies behind the plane through ``point`` [mm] across ``normal``, of any length, which points out of it."""
+
+    point: Vector
+    normal: Vector
+
+    def __post_init__(self) -> None:
+        if not np.linalg.norm(self.normal) > 0:
+            raise InputError("half space: normal", self.normal, "a direction")
+
+    def sample(self, points: Floats) -> Sampled:
+        """``(x - point) . normal``."""
+        normal = np.asarray(self.normal, float) / np.linalg.norm(self.normal)
+        return Sampled((points - self.point) @ normal, np.tile(normal, (len(points), 1)), np.zeros((len(points), 3, 3)))
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """A ball of ``radius`` [mm] about ``centre`` [mm]."""
+
+    centre: Vector
+    radius: float
+
+    def __post_init__(self) -> None:
+        _check_length("sphere: radius", self.radius)
+
+    def sample(self, points: Floats) -> Sampled:
+        """``|x - centre| - radius``."""
+        length, away, squares = _length(points - self.centre)
+        return Sampled(length - self.radius, away, _over(np.eye(3) - squares, length))
+
+
+@dataclass(frozen=True)
+class Capsule:
+    """All that is within ``radius`` of the segment from ``start`` to ``end`` [mm]."""
+
+    start: Vector
+    end: Vector
+    radius: float
+
+    def __post_init__(self) -> None:
+        _check_length("capsule: radius", self.radius)
+        _check_axis("capsule: end", self.start, self.end)
+
+    def sample(self, points: Floats) -> Sampled:
+        """The distance to the segment, less the radius."""
+        axis, extent = _axis(self.start, self.end)
+        along = (points - self.start) @ axis
+        length, away, squares = _length(points - self.start - np.clip(along, 0, extent)[:, None] * axis)
+        beside = ((along > 0) & (along < extent))[:, None, None]
+        bent = np.eye(3) - squares - np.where(beside, np.outer(axis, axis), 0.0)
+        return Sampled(length - self.radius, away, _over(bent, length))
+
+
+@dataclass(frozen=True)
+class Box:
+    """A box about ``centre`` with edges along the axes, of outer ``size`` [mm], edges and corners of radius ``rounding`` [mm]."""
+
+    centre: Vector
+    size: Vector
+    rounding: float
+
+    def __post_init__(self) -> None:
+        for length in self.size:
+            _check_length("box: size", length)
+        if not 0 <= self.rounding <= min(self.size) / 2:
+            raise InputError("box: rounding", self.rounding, "from 0 to half of the shortest edge")
+
+    def sample(self, points: Floats) -> Sampled:
+        """The distance to a box smaller by the rounding on each side, less the rounding."""
+        away = points - self.centre
+        sign = np.where(away < 0, -1.0, 1.0)
+        beyond = np.abs(away) - (np.asarray(self.size) / 2 - self.rounding)
+        distance, gradient, curvature = _orthant(beyond)
+        turned = curvature * sign[:, :, None] * sign[:, None, :]
+        return Sampled(distance - self.rounding, gradient * sign, turned)
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """A cylinder of ``radius`` [mm] about the segment from ``start`` to ``end`` [mm], with flat ends and sharp rims."""
+
+    start: Vector
+    end: Vector
+    radius: float
+
+    def __post_init__(self) -> None:
+        _check_length("cylinder: radius", self.radius)
+        _check_axis("cylinder: end", self.start, self.end)
+
+    def sample(self, points: Floats) -> Sampled:
+        """The distance to a rectangle, in the half-plane of the distances from the axis and from the middle."""
+        axis, extent = _axis(self.start, self.end)
+        away = points - (np.asarray(self.start, float) + self.end) / 2
+        along = away @ axis
+        from_axis, outward, squares = _length(away - along[:, None] * axis)
+        beyond = np.column_stack([from_axis - self.radius, np.abs(along) - extent / 2])
+        distance, slope, bend = _orthant(beyond)
+        frame = np.stack([outward, np.where(along < 0, -1.0, 1.0)[:, None] * axis], axis=1)
+        round_about = np.eye(3) - squares - np.outer(axis, axis)
+        curvature = np.einsum("nab,nai,nbj->nij", bend, frame, frame)
+        curvature += _over(slope[:, 0, None, None] * round_about, from_axis)
+        return Sampled(distance, np.einsum("na,nai->ni", slope, frame), curvature)
+
+
+def _orthant(beyond: Floats) -> Sampled:
+    """Distance to the orthant of d coordinates below zero, at ``beyond`` (n, d); derivatives (n, d) and (n, d, d)."""
+    outside = beyond > 0
+    length, away, squares = _length(np.where(outside, beyond, 0.0))
+    nearest = np.arange(beyond.shape[1]) == beyond.argmax(axis=1)[:, None]
+    distance = length + np.minimum(beyond.max(axis=1), 0)
+    within = ~outside.any(axis=1)
+    bent = np.eye(beyond.shape[1]) * outside[:, :, None] - squares
+    return Sampled(
+        distance, np.where(within[:, None], nearest, away), np.where(within[:, None, None], 0, _over(bent, length))
+    )
+
+
+def _length(vectors: Floats) -> tuple[Floats, Floats, Floats]:
+    """Lengths (n,) of ``vectors`` (n, d), unit vectors (n, d) along them (some axis for a zero), and their squares (n, d, d)."""
+    length = np.linalg.norm(vectors, axis=1)
+    some = np.eye(vectors.shape[1])[-1]
+    unit = np.where((length == 0)[:, None], some, vectors / np.where(length == 0, 1, length)[:, None])
+    return length, unit, unit[:, :, None] * unit[:, None, :]
+
+
+def _over(tensors: Floats, length: Floats) -> Floats:
+    """``tensors`` (n, d, d) divided by ``length`` (n,), zero where that is zero."""
+    return np.asarray(tensors * np.divide(1, length, out=np.zeros_like(length), where=length != 0)[:, None, None])
+
+
+def _axis(start: Vector, end: Vector) -> tuple[NDArray[np.float64], float]:
+    """The unit vector from ``start`` to ``end`` and the length between them."""
+    way = np.subtract(end, start, dtype=float)
+    extent = float(np.linalg.norm(way))
+    return way / extent, extent
+
+
+def _check_length(place: str, length: float) -> None:
+    if not 0 < length < np.inf:
+        raise InputError(place, length, "a length above 0 mm")
+
+
+def _check_axis(place: str, start: Vector, end: Vector) -> None:
+    if not np.linalg.norm(np.subtract(end, start)) > 0:
+        raise InputError(place, end, "another point than the start")

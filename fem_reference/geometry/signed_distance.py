@@ -1,0 +1,240 @@
+"""Signed distance to a body of many triangles: sampled once on a regular grid, then twice differentiable everywhere.
+
+Between the nodes stand tricubic B-splines, so that gradient and curvature are continuous: what Newton needs of contact.
+"""
+
+import logging
+import math
+import tempfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import igl
+import numpy as np
+from scipy.ndimage import spline_filter, zoom
+
+from fem_reference.geometry.distance import distances
+from fem_reference.geometry.rigid_bodies import Sampled, Vector
+from fem_reference.mesh import Floats, Surface, check_closed, check_finite, fingerprint, read_only, triangle_areas
+
+# The distance [mm] to what lies outside a grid: far away from everything, and yet a number to calculate with.
+FAR = 1e6
+# A grid of more nodes is not built to reach an error: 256 cubed, 134 MB.
+MOST_NODES = 2**24
+# The first grid of ``resolve`` has about this many cells along its longest edge.
+_FIRST_CELLS = 24
+# Beyond the margin the distance is exact for this many cells more: a spline forgets 73 % of a fault with each cell.
+_FORGETTING = 4
+# Of every so many nodes along an axis one is exact everywhere; the others only near the surface.
+_STRIDE = 4
+# Random points around the surface at which the error is looked for, and points in one call of libigl.
+_PROBES = 30_000
+_CHUNK = 1_000_000
+# Coefficients by power 0 to 3 (columns) of the four cubic B-splines that reach into a cell (rows).
+_SPLINES = np.array([[1, -3, 3, -1], [4, 0, -6, 3], [1, 3, 3, -3], [0, 0, 0, 1]]) / 6
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """An obstacle whose signed distance is a tricubic spline.
+
+    ``coefficients`` (i, j, k) [mm] of the B-splines about nodes ``spacing`` [mm] apart, the outermost at ``origin``. Within
+    ``margin`` [mm] of the surface the distance is meant; farther away it is coarser, and ``FAR`` where the grid ends.
+    ``error`` [mm] is the largest difference from the exact distance that was found within one spacing of the surface, and
+    ``mean_error`` [mm] the root of the mean square there. Farther away, ridges between two near parts are blunted as edges
+    are: by a third of a spacing. The gradient is that of the spline: a unit vector but for a few percent, more on edges.
+    """
+
+    coefficients: Floats
+    origin: Vector
+    spacing: float
+    margin: float
+    error: float
+    mean_error: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "coefficients", read_only(self.coefficients, np.float64))
+
+    def sample(self, points: Floats) -> Sampled:
+        """Distance, gradient and curvature at ``points`` (n, 3) [mm]; outside the grid ``FAR`` and zeros, NaN for NaN."""
+        found = Sampled(np.full(len(points), FAR), np.zeros((len(points), 3)), np.zeros((len(points), 3, 3)))
+        found.distance[~np.isfinite(points).all(axis=1)] = np.nan
+        at = (points - self.origin) / self.spacing
+        inside = np.flatnonzero(((at >= 1) & (at <= np.array(self.coefficients.shape) - 2)).all(axis=1))
+        for chunk in np.array_split(inside, 1 + len(inside) // 10_000):
+            for whole, part in zip(found, self._interpolate(at[chunk]), strict=True):
+                whole[chunk] = part
+        return found
+
+    def _interpolate(self, at: Floats) -> Sampled:
+        """At places (n, 3) inside the grid, counted in cells from its origin."""
+        shape = self.coefficients.shape
+        cell = np.minimum(at.astype(np.int64), np.array(shape) - 3)
+        x, y, z = (_weights(at[:, axis] - cell[:, axis]) for axis in range(3))
+        first = np.ravel_multi_index(tuple(cell.T - 1), shape)
+        reach = np.ravel_multi_index(tuple(np.indices((4, 4, 4)).reshape(3, -1)), shape)
+        around = self.coefficients.ravel()[first[:, None] + reach].reshape(-1, 4, 4, 4)
+        values = x @ (y[:, None] @ (around @ z.transpose(0, 2, 1)[:, None])).reshape(-1, 4, 9)
+        values = values.reshape(-1, 3, 3, 3)  # by the order of the derivative along x, y and z
+        curvature = np.empty((len(at), 3, 3))
+        for i, j in np.ndindex(3, 3):
+            curvature[:, i, j] = values[:, *(np.eye(3, dtype=int)[i] + np.eye(3, dtype=int)[j])]
+        gradient = np.stack([values[:, 1, 0, 0], values[:, 0, 1, 0], values[:, 0, 0, 1]], axis=1)
+        return Sampled(values[:, 0, 0, 0], gradient / self.spacing, curvature / self.spacing**2)
+
+
+def _weights(within: Floats) -> Floats:
+    """Value and two derivatives of the four B-splines of a cell at ``within`` (n,), from 0 to 1 across it: (n, 3, 4)."""
+    one, none = np.ones_like(within), np.zeros_like(within)
+    powers = np.stack([one, within, within**2, within**3], axis=1)
+    slopes = np.stack([none, one, 2 * within, 3 * within**2], axis=1)
+    bends = np.stack([none, none, 2 * one, 6 * within], axis=1)
+    return np.stack([powers, slopes, bends], axis=1) @ _SPLINES.T
+
+
+def build(surface: Surface, spacing: float, margin: float) -> Grid:
+    """The distance to a closed ``surface``, negative inside, on nodes ``spacing`` apart, meant within ``margin`` of it [mm].
+
+    Which way single triangles run does not matter. InputError where the surface bounds no body, as ``check_closed`` says.
+    """
+    surface = _one_way(surface)
+    low, shape = _extent(surface, spacing, margin)
+    values = _on_nodes(surface, low, shape, spacing, margin)
+    grid = Grid(_coefficients(values), tuple((low - spacing).tolist()), spacing, margin, np.nan, np.nan)
+    largest, mean = _errors(grid, surface)
+    return replace(grid, error=largest, mean_error=mean)
+
+
+def resolve(surface: Surface, error: float, margin: float) -> Grid:
+    """As ``build``, with the spacing halved until the grid's error [mm] is at most ``error``, or ``MOST_NODES`` forbids more.
+
+    While cells are larger than triangles, the error falls with the square of the spacing and faster; then, and on sharp
+    edges and thin rims, which a grid rounds, in proportion to it; in a slit narrower than a cell not at all. So the finest
+    grid may stay above ``error``: its own ``error`` says what it reached.
+    """
+    spacing = float(np.ptp(surface.points, axis=0).max()) / _FIRST_CELLS
+    grid = build(surface, spacing, margin)
+    while not grid.error <= error:
+        spacing /= 2
+        if math.prod(_extent(surface, spacing, margin)[1]) > MOST_NODES:
+            logger.warning("%s: error of its distance %.3g mm, wanted %.3g mm", surface.place, grid.error, error)
+            break
+        grid = build(surface, spacing, margin)
+    return grid
+
+
+def cached(surface: Surface, error: float, margin: float, folder: Path) -> Grid:
+    """As ``resolve``, kept in ``folder`` under a hash of all that it depends on, this file among it.
+
+    A file that is damaged is made anew.
+    """
+    code = np.frombuffer(Path(__file__).read_bytes(), np.uint8)
+    name = fingerprint(surface.points, surface.triangles, np.array([error, margin]), code)
+    path = folder / f"distance_{name[:32]}.npz"
+    grid = _read(path)
+    if grid is None:
+        grid = resolve(surface, error, margin)
+        _write(path, grid)
+    return grid
+
+
+def _read(path: Path) -> Grid | None:
+    """The grid of a file, None where there is none that can be read whole."""
+    if not path.is_file():
+        return None
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as kept:
+            numbers = (float(kept[name]) for name in ("spacing", "margin", "error", "mean_error"))
+            return Grid(kept["coefficients"], tuple(kept["origin"].tolist()), *numbers)
+    except Exception as error:  # zipfile and numpy raise whatever occurs to them over a damaged file
+        logger.warning("%s: damaged, made anew: %s", path, error)
+        return None
+
+
+def _write(path: Path, grid: Grid) -> None:
+    """The file whole or not at all, also where several processes write it."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".") as folder:
+        part = Path(folder) / path.name
+        np.savez(part, allow_pickle=False, **vars(grid))
+        part.replace(path)
+
+
+def _one_way(surface: Surface) -> Surface:
+    """A closed surface whose triangles all run the same way, outward."""
+    check_finite(surface)
+    triangles, _ = igl.bfs_orient(surface.triangles)
+    return check_closed(Surface(surface.points, triangles, surface.place))
+
+
+def _extent(surface: Surface, spacing: float, margin: float) -> tuple[Floats, tuple[int, ...]]:
+    """The first node (3,) [mm] of a grid that reaches ``margin`` and a cell beyond ``surface``, and its nodes along each axis."""
+    low, high = surface.points.min(axis=0) - margin - spacing, surface.points.max(axis=0) + margin + spacing
+    return low, tuple(int(count) for count in np.ceil((high - low) / spacing) + 1)
+
+
+def signed_distances(points: Floats, surface: Surface) -> Floats:
+    """Exact distance (n,) [mm] of ``points`` (n, 3) to a closed ``surface``, negative where it winds round them."""
+    found = [
+        np.where(igl.fast_winding_number(surface.points, surface.triangles, chunk) > 0.5, -1.0, 1.0)
+        * distances(chunk, surface).distance
+        for chunk in np.array_split(np.ascontiguousarray(points), 1 + len(points) // _CHUNK)
+    ]
+    return np.concatenate(found)
+
+
+def _on_nodes(surface: Surface, low: Floats, shape: tuple[int, ...], spacing: float, margin: float) -> Floats:
+    """The distance at nodes: exact within the margin and some cells more, trilinear between every fourth elsewhere."""
+    coarse_shape = [-(-(count - 1) // _STRIDE) + 1 for count in shape]
+    coarse_points = low + np.moveaxis(np.indices(coarse_shape), 0, -1).reshape(-1, 3) * (_STRIDE * spacing)
+    coarse = signed_distances(coarse_points, surface).reshape(coarse_shape)
+    stretch = [((count - 1) * _STRIDE + 1) / count for count in coarse_shape]
+    values: Floats = zoom(coarse, stretch, order=1)[tuple(slice(count) for count in shape)]
+    # Trilinear values are wrong by at most half the diagonal of a coarse cell: distance changes no faster than its place.
+    near = np.abs(values) < margin + (_FORGETTING + 0.75**0.5 * _STRIDE) * spacing
+    values[near] = signed_distances(low + np.argwhere(near) * spacing, surface)
+    return values
+
+
+def _coefficients(values: Floats) -> Floats:
+    """Those of the B-splines through ``values`` (i, j, k), with one more on each side.
+
+    The values continue beyond the border by reflection in their border value, which leaves them no bend there.
+    """
+    beyond = np.pad(values, _FORGETTING, mode="reflect", reflect_type="odd")
+    keep = slice(_FORGETTING - 1, 1 - _FORGETTING)
+    return np.asarray(spline_filter(beyond, order=3)[keep, keep, keep])
+
+
+def _errors(grid: Grid, surface: Surface) -> tuple[float, float]:
+    """The largest difference [mm] from the exact distance on the surface and at random points within a spacing of it.
+
+    Then the root of the mean square at those random points.
+    """
+    around = _around(surface, grid.spacing)
+    beside = grid.sample(around).distance - signed_distances(around, surface)
+    largest = max(np.abs(grid.sample(_on(surface)).distance).max(), np.abs(beside).max())
+    return float(largest), float(np.sqrt(np.mean(beside**2)))
+
+
+def _on(surface: Surface) -> Floats:
+    """All vertices, all middles of edges and triangles, and random points of edges, longer ones oftener: (n, 3) [mm]."""
+    random = np.random.default_rng(0)
+    ends = surface.points[surface.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)]
+    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    chosen = ends[random.choice(len(ends), _PROBES, p=lengths / lengths.sum())]
+    along = random.uniform(size=(_PROBES, 1))
+    edges = chosen[:, 0] * (1 - along) + chosen[:, 1] * along
+    return np.concatenate([surface.points, ends.mean(axis=1), surface.points[surface.triangles].mean(axis=1), edges])
+
+
+def _around(surface: Surface, reach: float) -> Floats:
+    """Random points (n, 3) of the triangles, moved by up to ``reach`` [mm] in any direction; the same every time."""
+    random = np.random.default_rng(1)
+    areas = triangle_areas(surface.points, surface.triangles)
+    corners = surface.points[surface.triangles[random.choice(len(areas), _PROBES, p=areas / areas.sum())]]
+    way = random.normal(size=(_PROBES, 3))
+    way *= reach * random.uniform(size=(_PROBES, 1)) / np.linalg.norm(way, axis=1, keepdims=True)
+    return np.asarray(np.einsum("nk,nkd->nd", random.dirichlet(np.ones(3), _PROBES), corners) + way)

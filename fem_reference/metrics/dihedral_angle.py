@@ -1,0 +1,47 @@
+"""How differently a run's surface is bent at its edges: the angle between neighbouring triangles against the reference's.
+
+Against rest, the mean magnitude is the dihedral angle change of the report (eq. 5.23, Figs 6.18 to 6.20).
+"""
+
+import numpy as np
+
+from fem_reference.geometry.edges import Edges
+from fem_reference.mesh import Floats
+from fem_reference.metrics import Measure, Yardstick, percentile, rms
+from fem_reference.metrics.edge_extension import worst_edges
+from fem_reference.runs import Run
+
+UNITS = dict.fromkeys(("mean", "mean_magnitude", "rms", "p95", "max", "mean_magnitude_of_edges"), "deg")
+
+
+def measure(run: Run, reference: Run, _yardstick: Yardstick) -> tuple[Measure, ...]:
+    """Over the edges, of the angle less that of the reference [deg], in (-180, 180]: the signed ``mean`` (above zero: more
+    convex), the ``rms``, and of the magnitude the mean ``mean_magnitude``, the 95th percentile ``p95`` and the greatest ``max``.
+
+    An edge weighs as the area around it at rest, a third of its two triangles. ``mean_magnitude_of_edges`` has every edge
+    alike, as the report plots it. NaN in a frame where a triangle has collapsed: it has no angle.
+    """
+    edges = Edges.of(reference.surface)
+    angles, wanted = (np.array([edges.angles(points) for points in each.positions]) for each in (run, reference))
+    turned = np.degrees(wrapped(angles - wanted))
+    size = np.abs(turned)
+    values = {
+        "mean": turned @ edges.areas / edges.areas.sum(),
+        "mean_magnitude": size @ edges.areas / edges.areas.sum(),
+        "rms": rms(turned, edges.areas),
+        "p95": np.array([percentile(each, edges.areas, 0.95) for each in size]),
+        "max": size.max(axis=1),
+        "mean_magnitude_of_edges": size.mean(axis=1),
+    }
+    worst = worst_edges(edges, turned, reference)
+    return tuple(Measure("dihedral_angle", name, UNITS[name], each, worst) for name, each in values.items())
+
+
+def wrapped(angles: Floats) -> Floats:
+    """Differences of two angles, in (-2 pi, 2 pi), the short way round: in (-pi, pi]. What is there already keeps its digits.
+
+    >>> np.degrees(wrapped(np.radians([20.0, 340.0, -340.0]))).round(9).tolist()
+    [20.0, -20.0, 20.0]
+    """
+    turns = np.where(angles > np.pi, 1, np.where(angles <= -np.pi, -1, 0))
+    return np.asarray(angles - 2 * np.pi * turns)

@@ -1,0 +1,45 @@
+"""How much longer or shorter the edges of a run's surface are than those of the reference, in per cent of their rest length.
+
+Against rest this is the edge extension of the report (l / L of Figs 6.15 to 6.17) less one.
+"""
+
+import numpy as np
+
+from fem_reference.geometry.edges import Edges
+from fem_reference.mesh import Floats
+from fem_reference.metrics import Measure, Yardstick, percentile, rms
+from fem_reference.runs import Run
+
+UNITS = dict.fromkeys(("mean", "rms", "p95", "max", "mean_of_edges"), "%")
+
+
+@np.errstate(over="ignore", invalid="ignore", divide="ignore")
+def measure(run: Run, reference: Run, _yardstick: Yardstick) -> tuple[Measure, ...]:
+    """Over the edges, of (l - l_reference) / L with the length L at rest [%]: the signed ``mean``, the ``rms``, and of the
+    magnitude the 95th percentile ``p95`` and the greatest ``max``.
+
+    An edge weighs as the area around it at rest, a third of its two triangles. ``mean_of_edges`` is the mean with every
+    edge alike, as the report plots it.
+    """
+    edges = Edges.of(reference.surface)
+    lengths, wanted = (np.array([edges.lengths(points) for points in each.positions]) for each in (run, reference))
+    longer = 100 * (lengths - wanted) / edges.lengths(reference.surface.points)
+    values = {
+        "mean": longer @ edges.areas / edges.areas.sum(),
+        "rms": rms(longer, edges.areas),
+        "p95": np.array([percentile(each, edges.areas, 0.95) for each in np.abs(longer)]),
+        "max": np.abs(longer).max(axis=1),
+        "mean_of_edges": longer.mean(axis=1),
+    }
+    worst = worst_edges(edges, longer, reference)
+    return tuple(Measure("edge_extension", name, UNITS[name], each, worst) for name, each in values.items())
+
+
+def worst_edges(edges: Edges, deviations: Floats, reference: Run) -> tuple[str, ...]:
+    """By frame the edge whose entry in ``deviations`` (f, e) is greatest in magnitude, and where the reference has it."""
+    ends = edges.ends[np.argmax(np.abs(deviations), axis=1)]
+    middles = reference.positions[np.arange(len(ends))[:, None], ends].mean(axis=1)
+    return tuple(
+        f"edge {one} to {other} at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
+        for (one, other), (x, y, z) in zip(np.sort(ends), middles, strict=True)
+    )

@@ -1,0 +1,47 @@
+"""How much of a run's surface is turned inside out or lies within another part of the body, against the reference.
+
+It is told from the surface alone, so of every run; where a solver has an interior, its smallest det F says more.
+"""
+
+import numpy as np
+
+from fem_reference.geometry.windings import outer_windings
+from fem_reference.mesh import Floats, triangle_areas
+from fem_reference.metrics import Measure, Yardstick
+from fem_reference.runs import Run
+
+UNITS = {"inside_out": "%", "overlapping": "%"}
+
+
+def measure(run: Run, reference: Run, _yardstick: Yardstick) -> tuple[Measure, ...]:
+    """Shares of the surface, by its area at rest, less those of the reference [%]: ``inside_out``, triangles whose outer side
+    faces a part of the body that is turned inside out, and ``overlapping``, those that lie inside another part of it.
+
+    NaN in a frame where a triangle has collapsed: it has no outer side.
+    """
+    windings, wanted = (
+        np.array([outer_windings(each.surface.moved_to(points)) for points in each.positions])
+        for each in (run, reference)
+    )
+    areas = triangle_areas(reference.surface.points, reference.surface.triangles)
+    return tuple(
+        Measure("inversion", name, UNITS[name], _share(sign * windings, areas) - _share(sign * wanted, areas), where)
+        for name, sign in (("inside_out", -1), ("overlapping", 1))
+        for where in [_first(sign * windings, run)]
+    )
+
+
+def _share(windings: Floats, areas: Floats) -> Floats:
+    """Per frame of ``windings`` (f, m), the share (f,) [%] of ``areas`` (m,) where they are above 0."""
+    share = 100 * (windings > 0) @ areas / areas.sum()
+    return np.where(np.isnan(windings).any(axis=1), np.nan, share)
+
+
+def _first(windings: Floats, run: Run) -> tuple[str, ...]:
+    """Per frame the triangle with the greatest of ``windings`` (f, m) and where the run has it; empty without one above 0."""
+    found = np.argmax(windings, axis=1)
+    middles = run.positions[np.arange(len(found))[:, None], run.surface.triangles[found]].mean(axis=1)
+    return tuple(
+        "" if line[triangle] <= 0 else f"triangle {triangle} at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
+        for line, triangle, (x, y, z) in zip(windings, found, middles, strict=True)
+    )
