@@ -61,8 +61,9 @@ class Entry:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What came of an entry: ``word`` is pass or fail, ``error`` the absolute error and ``within`` its bound, both in the unit of
-    the entry; NaN where nothing was measured, and then the finding's note says why.
+    """What came of an entry: ``word`` is pass or fail, or cannot say where there is no truth; ``error`` the absolute error and
+    ``within`` its bound, both in the unit of the entry; NaN where nothing was measured or there is no truth, and then the
+    finding's note says why.
     """
 
     entry: Entry
@@ -79,7 +80,7 @@ class Result:
 
     @property
     def word(self) -> str:
-        """Pass or fail."""
+        """Pass, fail or cannot say."""
         return judge(self.finding.value, self.truth, self.within)
 
 
@@ -93,11 +94,11 @@ def result(entry: Entry, finding: Finding, seconds: float, *, spoiled: bool) -> 
 def order(ladder: tuple[tuple[float, float], ...], truth: float) -> float | None:
     """The order at which the error falls over the last two meshes of a ``ladder`` of (size, value), None where one is exact.
 
-    >>> order(((2.0, 1.04), (1.0, 1.01)), 1.0)
+    >>> round(order(((2.0, 1.04), (1.0, 1.01)), 1.0), 6)
     2.0
     """
     (coarse, first), (fine, last) = ladder[-2:]
     errors = abs(first - truth), abs(last - truth)
     if min(errors) == 0:
         return None
-    return round(math.log(errors[0] / errors[1]) / math.log(coarse / fine), 12)
+    return math.log(errors[0] / errors[1]) / math.log(coarse / fine)

@@ -3,6 +3,7 @@
 import argparse
 import json
 import logging
+import os
 import re
 import signal
 import sys
@@ -20,7 +21,7 @@ from fem_reference.field_verbs import Told
 from fem_reference.overview import comparison_text, field_scene_facts, run_facts, run_text, scene_facts
 from fem_reference.records import parse
 from fem_reference.scene import Candidate, Scene, SolverChoice
-from fem_reference.verification.verb import verify
+from fem_reference.verification import verb as verification
 
 DONE, VERDICT_FAIL, BAD_INPUT, SOLVER_FAILED = range(4)
 INTERRUPTED, TERMINATED = 130, 143  # what shells report for them
@@ -53,11 +54,23 @@ def main(arguments: list[str]) -> int:
 
 
 def _check_outputs(options: argparse.Namespace) -> None:
-    """InputError where something else already stands in the place of an output."""
-    if options.out is not None and options.out.exists() and not options.out.is_dir():
-        raise InputError("--out", f'"{options.out}", a file', "a folder")
-    if options.json is not None and options.json.is_dir():
+    """InputError where an output cannot be written, before anything is measured; makes nothing."""
+    _check_folder("--out", _out(options), written=options.verb is not _list)
+    if options.json is None:
+        return
+    if options.json.is_dir():
         raise InputError("--json", f'"{options.json}", a folder', "a file")
+    if not options.json.exists():
+        _check_folder("--json", options.json.parent, written=True)
+
+
+def _check_folder(place: str, folder: Path, *, written: bool) -> None:
+    """InputError at ``place`` unless ``folder`` is one or can be made, and can be written into where it will be."""
+    there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not there.is_dir():
+        raise InputError(place, f'"{folder}", where "{there}" is a file', "a folder")
+    if written and not os.access(there, os.W_OK | os.X_OK):
+        raise InputError(place, f'"{folder}", where "{there}" cannot be written into', "a folder that can")
 
 
 def _show_progress(*, on: bool) -> None:
@@ -86,14 +99,11 @@ def _parser() -> argparse.ArgumentParser:
             sub.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help=change)
         sub.add_argument("--out", type=Path, metavar="DIR", help="where pages and stored runs go (default: reports)")
         sub.add_argument("--json", type=Path, metavar="FILE", help="write what is printed as JSON")
-        sub.add_argument(
-            "--ranks", type=int, metavar="N", help="MPI processes of the reference (default: 2 where there are)"
-        )
         sub.add_argument("--quiet", action="store_true", help="show no progress")
-        sub.set_defaults(verb=verb)
+        sub.set_defaults(verb=verb, ranks=None)
         return sub
 
-    add("demo", _demo, f"the main job: the case {MAIN_JOB}, its reference against its candidates", case=False)
+    demo = add("demo", _demo, f"the main job: the case {MAIN_JOB}, its reference against its candidates", case=False)
     run = add("run", _run, "solve a case and judge what it expects of the reference")
     run.add_argument("--solver", metavar="NAME", help="another solver than the case's own reference")
     comparison = add("compare", _compare, "measure candidates against the reference and write the page")
@@ -104,6 +114,9 @@ def _parser() -> argparse.ArgumentParser:
         help="a candidate of the case or a folder of frames; may be repeated",
     )
     comparison.add_argument("--unit", default="mm", help="unit of length of the frames in DIR (default: mm)")
+    for solving in (demo, run, comparison):
+        ranks = "MPI processes of the reference (default: 2 where there are)"
+        solving.add_argument("--ranks", type=int, metavar="N", help=ranks)
     page = add("page", _page, "write a page over several cases", case=False)
     page.add_argument(
         "name", metavar="NAME", choices=sorted(field_verbs.PAGES), help=f"one of {', '.join(sorted(field_verbs.PAGES))}"
@@ -185,7 +198,10 @@ def _page(options: argparse.Namespace) -> int:
 
 
 def _verify(options: argparse.Namespace) -> int:
-    return _told(verify(options.names, options.spoil, _out(options)), options)
+    measured = verification.verify(options.names, options.spoil)
+    status = _told(verification.told(measured), options)  # what took so long to measure is told whatever the page does
+    print(f"page: {report.write_verification(measured, _out(options))}")
+    return status
 
 
 def _judge(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:

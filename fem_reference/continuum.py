@@ -30,15 +30,57 @@ ELEMENTS: dict[str, tuple[Kind, int, int | None]] = {
 
 def check(body: "Continuum", element: str) -> None:
     """InputError unless ``element`` suits the cells and effects of ``body``, which has every region and fibre direction that it
-    speaks of.
+    speaks of, and prescribes what can be told apart and be solved.
     """
     check_element(element, body.mesh.kind, body.mesh.degree, body.effects, "element")
+    _check_prescribed(body.prescribed)
     held = [entry.on for entry in body.prescribed]
-    for on in [*held, *(effect.on for effect in body.effects if isinstance(effect, Load))]:
+    used = dict.fromkeys([*held, *(effect.on for effect in body.effects if isinstance(effect, Load))])
+    for on in used:
         if on not in body.mesh.facets:
             raise InputError("on", f'"{on}"', f"a region of the body: {', '.join(body.mesh.facets)}")
+    _check_regions(body.mesh, tuple(used))
     if body.fibre is None and any("fibre" in effect.needs for effect in body.effects):
         raise InputError("fibre", "nothing", "fibre directions, which an effect needs")
+
+
+def _check_prescribed(prescribed: tuple["Prescribed", ...]) -> None:
+    """InputError where two share a name, by which their forces are told, or springs would push away."""
+    names = [entry.name for entry in prescribed]
+    for entry in prescribed:
+        if names.count(entry.name) > 1:
+            raise InputError("prescribed", f'"{entry.name}" twice', "a name for each")
+        if entry.stiffness is not None and not entry.stiffness > 0:
+            raise InputError(
+                f"prescribed.{entry.name}.stiffness", f"{entry.stiffness:g}", "more than 0, or None: exact"
+            )
+
+
+def _check_regions(mesh: "Cells", names: tuple[str, ...]) -> None:
+    """InputError unless each of the regions ``names`` has facets, all of them on the boundary of the cells."""
+    boundary = set(map(tuple, boundary_facets(mesh).tolist()))
+    for name in names:
+        facets = set(map(tuple, np.sort(mesh.facets[name], axis=1).tolist()))
+        lost = sorted(facets - boundary)
+        if not facets:
+            raise InputError(f"facets.{name}", "none", "facets of one cell each")
+        if lost:
+            got = (
+                f"facets that are not of one cell each ({len(lost)} of {len(facets)}, the first with corners {lost[0]})"
+            )
+            raise InputError(f"facets.{name}", got, "facets on the boundary of the cells")
+
+
+def boundary_facets(mesh: "Cells") -> Ints:
+    """The facets that one cell alone has, as their corners (f, 3 or 4) in ascending order."""
+    if mesh.kind == "tetrahedron":
+        sides = [np.delete(np.arange(4), i) for i in range(4)]
+    else:
+        corners = reference_nodes(mesh.kind, 1)
+        sides = [np.flatnonzero(corners[:, axis] == end) for axis in range(3) for end in (0, 1)]
+    facets = np.sort(mesh.cells[:, np.stack(sides)].reshape(-1, len(sides[0])), axis=1)
+    unique, counts = np.unique(facets, axis=0, return_counts=True)
+    return np.asarray(unique[counts == 1])
 
 
 def check_element(element: str, kind: Kind, degree: int, effects: tuple[Effect, ...], place: str) -> None:

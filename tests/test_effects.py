@@ -121,7 +121,12 @@ def test_every_parameter_is_felt_and_has_its_unit(name: str) -> None:
         ("prestretch", "course", [{"frame": 0, "amount": -10.0}], r"want a course whose stretches 1 \+ amount"),
         ("mooney_rivlin", "c2", "-10 kPa", r"want c1 \+ c2 above zero"),
         ("pressure", "course", [], r"course: got \[\], want .* at least 1 item"),
-        ("pressure", "course", [*COURSE, {"frame": 30, "amount": 1.0}], r"course: .*want knots whose frames are each later than the one"),
+        (
+            "pressure",
+            "course",
+            [*COURSE, {"frame": 30, "amount": 1.0}],
+            r"course: .*want knots whose frames are each later",
+        ),
         ("pressure", "course", [{"frame": 0}], r"course\[0\]\.amount: got nothing, want this key"),
     ],
 )

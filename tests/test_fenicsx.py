@@ -1,6 +1,8 @@
 """The reference solver: exact where the answer is exact, of the right stiffness, independent of ranks, and honest when it fails."""
 
+import signal
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -10,7 +12,8 @@ from fem_reference import effects
 from fem_reference.motion import Rotation, apply
 from fem_reference.runs import Frame, Outcome
 from fem_reference.solvers import fenicsx
-from fem_reference.solvers.fenicsx import Settings
+from fem_reference.solvers.fenicsx import Settings, processes
+from fem_reference.solvers.fenicsx.processes import MARK, running
 from validation.torsion import square_bar_stiffness
 
 MU, BULK = 0.01, 10.0
@@ -118,7 +121,7 @@ def test_what_cannot_be_reached_is_a_status_that_keeps_the_frames_before() -> No
     problem = shapes.bar((1, 1, 1), (10, 10, 10), {"bottom": None, "top": motion}, MUSCLE, (0, 1, 10))
     outcome, frames = solved(problem, ranks=1, smallest_step=1.0)
     assert outcome.status in ("diverged", "inverted")
-    assert "try smaller cells" in outcome.message
+    assert outcome.message.endswith("try a smaller motion or smaller cells (muscle.tet_size)")
     assert "of cell" in outcome.message
     assert [frame.number for frame in frames] == [0, 1]
 
@@ -158,6 +161,44 @@ def test_a_time_limit_is_a_status() -> None:
     command = [sys.executable, "-c", "import time; time.sleep(60)"]
     outcome = fenicsx._run(command, Settings(time_limit="0.5 s"), lambda _: None)
     assert outcome.status == "timed out"
+
+
+def test_an_interrupt_right_after_the_start_ends_all_ranks(tmp_path) -> None:
+    (tmp_path / "sleep.py").write_text("import time; time.sleep(60)")
+    (*start, _) = fenicsx._command(Settings(ranks=2), tmp_path)
+    begin = time.perf_counter()
+    with pytest.raises(KeyboardInterrupt), running([*start[:-2], str(tmp_path / "sleep.py")], None) as started:
+        raise KeyboardInterrupt  # mpiexec has no processes yet, and ignores what comes before them
+    assert started.process.returncode != 0
+    assert time.perf_counter() - begin < 20
+
+
+@pytest.fixture
+def deaf(monkeypatch):
+    """The command line of a process that does not listen to signals, once it has reported 1."""
+    monkeypatch.setattr(processes, "_PATIENCE", 0.3)
+    ignore = "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN)"
+    return [sys.executable, "-c", f"{ignore}; print({MARK!r} + '1', flush=True); time.sleep(60)"]
+
+
+def test_an_interrupt_kills_a_process_that_does_not_listen(deaf) -> None:
+    def interrupt(started) -> None:
+        next(started.events())
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt), running(deaf, None) as started:
+        interrupt(started)
+    assert started.process.returncode == -signal.SIGKILL
+
+
+def test_a_time_limit_kills_a_process_that_does_not_listen(deaf) -> None:
+    with running(deaf, None) as started:
+        assert next(started.events()) == 1
+        with started.limited(0.2):
+            assert list(started.events()) == []
+        ended = started.ending("nothing is kept")
+    assert (ended.status, ended.message) == ("timed out", "stopped after 0.2 s, the time limit; nothing is kept")
+    assert started.process.returncode == -signal.SIGKILL
 
 
 def test_missing_software_is_named(bent, monkeypatch) -> None:

@@ -1,13 +1,14 @@
 """The reference solves bodies: what it refuses, springs, balance, the order of nodes, and processes that die."""
 
 import importlib.util
+import itertools
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from fem_reference import effects
-from fem_reference.continuum import ELEMENTS, Cells, Continuum, Prescribed, check
+from fem_reference.continuum import ELEMENTS, Cells, Continuum, Prescribed, boundary_facets, check
 from fem_reference.effects import Effect
 from fem_reference.errors import InputError, MissingSoftware
 from fem_reference.records import parse
@@ -146,6 +147,7 @@ def test_what_was_reached_is_kept_where_a_body_inverts(session) -> None:
     solved = session.solve(body, settings("Q1/P0", first_step=0.25))
     assert solved.outcome.status == "inverted"
     assert "Newton's method converged, but det F fell to" in solved.outcome.message
+    assert solved.outcome.message.endswith("try a smaller motion or smaller cells")  # a body has no keys
     assert [state.frame for state in solved.states] == [0.0, 0.25]
     with pytest.raises(ArithmeticError, match=r"inverted: Newton's method converged, but det F fell to"):
         _ = solved.last
@@ -154,7 +156,7 @@ def test_what_was_reached_is_kept_where_a_body_inverts(session) -> None:
 def test_a_session_outlives_its_process(session) -> None:
     body = turned(box("Q1/P0"), Turn((0.0, 0.0, 1.0), 0.3))
     before = session.solve(body, settings("Q1/P0")).last
-    session.worker.process.kill()
+    session.process.process.kill()
     dead = session.solve(body, settings("Q1/P0"))
     assert (dead.outcome.status, dead.states) == ("crashed", ())
     assert "the FEniCSx process ended with exit status -9" in dead.outcome.message
@@ -195,3 +197,63 @@ def test_regions_and_fibres_that_a_body_lacks_are_named() -> None:
     active = effect("fibre_active", stress="10 kPa", optimal_stretch=1.0, course=ONCE)
     with pytest.raises(InputError, match="fibre: got nothing, want fibre directions"):
         check(Continuum(box("Q1/P0"), (*FLESH, active), (), (0.0, 1.0)), "Q1/P0")
+
+
+def test_forces_have_names_of_their_own() -> None:
+    held = (Prescribed("end", "z0", (2,), Rest()), Prescribed("end", "z1", (2,), Rest()))
+    with pytest.raises(InputError, match='prescribed: got "end" twice, want a name for each'):
+        check(Continuum(box("Q1/P0"), FLESH, held, (0.0, 1.0)), "Q1/P0")
+
+
+@pytest.mark.parametrize("stiffness", [0.0, -1.0, float("nan")])
+def test_springs_pull(stiffness) -> None:
+    held = (Prescribed("end", "z0", (2,), Rest(), stiffness),)
+    with pytest.raises(InputError, match=r"prescribed\.end\.stiffness: got .*, want more than 0, or None: exact"):
+        check(Continuum(box("Q1/P0"), FLESH, held, (0.0, 1.0)), "Q1/P0")
+
+
+def shared_facet(mesh: Cells) -> list[int]:
+    """The corners of a facet between two cells."""
+    count = 4 if mesh.kind == "tetrahedron" else 8
+    pairs = itertools.combinations(mesh.cells[:, :count].tolist(), 2)
+    shared = (sorted({*one} & {*two}) for one, two in pairs)
+    return next(facet for facet in shared if len(facet) == len(mesh.facets["x0"][0]))
+
+
+@pytest.mark.parametrize("element", ["P2/P1", "P2", "Q1/P0", "Q2/Q1"])
+def test_regions_are_on_the_boundary_of_the_cells(element) -> None:
+    acting = PENALTY if ELEMENTS[element][2] is None else FLESH
+    mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), ELEMENTS[element][0], 2 if element in ("P2", "Q2/Q1") else 1)
+    every = np.concatenate(list(mesh.facets.values()))
+    assert {tuple(facet) for facet in boundary_facets(mesh).tolist()} == {tuple(sorted(f)) for f in every.tolist()}
+
+    held = (Prescribed("end", "lid", (2,), Rest()),)
+
+    def checked(facets, acting=acting, held=held) -> None:
+        other = replace(mesh, facets={"lid": np.asarray(facets), "unused": np.zeros_like(every[:1])})
+        check(Continuum(other, acting, held, (0.0, 1.0)), element)
+
+    checked(np.flip(every, axis=1))  # in whatever order
+    lost = shared_facet(mesh)
+    with pytest.raises(InputError, match=r"facets\.lid: got facets that are not of one cell each \(1 of 3"):
+        checked([every[0], every[1], lost])
+    pressed = effect("pressure", on="lid", pressure="1 kPa", course=ONCE)
+    with pytest.raises(InputError, match=r"facets\.lid: got facets that are not of one cell each \(1 of 1"):
+        checked([lost], (*acting, pressed), ())
+    with pytest.raises(InputError, match=r"facets\.lid: got none, want facets of one cell each"):
+        checked(every[:0])
+
+
+def test_a_time_limit_ends_one_body_and_not_the_session(session) -> None:  # noqa: ARG001 - it skips without FEniCSx
+    body = turned(box("Q1/P0"), Rest())
+    with fenicsx.session() as fresh:
+        # To start the process alone takes longer.
+        late = fresh.solve(body, settings("Q1/P0", time_limit="0.05 s"))
+        assert (late.outcome.status, late.states) == ("timed out", ())
+        assert "0 states are kept" in late.outcome.message
+        with pytest.raises(ArithmeticError, match="timed out: stopped after"):
+            _ = late.last
+        assert fresh.solve(body, settings("Q1/P0", time_limit="60 s")).outcome.status == "converged"
+        process = fresh.process
+        assert fresh.solve(body, settings("Q1/P0")).outcome.status == "converged"
+        assert fresh.process is process

@@ -297,5 +297,7 @@ def test_what_cannot_be_solved_is_named() -> None:
     strange = Cells(corners, np.arange(4)[None], "tetrahedron", 1, {"lid": np.array([[0, 1, 5]])})
     with pytest.raises(InputError, match=r"facets\.lid: got facets that are not of one cell each"):
         solve_body(Continuum(strange, law("P1"), (moved("lid", "lid", ALL),), (0.0, 1.0)), settings)
+    with pytest.raises(InputError, match=r"facets\.lid: got facets that are not of one cell each"):
+        Space(strange, "P1", 2).sides("lid")
     with pytest.raises(InputError, match="element: got"):
         solve_body(Continuum(straight, law("P1"), (), (0.0, 1.0)), BodySettings(element="P2/P1"))

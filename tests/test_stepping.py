@@ -31,7 +31,7 @@ def test_failed_steps_are_halved_and_resume_from_the_last_good_state() -> None:
 
     reached = marched(attempt)
     assert [entry.frame for entry in reached] == [10, 20]
-    assert all(entry.failed is None for entry in reached)
+    assert all(entry.status == "converged" for entry in reached)
     assert reached[0].cutbacks == 2  # 10 -> 5 -> 2.5
     assert reached[0].steps == 4
 
@@ -45,8 +45,7 @@ def test_steps_are_equal_and_none_is_a_sliver() -> None:
 def test_gives_up_below_the_smallest_step_and_says_where() -> None:
     reached = marched(lambda at: Attempt("inverted", 4, "det F") if at > 10 else Attempt(None, 3))
     assert reached[0].frame == 10
-    assert reached[0].failed is None
-    assert reached[1].failed is not None
-    assert reached[1].failed.failure == "inverted"
+    assert reached[0].status == "converged"
+    assert (reached[1].status, reached[1].sentence) == ("inverted", "det F")
     assert reached[1].at == 10
     assert len(reached) == 2

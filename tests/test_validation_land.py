@@ -102,8 +102,8 @@ def test_volume_of_the_wall() -> None:
 def test_published_results_stand_in_their_order() -> None:
     """The pressure moves the apex down and thins the wall; the active tension pulls it up and thickens it, as in the paper."""
     for apices, way in ((land.PASSIVE_APICES, -1), (land.ACTIVE_APICES, 1)):
-        inner, outer = (apex.value for apex in apices)
+        inner, outer = apices
         assert inner > outer
         assert np.sign(inner + 17) == np.sign(outer + 20) == way
-    assert land.PASSIVE_APICES[0].value - land.PASSIVE_APICES[1].value < 3
-    assert land.ACTIVE_APICES[0].value - land.ACTIVE_APICES[1].value > 3
+    assert land.PASSIVE_APICES[0] - land.PASSIVE_APICES[1] < 3
+    assert land.ACTIVE_APICES[0] - land.ACTIVE_APICES[1] > 3

@@ -38,11 +38,9 @@ def test_the_plate_does_the_work_of_squeezing(stretch: float) -> None:
     assert loads.squeeze_force(MU, BULK, stretch, 12.0) == pytest.approx((4 * near - far) / 3, rel=1e-8)
 
 
-@pytest.mark.parametrize("weight", [-0.9, -0.01, 0.0, 0.05, 0.8])
-def test_a_weight_hangs_where_the_bar_pulls_as_much(weight: float) -> None:
-    stretch = loads.hanging_stretch(MU, BULK, 3.0, weight)
-    assert (stretch > 1) == (weight > 0) or weight == 0
-    state = homogeneous.pulled(laws.neo_hooke(MU), BULK, weight / 3.0)
+@pytest.mark.parametrize("stretch", [0.5, 1.7])
+def test_the_plate_pulls_as_the_law_says(stretch: float) -> None:
+    state = homogeneous.pulled(laws.neo_hooke(MU), BULK, loads.squeeze_force(MU, BULK, stretch, 3.0) / 3.0)
     assert stretch == pytest.approx(state.stretches[0], rel=1e-11)
 
 
@@ -75,8 +73,6 @@ def test_a_light_column_sinks_as_in_small_strain() -> None:
 
 def test_a_body_in_a_fluid_has_the_pressure_of_the_fluid() -> None:
     pressure = 0.1
-    length = loads.pressed_lengths(BULK, pressure, 1.0)
-    assert length**3 == pytest.approx(loads.pressed_volume(BULK, pressure), rel=1e-14)
-    F = length * np.eye(3)
+    F = np.cbrt(loads.pressed_volume(BULK, pressure)) * np.eye(3)
     P = homogeneous.nominal_stress(laws.neo_hooke(MU), BULK, F, laws.X)
     assert P @ F.T / np.linalg.det(F) == pytest.approx(-pressure * np.eye(3), abs=1e-15)

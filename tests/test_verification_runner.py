@@ -3,6 +3,7 @@
 import json
 import logging
 import math
+import re
 import sys
 import threading
 import time
@@ -13,7 +14,7 @@ from typing import get_args
 import pytest
 
 from fem_reference import cli, truths
-from fem_reference.catalogue import Entry, Finding, Kind
+from fem_reference.catalogue import Entry, Finding, Kind, order
 from fem_reference.errors import InputError, MissingSoftware
 from fem_reference.verification import runner
 
@@ -97,9 +98,19 @@ def test_names_families_and_patterns_choose_in_the_order_of_the_catalogue(wanted
 
 def test_a_name_that_is_not_there_is_told_with_those_that_are() -> None:
     known = catalogue(entry("bar"), entry("tip", family="beams"))
-    want = r'NAME: got "Bar", want an entry \(bar, tip\), a family \(blocks, beams\) or a pattern of them'
+    want = r'NAME: got "Bar", want an entry \(such as bar\), a family \(blocks, beams\) or a pattern of them'
     with pytest.raises(InputError, match=want):
         runner.choose(known, ["tip", "Bar"], "NAME")
+
+
+def test_an_unknown_name_is_answered_shortly_however_many_there_are() -> None:
+    known = catalogue(*(entry(f"bar_{i}") for i in range(100)), entry("tip", family="beams"))
+    with pytest.raises(InputError) as refused:
+        runner.choose(known, ["tipp"], "NAME")
+    assert refused.value.want == "an entry (such as tip), a family (blocks, beams) or a pattern of them"
+    with pytest.raises(InputError) as refused:
+        runner.choose(known, ["bar_100"], "NAME")
+    assert refused.value.want.count("bar_") == 5
 
 
 def test_results_keep_their_order_and_every_thread_its_lab(monkeypatch) -> None:
@@ -152,6 +163,19 @@ def test_an_entry_that_raises_fails_alone(error) -> None:
     assert (failed.word, other.word) == ("fail", "pass")
     assert math.isnan(failed.finding.value)
     assert failed.finding.note == f"{type(error).__name__}: {error}"
+
+
+def test_a_truth_that_raises_fails_its_entry_alone() -> None:
+    def no_truth():
+        raise ValueError("no root")
+
+    both = entry("both", raising(OSError("pipe")).measure, truth=no_truth)
+    lost, nothing, other = runner.run([entry("lost", truth=no_truth), both, entry("other")], Labs())
+    assert (lost.word, nothing.word, other.word) == ("cannot say", "cannot say", "pass")
+    assert lost.finding.value == 1.0  # what was measured is kept
+    assert all(math.isnan(number) for number in (lost.truth, lost.within, lost.error, nothing.finding.value))
+    assert lost.finding.note == "no truth, ValueError: no root"
+    assert nothing.finding.note == "OSError: pipe; no truth, ValueError: no root"
 
 
 @pytest.mark.parametrize("error", [TypeError("ours"), KeyboardInterrupt("stop"), MissingSoftware("FEniCSx")])
@@ -275,9 +299,68 @@ def test_what_is_spoiled_is_measured_and_fails(verify, words, names) -> None:
 def test_an_unknown_name_is_bad_input(verify, words, place) -> None:
     status, told, facts = verify(*words)
     assert status == cli.BAD_INPUT
-    assert f'{place}: got "nobody", want an entry (bar, rod, tip), a family (bars, beams)' in told.err
+    assert f'{place}: got "nobody", want an entry, a family (bars, beams)' in told.err
     assert facts is None
     assert verify.made.lab.made == 0
+
+
+def test_a_page_that_cannot_be_written_leaves_what_was_measured_told(verify, monkeypatch) -> None:
+    def full(*_):
+        raise OSError("no space left")
+
+    target = verify.folder / "facts.json"
+    monkeypatch.setattr(cli.report, "write_verification", full)
+    status, told, _ = verify("bars", "--json", str(target))
+    assert status == cli.BAD_INPUT
+    assert "no space left" in told.err
+    assert "verdict: pass, 2 of 2 pass" in told.out
+    assert json.loads(target.read_text())["verdict"] == "pass"
+
+
+@pytest.mark.parametrize("option", ["--out", "--json"])
+def test_an_output_below_a_file_is_refused_before_anything_is_measured(option, verify, capsys) -> None:
+    file = verify.folder / "file"
+    file.write_text("mine")
+    assert cli.main(["verify", "bars", option, str(file / "below" / "it")]) == cli.BAD_INPUT
+    assert f'where "{file}" is a file, want a folder' in capsys.readouterr().err
+    assert verify.made.lab.made == 0
+    assert [path.name for path in verify.folder.iterdir()] == ["file"]
+
+
+def test_a_folder_that_cannot_be_written_into_is_refused_before_anything_is_measured(
+    verify, capsys, monkeypatch
+) -> None:
+    monkeypatch.setattr(cli.os, "access", lambda *_: False)  # the tests may run as root, who can write anywhere
+    assert cli.main(["verify", "bars", "--out", str(verify.folder / "new")]) == cli.BAD_INPUT
+    assert "cannot be written into" in capsys.readouterr().err
+    assert verify.made.lab.made == 0
+    assert cli.main(["list", "--out", str(verify.folder / "new")]) == cli.DONE
+
+
+@pytest.mark.parametrize("words", [["verify"], ["list"], ["page", "octave-examples"], ["show", "hip_flexion"]])
+def test_ranks_are_for_verbs_that_solve_a_muscle(words, capsys) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        cli.main([*words, "--ranks", "2"])
+    assert "unrecognized arguments: --ranks" in capsys.readouterr().err
+
+
+def test_a_body_of_the_catalogue_has_a_time_limit() -> None:
+    from fem_reference.verification.lab import FemLab
+
+    class Noted:
+        def solve(self, _, settings):
+            return settings.time_limit
+
+    lab = FemLab(Noted())
+    assert lab.solve(None, "P2/P1") == 1800
+    assert lab.solve(None, "P2/P1", time_limit="5 s") == 5
+
+
+def test_the_order_is_the_slope_of_the_last_two_errors() -> None:
+    # An error of 3 h^2.5 about a truth of 2; rounding of numbers near 2 over the smaller error, 3e-16 / 3e-3.
+    ladder = tuple((h, 2 + 3 * h**2.5) for h in (0.25, 0.125, 0.0625))
+    assert order(ladder, 2.0) == pytest.approx(2.5, abs=1e-12)
+    assert order(((1.0, 2.5), (0.5, 2.0)), 2.0) is None
 
 
 def test_without_fenicsx_it_says_so(verify) -> None:
@@ -291,6 +374,11 @@ def test_without_fenicsx_it_says_so(verify) -> None:
 
 
 # Truths
+
+
+def test_the_list_of_truths_names_every_module_and_no_other() -> None:
+    listed = re.findall(r"^\| `(\w+)\.py`", (truths.FOLDER / "README.md").read_text(), re.MULTILINE)
+    assert sorted(listed) == sorted(path.stem for path in truths.FOLDER.glob("*.py") if path.stem != "__init__")
 
 
 @pytest.fixture

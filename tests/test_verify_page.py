@@ -77,6 +77,18 @@ def test_what_is_not_a_number_fails_and_is_told() -> None:
     assert (row["value"], row["error"], row["ladder"]) == (None, None, [[1.0, None], [0.5, 2.0]])
 
 
+def test_an_entry_without_a_truth_is_told() -> None:
+    lost = Result(made().entry, Finding(2.0, note="no truth, ValueError: no root"), NAN, NAN, 1.0)
+    text = verify_page.render(verification(lost))
+    read(text)
+    assert "0 of 1 pass" in text
+    assert '<span class="badge cannot">cannot say</span>' in text
+    assert text.count('<span class="bad">not a number</span>') == 3  # truth, error and bound
+    assert "no truth, ValueError: no root" in text
+    (row,) = verify_page.facts(verification(lost))["entries"]
+    assert (row["value"], row["truth"], row["error"], row["within"]) == (2.0, None, None, None)
+
+
 def test_spoiled_entries_are_marked() -> None:
     text = verify_page.render(verification(made(value=4.0, spoiled=True), made("tip")))
     assert "1 entry is spoiled on purpose" in text

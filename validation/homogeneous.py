@@ -28,11 +28,6 @@ class Homogeneous:
         """Along x, y, z, (3,)."""
         return np.diag(self.F)
 
-    @property
-    def cauchy(self) -> Floats:
-        """Force per area as it is now [MPa], (3, 3)."""
-        return np.asarray(self.P @ self.F.T / np.linalg.det(self.F))
-
 
 def nominal_stress(law: Law, bulk: float, F: Floats, fibre: Floats) -> Floats:
     """``dW/dF + K (J - 1) J F^-T`` (3, 3) [MPa]."""

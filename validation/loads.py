@@ -4,7 +4,6 @@ Derived here from the energy by hand (Holzapfel 2000, Nonlinear Solid Mechanics,
 equations; roots to rounding. No reading error. ``mu`` and ``bulk`` [MPa].
 """
 
-import numpy as np
 from scipy.optimize import brentq
 
 
@@ -26,21 +25,6 @@ def squeeze_force(mu: float, bulk: float, stretch: float, area: float) -> float:
     """
     J = squeezed_volume(mu, bulk, stretch)
     return float(mu * J ** (-2 / 3) * (stretch - J / stretch**2) * area)
-
-
-def hanging_stretch(mu: float, bulk: float, area: float, weight: float) -> float:
-    """Of a bar of no weight of its own, ``area`` at rest [mm2], that carries ``weight`` [N]; below 1 where it stands under one.
-
-    ``squeeze_force(stretch) = weight``.
-    """
-
-    def unbalanced(stretch: float) -> float:
-        return squeeze_force(mu, bulk, stretch, area) - weight
-
-    reach = 2.0
-    while unbalanced(1 / reach) > 0 or unbalanced(reach) < 0:
-        reach *= 2
-    return float(brentq(unbalanced, 1 / reach, reach, xtol=1e-15, rtol=1e-15))
 
 
 def confined_stress(mu: float, bulk: float, stretch: float) -> float:
@@ -77,8 +61,3 @@ def pressed_volume(bulk: float, pressure: float) -> float:
     isochoric law adds nothing. P below K.
     """
     return 1 - pressure / bulk
-
-
-def pressed_lengths(bulk: float, pressure: float, rest: float) -> float:
-    """An edge [mm] of the body of :func:`pressed_volume`, ``rest`` [mm] at rest."""
-    return float(rest * np.cbrt(pressed_volume(bulk, pressure)))

@@ -1,4 +1,4 @@
-"""Torsion of a cylinder, inflation of a sphere and of a tube, of any law with a finite bulk modulus.
+"""Inflation of a sphere and of a tube, of any law with a finite bulk modulus.
 
 What ``validation/rivlin.py`` has in closed form for incompressible matter, without its part of the order of mu / K. The radius
 now is ``r(R)`` of incompressible matter plus a polynomial, such that the virtual work, the integral of ``P : dF R^n``, vanishes
@@ -65,20 +65,6 @@ def tube(law: Law, bulk: float, radii: tuple[float, float], inner_stretch: float
     return _pushing_out(wall, P, gradient, 1) / (inner_stretch * radii[0]), float(force)
 
 
-def torsion(law: Law, bulk: float, radius: float, twist: float) -> tuple[float, float]:
-    """Moment [N mm] and axial force [N] on the ends of a solid cylinder that is held at its length, its side free: the integrals of
-    ``2 pi R r P_tz`` and ``2 pi R P_zz``. ``radius`` [mm], ``twist`` [rad/mm]; a fibre runs along the axis.
-    """
-
-    def gradient(slope: float, r: float, R: float) -> Floats:
-        return np.array([[slope, 0, 0], [0, r / R, twist * r], [0, 0, 1.0]])
-
-    wall = _solid(radius)
-    r, P = _balanced(law, bulk, wall, gradient, 1)
-    rings = 2 * np.pi * wall.weights * wall.R
-    return float(np.sum(rings * r * P[:, 1, 2])), float(np.sum(rings * P[:, 2, 2]))
-
-
 def _hollow(radii: tuple[float, float], inner_stretch: float, power: int) -> Wall:
     """A wall whose inner face is held: ``start^(n+1) - a^(n+1) = R^(n+1) - A^(n+1)``, shapes that vanish at the inner face."""
     ticks, weights = legendre.leggauss(DEGREE + 8)
@@ -89,16 +75,6 @@ def _hollow(radii: tuple[float, float], inner_stretch: float, power: int) -> Wal
     shapes = (ticks + 1)[:, None] * values
     slopes = (values + (ticks + 1)[:, None] * _slopes(ticks)) / half
     return Wall(R, half * weights, start, (R / start) ** power, shapes, slopes)
-
-
-def _solid(radius: float) -> Wall:
-    """A cylinder whose axis stays: odd polynomials of R."""
-    ticks, weights = legendre.leggauss(DEGREE + 8)
-    R, x = radius * (ticks + 1) / 2, ((ticks + 1) / 2)[:, None]
-    even = 2 * x[:, 0] ** 2 - 1
-    values = legendre.legvander(even, DEGREE)
-    slopes = (values + 4 * x**2 * _slopes(even)) / radius
-    return Wall(R, radius / 2 * weights, R, np.ones_like(R), x * values, slopes)
 
 
 def _slopes(ticks: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""Closed forms for bodies of incompressible matter: torsion of a cylinder, inflation of a sphere and of a tube, flexure of a block.
+"""Closed forms for bodies of incompressible matter: torsion of a cylinder, inflation of a sphere, flexure of a block.
 
 Neo-Hooke ``mu/2 (I1 - 3)`` or Mooney-Rivlin ``c1 (I1 - 3) + c2 (I2 - 3)`` with J = 1. A body of bulk modulus K differs from it by
 a part of the order of mu / K. No reading error: closed forms, and root finding to rounding where a docstring says so.
@@ -77,42 +77,6 @@ class Sphere:
 
         stretch = float(brentq(slope, 1.0, 100 * self.outer / self.inner, xtol=1e-14, rtol=1e-14))
         return stretch, self.pressure(stretch)
-
-
-@dataclass(frozen=True)
-class Tube:
-    """A neo-Hookean tube between the radii ``inner`` A and ``outer`` B [mm], ``mu`` [MPa], inflated from inside and held at its
-    length: ``r^2 = R^2 + k``, ``k = a^2 - A^2``.
-
-    Source: Rivlin 1949, doi 10.1098/rsta.1949.0009; Ogden 1984, ch. 5.3.3.
-    """
-
-    mu: float
-    inner: float
-    outer: float
-
-    def radius(self, inner_stretch: float, rest: Floats) -> Floats:
-        """Where the points of radius ``rest`` [mm] are, [mm]."""
-        return np.sqrt(rest**2 + self.inner**2 * (inner_stretch**2 - 1))
-
-    def _radii(self, inner_stretch: float) -> tuple[float, float, float]:
-        """a, b [mm] and k [mm2]."""
-        a, b = self.radius(inner_stretch, np.array([self.inner, self.outer]))
-        return float(a), float(b), self.inner**2 * (inner_stretch**2 - 1)
-
-    def pressure(self, inner_stretch: float) -> float:
-        """Inside above outside [MPa], from a / A: ``mu (log(a B / (A b)) + k/2 (1/a^2 - 1/b^2))``."""
-        a, b, k = self._radii(inner_stretch)
-        return float(self.mu * (np.log(a * self.outer / (self.inner * b)) + k / 2 * (1 / a**2 - 1 / b**2)))
-
-    def axial_force(self, inner_stretch: float) -> float:
-        """The force along the axis in the wall [N], above zero where it is pulled: ``pi a^2 p - pi mu k log(a B / (A b))``.
-
-        Closed ends carry ``pi a^2 p`` of it; what holds them adds the rest, which is negative.
-        """
-        a, b, k = self._radii(inner_stretch)
-        held = -np.pi * self.mu * k * np.log(a * self.outer / (self.inner * b))
-        return float(np.pi * a**2 * self.pressure(inner_stretch) + held)
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from fem_reference.verification.parts import Value, course, effect, once, resist
 FAMILY = "heart benchmark"
 BULK = 100.0  # [MPa], some 1e4 times the stresses: J is 1 within 1e-4 on average
 RESIDUAL = 1e-10  # [N, mm3]; the beam carries 2e-5 N
-SOURCE = "Land et al. 2015, doi 10.1098/rspa.2015.0641"
+SOURCE = "Land et al. 2015, doi 10.1098/rspa.2015.0641: readings of its figures at second hand, see validation/land.py"
 X = (1.0, 0.0, 0.0)
 APEX = 0.6  # how long cells are at the apex of the ventricle that contracts, over what they were
 AROUND = 7.85  # an eighth of a turn around the widest of the ventricle outside [mm]: a ladder's sizes are this over n
@@ -146,12 +146,12 @@ def _entry(name: str, title: str, truth: Callable[[], float], within: float, **t
 def _published(name: str, place: int | None = None) -> float:
     """A number of ``validation.land`` [mm]."""
     found = getattr(find("land"), name)
-    return float((found if place is None else found[place]).value)
+    return float(found if place is None else found[place])
 
 
 _BEAM = Heart("P2/P1", degree=1)
 _TETRAHEDRA, _HEXAHEDRA = Heart("P2/P1"), Heart("Q2/Q1")
-_AGREE = "the codes of the benchmark agree within half a per cent"
+_BOUND = "a bound that this project sets itself, as the numbers are readings of figures at second hand, whose error nobody states"
 
 
 def _passive_entry(heart: Heart, place: int, because: str) -> Entry:
@@ -163,10 +163,10 @@ def _passive_entry(heart: Heart, place: int, because: str) -> Entry:
         f"A ventricle filled at 10 kPa: where its apex goes {where}, by quadratic {by}",
         partial(_published, "PASSIVE_APICES", place),
         0.005,
-        because=f"{_AGREE}; {because}",
+        because=f"0.5 %: {_BOUND}; {because}",
         measure=partial(_ladder, value=partial(heart.passive_apex, point=point), counts=(2, 3), size=AROUND),
         spoil="20 % stiffer",
-        spoiled=partial(once, value=partial(replace(heart, stiff=1.2).passive_apex, point=point), count=2),
+        spoiled=partial(once, value=partial(replace(heart, stiff=1.2).passive_apex, point=point), count=3),
     )
 
 
@@ -178,10 +178,10 @@ def _active_entry(place: int, because: str) -> Entry:
         f"A ventricle that contracts at 60 kPa against 15 kPa: where its apex goes {where}, by quadratic hexahedra",
         partial(_published, "ACTIVE_APICES", place),
         0.005,
-        because=f"{_AGREE}; {because}",
+        because=f"0.5 %: {_BOUND}; {because}",
         measure=partial(_ladder, value=partial(_HEXAHEDRA.active_apex, point=point), counts=(2, 3), size=AROUND),
         spoil="half the active tension",
-        spoiled=partial(once, value=partial(replace(_HEXAHEDRA, active=0.5).active_apex, point=point), count=2),
+        spoiled=partial(once, value=partial(replace(_HEXAHEDRA, active=0.5).active_apex, point=point), count=3),
     )
 
 
@@ -191,10 +191,10 @@ ENTRIES = (
         "A beam of heart muscle under a pressure that stays normal to it: height of its end, by quadratic tetrahedra",
         partial(_published, "TIP_OF_BEAM"),
         0.003,
-        because="the published number has three digits (0.1 %); the mesh leaves 0.2 %, as its clamped edges are singular",
+        because=f"0.3 %: {_BOUND}; the mesh leaves 0.2 %, as its clamped edges are singular",
         measure=partial(_ladder, value=_BEAM.beam_tip, counts=(2, 3), size=1.0),
         spoil="5 % stiffer",
-        spoiled=partial(once, value=replace(_BEAM, stiff=1.05).beam_tip, count=2),
+        spoiled=partial(once, value=replace(_BEAM, stiff=1.05).beam_tip, count=3),
     ),
     *(_passive_entry(_TETRAHEDRA, place, "the mesh leaves 0.1 %") for place in (0, 1)),
     *(_passive_entry(_HEXAHEDRA, place, "the mesh leaves 0.1 %") for place in (0, 1)),

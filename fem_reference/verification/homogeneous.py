@@ -93,12 +93,15 @@ class Specimen:
     bulk: float = BULK
     loads: tuple[Effect, ...] = ()
 
-    def solved(self, lab: Lab) -> Solved:
-        """Its states, on two cells a side."""
+    def body(self) -> Continuum:
+        """The block in two cells a side."""
         acting = (*self.material.effects, resistance(self.element, self.bulk), *self.loads)
         mesh = shapes.box((2, 2, 2), SIZE, ELEMENTS[self.element][0])
-        prescribed = MODES[self.mode][0](self.amount)
-        return lab.solve(Continuum(mesh, acting, prescribed, (0, 1), Along(self.fibre)), self.element, **STEPS)
+        return Continuum(mesh, acting, MODES[self.mode][0](self.amount), (0, 1), Along(self.fibre))
+
+    def solved(self, lab: Lab) -> Solved:
+        """Its states."""
+        return lab.solve(self.body(), self.element, **STEPS)
 
     def force(self, lab: Lab) -> Finding:
         """Along x on the face that is pulled [N]; sheared, x0 and x1 pull oppositely at its edges, and cancel."""

@@ -8,6 +8,8 @@ from fem_reference.continuum import Continuum, Solved
 from fem_reference.solvers import fenicsx, scikit_fem
 from fem_reference.solvers.fenicsx.session import Session
 
+_TIME_LIMIT = "30 min"  # of one body; the slowest of the catalogue takes about a minute
+
 
 class FemLab:
     """Solves bodies by the reference in a ``session``, and by the second opinion."""
@@ -16,8 +18,9 @@ class FemLab:
         self.session = session
 
     def solve(self, body: Continuum, element: str, **settings: Any) -> Solved:
-        """The states of ``body`` by the reference, FEniCSx."""
-        return self.session.solve(body, fenicsx.BodySettings(element=element, **settings))
+        """The states of ``body`` by the reference, FEniCSx; none may take for ever."""
+        limited = {"time_limit": _TIME_LIMIT} | settings
+        return self.session.solve(body, fenicsx.BodySettings(element=element, **limited))
 
     def second(self, body: Continuum, element: str, **settings: Any) -> Solved:
         """The states of ``body`` by the second opinion, scikit-fem."""

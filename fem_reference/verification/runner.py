@@ -11,6 +11,8 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, ExitStack
+from dataclasses import replace
+from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from types import ModuleType
 
@@ -51,11 +53,17 @@ def choose(catalogue: dict[str, Entry], wanted: Iterable[str], place: str) -> tu
             name for name, entry in catalogue.items() if fnmatchcase(name, text) or fnmatchcase(entry.family, text)
         }
         if not meant:
-            families = dict.fromkeys(entry.family for entry in catalogue.values())
-            known = f"an entry ({', '.join(catalogue)}), a family ({', '.join(families)}) or a pattern of them"
-            raise InputError(place, f'"{text}"', known)
+            raise InputError(place, f'"{text}"', _known(catalogue, text))
         chosen |= meant
     return tuple(name for name in catalogue if name in chosen)
+
+
+def _known(catalogue: dict[str, Entry], text: str) -> str:
+    """What could have been meant by ``text``: the names closest to it, and every family."""
+    families = dict.fromkeys(entry.family for entry in catalogue.values())
+    near = get_close_matches(text, catalogue, n=5)
+    told = f" (such as {', '.join(near)})" if near else ""
+    return f"an entry{told}, a family ({', '.join(families)}) or a pattern of them"
 
 
 def run(
@@ -98,13 +106,20 @@ def _taken(waiting: deque[tuple[int, Entry]]) -> Iterator[tuple[int, Entry]]:
 
 
 def _measured(entry: Entry, lab: Lab, *, spoiled: bool) -> Result:
-    """What came of an entry; where it raised, a finding that is not a number and says why."""
+    """What came of an entry; where it raised, a finding or a truth that is not a number, and a note that says why."""
     begin = time.perf_counter()
     try:
         finding = (entry.spoiled if spoiled else entry.measure)(lab)
     except FAILURES as error:
         finding = Finding(math.nan, note=f"{type(error).__name__}: {error}")
-    return result(entry, finding, time.perf_counter() - begin, spoiled=spoiled)
+    seconds = time.perf_counter() - begin
+    try:
+        return result(entry, finding, seconds, spoiled=spoiled)
+    except FAILURES as error:
+        notes = [finding.note, f"no truth, {type(error).__name__}: {error}"]
+        return Result(
+            entry, replace(finding, note="; ".join(filter(None, notes))), math.nan, math.nan, seconds, spoiled
+        )
 
 
 def _log_progress(last: Result, done: int, wanted: int, passed: float) -> None:

@@ -132,20 +132,6 @@ def warped_box(
     return mapped([Block(place, counts, _SIX)], kind, degree)
 
 
-def prism(corners: Floats, thickness: float, counts: Counts, kind: Kind, degree: int = 1) -> Cells:
-    """A quadrilateral of ``corners`` (4, 2) [mm], counter-clockwise, extruded along z: Cook's membrane is one.
-
-    Faces: y0 from the first corner to the second, then x1, y1 and x0; z0 and z1.
-    """
-
-    def place(unit: Floats) -> Floats:
-        x, y, z = unit.T
-        weights = np.stack([(1 - x) * (1 - y), x * (1 - y), x * y, (1 - x) * y], axis=1)
-        return np.column_stack([weights @ corners, thickness * z])
-
-    return mapped([Block(place, counts, _SIX)], kind, degree)
-
-
 def tube_quarter(inner: float, outer: float, length: float, counts: Counts, kind: Kind, degree: int) -> Cells:
     """The quarter x, y >= 0 of a tube along z; ``counts`` of cells through its wall, around the quarter and along it.
 

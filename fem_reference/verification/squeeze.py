@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from fem_reference.catalogue import Entry, Finding, Lab
-from fem_reference.continuum import ELEMENTS, Continuum, Prescribed, Solved
+from fem_reference.continuum import ELEMENTS, Continuum, Prescribed, Reached, Solved
 from fem_reference.truths import find
 from fem_reference.verification import shapes
 from fem_reference.verification.courses import Affine, Rest
@@ -25,8 +25,8 @@ GLUED_TO, GLUED_STEPS = 0.4, 12
 _NOT_MOVING = ((0.0, 0.0, 0.0),) * 3
 
 
-def _smooth(lab: Lab, element: str, bulk: float, *, growing: bool = False) -> Solved:
-    """The states of an eighth of a cube there and back: at even steps, or where they are ``growing`` at the ends of both ways."""
+def _smooth(lab: Lab, element: str, bulk: float, *, growing: bool = False) -> tuple[Reached, ...]:
+    """All states of an eighth of a cube there and back: at even steps, or where they are ``growing`` at the ends of both ways."""
     mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), ELEMENTS[element][0])
     prescribed = (
         Prescribed("x0", "x0", (0,), Rest()),
@@ -36,35 +36,34 @@ def _smooth(lab: Lab, element: str, bulk: float, *, growing: bool = False) -> So
     )
     frames = (0.0, 1.0, 2.0) if growing else tuple(np.linspace(0, 2, 2 * STEPS + 1).tolist())
     body = Continuum(mesh, neo_hooke(MU, bulk), prescribed, frames)
-    return lab.solve(body, element, first_step=0.05, smallest_step=1e-3, residual=RESIDUAL)
+    solved = lab.solve(body, element, first_step=0.05, smallest_step=1e-3, residual=RESIDUAL)
+    return (*solved.states[:-1], solved.last)
 
 
-def _note(solved: Solved) -> str:
+def _note(states: tuple[Reached, ...]) -> str:
     """What the squeeze cost, and the smallest det F of all its states."""
-    scalars = [state.scalars for state in solved.states]
+    scalars = [state.scalars for state in states]
     smallest = min(min(one["min_det_F_quadrature"], one["min_det_F_vertices"]) for one in scalars)
     return f"{sum(one['newton_iterations'] for one in scalars):.0f} Newton iterations, det F at least {smallest:.8f}"
 
 
 def force(lab: Lab, element: str, bulk: float, error: float = 0.0) -> Finding:
     """Of the plate at a tenth of the height [N]; ``error``: of the bulk modulus, relative."""
-    solved = _smooth(lab, element, bulk * (1 + error))
-    assert solved.last
-    return Finding(float(solved.states[STEPS].forces["plate"][2]), note=_note(solved))
+    states = _smooth(lab, element, bulk * (1 + error))
+    return Finding(float(states[STEPS].forces["plate"][2]), note=_note(states))
 
 
 def volume(lab: Lab, element: str, bulk: float, error: float = 0.0) -> Finding:
     """V / V0 at a tenth of the height."""
-    solved = _smooth(lab, element, bulk * (1 + error))
-    assert solved.last
-    return Finding(solved.states[STEPS].scalars["volume_ratio"], note=_note(solved))
+    states = _smooth(lab, element, bulk * (1 + error))
+    return Finding(states[STEPS].scalars["volume_ratio"], note=_note(states))
 
 
 def way_back(lab: Lab, element: str, bulk: float, *, growing: bool = False) -> Finding:
     """How far from rest [mm] any node is when the plate is back."""
-    solved = _smooth(lab, element, bulk, growing=growing)
-    off = np.linalg.norm(solved.last.points - solved.states[0].points, axis=1)
-    return Finding(float(off.max()), note=_note(solved))
+    states = _smooth(lab, element, bulk, growing=growing)
+    off = np.linalg.norm(states[-1].points - states[0].points, axis=1)
+    return Finding(float(off.max()), note=_note(states))
 
 
 def _glued(lab: Lab, element: str, count: int, height: float, **settings: float) -> Solved:

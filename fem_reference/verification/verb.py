@@ -1,9 +1,8 @@
 """What the verb ``verify`` does; the command line prints it."""
 
 import time
-from pathlib import Path
 
-from fem_reference import __version__, report
+from fem_reference import __version__
 from fem_reference.catalogue import Result
 from fem_reference.execution import versions
 from fem_reference.field_verbs import Told
@@ -13,8 +12,8 @@ from fem_reference.verification import runner
 _HEADS = ("entry", "value", "truth", "unit", "error", "within", "order", "seconds", "verdict")
 
 
-def verify(names: list[str], spoiled: list[str], out: Path) -> Told:
-    """The entries that ``names`` and ``spoiled`` mean (all where there are none), the latter with their spoils; and their page."""
+def verify(names: list[str], spoiled: list[str]) -> Verification:
+    """What came of the entries that ``names`` and ``spoiled`` mean (all where there are none), the latter with their spoils."""
     from fem_reference.verification.lab import lab  # loads the solvers
 
     catalogue = runner.entries()
@@ -24,13 +23,12 @@ def verify(names: list[str], spoiled: list[str], out: Path) -> Told:
     begin = time.perf_counter()
     results = runner.run(wanted, lab, wrong)
     made_with = {"fem_reference": __version__, **versions()}
-    return told(Verification(results, time.perf_counter() - begin, made_with), out)
+    return Verification(results, time.perf_counter() - begin, made_with)
 
 
-def told(verification: Verification, out: Path) -> Told:
-    """The page and the numbers of a verification, written into ``out``, and what to tell of it."""
-    page = report.write_verification(verification, out)
-    text = [*_lines(verification.results), verification.summary, f"page: {page}"]
+def told(verification: Verification) -> Told:
+    """What to tell of a verification."""
+    text = [*_lines(verification.results), verification.summary]
     return Told(facts(verification), "\n".join(text), verification.word)
 
 

@@ -64,7 +64,8 @@ def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
         job = Path(folder) / "job.pickle"
         job.write_bytes(pickle.dumps(Job(body, settings, _samples(problem))))
         outcome = _run(_command(settings, job), settings, lambda frame: sink(_with_held(problem, frame)))
-    return replace(outcome, cost={"seconds_mesh": problem.seconds} | outcome.cost)
+    key = " (muscle.tet_size)" if outcome.message.endswith("smaller cells") else ""  # which a scene calls them
+    return replace(outcome, message=outcome.message + key, cost={"seconds_mesh": problem.seconds} | outcome.cost)
 
 
 def _with_held(problem: Problem, frame: Frame) -> Frame:

@@ -44,7 +44,7 @@ class Body:
         self.internal = compiling.form(form.residual)
         self.held = [Hold(self.unknowns, entry, form.regions[entry.on]) for entry in body.prescribed]
         self.determinants = Determinants(self.mesh, self.cells, form.determinant, form.rule[0], body.mesh.kind)
-        springs = sum((hold.springs(form.measure(hold.entry.on)) for hold in self.held if hold.entry.stiffness), 0)
+        springs = sum((hold.springs(form.measure(hold.entry.on)) for hold in self.held), 0)
         self.newton = self._newton(form.residual + springs, settings)
         self.nodes = meshes.Nodes(body.mesh, self.cells, ufl.split(self.unknowns)[0])
 

@@ -37,13 +37,17 @@ class Hold:
     @property
     def conditions(self) -> list[Any]:
         """The conditions of what is prescribed exactly."""
-        return [] if self.entry.stiffness else [component.condition for component in self.components]
+        if self.entry.stiffness is not None:
+            return []
+        return [component.condition for component in self.components]
 
     def springs(self, measure: Any) -> Any:
-        """The weak form of springs that pull towards what is prescribed; ``measure`` is that of the region."""
+        """The weak form of springs that pull towards what is prescribed, 0 where it is exact; ``measure`` is of the region."""
+        if self.entry.stiffness is None:
+            return 0
         displacement = ufl.split(self.unknowns)[0]
         test = ufl.split(ufl.TestFunction(self.unknowns.function_space))[0]
-        stiffness = fem.Constant(self.unknowns.function_space.mesh, float(self.entry.stiffness or 0.0))
+        stiffness = fem.Constant(self.unknowns.function_space.mesh, float(self.entry.stiffness))
         return sum(
             stiffness * (displacement[entry.component] - entry.values) * test[entry.component] * measure
             for entry in self.components

@@ -3,11 +3,12 @@
 import importlib.util
 import json
 import re
+import signal
 import subprocess
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
 from typing import Any
 
 from fem_reference.children import environment
@@ -22,6 +23,7 @@ _SETTINGS = {
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
     "OMPI_MCA_rmaps_base_oversubscribe": "1",
 }
+_PATIENCE = 5.0  # [s] until a process that was asked to end is killed
 MARK = "@fem_reference "  # begins each line of the worker's output that is meant for us
 
 
@@ -33,17 +35,19 @@ def require_installed() -> None:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Worker:
-    """A running ``process``; ``timed_out`` is set when the ``time_limit`` [s] ended it, ``errors`` are the lines of its error
-    output so far, which the ``listener`` reads.
-    """
+class Process:
+    """A running ``process``, whose error output is read as it comes."""
 
-    process: subprocess.Popen[str]
-    time_limit: float | None
-    errors: list[str]
-    listener: threading.Thread
-    timed_out: threading.Event = field(default_factory=threading.Event)
+    def __init__(self, process: subprocess.Popen[str]) -> None:
+        self.process = process
+        self.overran: float | None = None  # the time limit [s] that ended it
+        self.errors: list[str] = []
+        self.listener = threading.Thread(target=self._listen)
+        self.listener.start()
+
+    def _listen(self) -> None:
+        assert self.process.stderr is not None
+        self.errors.extend(line for line in self.process.stderr if line.strip())
 
     def events(self) -> Iterator[dict[str, Any]]:
         """What it reports, until its output ends."""
@@ -56,8 +60,8 @@ class Worker:
         """How it ended without a report; ``kept`` says what there is all the same."""
         code = self.process.wait()
         self.listener.join(timeout=5)  # its last words may still be under way
-        if self.timed_out.is_set():
-            return Outcome("timed out", f"stopped after {self.time_limit:.0f} s, the time limit; {kept}")
+        if self.overran is not None:
+            return Outcome("timed out", f"stopped after {self.overran:g} s, the time limit; {kept}")
         return Outcome("crashed", f"the FEniCSx process ended with exit status {code} ({self._reason()}); {kept}")
 
     def _reason(self) -> str:
@@ -72,18 +76,36 @@ class Worker:
             self.process.stdin.write(f"{line}\n")
             self.process.stdin.flush()
 
-    def stop(self) -> None:
-        """End it for the time limit: mpiexec ignores a signal that comes before its own processes."""
-        self.timed_out.set()
+    @contextmanager
+    def limited(self, time_limit: float | None) -> Iterator[None]:
+        """End it where what is done meanwhile takes longer than ``time_limit`` [s]."""
+        seconds = threading.TIMEOUT_MAX if time_limit is None else time_limit
+        timer = threading.Timer(seconds, self._overrun, [seconds])
+        timer.daemon = True
+        timer.start()
+        try:
+            yield
+        finally:
+            timer.cancel()
+            timer.join()  # where it has begun to end the process, that is over after this
+
+    def _overrun(self, time_limit: float) -> None:
+        self.overran = time_limit
+        self.end()
+
+    def end(self) -> None:
+        """End it: ask again and again, as mpiexec ignores a signal that comes before its own processes; at last kill it."""
+        asked = time.monotonic()
         while self.process.poll() is None:
-            self.process.terminate()
+            patient = time.monotonic() - asked < _PATIENCE
+            self.process.send_signal(signal.SIGTERM if patient else signal.SIGKILL)
             with suppress(subprocess.TimeoutExpired):
                 self.process.wait(timeout=0.5)
 
 
 @contextmanager
-def running(command_line: list[str], time_limit: float | None, *, fed: bool = False) -> Iterator[Worker]:
-    """The worker that ``command_line`` starts; it has ended when this does. One that is ``fed`` reads lines from us until then."""
+def running(command_line: list[str], time_limit: float | None, *, fed: bool = False) -> Iterator[Process]:
+    """The process that ``command_line`` starts; it has ended when this does. One that is ``fed`` reads lines from us until then."""
     process = subprocess.Popen(
         command_line,
         stdin=subprocess.PIPE if fed else subprocess.DEVNULL,
@@ -93,28 +115,17 @@ def running(command_line: list[str], time_limit: float | None, *, fed: bool = Fa
         errors="replace",
         env=environment(**_SETTINGS),
     )
-    assert process.stderr is not None
-    errors: list[str] = []
-    listener = threading.Thread(
-        target=lambda stream: errors.extend(line for line in stream if line.strip()), args=[process.stderr]
-    )
-    worker = Worker(process, time_limit, errors, listener)
-    listener.start()
-    timer = threading.Timer(time_limit or threading.TIMEOUT_MAX, worker.stop)
-    timer.daemon = True
-    timer.start()
+    started = Process(process)
     try:
-        yield worker
-        if process.stdin is not None:
-            with suppress(BrokenPipeError):
-                process.stdin.close()
-        process.wait()
-    finally:
-        timer.cancel()
-        if process.poll() is None:
-            process.terminate()
+        with started.limited(time_limit):
+            yield started
+            if process.stdin is not None:
+                with suppress(BrokenPipeError):
+                    process.stdin.close()
             process.wait()
-        listener.join()
+    finally:
+        started.end()
+        started.listener.join()
         for stream in (process.stdin, process.stdout, process.stderr):
             if stream is not None:
                 stream.close()

@@ -13,7 +13,7 @@ from fem_reference.children import command
 from fem_reference.continuum import Continuum, Reached, Solved, check
 from fem_reference.runs import Outcome
 from fem_reference.solvers.fenicsx.jobs import Job
-from fem_reference.solvers.fenicsx.processes import Worker, require_installed, running
+from fem_reference.solvers.fenicsx.processes import Process, require_installed, running
 from fem_reference.solvers.fenicsx.settings import BodySettings
 
 
@@ -23,29 +23,39 @@ class Session:
     def __init__(self, folder: Path, stack: ExitStack) -> None:
         """``folder``: where jobs and states are passed; ``stack`` ends the processes."""
         self.folder, self.stack = folder, stack
-        self.worker: Worker | None = None
+        self.process: Process | None = None
         self.closed = False
 
     def solve(self, body: Continuum, settings: BodySettings) -> Solved:
-        """The states of ``body``; a process that dies is the status *crashed*, not an exception. RuntimeError once it is closed."""
+        """The states of ``body``; a process that dies is the status *crashed*, and one that takes longer than the time limit is
+        ended and *timed out*, not an exception. RuntimeError once it is closed.
+        """
         if self.closed:
             raise RuntimeError("the session is closed")
         check(body, settings.element)
         job = self.folder / "job.pickle"
         job.write_bytes(pickle.dumps(Job(body, settings, {})))
-        if self.worker is None:
-            self.worker = self.stack.enter_context(running(command("-m", _WORKER, "-"), None, fed=True))
-        self.worker.feed(str(job))
-        states: list[Reached] = []
-        for event in self.worker.events():
-            if "frame" not in event:
-                return Solved(tuple(states), Outcome(event["status"], event["message"], event["cost"]))
-            states.append(_state(event))
-        dead, self.worker = self.worker, None
-        return Solved(tuple(states), dead.ending(f"{len(states)} states are kept"))
+        if self.process is None:
+            self.process = self.stack.enter_context(running(command("-m", _WORKER, "-"), None, fed=True))
+        with self.process.limited(settings.time_limit):
+            solved = _solved(self.process, job)
+        if self.process.overran is not None or solved.outcome.status == "crashed":
+            self.process = None
+        return solved
 
 
 _WORKER = "fem_reference.solvers.fenicsx.worker"
+
+
+def _solved(process: Process, job: Path) -> Solved:
+    """What ``process`` makes of the ``job``."""
+    process.feed(str(job))
+    states: list[Reached] = []
+    for event in process.events():
+        if "frame" not in event:
+            return Solved(tuple(states), Outcome(event["status"], event["message"], event["cost"]))
+        states.append(_state(event))
+    return Solved(tuple(states), process.ending(f"{len(states)} states are kept"))
 
 
 def _state(event: dict[str, Any]) -> Reached:

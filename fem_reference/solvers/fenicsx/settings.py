@@ -13,6 +13,7 @@ class BodySettings(Record):
     easy step (at most 5 Newton iterations) and is halved when Newton needs more than ``newton_iterations`` or a cell inverts.
     ``residual`` [N, mm3] ends Newton's iteration: the norm of out-of-balance nodal forces and of the volume equation.
     ``quadrature_degree``: of the polynomials that are integrated exactly on a straight cell, by default what the element needs.
+    ``time_limit``: when to give up, by default never.
     """
 
     element: str = "P2/P1"

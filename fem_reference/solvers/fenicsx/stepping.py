@@ -19,20 +19,23 @@ class Attempt:
 
 
 @dataclass(frozen=True)
-class Reached:
-    """A requested frame was reached, or (``failed``) could not be: steps, Newton iterations and cut-backs since the last one."""
+class Step:
+    """The way to a requested frame: load steps, Newton iterations and cut-backs since the last one. Where it could not be
+    reached, ``status`` and ``sentence`` are those of the last attempt, and the last good state is ``at`` a frame.
+    """
 
     frame: float
     steps: int
     iterations: int
     cutbacks: int
-    failed: Attempt | None = None
+    status: Status = "converged"
+    sentence: str = ""
     at: float = 0.0
 
 
 def march(
     attempt: Callable[[float], Attempt], frames: tuple[float, ...], first_step: float, smallest_step: float
-) -> Iterator[Reached]:
+) -> Iterator[Step]:
     """Go from ``frames[0]`` (where the body rests) through every frame; ``attempt`` solves at a load, from the last state that
     converged, and must leave that state untouched where it fails. Ends after the first frame that cannot be reached.
     """
@@ -48,10 +51,10 @@ def march(
                 cutbacks += 1
                 step = size / 2
                 if step < smallest_step:
-                    yield Reached(frame, steps, iterations, cutbacks, result, at)
+                    yield Step(frame, steps, iterations, cutbacks, result.failure, result.sentence, at)
                     return
                 continue
             at = frame if size == left else at + size
             steps += 1
             step = step * GROWTH if result.iterations <= EASY else size
-        yield Reached(frame, steps, iterations, cutbacks, at=at)
+        yield Step(frame, steps, iterations, cutbacks, at=at)

@@ -17,7 +17,7 @@ from fem_reference.solvers.fenicsx.processes import MARK
 
 from fem_reference.solvers.fenicsx import compiling  # isort: skip - after the door
 from fem_reference.solvers.fenicsx.body import Body  # isort: skip
-from fem_reference.solvers.fenicsx.stepping import Attempt, Reached, march  # isort: skip
+from fem_reference.solvers.fenicsx.stepping import Attempt, Step, march  # isort: skip
 
 _PHASES = ("SNESFunctionEval", "SNESJacobianEval", "MatSolve", "MatLUFactorSym", "MatLUFactorNum")
 
@@ -39,7 +39,7 @@ class Worker:
     def run(self) -> None:
         """March through the frames and report how it ended."""
         frames, settings = self.job.body.frames, self.settings
-        self.report_frame(Reached(frames[0], 0, 0, 0))
+        self.report_frame(Step(frames[0], 0, 0, 0))
         for reached in march(self.attempt, frames, settings.first_step, settings.smallest_step):
             for name, count in (
                 ("newton_iterations", reached.iterations),
@@ -47,8 +47,8 @@ class Worker:
                 ("cut_backs", reached.cutbacks),
             ):
                 self.counts[name] += count
-            if reached.failed is not None:
-                self.report(status=reached.failed.failure, message=self.sentence(reached), cost=self.cost())
+            if reached.status != "converged":
+                self.report(status=reached.status, message=self.sentence(reached), cost=self.cost())
                 return
             self.report_frame(reached)
         self.report(status="converged", message=f"all {len(frames)} frames reached", cost=self.cost())
@@ -60,16 +60,15 @@ class Worker:
         self.solving += time.perf_counter() - begin
         return result
 
-    def sentence(self, reached: Reached) -> str:
+    def sentence(self, reached: Step) -> str:
         """Why a frame could not be reached, where, and what to try."""
-        assert reached.failed is not None
         return (
-            f"{reached.failed.sentence} beyond frame {reached.at:.2f} with steps down to {self.settings.smallest_step}; "
+            f"{reached.sentence} beyond frame {reached.at:.2f} with steps down to {self.settings.smallest_step}; "
             f"in the last good state det F is smallest, {self.body.determinants.smallest()}; "
-            "try smaller cells (muscle.tet_size) or a smaller motion"
+            "try a smaller motion or smaller cells"
         )
 
-    def report_frame(self, reached: Reached) -> None:
+    def report_frame(self, reached: Step) -> None:
         """Write the frame's positions and forces beside the job and tell of it."""
         forces, moments = self.body.forces()
         arrays = {name: self.body.positions(*sample) for name, sample in self.job.samples.items()}

@@ -13,8 +13,7 @@ from fem_reference.continuum import Continuum, Prescribed, Reached, Solved, chec
 from fem_reference.mesh import Floats, Ints
 from fem_reference.records import Record
 from fem_reference.runs import Outcome
-from fem_reference.solvers.fenicsx import stepping
-from fem_reference.solvers.fenicsx.stepping import Attempt, march
+from fem_reference.solvers.fenicsx.stepping import Attempt, Step, march
 from fem_reference.solvers.scikit_fem.equations import Equations
 
 log = logging.getLogger(__name__)
@@ -47,20 +46,20 @@ def solve_body(body: Continuum, settings: BodySettings) -> Solved:
     check(body, settings.element)
     begin = time.perf_counter()
     march_of = _March(body, settings)
-    states = [march_of.state(stepping.Reached(body.frames[0], 0, 0, 0))]
+    states = [march_of.state(Step(body.frames[0], 0, 0, 0))]
     counts = {"newton_iterations": 0.0, "load_steps": 0.0, "cut_backs": 0.0}
 
     def cost() -> dict[str, float]:
         return counts | {"seconds": time.perf_counter() - begin, "unknowns": float(march_of.equations.space.size)}
 
-    for reached in march(march_of.attempt, body.frames, settings.first_step, settings.smallest_step):
-        for name, count in zip(counts, (reached.iterations, reached.steps, reached.cutbacks), strict=True):
+    for step in march(march_of.attempt, body.frames, settings.first_step, settings.smallest_step):
+        for name, count in zip(counts, (step.iterations, step.steps, step.cutbacks), strict=True):
             counts[name] += count
-        if reached.failed is not None and reached.failed.failure is not None:
-            sentence = f"{reached.failed.sentence} beyond frame {reached.at:.4g}; try other cells or a smaller motion"
-            return Solved(tuple(states), Outcome(reached.failed.failure, sentence, cost()))
-        states.append(march_of.state(reached))
-        log.debug("frame %g: %d Newton iterations", reached.frame, reached.iterations)
+        if step.status != "converged":
+            sentence = f"{step.sentence} beyond frame {step.at:.4g}; try other cells or a smaller motion"
+            return Solved(tuple(states), Outcome(step.status, sentence, cost()))
+        states.append(march_of.state(step))
+        log.debug("frame %g: %d Newton iterations", step.frame, step.iterations)
     return Solved(tuple(states), Outcome("converged", f"all {len(states)} frames reached", cost()))
 
 
@@ -152,15 +151,15 @@ class _March:
                     values |= dict(zip((3 * nodes + i).tolist(), moved[:, i].tolist(), strict=True))
         return np.array(list(values), np.int64), np.array(list(values.values()))
 
-    def state(self, reached: stepping.Reached) -> Reached:
+    def state(self, step: Step) -> Reached:
         """What is to be told of the present unknowns."""
         equations, unknowns = self.equations, self.unknowns
         places = equations.space.rest + unknowns[: equations.space.rest.size].reshape(-1, 3)
-        residual, _ = equations.assembled(unknowns, reached.frame, springs=False)
+        residual, _ = equations.assembled(unknowns, step.frame, springs=False)
         held = {entry.name: self._force(entry, places, residual) for entry in self.body.prescribed}
         inside, vertices = equations.smallest_determinants(unknowns)
         return Reached(
-            reached.frame,
+            step.frame,
             places[equations.space.nodes],
             {name: force for name, (force, _) in held.items()},
             {name: moment for name, (_, moment) in held.items()},
@@ -168,9 +167,9 @@ class _March:
                 "min_det_F_quadrature": inside,
                 "min_det_F_vertices": vertices,
                 "volume_ratio": equations.volume_ratio(unknowns),
-                "energy": equations.energy(unknowns, reached.frame),
-                "newton_iterations": float(reached.iterations),
-                "cut_backs": float(reached.cutbacks),
+                "energy": equations.energy(unknowns, step.frame),
+                "newton_iterations": float(step.iterations),
+                "cut_backs": float(step.cutbacks),
             },
         )
 
