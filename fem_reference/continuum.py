@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from fem_reference.contact import Contact, Obstruction
 from fem_reference.effects import Effect, Load
 from fem_reference.errors import InputError
 from fem_reference.mesh import Floats, Ints
@@ -35,7 +36,8 @@ def check(body: "Continuum", element: str) -> None:
     check_element(element, body.mesh.kind, body.mesh.degree, body.effects, "element")
     _check_prescribed(body.prescribed)
     held = [entry.on for entry in body.prescribed]
-    used = dict.fromkeys([*held, *(effect.on for effect in body.effects if isinstance(effect, Load))])
+    pushed = [body.contact.on] if body.contact else []
+    used = dict.fromkeys([*held, *pushed, *(effect.on for effect in body.effects if isinstance(effect, Load))])
     for on in used:
         if on not in body.mesh.facets:
             raise InputError("on", f'"{on}"', f"a region of the body: {', '.join(body.mesh.facets)}")
@@ -159,21 +161,26 @@ class ByCell:
 
 @dataclass(frozen=True, eq=False)
 class Continuum:
-    """A body of ``mesh`` with its ``effects``; at ``frames[0]`` it rests. A load acts on the facets that its ``on`` names."""
+    """A body of ``mesh`` with its ``effects``; at ``frames[0]`` it rests. A load acts on the facets that its ``on`` names; by
+    ``contact``, where there is one, every obstruction pushes.
+    """
 
     mesh: Cells
     effects: tuple[Effect, ...]
     prescribed: tuple[Prescribed, ...]
     frames: tuple[float, ...]
     fibre: Directions | None = None
+    contact: Contact | None = None
+    obstructions: tuple[Obstruction, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class Reached:
     """A state of a body at a frame: ``points`` (n, 3) [mm] where the nodes of the mesh are, and by name of what is prescribed the
     ``forces`` (3,) [N] that hold it there, along the prescribed components, and their ``moments`` (3,) [N mm] about the origin (at
-    nodes of two regions that prescribe the same component, the force counts in both); ``scalars``: min_det_F_quadrature,
-    min_det_F_vertices, volume_ratio, energy [N mm], newton_iterations, cut_backs.
+    nodes of two regions that prescribe the same component, the force counts in both), and what obstructions exert; ``scalars``:
+    min_det_F_quadrature, min_det_F_vertices, volume_ratio, energy [N mm] of what acts inside, newton_iterations, cut_backs; with
+    contact the deepest penetration [mm], the greatest contact_pressure [MPa] and the contact_area at rest [mm2].
     """
 
     frame: float

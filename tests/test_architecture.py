@@ -25,6 +25,7 @@ ORDER = [
     "field",
     "casefile",
     "geometry",
+    "contact",
     "continuum",
     "problem",
     "solvers",

@@ -19,6 +19,7 @@ SHAPES: dict[str, Callable[[Kind, int], Cells]] = {
     "warped_box": lambda kind, degree: shapes.warped_box((3, 4, 3), (3.0, 4.0, 5.0), kind, degree),
     "tube_quarter": lambda kind, degree: shapes.tube_quarter(5.0, 10.0, 8.0, (2, 3, 2), kind, degree),
     "sphere_octant": lambda kind, degree: shapes.sphere_octant(5.0, 10.0, 2, 2, kind, degree),
+    "ball_octant": lambda kind, degree: shapes.ball_octant(1.0, 10.0, 2, 4, kind, degree),
     "cylinder": lambda kind, degree: shapes.cylinder(10.0, 20.0, 1, 2, kind, degree),
     "ventricle": lambda kind, degree: shapes.ventricle((1, 3, 1), kind, degree),
     "ventricle_quarter": lambda kind, degree: shapes.ventricle_quarter((1, 3, 1), kind, degree),
@@ -280,3 +281,15 @@ def test_a_warped_box_of_few_curved_tetrahedra_has_none_turned_over(counts: tupl
     ticks = np.array(list(product(np.linspace(0, 1, 9), repeat=3)))
     body = shapes.warped_box(counts, (1.0, 1.0, 1.0), "tetrahedron", 2)
     assert np.linalg.det(jacobians(body, ticks[ticks.sum(axis=1) <= 1])).min() > 0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_octant_of_a_ball_has_its_volume_and_grows_evenly(kind: Kind) -> None:
+    # Curved cells of an eighth of a turn are 3e-4 off the sphere; each layer along an axis is as many times the last.
+    body = shapes.ball_octant(1.0, 10.0, 2, 5, kind, 2)
+    assert volume(body) == pytest.approx(np.pi * 1000 / 6, rel=1e-3)
+    assert area(body, "outer") == pytest.approx(np.pi * 100 / 2, rel=1e-3)
+    on_axis = np.sort(body.points[(np.abs(body.points[:, :2]) < 1e-9).all(axis=1)][:, 2])[::2]
+    layers = np.diff(on_axis[on_axis > 1 - 1e-9])
+    assert layers[1:] / layers[:-1] == pytest.approx(layers[1] / layers[0], rel=1e-9)
+    assert layers[0] == pytest.approx(0.5, rel=1e-9)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from itertools import combinations, permutations
 
 import numpy as np
+from scipy.optimize import brentq
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
@@ -244,3 +245,28 @@ def ventricle(counts: Counts, kind: Kind, degree: int) -> Cells:
 def ventricle_quarter(counts: Counts, kind: Kind, degree: int) -> Cells:
     """The quarter x, y >= 0 of :func:`ventricle`, with the faces x0 and y0 too."""
     return mapped(_disc(_in_ventricle, _SQUARE_IN_VENTRICLE, counts, _VENTRICLE, quarter=True), kind, degree)
+
+
+def ball_octant(core: float, outer: float, n: int, layers: int, kind: Kind, degree: int) -> Cells:
+    """The octant x, y, z >= 0 of a ball: a cube of n cells a side of length ``core`` at its centre, and around it layers of cells
+    that grow evenly from those of the cube to the sphere of radius ``outer``. Faces: outer, x0, y0, z0.
+    """
+    size, far = core / n, outer - core
+    growth = brentq(lambda q: size * (q**layers - 1) / (q - 1) - far, 1 + 1e-9, 1 + far / size)
+
+    def patch(axis: int) -> Block:
+        one, other = (other for other in range(3) if other != axis)
+
+        def place(unit: Floats) -> Floats:
+            face = np.ones_like(unit)
+            face[:, [one, other]] = unit[:, :2]
+            way = np.ones_like(unit)
+            way[:, [one, other]] = np.tan(np.pi / 4 * unit[:, :2])
+            sphere = outer * way / np.linalg.norm(way, axis=1)[:, None]
+            share = (growth ** (layers * unit[:, 2:]) - 1) / (growth**layers - 1)
+            return np.asarray(core * face + share * (sphere - core * face))
+
+        return Block(place, (n, n, layers), {"x0": f"{'xyz'[one]}0", "y0": f"{'xyz'[other]}0", "z1": "outer"})
+
+    middle = Block(lambda unit: core * unit, (n, n, n), {face: face for face in ("x0", "y0", "z0")})
+    return mapped([middle, *(patch(axis) for axis in range(3))], kind, degree)

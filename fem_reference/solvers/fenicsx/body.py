@@ -15,6 +15,7 @@ from mpi4py import MPI
 from fem_reference.continuum import ELEMENTS, Continuum
 from fem_reference.mesh import Floats, Ints
 from fem_reference.solvers.fenicsx import compiling, forms, meshes
+from fem_reference.solvers.fenicsx.contact import watch
 from fem_reference.solvers.fenicsx.determinants import Determinants
 from fem_reference.solvers.fenicsx.holds import Hold
 from fem_reference.solvers.fenicsx.settings import BodySettings
@@ -41,14 +42,18 @@ class Body:
         self.amounts = form.amounts
         self.volume_form, self.energy_form = compiling.form(form.volume), compiling.form(form.energy)
         self.rest_volume = self.integral(self.volume_form)
-        self.internal = compiling.form(form.residual)
+        self.internal = compiling.form(form.residual, form.entity_maps)
+        self.pushes, self.frame = form.pushes, body.frames[0]
         self.held = [Hold(self.unknowns, entry, form.regions[entry.on]) for entry in body.prescribed]
         self.determinants = Determinants(self.mesh, self.cells, form.determinant, form.rule[0], body.mesh.kind)
         springs = sum((hold.springs(form.measure(hold.entry.on)) for hold in self.held), 0)
-        self.newton = self._newton(form.residual + springs, settings)
+        slope = ufl.derivative(springs, self.unknowns) if springs else 0
+        self.newton = self._newton(form.residual + springs, form.tangent + slope, form.entity_maps, settings)
+        if self.pushes:
+            watch(self.newton, self.update_pushes)
         self.nodes = meshes.Nodes(body.mesh, self.cells, ufl.split(self.unknowns)[0])
 
-    def _newton(self, equations: Any, settings: BodySettings) -> NonlinearProblem:
+    def _newton(self, equations: Any, tangent: Any, maps: Any, settings: BodySettings) -> NonlinearProblem:
         """Newton's method, each step whole and by a sparse LU factorisation (MUMPS).
 
         A line search would weigh out-of-balance forces [N] against volumes [mm3]: it stalls where bodies bend or are soft.
@@ -67,6 +72,8 @@ class Body:
         return NonlinearProblem(
             equations,
             self.unknowns,
+            J=tangent,
+            entity_maps=maps,
             bcs=[condition for hold in self.held for condition in hold.conditions],
             petsc_options=options,
             jit_options=compiling.OPTIONS,
@@ -77,6 +84,11 @@ class Body:
     def size(self) -> int:
         """How many unknowns there are, over all ranks."""
         return int(self.unknowns.function_space.dofmap.index_map.size_global)
+
+    def update_pushes(self) -> None:
+        """Bring what obstructions do up to date with the unknowns."""
+        if self.pushes:
+            self.pushes.update(self.frame)
 
     def attempt(self, frame: float) -> Attempt:
         """Solve at ``frame`` from the present state; on failure go back to it. A state in which det F is not positive, at a
@@ -99,13 +111,15 @@ class Body:
             amount.value = effect.amount(frame)
         for hold in self.held:
             hold.move_to(frame)
+        self.frame = frame
         self.newton.solve()
         snes = self.newton.solver
         return int(snes.getConvergedReason()), int(snes.getIterationNumber())
 
     def scalars(self) -> dict[str, float]:
         """The smallest det F at quadrature points and vertices, V/V0, and the energy [N mm]."""
-        return {
+        contact = self.pushes.scalars(self.comm) if self.pushes else {}
+        return contact | {
             "min_det_F_quadrature": self.determinants.smallest("quadrature point").value,
             "min_det_F_vertices": self.determinants.smallest("vertex").value,
             "volume_ratio": self.integral(self.volume_form) / self.rest_volume,
@@ -122,6 +136,7 @@ class Body:
         vector.scatter_reverse(la.InsertMode.add)
         now = np.array(self.unknowns.x.array)
         held = {hold.entry.name: hold.force(vector.array, now) for hold in self.held}
+        held |= self.pushes.forces() if self.pushes else {}
         forces = {name: self.comm.allreduce(force, MPI.SUM) for name, (force, _) in held.items()}
         moments = {name: self.comm.allreduce(moment, MPI.SUM) for name, (_, moment) in held.items()}
         return forces, moments

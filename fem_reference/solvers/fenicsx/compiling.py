@@ -12,9 +12,9 @@ PATIENCE = 300  # [s] that a process waits for another's compilation
 OPTIONS = {"timeout": PATIENCE}
 
 
-def form(expression: Any) -> Any:
-    """A compiled form."""
-    return fem.form(expression, jit_options=OPTIONS)
+def form(expression: Any, entity_maps: Any = None) -> Any:
+    """A compiled form; ``entity_maps``: how meshes that meet in it lie in each other."""
+    return fem.form(expression, jit_options=OPTIONS, entity_maps=entity_maps)
 
 
 def expression(value: Any, points: Any) -> Any:

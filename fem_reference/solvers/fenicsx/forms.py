@@ -12,6 +12,7 @@ from fem_reference.continuum import Continuum
 from fem_reference.effects import Effect, Load, State, total_energy
 from fem_reference.mesh import Floats, Ints
 from fem_reference.solvers.fenicsx import meshes, quadrature
+from fem_reference.solvers.fenicsx.contact import Pushes
 from fem_reference.solvers.fenicsx.settings import BodySettings
 
 Rule = tuple[Floats, Floats]
@@ -53,12 +54,29 @@ class Form:
         self.determinant = state.J
         self.volume, self.energy = state.J * self.dx, total_energy(acting, state) * self.dx
         test = ufl.TestFunction(unknowns.function_space)
+        step = ufl.TrialFunction(unknowns.function_space)
         self.residual = ufl.derivative(self.energy, unknowns, test)
         for effect, amount in acting:
             if isinstance(effect, Load):
                 traction = effect.traction(replace(state, amount=amount), list(ufl.FacetNormal(msh)))
                 work = sum(a * b for a, b in zip(traction, ufl.split(test)[0], strict=True))
                 self.residual -= work * self.measure(effect.on)
+        self.tangent = ufl.derivative(self.residual, unknowns, step)
+        self.pushes = self._pushes(body, unknowns, degree)
+        if self.pushes is not None:
+            measure, moved, along = self.measure(self.pushes.law.on), ufl.split(test)[0], ufl.split(step)[0]
+            self.residual += self.pushes.residual(moved, measure)
+            self.tangent += self.pushes.tangent(along, moved, measure)
+
+    @property
+    def entity_maps(self) -> list[Any] | None:
+        """What compiled forms need to know of the facets that obstructions push on."""
+        return [self.pushes.map] if self.pushes else None
+
+    def _pushes(self, body: Continuum, unknowns: fem.Function, degree: int) -> Pushes | None:
+        """What obstructions do, where there is contact."""
+        law = body.contact
+        return None if law is None else Pushes(body, law, unknowns, self.regions[law.on], degree)
 
     def measure(self, region: str) -> Any:
         """The measure of the facets of ``region``."""

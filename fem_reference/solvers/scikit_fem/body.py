@@ -10,6 +10,7 @@ from pydantic import Field
 from scipy.sparse.linalg import splu
 
 from fem_reference.continuum import Continuum, Prescribed, Reached, Solved, check
+from fem_reference.errors import InputError
 from fem_reference.mesh import Floats, Ints
 from fem_reference.records import Record
 from fem_reference.runs import Outcome
@@ -44,6 +45,8 @@ class BodySettings(Record):
 def solve_body(body: Continuum, settings: BodySettings) -> Solved:
     """The states of ``body`` at its frames, as far as they can be reached."""
     check(body, settings.element)
+    if body.contact is not None:
+        raise InputError("contact", "obstructions", "a body without, as this solver knows no contact")
     begin = time.perf_counter()
     march_of = _March(body, settings)
     states = [march_of.state(Step(body.frames[0], 0, 0, 0))]

@@ -1,0 +1,39 @@
+"""Rigid bodies that push: what is in the way of a deformable body, and the law of the pressure between them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from fem_reference.geometry.rigid_bodies import Obstacle
+from fem_reference.mesh import Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Obstruction:
+    """A rigid body in the way: its ``shape`` in its own rest frame, and the 4 x 4 matrix ``pose`` of a frame number that takes it
+    to where it is; both picklable.
+    """
+
+    name: str
+    shape: Obstacle
+    pose: Callable[[float], Floats]
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Obstructions push on the region ``on`` without friction, with any sliding: by a pressure of the gap g, the signed distance
+    (negative inside), that is zero beyond ``smoothing`` d [mm], ``k (d - g)^2 / (4 d)`` from d to -d, and ``-k g`` deeper: the
+    slope of an energy per rest area, twice differentiable. ``stiffness``: k [MPa/mm]; pressed by p, a surface gets p / k deep.
+    """
+
+    on: str
+    stiffness: float
+    smoothing: float
+
+    def pressure(self, gap: Floats) -> tuple[Floats, Floats]:
+        """The pressure (n,) [MPa] at gaps (n,) [mm], and its slope in the gap [MPa/mm]; NaN for NaN."""
+        k, d = self.stiffness, self.smoothing
+        near = np.where(gap > d, 0.0, d - gap)
+        pressure = np.where(gap < -d, -k * gap, k * near**2 / (4 * d))
+        return pressure, np.where(gap < -d, -k, -k * near / (2 * d))

@@ -1,0 +1,146 @@
+"""Bodies that are pushed by rigid ones: a plate on a block, and a ball on a large body, as Hertz has it."""
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
+
+from fem_reference.catalogue import Entry, Finding, Lab
+from fem_reference.contact import Contact, Obstruction
+from fem_reference.continuum import ELEMENTS, Continuum, Prescribed, Reached
+from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere, Vector
+from fem_reference.mesh import Floats
+from fem_reference.truths import find
+from fem_reference.verification import shapes
+from fem_reference.verification.courses import Rest
+from fem_reference.verification.parts import SYMMETRY, neo_hooke
+
+MU = 0.01  # [MPa]
+PLATE_BULK, PLATE_STIFFNESS, PLATE_WAY = 10.0, 1.0, 0.5  # [MPa], [MPa/mm] and [mm], on a cube of 1 mm
+RADIUS, APPROACH, BULK = 10.0, 0.1, 10.0  # of the ball [mm], and of the body [MPa]: pressed to a contact of 1 mm
+BALL_STIFFNESS, FAR, CORE = 2.0, 300.0, 1.2  # [MPa/mm]; where the body ends, and its finest part [mm]
+
+
+@dataclass(frozen=True)
+class Slide:
+    """A rigid body, turned by the rotation vector ``turned`` [rad] and moved by ``start`` [mm], that goes by ``way`` [mm] from
+    frame 0 to frame 1.
+    """
+
+    way: Vector
+    start: Vector = (0.0, 0.0, 0.0)
+    turned: Vector = (0.0, 0.0, 0.0)
+
+    def __call__(self, frame: float) -> Floats:
+        """Its pose, 4 x 4."""
+        pose = np.eye(4)
+        pose[:3, :3] = Rotation.from_rotvec(self.turned).as_matrix()
+        pose[:3, 3] = np.array(self.start) + np.array(self.way) * frame
+        return pose
+
+
+def plate(lab: Lab, element: str, stiffness: float) -> Finding:
+    """The force [N] of a smooth plate that is moved down on an eighth of a cube of 2 mm."""
+    mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), ELEMENTS[element][0])
+    law = Contact("z1", stiffness, 0.01)
+    above = Obstruction("plate", HalfSpace((0.0, 0.0, 1.0), (0.0, 0.0, -1.0)), Slide((0.0, 0.0, -PLATE_WAY)))
+    body = Continuum(mesh, neo_hooke(MU, PLATE_BULK), SYMMETRY, (0.0, 1.0), contact=law, obstructions=(above,))
+    state = lab.solve(body, element, first_step=0.2, residual=1e-12).last
+    return Finding(float(state.forces["plate"][2]), note=f"{state.scalars['penetration']:.4f} mm deep")
+
+
+def _plate_truth() -> float:
+    """The block's own force where the plate, a spring beyond its smoothing, has the same."""
+    force = partial(find("loads").squeeze_force, MU, PLATE_BULK, area=1.0)
+
+    def apart(stretch: float) -> float:
+        return float(force(stretch=stretch)) + PLATE_STIFFNESS * (stretch - (1 - PLATE_WAY))
+
+    return float(force(stretch=brentq(apart, 1 - PLATE_WAY, 1.0, xtol=1e-15)))
+
+
+def pressed(lab: Lab, n: int, radius: float = RADIUS) -> Reached:
+    """A quarter of a large body, z >= 0, into which a ball of ``radius`` [mm] is pushed by APPROACH."""
+    mesh = shapes.ball_octant(CORE, FAR, n, 2 * n + 2, "hexahedron", 2)
+    law = Contact("z0", BALL_STIFFNESS, 5e-4)
+    ball = Obstruction("ball", Sphere((0.0, 0.0, -radius), radius), Slide((0.0, 0.0, APPROACH)))
+    held = (*SYMMETRY[:2], Prescribed("far", "outer", (0, 1, 2), Rest()))
+    body = Continuum(mesh, neo_hooke(MU, BULK), held, (0.0, 1.0), contact=law, obstructions=(ball,))
+    return lab.solve(body, "Q2/Q1", first_step=0.5, residual=1e-10, newton_iterations=25).last
+
+
+def _force(state: Reached) -> float:
+    return 4 * float(state.forces["ball"][2])
+
+
+def _contact_radius(state: Reached) -> float:
+    """From the lever of the force on the quarter: Hertz's pressures have their middle at 3/8 of the radius."""
+    return 8 / 3 * float(-state.moments["ball"][1] / state.forces["ball"][2])
+
+
+def _peak(state: Reached) -> float:
+    return float(state.scalars["contact_pressure"])
+
+
+def _measured(lab: Lab, n: int, value: Any, radius: float = RADIUS) -> Finding:
+    state = pressed(lab, n, radius)
+    return Finding(
+        value(state), note=f"the ball is {1000 * state.scalars['penetration']:.1f} micrometres deep in the body"
+    )
+
+
+def _hertz() -> Any:
+    """The closed form for a rigid ball on a body of the same moduli."""
+    young, poisson = 9 * BULK * MU / (3 * BULK + MU), (3 * BULK - 2 * MU) / (2 * (3 * BULK + MU))
+    hertz = find("hertz")
+    return hertz.rigid_sphere(RADIUS, young, poisson, hertz.force_at(RADIUS, young, poisson, APPROACH))
+
+
+def _hertz_truth(name: str) -> float:
+    return float(getattr(_hertz(), name))
+
+
+def _hertz_entry(name: str, title: str, unit: str, attribute: str, value: Any) -> Entry:
+    return Entry(
+        name=f"hertz_{name}",
+        family="contact",
+        title=f"A rigid ball pressed into a large body: {title}",
+        unit=unit,
+        truth=partial(_hertz_truth, attribute),
+        within=0.02,
+        relative=True,
+        because="the mesh leaves 1 to 1.5 %, strains of a tenth, the end of the body and the depth of the ball in it less each",
+        kind="closed form",
+        source="Hertz 1882; validation/hertz.py",
+        measure=partial(_measured, n=4, value=value),
+        spoil="a ball of twice the radius",
+        spoiled=partial(_measured, n=4, value=value, radius=2 * RADIUS),
+    )
+
+
+ENTRIES = (
+    *(
+        Entry(
+            name=f"plate_{element.lower().replace('/', '_')}",
+            family="contact",
+            title=f"A smooth plate on a block, by {element}: its force at half the height",
+            unit="N",
+            truth=_plate_truth,
+            within=1e-9,
+            relative=True,
+            because="the state is homogeneous and the plate a spring: what is left is Newton's residual of 1e-12 N",
+            kind="closed form",
+            source="validation/loads.py: the squeeze of a block, in series with the spring",
+            measure=partial(plate, element=element, stiffness=PLATE_STIFFNESS),
+            spoil="a plate 1 % stiffer",
+            spoiled=partial(plate, element=element, stiffness=1.01 * PLATE_STIFFNESS),
+        )
+        for element in ("P2/P1", "Q2/Q1", "Q1/P0")
+    ),
+    _hertz_entry("force", "its force", "N", "force", _force),
+    _hertz_entry("radius", "the radius of the contact", "mm", "contact_radius", _contact_radius),
+    _hertz_entry("pressure", "the greatest pressure", "MPa", "peak_pressure", _peak),
+)
