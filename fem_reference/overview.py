@@ -37,12 +37,13 @@ def scene_facts(scene: Scene, setup: Setup) -> dict[str, Any]:
             bone.name: f"{len(bone.surface.triangles)} triangles, {_motion(bone.motion)}" for bone in setup.bones
         },
         "attachments": {
-            held.attachment: f"{len(held.vertices)} vertices, {areas[held.vertices].sum():.0f} mm2, held by {held.bone.name}"
+            held.attachment: f"{len(held.vertices)} vertices, {areas[held.vertices].sum():.0f} mm2, held by {held.bone.name} "
+            + ("exactly" if held.stiffness is None else f"by springs of {held.stiffness:g} MPa/mm")
             for held in setup.held
         },
         "effects": {effect.title: _parameters(effect) for effect in scene.effects},
         "frames": f"{scene.frames.first} to {scene.frames.last}, every {scene.frames.every}",
-        "reference": scene.reference.solver,
+        "reference": " ".join([scene.reference.solver, *(f"{k}={v}" for k, v in scene.reference.settings.items())]),
         "candidates": {candidate.name: candidate.solver for candidate in scene.candidate},
         "expects": [
             f"{e.of} {e.metric} {e.statistic} at frame {e.frame}: {e.truth} within {e.within} ({e.kind})"

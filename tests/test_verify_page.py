@@ -107,7 +107,7 @@ def test_numbers_have_six_digits_where_value_and_truth_stand_beside_each_other()
 
 def test_files_hold_the_same_numbers(tmp_path) -> None:
     told = verification(made(order=2.0, ladder=LADDER), made("tip", NAN))
-    page = report.write_verification(told, tmp_path / "new" / "reports")
+    page = report.write_verification(told, tmp_path / "new" / "reports", "verify")
     assert page == tmp_path / "new" / "reports" / "verify.html"
     assert page.read_text().count("badge pass") == 1
     stored = json.loads(page.with_name("verify.json").read_text())

@@ -37,13 +37,13 @@ def write_examples(title: str, examples: tuple[Example, ...], path: Path, *, dif
     files.write_text(path, text)
 
 
-def write_verification(verification: Verification, folder: Path) -> Path:
-    """Write ``verify.json`` and ``verify.html`` into ``folder``; the path of the page."""
+def write_verification(verification: Verification, folder: Path, name: str) -> Path:
+    """Write a page ``name`` and its numbers as JSON into ``folder``; the path of the page."""
     texts = {
-        "verify.json": json.dumps(verify_page.facts(verification), indent=1, allow_nan=False),
-        "verify.html": verify_page.render(verification),
+        f"{name}.json": json.dumps(verify_page.facts(verification), indent=1, allow_nan=False),
+        f"{name}.html": verify_page.render(verification),
     }
     folder.mkdir(parents=True, exist_ok=True)
-    for name, text in texts.items():
-        files.write_text(folder / name, text)
-    return folder / "verify.html"
+    for file, text in texts.items():
+        files.write_text(folder / file, text)
+    return folder / f"{name}.html"
