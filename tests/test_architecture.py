@@ -28,6 +28,7 @@ ORDER = [
     "contact",
     "continuum",
     "problem",
+    "stepping",
     "solvers",
     "metrics",
     "judge",

@@ -1,6 +1,6 @@
 """Adaptive load steps: every frame is hit, failures are cut, easy steps grow, and what cannot be reached is said."""
 
-from fem_reference.solvers.fenicsx.stepping import Attempt, march
+from fem_reference.stepping import Attempt, march
 
 
 def marched(attempt, frames=(0, 10, 20), first_step=10.0, smallest_step=0.5):

@@ -19,7 +19,7 @@ from fem_reference.solvers.fenicsx.contact import watch
 from fem_reference.solvers.fenicsx.determinants import Determinants
 from fem_reference.solvers.fenicsx.holds import Hold
 from fem_reference.solvers.fenicsx.settings import BodySettings
-from fem_reference.solvers.fenicsx.stepping import Attempt
+from fem_reference.stepping import Attempt
 
 _NOT_A_NUMBER = -4  # how PETSc's SNES ends there; the name of the constant depends on its version
 

@@ -30,9 +30,9 @@ class Hold:
 
     def __init__(self, unknowns: fem.Function, entry: Prescribed, facets: Ints) -> None:
         self.entry, self.unknowns = entry, unknowns
-        self.components = [_Component(unknowns, component, facets) for component in entry.components]
-        # All three of the nodes, for where the forces act now.
+        # All three of the nodes, for where the forces act now, and those that are prescribed.
         self.all = [_Component(unknowns, component, facets) for component in range(3)]
+        self.components = [self.all[component] for component in entry.components]
 
     @property
     def conditions(self) -> list[Any]:

@@ -17,7 +17,7 @@ from fem_reference.solvers.fenicsx.processes import MARK
 
 from fem_reference.solvers.fenicsx import compiling  # isort: skip - after the door
 from fem_reference.solvers.fenicsx.body import Body  # isort: skip
-from fem_reference.solvers.fenicsx.stepping import Attempt, Step, march  # isort: skip
+from fem_reference.stepping import Attempt, Step, march  # isort: skip
 
 _PHASES = ("SNESFunctionEval", "SNESJacobianEval", "MatSolve", "MatLUFactorSym", "MatLUFactorNum")
 

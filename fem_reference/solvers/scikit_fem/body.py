@@ -14,8 +14,8 @@ from fem_reference.errors import InputError
 from fem_reference.mesh import Floats, Ints
 from fem_reference.records import Record
 from fem_reference.runs import Outcome
-from fem_reference.solvers.fenicsx.stepping import Attempt, Step, march
 from fem_reference.solvers.scikit_fem.equations import Equations
+from fem_reference.stepping import Attempt, Step, march
 
 log = logging.getLogger(__name__)
 
