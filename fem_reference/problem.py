@@ -1,8 +1,11 @@
 """Scene -> everything a solver needs, as arrays: bodies, what is held, effects, fibres, frames. It knows no solver."""
 
 import logging
+import os
 import time
 from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
@@ -15,6 +18,8 @@ from fem_reference.geometry.distance import distances
 from fem_reference.geometry.embedding import Locator
 from fem_reference.geometry.fibres import directions, nearest_directions, trace
 from fem_reference.geometry.intersections import self_intersections
+from fem_reference.geometry.rigid_bodies import Obstacle
+from fem_reference.geometry.signed_distance import cached
 from fem_reference.geometry.tetrahedra import tetrahedralise
 from fem_reference.mesh import (
     Floats,
@@ -37,14 +42,26 @@ from fem_reference.scene import Scene
 
 log = logging.getLogger(__name__)
 
+# Up to here [mm] from a bone the distance to it is meant; where grids of distances are kept.
+DISTANCE_MARGIN = 12.0
+DISTANCES = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fem_reference" / "distances"
+
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A rigid bone: its ``surface`` at rest and its ``motion``, None where it rests."""
+    """A rigid bone: its ``surface`` at rest, its ``motion``, None where it rests, and how well the distance to the surface shall be
+    known, ``distance_error`` [mm].
+    """
 
     name: str
     surface: Surface
     motion: Rotation | None
+    distance_error: float = 0.05
+
+    @cached_property
+    def shape(self) -> Obstacle:
+        """The signed distance to the surface, in the frame of rest; InputError where the surface is not closed."""
+        return cached(self.surface, self.distance_error, DISTANCE_MARGIN, DISTANCES)
 
     def pose(self, frame: float) -> Floats:
         """The 4 x 4 matrix that takes rest positions to positions at ``frame``."""
@@ -157,7 +174,7 @@ def _body(scene: Scene, i: int) -> Body:
     bone = scene.bone[i]
     surface = files.read_surface(scene.file(bone.surface, f"bone[{i}].surface"), bone.unit)
     check_finite(surface)
-    return Body(bone.name, surface, bone.motion.rotation() if bone.motion else None)
+    return Body(bone.name, surface, bone.motion.rotation() if bone.motion else None, bone.distance_error)
 
 
 def _held(scene: Scene, surface: Surface, bones: tuple[Body, ...]) -> tuple[Held, ...]:

@@ -75,12 +75,15 @@ class Motion(Record):
 
 
 class Bone(Record):
-    """A rigid body; without ``motion`` it rests."""
+    """A rigid body; without ``motion`` it rests. ``distance_error``: how well the distance to its surface shall be known, root mean
+    square beside the surface.
+    """
 
     name: str
     surface: str
     unit: LengthUnit
     motion: Motion | None = None
+    distance_error: PositiveLength = 0.05
 
 
 class VertexList(Record):

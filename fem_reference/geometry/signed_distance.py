@@ -108,18 +108,18 @@ def build(surface: Surface, spacing: float, margin: float) -> Grid:
 
 
 def resolve(surface: Surface, error: float, margin: float) -> Grid:
-    """As ``build``, with the spacing halved until the grid's error [mm] is at most ``error``, or ``MOST_NODES`` forbids more.
+    """As ``build``, with the spacing halved until the grid's ``mean_error`` [mm] is at most ``error``, or ``MOST_NODES`` forbids
+    more: then its own errors say what it reached.
 
-    While cells are larger than triangles, the error falls with the square of the spacing and faster; then, and on sharp
-    edges and thin rims, which a grid rounds, in proportion to it; in a slit narrower than a cell not at all. So the finest
-    grid may stay above ``error``: its own ``error`` says what it reached.
+    The largest error is no such measure: on sharp edges and thin rims, which a grid rounds, it falls only in proportion to the
+    spacing, and in a slit narrower than a cell not at all.
     """
     spacing = float(np.ptp(surface.points, axis=0).max()) / _FIRST_CELLS
     grid = build(surface, spacing, margin)
-    while not grid.error <= error:
+    while not grid.mean_error <= error:
         spacing /= 2
         if math.prod(_extent(surface, spacing, margin)[1]) > MOST_NODES:
-            logger.warning("%s: error of its distance %.3g mm, wanted %.3g mm", surface.place, grid.error, error)
+            logger.warning("%s: error of its distance %.3g mm, wanted %.3g mm", surface.place, grid.mean_error, error)
             break
         grid = build(surface, spacing, margin)
     return grid
