@@ -257,7 +257,7 @@ def test_every_key_is_needed(bar: Path, line: str) -> None:
             "attachment, bone, candidate, effect, expect, fibres, frames, muscle, proves, reference, spoil, title",
         ),
         ("[muscle]\n", "muscle.colour", "surface, tet_size, unit"),
-        ("[[bone]]\n", "bone[0].colour", "motion, name, surface, unit"),
+        ("[[bone]]\n", "bone[0].colour", "distance_error, motion, name, surface, unit"),
         ("[[attachment]]\n", "attachment[0].colour", "bone, name, outline, stiffness, vertices, within"),
         ("[[effect]]\n", "effect[0].colour", "mu"),
         ("[fibres.traced]\n", "fibres.traced.colour", "count, end, start"),
