@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fem_reference.geometry.rigid_bodies import Obstacle
-from fem_reference.mesh import Floats
+from fem_reference.mesh import Floats, Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,16 +20,33 @@ class Obstruction:
     pose: Callable[[float], Floats]
 
 
-@dataclass(frozen=True)
-class Contact:
-    """Obstructions push on the region ``on`` without friction, with any sliding: by a pressure of the gap g, the signed distance
-    (negative inside), that is zero beyond ``smoothing`` d [mm], ``k (d - g)^2 / (4 d)`` from d to -d, and ``-k g`` deeper: the
-    slope of an energy per rest area, twice differentiable. ``stiffness``: k [MPa/mm]; pressed by p, a surface gets p / k deep.
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """Material points that obstructions push on, for a surface that the cells follow only roughly: the straight ``cells`` (n,)
+    they move with, ``points`` (n, 3) [mm] where they are at rest, somewhat outside their cell perhaps, and the rest ``areas``
+    (n,) [mm2] that each stands for.
     """
 
-    on: str
+    cells: Ints
+    points: Floats
+    areas: Floats
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Obstructions push without friction, with any sliding, on ``on``: the facets of a region, by name, or a skin. They push by a
+    pressure of the gap g, the signed distance (negative inside), that is zero beyond ``smoothing`` d [mm], ``k (d - g)^2 / (4 d)``
+    from d to -d, and ``-k g`` deeper: the slope of an energy per rest area, twice differentiable. ``stiffness``: k [MPa/mm];
+    pressed by p, a surface gets p / k deep.
+
+    With ``relaxed``, two frame numbers, a point that is too near at the first of them for no pressure feels as much less depth
+    there, and all of its depth from the second on: what overlaps at rest is pushed out gradually.
+    """
+
+    on: str | Skin
     stiffness: float
     smoothing: float
+    relaxed: tuple[float, float] | None = None
 
     def pressure(self, gap: Floats) -> tuple[Floats, Floats]:
         """The pressure (n,) [MPa] at gaps (n,) [mm], and its slope in the gap [MPa/mm]; NaN for NaN."""
@@ -37,3 +54,10 @@ class Contact:
         near = np.where(gap > d, 0.0, d - gap)
         pressure = np.where(gap < -d, -k * gap, k * near**2 / (4 * d))
         return pressure, np.where(gap < -d, -k, -k * near / (2 * d))
+
+    def allowance(self, frame: float) -> float:
+        """The share of what overlaps at rest that is not felt at ``frame``."""
+        if self.relaxed is None:
+            return 0.0
+        first, last = self.relaxed
+        return float(np.clip((last - frame) / (last - first), 0, 1))

@@ -14,13 +14,15 @@ from mpi4py import MPI
 
 from fem_reference.continuum import ELEMENTS, Continuum
 from fem_reference.mesh import Floats, Ints
-from fem_reference.solvers.fenicsx import compiling, forms, meshes
-from fem_reference.solvers.fenicsx.contact import watch
+from fem_reference.solvers.fenicsx import compiling, forms, meshes, pushed_points
+from fem_reference.solvers.fenicsx.contact import Pushes, Watched
 from fem_reference.solvers.fenicsx.determinants import Determinants
 from fem_reference.solvers.fenicsx.holds import Hold
 from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.stepping import Attempt
 
+# A load step in which a point gets so much deeper [mm] into an obstruction than it is at both ends goes through it: it is cut.
+DEEPER = 0.5
 _NOT_A_NUMBER = -4  # how PETSc's SNES ends there; the name of the constant depends on its version
 
 
@@ -42,18 +44,32 @@ class Body:
         self.amounts = form.amounts
         self.volume_form, self.energy_form = compiling.form(form.volume), compiling.form(form.energy)
         self.rest_volume = self.integral(self.volume_form)
-        self.internal = compiling.form(form.residual, form.entity_maps)
-        self.pushes, self.frame = form.pushes, body.frames[0]
+        self.internal = compiling.form(form.residual)
         self.held = [Hold(self.unknowns, entry, form.regions[entry.on]) for entry in body.prescribed]
         self.determinants = Determinants(self.mesh, self.cells, form.determinant, form.rule[0], body.mesh.kind)
         springs = sum((hold.springs(form.measure(hold.entry.on)) for hold in self.held), 0)
         slope = ufl.derivative(springs, self.unknowns) if springs else 0
-        self.newton = self._newton(form.residual + springs, form.tangent + slope, form.entity_maps, settings)
-        if self.pushes:
-            watch(self.newton, self.update_pushes)
+        self.newton = self._newton(form.residual + springs, form.tangent + slope, settings)
+        self.contact = self._contact(body, form) if body.contact else None
         self.nodes = meshes.Nodes(body.mesh, self.cells, ufl.split(self.unknowns)[0])
 
-    def _newton(self, equations: Any, tangent: Any, maps: Any, settings: BodySettings) -> NonlinearProblem:
+    def _contact(self, body: Continuum, form: forms.Form) -> Watched:
+        """What obstructions do, added to Newton's method."""
+        law, space, parents = body.contact, self.displacement_space, np.ravel(self.displacement_dofs)
+        assert law is not None  # asked for only where it is there
+        if isinstance(law.on, str):
+            facets = form.regions[law.on]
+            points = pushed_points.on_facets(space, parents, body.mesh, facets, form.degree)
+        else:
+            points = pushed_points.on_skin(space, parents, law.on, self.local)
+        pushes = Pushes(law, body.obstructions, points, self.unknowns, body.frames[0])
+        return Watched(self.newton, pushes, self._conditions)
+
+    @property
+    def _conditions(self) -> list[Any]:
+        return [condition for hold in self.held for condition in hold.conditions]
+
+    def _newton(self, equations: Any, tangent: Any, settings: BodySettings) -> NonlinearProblem:
         """Newton's method, each step whole and by a sparse LU factorisation (MUMPS).
 
         A line search would weigh out-of-balance forces [N] against volumes [mm3]: it stalls where bodies bend or are soft.
@@ -73,8 +89,7 @@ class Body:
             equations,
             self.unknowns,
             J=tangent,
-            entity_maps=maps,
-            bcs=[condition for hold in self.held for condition in hold.conditions],
+            bcs=self._conditions,
             petsc_options=options,
             jit_options=compiling.OPTIONS,
             petsc_options_prefix="fem_reference_",
@@ -85,11 +100,6 @@ class Body:
         """How many unknowns there are, over all ranks."""
         return int(self.unknowns.function_space.dofmap.index_map.size_global)
 
-    def update_pushes(self) -> None:
-        """Bring what obstructions do up to date with the unknowns."""
-        if self.pushes:
-            self.pushes.update(self.frame)
-
     def attempt(self, frame: float) -> Attempt:
         """Solve at ``frame`` from the present state; on failure go back to it. A state in which det F is not positive, at a
         quadrature point or a vertex, is inverted whatever Newton's method says.
@@ -97,9 +107,14 @@ class Body:
         before = np.array(self.unknowns.x.array)
         reason, iterations = self._solve(frame)
         smallest = self.determinants.smallest()
-        if reason > 0 and smallest.value > 0:
+        through = self.contact.pushes.tunnelled(self.comm, DEEPER) if self.contact and reason > 0 else None
+        if reason > 0 and smallest.value > 0 and through is None:
+            if self.contact:
+                self.contact.pushes.settle()
             return Attempt(None, iterations)
         self.unknowns.x.array[:] = before
+        if through is not None:
+            return Attempt("diverged", iterations, f"Newton's method converged, but {through}")
         if reason > 0:
             return Attempt("inverted", iterations, f"Newton's method converged, but det F fell to {smallest}")
         how = "went where a law has no value" if reason == _NOT_A_NUMBER else "did not converge"
@@ -111,14 +126,15 @@ class Body:
             amount.value = effect.amount(frame)
         for hold in self.held:
             hold.move_to(frame)
-        self.frame = frame
+        if self.contact:
+            self.contact.frame = frame
         self.newton.solve()
         snes = self.newton.solver
         return int(snes.getConvergedReason()), int(snes.getIterationNumber())
 
     def scalars(self) -> dict[str, float]:
         """The smallest det F at quadrature points and vertices, V/V0, and the energy [N mm]."""
-        contact = self.pushes.scalars(self.comm) if self.pushes else {}
+        contact = self.contact.pushes.scalars(self.comm) if self.contact else {}
         return contact | {
             "min_det_F_quadrature": self.determinants.smallest("quadrature point").value,
             "min_det_F_vertices": self.determinants.smallest("vertex").value,
@@ -135,8 +151,10 @@ class Body:
         vector = fem.assemble_vector(self.internal)
         vector.scatter_reverse(la.InsertMode.add)
         now = np.array(self.unknowns.x.array)
+        if self.contact:
+            vector.array[:] += self.contact.gathered()
         held = {hold.entry.name: hold.force(vector.array, now) for hold in self.held}
-        held |= self.pushes.forces() if self.pushes else {}
+        held |= self.contact.pushes.forces() if self.contact else {}
         forces = {name: self.comm.allreduce(force, MPI.SUM) for name, (force, _) in held.items()}
         moments = {name: self.comm.allreduce(moment, MPI.SUM) for name, (_, moment) in held.items()}
         return forces, moments

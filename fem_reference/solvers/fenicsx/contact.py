@@ -1,131 +1,200 @@
-"""Rigid bodies that push on a region: pressure of the gap at the quadrature points of its facets, with its tangent."""
+"""Rigid bodies that push on material points of a body: pressure of the gap, with its tangent, added to what DOLFINx assembles."""
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-import basix
-import basix.ufl
 import numpy as np
-import ufl
-from dolfinx import fem, mesh
+from dolfinx import fem, la
 from dolfinx.fem.petsc import NonlinearProblem, assign
 from mpi4py import MPI
-from numpy.typing import NDArray
+from petsc4py import PETSc
 
 from fem_reference.contact import Contact, Obstruction
-from fem_reference.continuum import Continuum
-from fem_reference.mesh import Floats, Ints
-from fem_reference.solvers.fenicsx import compiling
+from fem_reference.mesh import Floats
+from fem_reference.solvers.fenicsx.pushed_points import PushedPoints
+
+# A point is looked for at so many places of its way through an obstruction's frame between two states.
+_WAYPOINTS = 8
 
 
 @dataclass(frozen=True, eq=False)
 class Push:
-    """What one obstruction does at n ``points`` (n, 3) [mm]: ``depth`` (n,) [mm], negative outside, ``pressure`` (n,) [MPa per
-    rest area], ``traction`` (n, 3) and its ``slope`` (n, 3, 3) [MPa/mm].
+    """What one obstruction does at n points: ``gap`` (n,) [mm], negative inside, ``pressure`` (n,) [MPa per rest area],
+    ``traction`` (n, 3) and its ``slope`` (n, 3, 3) [MPa/mm]; ``local`` (n, 3) [mm], the points in the obstruction's rest frame.
     """
 
-    points: Floats
-    depth: Floats
+    gap: Floats
     pressure: Floats
     traction: Floats
     slope: Floats
+    local: Floats
 
 
-def push(law: Contact, obstruction: Obstruction, points: Floats, frame: float) -> Push:
-    """What ``obstruction`` does, where it is at ``frame``, to the ``points`` (n, 3) [mm]."""
+def push(law: Contact, obstruction: Obstruction, points: Floats, frame: float, allowed: Floats) -> Push:
+    """What ``obstruction`` does, where it is at ``frame``, to the ``points`` (n, 3) [mm], which feel ``allowed`` (n,) less depth."""
     pose = obstruction.pose(frame)
     turn = pose[:3, :3]
-    sampled = obstruction.shape.sample((points - pose[:3, 3]) @ turn)
-    pressure, change = law.pressure(sampled.distance)
+    local = (points - pose[:3, 3]) @ turn
+    sampled = obstruction.shape.sample(local)
+    pressure, change = law.pressure(sampled.distance + allowed)
     normal, curvature = sampled.gradient @ turn.T, turn @ sampled.curvature @ turn.T
     slope = change[:, None, None] * normal[:, :, None] * normal[:, None, :] + pressure[:, None, None] * curvature
-    return Push(points, -sampled.distance, pressure, pressure[:, None] * normal, slope)
+    return Push(sampled.distance, pressure, pressure[:, None] * normal, slope, local)
 
 
 class Pushes:
-    """What obstructions do on this rank's ``facets``: their traction and its slope at the quadrature points, as functions on the
-    facets that the weak form integrates; to be brought up to date before each assembly.
-    """
+    """What obstructions do to this rank's pushed points."""
 
-    def __init__(self, body: Continuum, law: Contact, unknowns: fem.Function, facets: Ints, degree: int) -> None:
-        """``degree`` of the rule on facets."""
-        self.obstructions, self.law, self.mesh = body.obstructions, law, unknowns.function_space.mesh
-        self.facets, self.map = mesh.create_submesh(self.mesh, 2, facets)[:2]
-        cell = "triangle" if body.mesh.kind == "tetrahedron" else "quadrilateral"
-        number, vector, tensor = (
-            fem.functionspace(self.facets, basix.ufl.quadrature_element(cell, value_shape=(3,) * rank, degree=degree))
-            for rank in range(3)
-        )
-        self.traction, self.slope = fem.Function(vector), fem.Function(tensor)
-        rule = ufl.Measure("dx", domain=self.facets, metadata={"quadrature_degree": degree})
-        self.areas: Floats = np.asarray(fem.assemble_vector(compiling.form(ufl.TestFunction(number) * rule)).array)
-        points = basix.make_quadrature(basix.CellType[cell], degree)[0]
-        self.now = compiling.expression(ufl.SpatialCoordinate(self.mesh) + ufl.split(unknowns)[0], points)
-        self.sides = self._sides()
-        self.last: dict[str, Push] = {}
-
-    def _sides(self) -> NDArray[np.int32]:
-        """Of each facet: a cell that it bounds, and which of the cell's facets it is, (f, 2)."""
-        topology, own = self.mesh.topology, self.facets.topology.index_map(2)
-        count = own.size_local + own.num_ghosts
-        numbers = self.map.sub_topology_to_topology(np.arange(count, dtype=np.int32), inverse=False)
-        cells, facets = topology.connectivity(2, 3), topology.connectivity(3, 2)
-        sides = [(cells.links(facet)[0], facet) for facet in numbers]
-        found = [(cell, int(np.flatnonzero(facets.links(cell) == facet)[0])) for cell, facet in sides]
-        return np.array(found, np.int32).reshape(-1, 2)
-
-    def residual(self, test: Any, measure: Any) -> Any:
-        """The weak form of the traction."""
-        return -ufl.dot(self.traction, test) * measure
-
-    def tangent(self, step: Any, test: Any, measure: Any) -> Any:
-        """Its slope along a displacement ``step``."""
-        return -ufl.dot(self.slope * step, test) * measure
+    def __init__(
+        self, law: Contact, obstructions: tuple[Obstruction, ...], points: PushedPoints, unknowns: fem.Function, frame: float
+    ) -> None:
+        """``frame``: where the body rests."""
+        self.law, self.obstructions, self.points, self.unknowns, self.frame = law, obstructions, points, unknowns, frame
+        none = np.zeros(len(points.areas))
+        at_rest = [push(law, entry, points.rest, frame, none) for entry in obstructions]
+        self.overlaps = [np.maximum(law.smoothing - one.gap, 0) if law.relaxed else none for one in at_rest]
+        self.now = self.settled = at_rest
 
     def update(self, frame: float) -> None:
-        """Traction and slope with the unknowns as they are and the obstructions where they are at ``frame``."""
-        if len(self.sides) == 0:
-            return
-        points = self.now.eval(self.mesh, self.sides).reshape(-1, 3)
-        self.last = {entry.name: push(self.law, entry, points, frame) for entry in self.obstructions}
-        self.traction.x.array[:] = np.sum([one.traction for one in self.last.values()], axis=0).ravel()
-        self.slope.x.array[:] = np.sum([one.slope for one in self.last.values()], axis=0).ravel()
+        """What obstructions do with the unknowns as they are and the obstructions where they are at ``frame``."""
+        self.frame, share = frame, self.law.allowance(frame)
+        points = self.points.positions(self.unknowns.x.array)
+        self.now = [
+            push(self.law, entry, points, frame, share * overlap)
+            for entry, overlap in zip(self.obstructions, self.overlaps, strict=True)
+        ]
 
-    def forces(self) -> dict[str, tuple[Floats, Floats]]:
-        """By name of an obstruction, the force (3,) [N] that it exerts on this rank's facets and its moment (3,) [N mm] about the
-        origin.
-        """
-        found = {entry.name: (np.zeros(3), np.zeros(3)) for entry in self.obstructions}
-        for name, one in self.last.items():
-            forces = self.areas[:, None] * one.traction[: len(self.areas)]
-            found[name] = forces.sum(axis=0), np.cross(one.points[: len(self.areas)], forces).sum(axis=0)
+    def residual(self, moves: Floats | None = None) -> Floats:
+        """The weak form of what they do, over this rank's unknowns, ghosts too; of ``moves`` of the unknowns too, linearly."""
+        traction = np.sum([one.traction for one in self.now], axis=0)
+        if moves is not None and moves.any():
+            way = np.einsum("nk,nki->ni", self.points.basis, moves[self.points.dofs])
+            traction = traction + np.einsum("nij,nj->ni", np.sum([one.slope for one in self.now], axis=0), way)
+        pushed = np.flatnonzero(traction.any(axis=1))
+        forces = -self.points.areas[pushed, None] * traction[pushed]
+        found = np.zeros(len(self.unknowns.x.array))
+        np.add.at(found, self.points.dofs[pushed], self.points.basis[pushed, :, None] * forces[:, None, :])
         return found
 
-    def scalars(self, comm: MPI.Comm) -> dict[str, float]:
-        """The deepest ``penetration`` [mm] and largest ``contact_pressure`` [MPa] at a quadrature point, and the rest area that is
-        pushed, ``contact_area`` [mm2].
+    def tangent(self) -> Iterator[tuple[Any, Any]]:
+        """The slope of the residual, cell by cell that is pushed: the unknowns (3 k,) and the matrix (3 k, 3 k)."""
+        slope = np.sum([one.slope for one in self.now], axis=0)
+        pushed = np.flatnonzero(slope.any(axis=(1, 2)))
+        cells, where = np.unique(self.points.cells[pushed], return_index=True)
+        some = self.points.take(pushed)
+        stiff = -some.areas[:, None, None] * slope[pushed]
+        for cell, first in zip(cells, where, strict=True):
+            mine = some.cells == cell
+            basis = some.basis[mine]
+            size = 3 * basis.shape[1]
+            yield some.dofs[first].ravel(), np.einsum("na,nij,nb->aibj", basis, stiff[mine], basis).reshape(size, size)
+
+    def forces(self) -> dict[str, tuple[Floats, Floats]]:
+        """By name of an obstruction, the force (3,) [N] that it exerts on this rank's points and its moment (3,) [N mm] about the
+        origin.
         """
-        pushed = np.zeros(len(self.areas), bool)
-        depth = pressure = 0.0
-        for one in self.last.values():
-            pushed |= one.pressure[: len(self.areas)] > 0
-            depth, pressure = max(depth, float(one.depth.max())), max(pressure, float(one.pressure.max()))
+        points, areas = self.points.positions(self.unknowns.x.array), self.points.areas[:, None]
         return {
-            "penetration": comm.allreduce(depth, MPI.MAX),
-            "contact_pressure": comm.allreduce(pressure, MPI.MAX),
-            "contact_area": comm.allreduce(float(self.areas[pushed].sum()), MPI.SUM),
+            entry.name: ((areas * one.traction).sum(axis=0), np.cross(points, areas * one.traction).sum(axis=0))
+            for entry, one in zip(self.obstructions, self.now, strict=True)
         }
 
+    def scalars(self, comm: MPI.Comm) -> dict[str, float]:
+        """The deepest ``penetration`` [mm] and largest ``contact_pressure`` [MPa] at a point, the rest area that is pushed,
+        ``contact_area`` [mm2], and how deep the deepest point that is pushed was at rest, ``overlap_at_rest`` [mm].
+        """
+        pushed = np.zeros(len(self.points.areas), bool)
+        depth = pressure = overlap = 0.0
+        for one, before in zip(self.now, self.overlaps, strict=True):
+            pushed |= one.pressure > 0
+            depth = max(depth, float(-one.gap.min(initial=0.0)))
+            pressure = max(pressure, float(one.pressure.max(initial=0.0)))
+            overlap = max(overlap, float(before.max(initial=0.0)) - self.law.smoothing)
+        found = {
+            "penetration": comm.allreduce(depth, MPI.MAX),
+            "contact_pressure": comm.allreduce(pressure, MPI.MAX),
+            "contact_area": comm.allreduce(float(self.points.areas[pushed].sum()), MPI.SUM),
+        }
+        return found | ({"overlap_at_rest": comm.allreduce(max(overlap, 0.0), MPI.MAX)} if self.law.relaxed else {})
 
-def watch(problem: NonlinearProblem, update: Callable[[], None]) -> None:
-    """Bring what does not follow the unknowns by itself up to date before each residual of Newton's method."""
-    assemble, _, context = problem.solver.getFunction()[1]
+    def deepest(self, comm: MPI.Comm) -> str:
+        """Where the deepest point is, and in which obstruction."""
+        points = self.points.positions(self.unknowns.x.array)
+        mine = [
+            (float(-one.gap.min()), entry.name, points[int(np.argmin(one.gap))].tolist())
+            for entry, one in zip(self.obstructions, self.now, strict=True)
+            if len(points)
+        ]
+        depth, name, (x, y, z) = max(one for rank in comm.allgather(mine) for one in rank)
+        return f'{max(depth, 0.0):.2f} mm in "{name}" at ({x:.1f}, {y:.1f}, {z:.1f}) mm'
 
-    def residual(snes: Any, x: Any, b: Any) -> None:
-        assign(x, problem.u)
-        problem.u.x.scatter_forward()
-        update()
-        assemble(snes, x, b, **context)
+    def settle(self) -> None:
+        """Take the present state as the one that the next step starts from."""
+        self.settled = self.now
 
-    problem.solver.setFunction(residual, problem.b)
+    def tunnelled(self, comm: MPI.Comm, deeper: float) -> str | None:
+        """Where a point went through an obstruction since the last settled state: on its straight way through the obstruction's
+        frame it was ``deeper`` [mm] than at both ends. None where none did.
+        """
+        mine = [found for i in range(len(self.obstructions)) if (found := self._through(i, deeper))]
+        found = [one for rank in comm.allgather(mine) for one in rank]
+        return max(found)[1] if found else None
+
+    def _through(self, i: int, deeper: float) -> tuple[float, str] | None:
+        before, now, entry = self.settled[i], self.now[i], self.obstructions[i]
+        moved = np.flatnonzero(np.linalg.norm(now.local - before.local, axis=1) > deeper)
+        shares = np.linspace(0, 1, _WAYPOINTS + 2)[1:-1, None, None]
+        way = (1 - shares) * before.local[moved] + shares * now.local[moved]
+        on_way = entry.shape.sample(way.reshape(-1, 3)).distance.reshape(_WAYPOINTS, -1).min(axis=0, initial=np.inf)
+        excess = np.minimum(np.minimum(before.gap, now.gap)[moved], 0) - on_way
+        if len(moved) == 0 or not excess.max() > deeper:
+            return None
+        worst = int(np.argmax(excess))
+        x, y, z = self.points.rest[moved[worst]]
+        return float(excess[worst]), f'the point that rests at ({x:.1f}, {y:.1f}, {z:.1f}) mm went through "{entry.name}"'
+
+
+class Watched:
+    """Newton's method of ``problem`` with the residual and the tangent of ``pushes`` added to what DOLFINx assembles."""
+
+    def __init__(self, problem: NonlinearProblem, pushes: Pushes, conditions: list[Any]) -> None:
+        self.problem, self.pushes, self.conditions, self.frame = problem, pushes, conditions, pushes.frame
+        unknowns = pushes.unknowns
+        space = unknowns.function_space
+        self.owned = space.dofmap.index_map.size_local * space.dofmap.index_map_bs
+        self.work = la.vector(space.dofmap.index_map, space.dofmap.index_map_bs)
+        self.free = np.ones(len(unknowns.x.array), bool)
+        for condition in conditions:
+            self.free[condition.dof_indices()[0]] = False
+        snes = problem.solver
+        self.assemble, _, self.context = snes.getFunction()[1]
+        snes.setFunction(self.residual, problem.b)
+        matrix, preconditioner, (self.linearise, _, self.linear_context) = snes.getJacobian()
+        snes.setJacobian(self.tangent, matrix, preconditioner)
+
+    def residual(self, snes: Any, x: Any, b: Any) -> None:
+        """What is out of balance at ``x``."""
+        assign(x, self.problem.u)
+        self.problem.u.x.scatter_forward()
+        self.pushes.update(self.frame)
+        self.assemble(snes, x, b, **self.context)
+        # Where unknowns are not yet what is prescribed, the tangent is asked what their move will do.
+        moves = np.zeros(len(self.free))
+        for condition in self.conditions:
+            condition.set(moves, self.problem.u.x.array, 1.0)
+        b.array[:] += self.gathered(moves)[: self.owned] * self.free[: self.owned]
+
+    def gathered(self, moves: Floats | None = None) -> Floats:
+        """The residual of the pushes over this rank's unknowns, with what other ranks add to its own."""
+        self.work.array[:] = self.pushes.residual(moves)
+        self.work.scatter_reverse(la.InsertMode.add)
+        return np.asarray(self.work.array)
+
+    def tangent(self, snes: Any, x: Any, matrix: Any, preconditioner: Any) -> None:
+        """The slope of the residual; the pushes are those of the residual, which comes before it."""
+        self.linearise(snes, x, matrix, preconditioner, **self.linear_context)
+        for dofs, block in self.pushes.tangent():
+            places = np.where(self.free[dofs], dofs, -1).astype(PETSc.IntType)  # PETSc leaves out what is negative
+            matrix.setValuesLocal(places, places, block, addv=PETSc.InsertMode.ADD)
+        matrix.assemble()

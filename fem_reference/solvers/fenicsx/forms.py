@@ -12,7 +12,6 @@ from fem_reference.continuum import Continuum
 from fem_reference.effects import Effect, Load, State, total_energy
 from fem_reference.mesh import Floats, Ints
 from fem_reference.solvers.fenicsx import meshes, quadrature
-from fem_reference.solvers.fenicsx.contact import Pushes
 from fem_reference.solvers.fenicsx.settings import BodySettings
 
 Rule = tuple[Floats, Floats]
@@ -35,8 +34,8 @@ class UflFunctions:
 
 class Form:
     """``energy`` and ``volume`` as integrals, ``residual`` as what vanishes in equilibrium, det F as ``determinant``; ``amounts``
-    by effect, constants to be set; ``rule``: points (q, 3) and weights (q,) of the quadrature; ``regions``: by name, this rank's
-    facets.
+    by effect, constants to be set; ``rule``: points (q, 3) and weights (q,) of the quadrature, of ``degree``; ``regions``: by
+    name, this rank's facets.
     """
 
     def __init__(
@@ -45,8 +44,8 @@ class Form:
         """``cells``: which cell of the body each of this rank's is."""
         self.mesh, self.regions = msh, meshes.local_facets(msh, body.mesh.facets)
         self.rule = quadrature.rule(settings.element, settings.quadrature_degree)
-        degree = settings.quadrature_degree or quadrature.DEGREE[settings.element]
-        self.dx, self.ds = _measures(msh, self.regions, self.rule, degree)
+        self.degree = settings.quadrature_degree or quadrature.DEGREE[settings.element]
+        self.dx, self.ds = _measures(msh, self.regions, self.rule, self.degree)
         self.amounts = [fem.Constant(msh, 1.0) for _ in body.effects]
         effects = [_symbolic(effect, msh) for effect in body.effects]
         acting = list(zip(effects, self.amounts, strict=True))
@@ -62,21 +61,6 @@ class Form:
                 work = sum(a * b for a, b in zip(traction, ufl.split(test)[0], strict=True))
                 self.residual -= work * self.measure(effect.on)
         self.tangent = ufl.derivative(self.residual, unknowns, step)
-        self.pushes = self._pushes(body, unknowns, degree)
-        if self.pushes is not None:
-            measure, moved, along = self.measure(self.pushes.law.on), ufl.split(test)[0], ufl.split(step)[0]
-            self.residual += self.pushes.residual(moved, measure)
-            self.tangent += self.pushes.tangent(along, moved, measure)
-
-    @property
-    def entity_maps(self) -> list[Any] | None:
-        """What compiled forms need to know of the facets that obstructions push on."""
-        return [self.pushes.map] if self.pushes else None
-
-    def _pushes(self, body: Continuum, unknowns: fem.Function, degree: int) -> Pushes | None:
-        """What obstructions do, where there is contact."""
-        law = body.contact
-        return None if law is None else Pushes(body, law, unknowns, self.regions[law.on], degree)
 
     def measure(self, region: str) -> Any:
         """The measure of the facets of ``region``."""

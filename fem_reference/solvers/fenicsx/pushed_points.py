@@ -1,0 +1,112 @@
+"""The material points that rigid bodies push on: where they are in the cells, and how displacement reaches them."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import basix
+import numpy as np
+from dolfinx import fem
+
+from fem_reference.contact import Skin
+from fem_reference.continuum import Cells
+from fem_reference.mesh import Floats, Ints
+
+
+@dataclass(frozen=True, eq=False)
+class PushedPoints:
+    """n points of this rank's cells: where they ``rest`` (n, 3) [mm], the rest ``areas`` (n,) [mm2] they stand for, the ``cells``
+    (n,) they move with, and how: the values ``basis`` (n, k) there of the nodal functions whose unknowns are ``dofs`` (n, k, 3).
+    """
+
+    rest: Floats
+    areas: Floats
+    cells: Ints
+    basis: Floats
+    dofs: Ints
+
+    def positions(self, unknowns: Floats) -> Floats:
+        """Where the points are now (n, 3) [mm]."""
+        return np.asarray(self.rest + np.einsum("nk,nki->ni", self.basis, unknowns[self.dofs]))
+
+    def take(self, chosen: Ints) -> "PushedPoints":
+        """Some of the points."""
+        return PushedPoints(*(getattr(self, name)[chosen] for name in ("rest", "areas", "cells", "basis", "dofs")))
+
+
+def on_facets(space: fem.FunctionSpace, parents: Ints, mesh: Cells, facets: Ints, degree: int) -> PushedPoints:
+    """The quadrature points of a rule of ``degree`` on those of the ``facets`` whose cell is this rank's own; ``space`` is that of
+    the displacement, ``parents`` the unknown of each of its degrees of freedom.
+    """
+    kind = basix.CellType[mesh.kind]
+    sides = _sides(space.mesh.topology, facets)
+    side = basix.CellType.triangle if mesh.kind == "tetrahedron" else basix.CellType.quadrilateral
+    points, weights = basix.make_quadrature(side, degree)
+    corners, topology = basix.geometry(kind), basix.topology(kind)[2]
+    parts = [_empty(space)]
+    for number, vertices in enumerate(topology):
+        cells = sides[sides[:, 1] == number, 0]
+        first, *others = corners[vertices[:3]]
+        edges = np.stack([other - first for other in others])  # along the two coordinates of the side
+        within = first + points @ edges
+        places, slopes = _geometry(space, mesh, cells, within)
+        across = np.cross(slopes @ edges[0], slopes @ edges[1])
+        areas = np.linalg.norm(across, axis=2) * weights
+        repeated = np.repeat(cells, len(points))
+        parts.append(_points(space, parents, repeated, np.tile(within, (len(cells), 1)), places, areas))
+    return PushedPoints(*(np.concatenate([getattr(part, name) for part in parts]) for name in _FIELDS))
+
+
+def on_skin(space: fem.FunctionSpace, parents: Ints, skin: Skin, local: dict[int, int]) -> PushedPoints:
+    """The points of a ``skin`` whose cell is this rank's own; ``local``: its number here by that in the body's mesh."""
+    mine = np.array([i for i, cell in enumerate(skin.cells) if int(cell) in local], np.int64)
+    cells = np.array([local[int(skin.cells[i])] for i in mine], np.int32)
+    msh = space.mesh
+    corners = msh.geometry.x[msh.geometry.dofmap[cells]]
+    edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+    points = skin.points[mine]
+    within = np.linalg.solve(edges, (points - corners[:, 0])[:, :, None])[:, :, 0]
+    return _points(space, parents, cells, within, points, skin.areas[mine])
+
+
+_FIELDS = ("rest", "areas", "cells", "basis", "dofs")
+
+
+def _points(
+    space: fem.FunctionSpace, parents: Ints, cells: Ints, within: Floats, rest: Floats, areas: Floats
+) -> PushedPoints:
+    """Points at ``within`` (n, 3) of the reference cell of ``cells`` (n,)."""
+    basis = _element(space).tabulate(0, within)[0, :, :, 0]
+    nodes = space.dofmap.list[cells].astype(np.int64)
+    dofs = np.asarray(parents, np.int64)[3 * nodes[:, :, None] + np.arange(3)]
+    return PushedPoints(rest.reshape(-1, 3), areas.ravel(), np.asarray(cells), basis, dofs)
+
+
+def _empty(space: fem.FunctionSpace) -> PushedPoints:
+    count = space.dofmap.list.shape[1]
+    no = np.zeros(0, np.int64)
+    return PushedPoints(np.zeros((0, 3)), np.zeros(0), no, np.zeros((0, count)), np.zeros((0, count, 3), np.int64))
+
+
+def _element(space: fem.FunctionSpace) -> Any:
+    return space.element.basix_element
+
+
+def _geometry(space: fem.FunctionSpace, mesh: Cells, cells: Ints, within: Floats) -> tuple[Floats, Floats]:
+    """Of ``cells`` (m,), the rest positions (m, q, 3) of points ``within`` (q, 3) the reference cell, and their slopes there
+    (m, q, 3, 3).
+    """
+    element = basix.create_element(
+        basix.ElementFamily.P, basix.CellType[mesh.kind], mesh.degree, basix.LagrangeVariant.gll_warped
+    )
+    values = element.tabulate(1, within)[:, :, :, 0]
+    nodes = space.mesh.geometry.x[space.mesh.geometry.dofmap[cells]]
+    return np.einsum("qk,mki->mqi", values[0], nodes), np.einsum("jqk,mki->mqij", values[1:], nodes)
+
+
+def _sides(topology: Any, facets: Ints) -> Ints:
+    """Of each facet of a cell that is this rank's own: the cell, and which of the cell's facets it is, (f, 2)."""
+    cells, back = topology.connectivity(2, 3), topology.connectivity(3, 2)
+    own = topology.index_map(3).size_local
+    beside = [(int(cells.links(facet)[0]), facet) for facet in facets]
+    found = [(cell, int(np.flatnonzero(back.links(cell) == facet)[0])) for cell, facet in beside if cell < own]
+    return np.array(found, np.int64).reshape(-1, 2)
