@@ -11,6 +11,7 @@ import numpy as np
 from fem_reference.effects import Coursed, Effect, FieldEffect, Load
 from fem_reference.effects import find as find_effect
 from fem_reference.effects import names as effect_names
+from fem_reference.effects.contact import Contact
 from fem_reference.errors import InputError
 from fem_reference.field.scene import FieldScene, FieldSceneFile
 from fem_reference.records import Record, join, parse
@@ -129,7 +130,7 @@ def _scene(table: dict[str, Any], path: Path) -> Scene | FieldScene:
     if scalar:
         inside = parse(FieldSceneFile, {"candidate": (), "boundary": ()} | table, place)
     else:
-        inside = parse(SceneFile, {"candidate": ()} | table, place)
+        inside = parse(SceneFile, {"candidate": (), "attachment": ()} | table, place)
     if isinstance(effects, list):
         _check_effects([entry["name"] for entry in effects], read_effects, place)
     if scalar:
@@ -176,6 +177,13 @@ def _check_names(scene: Scene) -> None:
     ends = [(f"fibres.traced.{end}", getattr(traced, end)) for end in ("start", "end") if traced]
     _check_used(bones, [(f"attachment[{i}].bone", entry.bone) for i, entry in enumerate(scene.attachment)], scene.place)
     _check_used(attachments, ends, scene.place)
+    pushing = [
+        (f"effect[{i}].bones", name)
+        for i, effect in enumerate(scene.effects)
+        if isinstance(effect, Contact)
+        for name in effect.bones or ()
+    ]
+    _check_used(bones, pushing, scene.place)
     loads = [(f"effect[{i}].on", effect.on) for i, effect in enumerate(scene.effects) if isinstance(effect, Load)]
     _check_used([*attachments, FREE], loads, scene.place)
     _check_used(candidates, [(f"expect[{i}].of", entry.of) for i, entry in enumerate(scene.expect)], scene.place)
@@ -197,7 +205,8 @@ def _check_once(names: list[str], place: str) -> None:
 def _check_used(known: list[str], uses: list[tuple[str, str]], place: str) -> None:
     for key, name in uses:
         if name not in known:
-            raise InputError(join(place, key), f'"{name}"', f"one of {', '.join(known)}")
+            want = f"one of {', '.join(known)}" if known else "a name that is there: there is none"
+            raise InputError(join(place, key), f'"{name}"', want)
 
 
 def _check_rest(scene: Scene) -> None:
@@ -207,8 +216,8 @@ def _check_rest(scene: Scene) -> None:
             got = f"an amount of {effect.amount(scene.frames.first):g} at frame {scene.frames.first}, the first"
             raise InputError(join(scene.place, f"effect[{i}].course"), got, "0 there, where the muscle rests")
     for i, bone in enumerate(scene.bone):
-        pose = bone.motion.rotation().pose(scene.frames.first) if bone.motion else np.eye(4)
+        pose = bone.motion.poses().pose(scene.frames.first) if bone.motion else np.eye(4)
         if not abs(pose - np.eye(4)).max() <= 1e-12:  # NaN is no rest
-            raise InputError(
-                join(scene.place, f"bone[{i}].motion"), "a bone turned at the first frame", "angle 0 there"
-            )
+            slid = np.array_equal(pose[:3, :3], np.eye(3))
+            what, want = ("moved", "distance 0 there") if slid else ("turned", "angle 0 there")
+            raise InputError(join(scene.place, f"bone[{i}].motion"), f"a bone {what} at the first frame", want)

@@ -4,18 +4,20 @@ from dataclasses import dataclass
 
 from fem_reference.errors import InputError
 from fem_reference.judge import Verdict, Word, overall, verdict
+from fem_reference.mesh import Floats
 from fem_reference.metrics import Measure, Yardstick, at_rest, measure
 from fem_reference.metrics.fibre_length import extension_error
 from fem_reference.problem import Setup
 from fem_reference.runs import Run
-from fem_reference.scene import Scene
+from fem_reference.scene import Expectation, Scene
+from fem_reference.study import ErrorBars, Of
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """``deviations``: by candidate name, its measures against the reference. ``changes``: by run name (``"reference"`` among
     them), its measures against the rest state. ``extension_error`` [mm]: by frame, the greatest error over the fibres that the
-    extension makes on the reference's own surface.
+    extension makes on the reference's own surface. ``error_bars``: how well the reference is known, None where nobody asked.
     """
 
     scene: Scene
@@ -27,6 +29,7 @@ class Comparison:
     changes: dict[str, tuple[Measure, ...]]
     extension_error: Measure
     verdicts: tuple[Verdict, ...]
+    error_bars: ErrorBars | None = None
 
     @property
     def word(self) -> Word:
@@ -34,21 +37,37 @@ class Comparison:
         return overall(verdict.word for verdict in self.verdicts)
 
 
-def compare(scene: Scene, setup: Setup, reference: Run, candidates: tuple[Run, ...]) -> Comparison:
-    """Measure and judge runs that all have the frames of the scene (``not a number`` where a run did not reach one)."""
+def compare(
+    scene: Scene, setup: Setup, reference: Run, candidates: tuple[Run, ...], error_bars: ErrorBars | None = None
+) -> Comparison:
+    """Measure and judge runs that all have the frames of the scene (``not a number`` where a run did not reach one); with
+    ``error_bars`` nothing is judged that they are too wide for.
+    """
     if reference.fibres is None:
         raise InputError(
             f"{reference.name}: fibres", "a run without an interior", "a reference that carries the fibres"
         )
-    yardstick = Yardstick.of(reference, reference.fibres)
+    yardstick = Yardstick.of(reference, reference.fibres, setup.bones, setup.free)
     deviations = {run.name: measure(run, reference, yardstick) for run in candidates}
     changes = {run.name: measure(run, at_rest(run), yardstick) for run in (reference, *candidates)}
     measured = {"reference": changes["reference"]} | deviations
     verdicts = tuple(
-        verdict(expectation.model_copy(update={"of": name}), measured[name], reference.numbers)
+        verdict(
+            expectation.model_copy(update={"of": name}),
+            measured[name],
+            reference.numbers,
+            _bars(error_bars, expectation),
+        )
         for expectation in scene.expect
         for name in (deviations if expectation.of == "candidates" else [expectation.of])
         if name in measured
     )
     error = extension_error(reference, yardstick)
-    return Comparison(scene, setup, reference, candidates, yardstick, deviations, changes, error, verdicts)
+    return Comparison(scene, setup, reference, candidates, yardstick, deviations, changes, error, verdicts, error_bars)
+
+
+def _bars(error_bars: ErrorBars | None, expectation: Expectation) -> Floats | None:
+    """The error bars (f,) of what is expected; None without any of it."""
+    of: Of = "change" if expectation.of == "reference" else "deviation"
+    found = None if error_bars is None else error_bars.find(of, expectation.metric, expectation.statistic)
+    return None if found is None else found.values

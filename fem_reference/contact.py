@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fem_reference.geometry.rigid_bodies import Obstacle
-from fem_reference.mesh import Floats, Ints
+from fem_reference.geometry.skins import Skin
+from fem_reference.mesh import Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,18 +19,6 @@ class Obstruction:
     name: str
     shape: Obstacle
     pose: Callable[[float], Floats]
-
-
-@dataclass(frozen=True, eq=False)
-class Skin:
-    """Material points that obstructions push on, for a surface that the cells follow only roughly: the straight ``cells`` (n,)
-    they move with, ``points`` (n, 3) [mm] where they are at rest, somewhat outside their cell perhaps, and the rest ``areas``
-    (n,) [mm2] that each stands for.
-    """
-
-    cells: Ints
-    points: Floats
-    areas: Floats
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ def check(body: "Continuum", element: str) -> None:
     check_element(element, body.mesh.kind, body.mesh.degree, body.effects, "element")
     _check_prescribed(body.prescribed)
     held = [entry.on for entry in body.prescribed]
-    pushed = [body.contact.on] if body.contact else []
+    pushed = [body.contact.on] if body.contact and isinstance(body.contact.on, str) else []
     used = dict.fromkeys([*held, *pushed, *(effect.on for effect in body.effects if isinstance(effect, Load))])
     for on in used:
         if on not in body.mesh.facets:

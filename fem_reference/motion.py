@@ -1,4 +1,4 @@
-"""Rigid motion of a bone: frame number -> 4 x 4 pose, by an angle about a fixed axis between keyframes."""
+"""Rigid motion of a bone: frame number -> 4 x 4 pose, by an angle about a fixed axis or a way along it, between keyframes."""
 
 from dataclasses import dataclass
 
@@ -34,6 +34,33 @@ class Rotation:
         pose[:3, :3] = turn
         pose[:3, 3] = np.asarray(self.centre) - turn @ np.asarray(self.centre)
         return pose
+
+
+@dataclass(frozen=True)
+class Translation:
+    """Sliding along ``direction``, of any length, by ``distances`` [mm] at ``frames``, linear in between.
+
+    Before the first and after the last keyframe the bone rests there.
+    """
+
+    direction: tuple[float, float, float]
+    frames: tuple[float, ...]
+    distances: tuple[float, ...]
+
+    def pose(self, frame: float) -> Floats:
+        """The 4 x 4 matrix that takes rest positions to positions at ``frame``.
+
+        >>> down = Translation((0, -2, 0), (0.0, 10.0), (0.0, 30.0))
+        >>> (down.pose(5) @ [1, 1, 1, 1]).tolist()
+        [1.0, -14.0, 1.0, 1.0]
+        """
+        distance = float(np.interp(frame, self.frames, self.distances))
+        pose = np.eye(4)
+        pose[:3, 3] = distance * np.asarray(self.direction, float) / np.linalg.norm(self.direction)
+        return pose
+
+
+RigidMotion = Rotation | Translation
 
 
 def apply(pose: Floats, points: Floats) -> Floats:

@@ -13,11 +13,12 @@ from fem_reference.field.runs import FieldRun
 from fem_reference.field.scene import FieldScene
 from fem_reference.judge import overall
 from fem_reference.mesh import enclosed_volume, vertex_areas
-from fem_reference.motion import Rotation
-from fem_reference.problem import Setup
+from fem_reference.motion import RigidMotion, Translation
+from fem_reference.problem import Body, Setup
 from fem_reference.report.words import exact
 from fem_reference.runs import Run
 from fem_reference.scene import Scene
+from fem_reference.study import ErrorBar
 
 
 def scene_facts(scene: Scene, setup: Setup) -> dict[str, Any]:
@@ -32,10 +33,9 @@ def scene_facts(scene: Scene, setup: Setup) -> dict[str, Any]:
             "triangles": len(surface.triangles),
             "volume_mm3": enclosed_volume(surface.points, surface.triangles),
             "tet_size_mm": scene.muscle.tet_size,
+            "mesher": scene.muscle.mesher,
         },
-        "bones": {
-            bone.name: f"{len(bone.surface.triangles)} triangles, {_motion(bone.motion)}" for bone in setup.bones
-        },
+        "bones": {bone.name: f"{_shape(bone)}, {_motion(bone.motion)}" for bone in setup.bones},
         "attachments": {
             held.attachment: f"{len(held.vertices)} vertices, {areas[held.vertices].sum():.0f} mm2, held by {held.bone.name} "
             + ("exactly" if held.stiffness is None else f"by springs of {held.stiffness:g} MPa/mm")
@@ -56,9 +56,26 @@ def _parameters(effect: Effect) -> dict[str, str]:
     return {name: f"{exact(value)} {unit}".rstrip() for name, value, unit in effect.parameters}
 
 
-def _motion(motion: Rotation | None) -> str:
+def _shape(bone: Body) -> str:
+    """How fine the surface of a bone is, or what its closed form is."""
+    if bone.solid is None:
+        return f"{len(bone.surface.triangles)} triangles"
+    kind = "".join(f" {letter.lower()}" if letter.isupper() else letter for letter in type(bone.solid).__name__)
+    values = ", ".join(f"{name} {_number_or_three(value)}" for name, value in vars(bone.solid).items())
+    return f"{kind.strip()} of {values}, mm"
+
+
+def _number_or_three(value: Any) -> str:
+    return f"({', '.join(f'{entry:g}' for entry in value)})" if isinstance(value, tuple) else f"{value:g}"
+
+
+def _motion(motion: RigidMotion | None) -> str:
     if motion is None:
         return "rests"
+    if isinstance(motion, Translation):
+        stops = zip(motion.frames, motion.distances, strict=True)
+        keys = ", ".join(f"{distance:g} at {frame:g}" for frame, distance in stops)
+        return f"slides along {_number_or_three(motion.direction)}, mm at frame: {keys}"
     x, y, z = motion.centre
     keys = ", ".join(f"{angle:g} at {frame:g}" for frame, angle in zip(motion.frames, motion.angles, strict=True))
     return f"turns about ({x:g}, {y:g}, {z:g}) mm along {motion.axis}, rad at frame: {keys}"
@@ -156,6 +173,7 @@ def comparison_text(result: Comparison, page: Path) -> str:
     judged = [
         f"{verdict.word}: {verdict.expectation.of} {verdict.expectation.metric} {verdict.expectation.statistic} at frame "
         f"{verdict.frame} is {verdict.value:.4g} {verdict.unit}, expected {verdict.truth:.4g} within {verdict.within:.4g}"
+        + ("" if verdict.error_bar is None else f", known to {verdict.error_bar:.2g}")
         for verdict in result.verdicts
     ]
     worst = [
@@ -164,7 +182,31 @@ def comparison_text(result: Comparison, page: Path) -> str:
         for name, measures in result.deviations.items()
         for measure in measures
     ]
-    return "\n".join([*runs, *worst, *judged, f"verdict: {result.word}", f"page: {page}"])
+    return "\n".join([*runs, *_known(result), *worst, *judged, f"verdict: {result.word}", f"page: {page}"])
+
+
+def _known(result: Comparison) -> list[str]:
+    """How well the reference is known, a line a statistic; nothing where nobody asked."""
+    if result.error_bars is None:
+        return []
+    lines = [
+        "how well the reference is known (its greatest change from rest; the error bar of it, where that is widest):"
+    ]
+    for measure in result.changes[result.reference.name]:
+        bar = result.error_bars.find("change", measure.metric, measure.statistic)
+        if bar is not None:
+            value = f"{measure.values[measure.worst]:.4g} {measure.unit}"
+            lines.append(f"  {measure.metric} {measure.statistic}: {value}, {_bar(result, bar)}")
+    lines.append("how well deviations from it are known (the error bar, where that is widest):")
+    deviations = [bar for bar in result.error_bars.bars if bar.of == "deviation"]
+    return lines + [f"  {bar.metric} {bar.statistic}: {_bar(result, bar)}" for bar in deviations]
+
+
+def _bar(result: Comparison, bar: ErrorBar) -> str:
+    assert result.error_bars is not None  # the bar is of them
+    order = "no order" if math.isnan(bar.order) else f"order {bar.order:.1f}"
+    at = f"frame {result.error_bars.numbers[bar.worst]}"
+    return f"\N{PLUS-MINUS SIGN} {bar.values[bar.worst]:.2g} {bar.unit} at {at}, {order}, {bar.course}"
 
 
 def run_facts(scene: Scene, run: Run) -> dict[str, Any]:

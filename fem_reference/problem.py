@@ -8,18 +8,22 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fem_reference import files
-from fem_reference.continuum import ByCell, Cells, Continuum, Prescribed
 from fem_reference.effects import Effect
+from fem_reference.effects.contact import Contact as ContactEffect
 from fem_reference.errors import InputError
+from fem_reference.geometry import block
 from fem_reference.geometry.attachments import facets_under, pick
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.embedding import Locator
 from fem_reference.geometry.fibres import directions, nearest_directions, trace
 from fem_reference.geometry.intersections import self_intersections
-from fem_reference.geometry.rigid_bodies import Obstacle
+from fem_reference.geometry.rigid_bodies import Obstacle, solid
 from fem_reference.geometry.signed_distance import cached
+from fem_reference.geometry.skins import Skin, skin_of
+from fem_reference.geometry.tessellation import tessellated
 from fem_reference.geometry.tetrahedra import tetrahedralise
 from fem_reference.mesh import (
     Floats,
@@ -27,7 +31,6 @@ from fem_reference.mesh import (
     Polylines,
     Surface,
     TetMesh,
-    boundary,
     check_closed,
     check_finite,
     fingerprint,
@@ -36,7 +39,7 @@ from fem_reference.mesh import (
     triangle_areas,
     vertex_areas,
 )
-from fem_reference.motion import Rotation, apply
+from fem_reference.motion import RigidMotion
 from fem_reference.records import join
 from fem_reference.scene import Scene
 
@@ -49,19 +52,22 @@ DISTANCES = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A rigid bone: its ``surface`` at rest, its ``motion``, None where it rests, and how well the distance to the surface shall be
-    known, ``distance_error`` [mm].
+    """A rigid bone: its ``surface`` at rest, its ``motion``, None where it rests, and how its distance shall be known, as
+    ``scene.Bone`` has it [mm]; or the ``solid`` of closed form whose vertices the surface has.
     """
 
     name: str
     surface: Surface
-    motion: Rotation | None
+    motion: RigidMotion | None
     distance_error: float = 0.05
+    distance_rounding: float = 1.0
+    solid: Obstacle | None = None
 
     @cached_property
     def shape(self) -> Obstacle:
-        """The signed distance to the surface, in the frame of rest; InputError where the surface is not closed."""
-        return cached(self.surface, self.distance_error, DISTANCE_MARGIN, DISTANCES)
+        """The signed distance to the surface, in the frame of rest; InputError where the surface of a file is not closed."""
+        named = replace(self.surface, place=f'bone "{self.name}": {self.surface.place}')
+        return self.solid or cached(named, self.distance_error, DISTANCE_MARGIN, self.distance_rounding, DISTANCES)
 
     def pose(self, frame: float) -> Floats:
         """The 4 x 4 matrix that takes rest positions to positions at ``frame``."""
@@ -92,12 +98,22 @@ class Setup:
     frames: tuple[int, ...]
     interval: float | None
 
+    @cached_property
+    def free(self) -> NDArray[np.bool_]:
+        """Which vertices (n,) of the surface bones may push on: those that none holds, nor any of their neighbours."""
+        triangles = self.surface.triangles
+        held = np.zeros(len(self.surface.points), bool)
+        held[np.concatenate([np.zeros(0, np.int64), *(entry.vertices for entry in self.held)])] = True
+        free = ~held
+        free[triangles[held[triangles].any(axis=1)]] = False
+        return free
+
 
 @dataclass(frozen=True, eq=False)
 class Problem(Setup):
     """A setup filled with tetrahedra (``mesh.facets`` by attachment), with its effects and fibres; ``directions`` (k, 3), the unit
-    vector along the fibres in each tet, where an effect needs it; ``mesh_facts`` are what the mesh is like, ``seconds`` how long
-    it took to make.
+    vector along the fibres in each tet, where an effect needs it; ``skin``, what bones push on, where they do; ``mesh_facts`` are
+    what the mesh is like, ``seconds`` how long it took to make.
     """
 
     mesh: TetMesh
@@ -106,33 +122,12 @@ class Problem(Setup):
     mesh_facts: dict[str, float | str]
     seconds: float
     directions: Floats | None = None
+    skin: Skin | None = None
 
-
-@dataclass(frozen=True)
-class Follows:
-    """The displacement of what ``bone`` holds."""
-
-    bone: Body
-
-    def __call__(self, points: Floats, frame: float) -> Floats:
-        """The displacement (n, 3) [mm] of rest points (n, 3) at a frame number."""
-        return apply(self.bone.pose(frame), points) - points
-
-
-def as_continuum(problem: Problem) -> Continuum:
-    """The muscle as a body: its bones prescribe where the facets that they hold are; the rest of its skin is ``"free"``."""
-    mesh = problem.mesh
-    held = np.concatenate([np.sort(mesh.facets[entry.attachment], axis=1) for entry in problem.held])
-    skin, _ = boundary(mesh.tets)
-    taken = {tuple(facet) for facet in held.tolist()}
-    free = skin[[tuple(facet) not in taken for facet in np.sort(skin, axis=1).tolist()]]
-    cells = Cells(mesh.points, mesh.tets, "tetrahedron", 1, {**mesh.facets, "free": free})
-    prescribed = tuple(
-        Prescribed(entry.attachment, entry.attachment, (0, 1, 2), Follows(entry.bone), entry.stiffness)
-        for entry in problem.held
-    )
-    fibre = None if problem.directions is None else ByCell(problem.directions)
-    return Continuum(cells, problem.effects, prescribed, problem.frames, fibre)
+    @property
+    def contact(self) -> ContactEffect | None:
+        """The effect by which bones push, None where they do not."""
+        return next((effect for effect in self.effects if isinstance(effect, ContactEffect)), None)
 
 
 def setup(scene: Scene) -> Setup:
@@ -140,14 +135,15 @@ def setup(scene: Scene) -> Setup:
     place = join(scene.place, "muscle.surface")
     surface = files.read_surface(scene.file(scene.muscle.surface, "muscle.surface"), scene.muscle.unit)
     surface = check_closed(Surface(surface.points, surface.triangles, f"{place}: {surface.place}"))
-    bones = tuple(_body(scene, i) for i in range(len(scene.bone)))
+    bones = tuple(_body(scene, i, surface) for i in range(len(scene.bone)))
     return Setup(surface, bones, _held(scene, surface, bones), scene.frames.numbers, scene.frames.interval)
 
 
 def build(scene: Scene, rest: Setup) -> Problem:
     """The whole problem of a scene: its setup ``rest``, filled with tetrahedra and fibres."""
     begin = time.perf_counter()
-    bare = tetrahedralise(rest.surface, scene.muscle.tet_size)
+    fill = {"quality": tetrahedralise, "block": block.fill}[scene.muscle.mesher]
+    bare = fill(rest.surface, scene.muscle.tet_size)
     facets = {held.attachment: facets_under(bare, rest.surface, held.vertices) for held in rest.held}
     for i, held in enumerate(rest.held):
         if len(facets[held.attachment]) == 0:
@@ -167,14 +163,28 @@ def build(scene: Scene, rest: Setup) -> Problem:
         mesh_facts=_mesh_facts(rest, mesh),
         seconds=time.perf_counter() - begin,
         directions=_directions(scene, mesh, fibres),
+        skin=_skin(scene, rest, mesh),
     )
 
 
-def _body(scene: Scene, i: int) -> Body:
-    bone = scene.bone[i]
+def _skin(scene: Scene, rest: Setup, mesh: TetMesh) -> Skin | None:
+    """What bones push on, where they do: the surface that they do not hold, at points half a tet apart or nearer."""
+    if not any(isinstance(effect, ContactEffect) for effect in scene.effects):
+        return None
+    return skin_of(rest.surface, rest.free, mesh, scene.muscle.tet_size / 2)
+
+
+def _body(scene: Scene, i: int, muscle: Surface) -> Body:
+    bone, form = scene.bone[i], solid(scene.bone[i])
+    motion = bone.motion.poses() if bone.motion else None
+    if form is not None:
+        surface = tessellated(form, muscle.points, join(scene.place, f"bone[{i}]"))
+        return Body(bone.name, surface, motion, solid=form)
+    assert bone.surface is not None  # a Bone record has a closed form or a surface with its unit
+    assert bone.unit is not None
     surface = files.read_surface(scene.file(bone.surface, f"bone[{i}].surface"), bone.unit)
     check_finite(surface)
-    return Body(bone.name, surface, bone.motion.rotation() if bone.motion else None, bone.distance_error)
+    return Body(bone.name, surface, motion, bone.distance_error, bone.distance_rounding)
 
 
 def _held(scene: Scene, surface: Surface, bones: tuple[Body, ...]) -> tuple[Held, ...]:

@@ -5,19 +5,17 @@
 
 import hashlib
 import json
-import math
 import os
-from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal, Self
 
-from pydantic import ConfigDict, Field, field_validator, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
+from fem_reference.bones import Bone
 from fem_reference.effects import Effect
 from fem_reference.errors import InputError
-from fem_reference.motion import Rotation
 from fem_reference.records import Record, join
-from fem_reference.units import Angle, AreaStiffness, LengthUnit, Point, PositiveLength, Time
+from fem_reference.units import AreaStiffness, LengthUnit, PositiveLength, Time
 
 DATA_SETTING = "FEM_REFERENCE_DATA"
 MOST_FRAMES = 100_000
@@ -33,57 +31,14 @@ HOME = home(Path(__file__).resolve().parent)
 
 
 class Muscle(Record):
-    """The deformable body: a closed triangle surface and the size of the tetrahedra it is filled with."""
+    """The deformable body: a closed triangle surface, the size of the tetrahedra it is filled with, and how: with good tetrahedra
+    (``"quality"``), or an axis-aligned box with a grid of boxes, each cut into six (``"block"``).
+    """
 
     surface: str
     unit: LengthUnit
     tet_size: PositiveLength
-
-
-class Keyframe(Record):
-    """Where the motion is at a frame number."""
-
-    frame: float
-    angle: Angle
-
-
-class Motion(Record):
-    """A rotation about a fixed axis, linear between keyframes."""
-
-    axis: tuple[float, float, float]
-    centre: Point
-    keyframes: tuple[Keyframe, ...] = Field(min_length=2)
-
-    @field_validator("axis")
-    @classmethod
-    def _check_axis(cls, axis: tuple[float, float, float]) -> tuple[float, float, float]:
-        if not 1e-9 < math.hypot(*axis) < 1e9:
-            raise ValueError("an axis that is not zero, with a length from 1e-9 to 1e9")
-        return axis
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        frames = [keyframe.frame for keyframe in self.keyframes]
-        if any(late <= early for early, late in pairwise(frames)):
-            raise ValueError("keyframes in the order of their frames")
-        return self
-
-    def rotation(self) -> Rotation:
-        """The motion as poses over frame numbers."""
-        frames, angles = zip(*((key.frame, key.angle) for key in self.keyframes), strict=True)
-        return Rotation(self.axis, self.centre, frames, angles)
-
-
-class Bone(Record):
-    """A rigid body; without ``motion`` it rests. ``distance_error``: how well the distance to its surface shall be known, root mean
-    square beside the surface.
-    """
-
-    name: str
-    surface: str
-    unit: LengthUnit
-    motion: Motion | None = None
-    distance_error: PositiveLength = 0.05
+    mesher: Literal["quality", "block"] = "quality"
 
 
 class VertexList(Record):
@@ -224,7 +179,7 @@ class SceneFile(Record):
     proves: str
     muscle: Muscle
     bone: tuple[Bone, ...] = Field(min_length=1)
-    attachment: tuple[Attachment, ...] = Field(min_length=1)
+    attachment: tuple[Attachment, ...]
     effect: tuple[Any, ...] = Field(min_length=1)
     fibres: Fibres
     frames: Frames

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fem_reference import effects
-from fem_reference.effects import Coursed, Effect, Energy, Load, State
+from fem_reference.effects import Coursed, Effect, Energy, Interaction, Load, State
 from fem_reference.records import parse
 
 COURSE = [{"frame": 0, "amount": 0.0}, {"frame": 10, "amount": 1.0}, {"frame": 30, "amount": 0.5}]
@@ -24,6 +24,7 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     "gravity": {"density": "1060 kg/m3", "acceleration": "0, 0, -9.81 m/s^2", "course": COURSE},
     "pressure": {"on": "top", "pressure": "8 kPa", "course": COURSE},
     "traction": {"on": "top", "force": "0, 6.25, 1 kPa", "course": COURSE},
+    "contact": {"stiffness": "500 kPa/mm", "smoothing": "0.3 mm", "bones": ["femur"]},
     "prestretch": {"stretch": 1.1, "course": COURSE},
 }
 OTHER: dict[str, Any] = {
@@ -47,6 +48,8 @@ OTHER: dict[str, Any] = {
 }  # of other parameters it is 7 MPa
 POSITIVE = ["mu", "bulk", "stress", "c3", "c5", "tension", "k1", "c", "density"]
 KINDS = {"MPa": "pressure", "rad": "an angle", "tonne/mm^3": "a density", "mm/s^2": "acceleration"}
+# What acts by an expression at a point of the body; an interaction does not.
+EXPRESSED = [name for name in PARAMETERS if not issubclass(effects.find(name), Interaction)]
 ENERGIES = [name for name in PARAMETERS if issubclass(effects.find(name), Energy)]
 ELASTIC = [name for name in ENERGIES if name != "gravity"]
 COURSED = [name for name in PARAMETERS if issubclass(effects.find(name), Coursed)]

@@ -21,6 +21,7 @@ ORDER = [
     "formats",
     "files",
     "runs",
+    "bones",
     "scene",
     "field",
     "casefile",
@@ -28,14 +29,17 @@ ORDER = [
     "contact",
     "continuum",
     "problem",
+    "deformable",
     "stepping",
     "solvers",
     "metrics",
+    "study",
     "judge",
     "comparison",
     "catalogue",
     "report",
     "execution",
+    "refinement",
     "field_execution",
     "overview",
     "field_verbs",
@@ -45,7 +49,7 @@ ORDER = [
     "__main__",
 ]
 # These see runs and never who made them.
-BLIND_TO_SOLVERS = ["metrics", "judge", "comparison", "report"]
+BLIND_TO_SOLVERS = ["metrics", "study", "judge", "comparison", "report"]
 DOORS = {
     "dolfinx": ["solvers/fenicsx/"],
     "dolfinx_solver": ["solvers/fenicsx/"],

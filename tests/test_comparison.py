@@ -9,12 +9,15 @@ import shapes
 from fem_reference.comparison import compare
 from fem_reference.errors import InputError
 from fem_reference.mesh import Polylines
+from fem_reference.problem import Setup
 from fem_reference.runs import Outcome, Run
 from fem_reference.scene import Expectation
+from fem_reference.study import ErrorBar, ErrorBars
 
 REST = shapes.sphere(2, 10.0)
 FIBRE = Polylines(np.array([[0.0, 0, -5], [0, 0, 5]]), np.array([0, 2]))
 OUTCOME = Outcome("converged", "done")
+SETUP = Setup(REST, (), (), (0, 10), None)
 
 
 def run(name: str, growth: tuple[float, float], *, fibres: bool = True) -> Run:
@@ -39,7 +42,7 @@ def scene(*expectations: Expectation) -> SimpleNamespace:
 
 def test_candidates_are_measured_against_the_reference_and_all_against_rest() -> None:
     # Spheres that grow by 10 and 21 %: 1.1^3 = 1.331 of rest, and 1.1^3 of each other.
-    result = compare(scene(), None, run("reference", (1, 1.1)), (run("large", (1, 1.21), fibres=False),))
+    result = compare(scene(), SETUP, run("reference", (1, 1.1)), (run("large", (1, 1.21), fibres=False),))
     volume = {name: volume_deviation(measures) for name, measures in result.changes.items()}
     assert volume == pytest.approx({"reference": 33.1, "large": 100 * (1.21**3 - 1)})
     assert volume_deviation(result.deviations["large"]) == pytest.approx(33.1)
@@ -51,16 +54,32 @@ def test_candidates_are_measured_against_the_reference_and_all_against_rest() ->
 def test_expectations_meet_the_runs_that_they_are_of() -> None:
     expected = (expectation("reference", "33.1 %"), expectation("candidates", "33.1 %"), expectation("absent", "0 %"))
     candidates = (run("right", (1, 1.21)), run("wrong", (1, 1.1)))
-    result = compare(scene(*expected), None, run("reference", (1, 1.1)), candidates)
+    result = compare(scene(*expected), SETUP, run("reference", (1, 1.1)), candidates)
     assert [(one.expectation.of, one.word) for one in result.verdicts] == [
         ("reference", "pass"),
         ("right", "pass"),
         ("wrong", "fail"),
     ]
     assert result.word == "fail"
-    assert compare(scene(), None, run("reference", (1, 1.1)), candidates).word == "not judged"
+    assert compare(scene(), SETUP, run("reference", (1, 1.1)), candidates).word == "not judged"
+
+
+def test_expectations_of_the_reference_and_of_candidates_have_bars_of_their_own() -> None:
+    expected = (expectation("reference", "33.1 %"), expectation("candidates", "33.1 %"))
+    bars = tuple(
+        ErrorBar(of, "volume", "deviation", "%", np.array([0.0, value]), 1.0, "converges", {})
+        for of, value in (("change", 0.002), ("deviation", 0.004))
+    )
+    known = ErrorBars((0, 10), (4.0, 5.0, 6.0), bars)
+    result = compare(scene(*expected), SETUP, run("reference", (1, 1.1)), (run("right", (1, 1.21)),), known)
+    # The tolerance is 0.01 %: a third of it lies between the two.
+    assert [(one.word, one.error_bar) for one in result.verdicts] == [("pass", 0.002), ("cannot say", 0.004)]
+    assert result.error_bars is known
+    bare = ErrorBars((0, 10), (4.0, 5.0, 6.0), ())
+    result = compare(scene(*expected), SETUP, run("reference", (1, 1.1)), (run("right", (1, 1.21)),), bare)
+    assert [(one.word, one.error_bar) for one in result.verdicts] == [("pass", None), ("pass", None)]
 
 
 def test_a_reference_carries_the_fibres() -> None:
     with pytest.raises(InputError, match="reference: fibres: got a run without an interior"):
-        compare(scene(), None, run("reference", (1, 1.1), fibres=False), ())
+        compare(scene(), SETUP, run("reference", (1, 1.1), fibres=False), ())

@@ -31,7 +31,7 @@ def run_of(rest: Surface, *frames: np.ndarray) -> Run:
 def taken(run: Run, reference: Run | None = None) -> dict[str, Measure]:
     """The measures of edges by ``metric.statistic``, against rest where there is no reference."""
     reference = at_rest(run) if reference is None else reference
-    found = measure(run, reference, Yardstick.of(reference, FIBRE))
+    found = measure(run, reference, Yardstick.of(reference, FIBRE, ()))
     return {f"{one.metric}.{one.statistic}": one for one in found if one.metric in ("edge_extension", "dihedral_angle")}
 
 
@@ -239,7 +239,7 @@ def test_what_is_not_a_number_never_passes(place: str, bad: float) -> None:
     spoilt = ball.points.copy()
     spoilt[5] = bad
     runs = {"run": run_of(ball, ball.points), "reference": run_of(ball, ball.points)} | {place: run_of(ball, spoilt)}
-    yardstick = Yardstick.of(run_of(ball, ball.points), FIBRE)
+    yardstick = Yardstick.of(run_of(ball, ball.points), FIBRE, ())
     measures = [
         one
         for metric in (edge_extension, dihedral_angle)

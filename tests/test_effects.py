@@ -15,6 +15,7 @@ from acting import (
     COURSED,
     ELASTIC,
     ENERGIES,
+    EXPRESSED,
     FIBRE,
     KINDS,
     OTHER,
@@ -78,7 +79,7 @@ def test_the_rest_state_has_no_stress(name: str) -> None:
         assert abs(after - before) / (2 * step) < 1e-7
 
 
-@pytest.mark.parametrize("name", PARAMETERS)
+@pytest.mark.parametrize("name", EXPRESSED)
 def test_every_parameter_is_felt_and_has_its_unit(name: str) -> None:
     effect, F = make(name), uniaxial(1.6) @ (np.eye(3) + 0.05 * deformations()[0])
     for key, _, unit in effect.parameters:
@@ -175,7 +176,7 @@ def symbols(value: Any) -> Any:
     return tuple(symbols(entry) for entry in value) if isinstance(value, tuple | list | np.ndarray) else value
 
 
-@pytest.mark.parametrize("name", PARAMETERS)
+@pytest.mark.parametrize("name", EXPRESSED)
 def test_expressions_take_symbols(name: str) -> None:
     effect = make(name)
     symbolic = effect.model_copy(update={key: symbols(value) for key, value, _ in effect.parameters if key != "course"})

@@ -81,6 +81,24 @@ def test_a_tolerance_below_zero_is_refused() -> None:
         checked(within="-0.5 %")
 
 
+def test_a_verdict_is_only_on_frames_whose_error_bar_is_a_third_of_the_tolerance() -> None:
+    def with_bars(values, bars, **changes):
+        measure = Measure("volume", "deviation", "%", np.array(values))
+        return verdict(expectation(**changes), [measure], NUMBERS, np.array(bars))
+
+    found = with_bars([0.1, -0.4, 0.2], [0.0, 0.1, 0.16])
+    assert (found.word, found.frame, found.error_bar) == ("pass", 10, 0.1)
+    found = with_bars([0.1, -0.4, 0.2], [0.0, 0.1, 0.17])
+    assert (found.word, found.frame, found.error_bar) == ("cannot say", 20, 0.17)
+    found = with_bars([0.1, -0.4, 0.2], [0.3, np.nan, 0.17])
+    assert (found.word, found.frame, np.isnan(found.error_bar)) == ("cannot say", 10, True)
+    # What is told apart from the truth in one frame is told.
+    found = with_bars([0.1, -0.6, 0.2], [0.0, 0.1, 0.3])
+    assert (found.word, found.frame) == ("fail", 10)
+    assert with_bars([0.1, -0.4, 0.2], [0.0, 0.1, 9.0], frame=10).word == "pass"
+    assert judged([0.1, -0.4, 0.2]).error_bar is None
+
+
 def test_a_truth_known_to_nobody_knows_what_judges_nothing() -> None:
     assert judge(0.0, 0.0, 1.0, error_bar=float("nan")) == "cannot say"
 

@@ -64,7 +64,8 @@ def test_json_has_the_documented_keys(job) -> None:
         set(row) == {"candidate", "metric", "statistic", "frame", "value", "unit"} for row in job.facts["measures"]
     )
     metrics = {row["metric"] for row in rows(job.facts, "pbd")}
-    assert metrics == {"dihedral_angle", "edge_extension", "fibre_length", "inversion", "surface_deviation", "volume"}
+    surface = {"dihedral_angle", "edge_extension", "inversion", "surface_deviation", "volume"}
+    assert metrics == surface | {"fibre_length", "penetration"}
     assert {row["frame"] for row in rows(job.facts, "pbd")} == {0, 5, 10, 15, 20}
     assert {row["unit"] for row in rows(job.facts, "pbd")} == {"mm", "mm3", "%", "deg"}
 
@@ -256,9 +257,10 @@ def test_a_reference_that_fails_is_status_three_with_its_frames_kept(job, tmp_pa
     assert facts["status"] in ("diverged", "inverted")
     assert facts["verdict"] == "fail"
     first = [row["value"] for row in rows(facts, "pbd") if row["frame"] == 0]
-    last = [row["value"] for row in rows(facts, "pbd") if row["frame"] == 20]
+    last = {row["metric"]: row["value"] for row in rows(facts, "pbd") if row["frame"] == 20}
     assert None not in first
-    assert set(last) == {None}
+    assert last.pop("penetration") is not None  # of the candidate alone
+    assert set(last.values()) == {None}
     assert (tmp_path / "out" / "bar" / "report.html").exists()
 
 

@@ -9,16 +9,19 @@ import igl
 import numpy as np
 import pytest
 
-from fem_reference.files import read_surface
+from fem_reference.files import read_polylines, read_surface
+from fem_reference.geometry.block import fill
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.intersections import self_intersections
-from fem_reference.mesh import Surface, check_closed, enclosed_volume, vertex_areas
+from fem_reference.mesh import Surface, boundary, check_closed, enclosed_volume, vertex_areas
 from fem_reference.motion import Rotation, apply
 from fem_reference.scene import HOME
 
 FOLDERS = sorted(path for path in (HOME / "meshes").iterdir() if path.is_dir())
 CARDS = {folder: tomllib.loads((folder / "card.toml").read_text(encoding="utf-8"))["file"] for folder in FOLDERS}
 FILES = [pytest.param(folder / entry["name"], entry, id=entry["name"]) for folder in FOLDERS for entry in CARDS[folder]]
+SURFACES = [each for each in FILES if each.values[0].suffix == ".ply"]
+BOX = HOME / "meshes" / "box"
 WITHIN = 1.5  # mm, the attachments of cases/hip_flexion
 
 
@@ -51,13 +54,17 @@ def test_file_is_what_its_card_says(path: Path, entry: dict) -> None:
     assert hashlib.sha256(path.read_bytes()).hexdigest() == entry["sha256"]
     assert entry["unit"] == "mm"
     assert all(entry[key] for key in ("what", "licence", "built"))
+
+
+@pytest.mark.parametrize(("path", "entry"), SURFACES)
+def test_surface_is_as_large_as_its_card_says(path: Path, entry: dict) -> None:
     surface = read_surface(path, 1.0)
     assert len(surface.triangles) == entry["triangles"]
     # The card states thousandths of a mm3; without check_closed, so that a surface turned inside out is negative here.
     assert enclosed_volume(surface.points, surface.triangles) == pytest.approx(entry["volume_mm3"], abs=6e-4)
 
 
-@pytest.mark.parametrize(("path", "entry"), FILES)
+@pytest.mark.parametrize(("path", "entry"), SURFACES)
 def test_file_bounds_a_body(path: Path, entry: dict) -> None:
     assert len(check_closed(read_surface(path, 1.0)).triangles) == entry["triangles"]
 
@@ -65,8 +72,9 @@ def test_file_bounds_a_body(path: Path, entry: dict) -> None:
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
 def test_build_script_makes_the_same_bodies(folder: Path) -> None:
     made = runpy.run_path(str(folder / "build.py"))["build"]()
-    assert {f"{name}.ply" for name in made} == {entry["name"] for entry in CARDS[folder]}
-    for entry in CARDS[folder]:
+    surfaces = [entry for entry in CARDS[folder] if entry["name"].endswith(".ply")]
+    assert {f"{name}.ply" for name in made} == {entry["name"] for entry in surfaces}
+    for entry in surfaces:
         # Another gmsh may place its nodes otherwise: the gap between chord and arc then changes by a part of itself,
         # and with edges of 5 to 10 mm on radii of 15 to 60 mm all of it is about a hundredth of the volume.
         # The figure spread from a start 1 mm away or from other dense points: 7e-5 and 3e-4 of its volume.
@@ -146,3 +154,46 @@ def test_figure_lies_on_a_skin_that_is_its_own_mirror_image(figure: Surface) -> 
     assert skin(figure.points * [-1, 1, 1]) == pytest.approx(skin(figure.points), abs=1e-10)
     # Newton's method with one-sided differences over 0.01 mm: each step leaves about 0.01 mm / 15 mm of the distance.
     assert np.abs(skin(figure.points)).max() < 1e-6
+
+
+@pytest.fixture(scope="module")
+def box() -> Surface:
+    return outward(BOX / "box.ply")
+
+
+def places(corners: np.ndarray) -> set[tuple[tuple[int, ...], ...]]:
+    """Triangles (m, 3, 3) of whole mm, each from its lowest corner on in the order that it runs."""
+    rows = [[tuple(corner) for corner in triangle] for triangle in np.rint(corners).astype(int).tolist()]
+    return {tuple(row[row.index(min(row)) :] + row[: row.index(min(row))]) for row in rows}
+
+
+def test_box_has_the_skin_of_a_block_mesh_of_its_squares(box: Surface) -> None:
+    assert box.points.min(axis=0).tolist() == [-50, 10, -50]
+    assert box.points.max(axis=0).tolist() == [50, 90, 50]
+    mesh = fill(box, 5.0)
+    assert places(box.points[box.triangles]) == places(mesh.points[boundary(mesh.tets)[0]])
+
+
+@pytest.mark.parametrize("size", [10.0, 20.0])
+def test_box_nests_under_coarser_block_meshes(box: Surface, size: float) -> None:
+    mesh = fill(box, size)
+    points = box.points[box.triangles].reshape(-1, 3)
+    holders = np.zeros(len(box.triangles))
+    for one, two, three in mesh.points[boundary(mesh.tets)[0]]:
+        edges = np.stack([two - one, three - one])
+        shares = (points - one) @ np.linalg.pinv(edges)
+        off = np.abs(points - one - shares @ edges).max(axis=1)
+        inside = (off < 1e-9) & (shares.min(axis=1) > -1e-9) & (shares.sum(axis=1) < 1 + 1e-9)
+        holders += inside.reshape(-1, 3).all(axis=1)
+    assert (holders == 1).all()
+
+
+def test_box_fibres_are_straight_lie_apart_and_5_mm_inside(box: Surface) -> None:
+    fibres = read_polylines(BOX / "fibres.vtk", 1.0)
+    lines = np.split(fibres.points, fibres.offsets[1:-1])
+    ways = [np.unique(np.diff(line, axis=0), axis=0).tolist() for line in lines]
+    assert ways == [[[0, 10, 0]]] * 6 + [[[10, 0, 0]]] * 6
+    assert fibres.lengths().tolist() == pytest.approx([70] * 6 + [90] * 6)
+    assert signed(fibres.points, box).max() == pytest.approx(-5, abs=1e-12)
+    apart = [np.linalg.norm(one[:, None] - other, axis=2).min() for i, one in enumerate(lines) for other in lines[:i]]
+    assert min(apart) > 15

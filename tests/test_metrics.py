@@ -21,6 +21,7 @@ RADIUS = 40.0
 CENTRE = np.array([146.0, 238.0, -431.0])
 UNITS = {
     "volume": {"deviation": "%", "deviation_volume": "mm3"},
+    "penetration": {"deepest": "mm", "volume": "mm3"},
     "fibre_length": {
         "mean": "mm",
         "rms": "mm",
@@ -90,7 +91,7 @@ def _wavy(points: np.ndarray) -> np.ndarray:
 
 
 REFERENCE = _run([SPHERE.points, _wavy(SPHERE.points)], [FIBRES.points, _wavy(FIBRES.points)])
-YARDSTICK = Yardstick.of(REFERENCE, FIBRES)
+YARDSTICK = Yardstick.of(REFERENCE, FIBRES, ())
 
 
 def _values(run: Run, reference: Run, yardstick: Yardstick) -> dict[str, np.ndarray]:
@@ -133,13 +134,13 @@ def test_a_shift_of_one_mm_is_one_mm() -> None:
 
 def test_travel_is_the_greatest_displacement() -> None:
     run = _run([SPHERE.points, SPHERE.points + np.array([3, 4, 0])])
-    assert_allclose(Yardstick.of(run, FIBRES).travel, 5, rtol=1e-12)
+    assert_allclose(Yardstick.of(run, FIBRES, ()).travel, 5, rtol=1e-12)
 
 
 def test_nothing_that_travels() -> None:
     still = _run([SPHERE.points, SPHERE.points])
     run = _run([SPHERE.points, SPHERE.points + np.array([1, 0, 0])])
-    found = _values(run, still, Yardstick.of(still, FIBRES))
+    found = _values(run, still, Yardstick.of(still, FIBRES, ()))
     assert found["surface_deviation.rms_percent"].tolist() == [0, np.inf]
     assert found["surface_deviation.max_percent"].tolist() == [0, np.inf]
 
@@ -147,7 +148,7 @@ def test_nothing_that_travels() -> None:
 @pytest.mark.parametrize("factor", [0.9, 1.05])
 def test_scaling_changes_the_volume_by_its_cube(factor: float) -> None:
     still = _run([SPHERE.points])
-    found = _values(_run([_scaled(SPHERE.points, factor)]), still, Yardstick.of(still, FIBRES))
+    found = _values(_run([_scaled(SPHERE.points, factor)]), still, Yardstick.of(still, FIBRES, ()))
     assert_allclose(found["volume.deviation"], 100 * (factor**3 - 1), rtol=1e-10)
     inscribed = ConvexHull(SPHERE.points).volume
     assert_allclose(found["volume.deviation_volume"], inscribed * (factor**3 - 1), rtol=1e-10)
@@ -159,7 +160,7 @@ def test_concentric_spheres_are_the_difference_of_their_radii_apart() -> None:
     The vertices of the inner are nearer to the outer's facets, by their sagitta at most.
     """
     still = _run([SPHERE.points])
-    found = _values(_run([_scaled(SPHERE.points, 1.1)]), still, Yardstick.of(still, FIBRES))
+    found = _values(_run([_scaled(SPHERE.points, 1.1)]), still, Yardstick.of(still, FIBRES, ()))
     assert_allclose(found["surface_deviation.hausdorff"], 4, rtol=1e-10)
     assert 4 - 1.1 * _sagitta() < found["surface_deviation.distance_mean"][0] < 4
     assert found["surface_deviation.distance_mean"][0] <= found["surface_deviation.distance_rms"][0] < 4
@@ -180,7 +181,7 @@ def test_sliding_is_material_and_not_geometric() -> None:
     turn = Rotation.from_rotvec([0, 0, 0.5])
     still = _run([SPHERE.points])
     run = _run([CENTRE + turn.apply(SPHERE.points - CENTRE)])
-    found = _values(run, still, Yardstick.of(still, FIBRES))
+    found = _values(run, still, Yardstick.of(still, FIBRES, ()))
     moved = 2 * np.sin(0.25) * RADIUS
     assert_allclose(found["surface_deviation.rms"], moved * np.sqrt(2 / 3), rtol=0.01)  # areas of flat facets: 0.5 %
     assert_allclose(found["surface_deviation.max"], moved, rtol=0.01)
@@ -197,7 +198,7 @@ def test_statistics_are_weighted_by_area() -> None:
     share = (SPHERE.points[:, 2] - CENTRE[2]) / (2 * RADIUS) + 0.5
     still = _run([SPHERE.points])
     run = _run([SPHERE.points + share[:, None] * (1, 0, 0)])
-    found = _values(run, still, Yardstick.of(still, FIBRES))
+    found = _values(run, still, Yardstick.of(still, FIBRES, ()))
     assert_allclose(found["surface_deviation.p95"], 0.95, atol=0.01)
     assert_allclose(found["surface_deviation.rms"], np.sqrt(1 / 3), atol=0.01)
     assert np.quantile(share, 0.95) > 0.97  # an unweighted percentile would not pass
@@ -208,7 +209,7 @@ def test_statistics_are_weighted_by_area() -> None:
 def test_a_stretch_of_everything_stretches_every_fibre(factor: float, interior: bool) -> None:
     still = _run([SPHERE.points], [FIBRES.points])
     run = _run([_scaled(SPHERE.points, factor)], [_scaled(FIBRES.points, factor)] if interior else None)
-    found = _values(run, still, Yardstick.of(still, FIBRES))
+    found = _values(run, still, Yardstick.of(still, FIBRES, ()))
     lengths, change = FIBRES.lengths(), factor - 1
     assert_allclose(found["fibre_length.max_percent"], 100 * abs(change), rtol=1e-10)
     assert_allclose(found["fibre_length.rms_percent"], 100 * abs(change), rtol=1e-10)
@@ -230,19 +231,19 @@ def test_a_run_without_fibres_is_compared_like_with_like() -> None:
 def test_the_extension_error_is_surface_against_inside() -> None:
     still, affine = SPHERE.points, _scaled(SPHERE.points, 1.2)
     run = _run([still, affine, still], [FIBRES.points, _scaled(FIBRES.points, 1.2), _scaled(FIBRES.points, 1.1)])
-    found = extension_error(run, Yardstick.of(run, FIBRES))
+    found = extension_error(run, Yardstick.of(run, FIBRES, ()))
     # Still and affine: exact. Fibres a tenth longer in a surface at rest: a tenth of the longest, which is fibre 2.
     assert_allclose(found.values, [0, 0, 0.1 * FIBRES.lengths().max()], rtol=1e-10, atol=1e-10)
     assert (found.metric, found.statistic, found.unit) == ("fibre_length", "extension_error", "mm")
     assert found.where[2] == "fibre 2"
     bare = replace(run, fibres=None, fibre_positions=None)
-    assert np.isnan(extension_error(bare, Yardstick.of(bare, FIBRES)).values).all()
+    assert np.isnan(extension_error(bare, Yardstick.of(bare, FIBRES, ())).values).all()
 
 
 def test_rest_carries_the_fibres() -> None:
     """Fibres a tenth longer in a surface at rest: measured against rest directly, not through the surface."""
     run = _run([SPHERE.points, SPHERE.points], [FIBRES.points, _scaled(FIBRES.points, 1.1)])
-    found = _values(run, at_rest(run), Yardstick.of(run, FIBRES))
+    found = _values(run, at_rest(run), Yardstick.of(run, FIBRES, ()))
     assert_allclose(found["fibre_length.max_percent"], [0, 10], rtol=1e-10, atol=1e-12)
     bare = at_rest(_run([SPHERE.points]))
     assert bare.fibre_positions is None
@@ -254,7 +255,7 @@ def test_where_names_the_worst() -> None:
     fibres = FIBRES.points.copy()
     fibres[12:24] = _scaled(FIBRES.points, 1.5)[12:24]
     still = _run([SPHERE.points], [FIBRES.points])
-    measures = measure(_run([moved], [fibres]), still, Yardstick.of(still, FIBRES))
+    measures = measure(_run([moved], [fibres]), still, Yardstick.of(still, FIBRES, ()))
     x, y, z = SPHERE.points[123]
     place = f"vertex 123 at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
     assert _find(measures, "surface_deviation.max").where == (place,)
@@ -279,7 +280,7 @@ def test_moving_everything_rigidly_changes_nothing(interior: bool) -> None:
     run = _run([_scaled(SPHERE.points, 0.95)] * 2, [_scaled(FIBRES.points, 0.95)] * 2 if interior else None)
     reference = moved_run(REFERENCE, rest, fibres)
     before = _values(run, REFERENCE, YARDSTICK)
-    after = _values(moved_run(run, rest, fibres), reference, Yardstick.of(reference, fibres))
+    after = _values(moved_run(run, rest, fibres), reference, Yardstick.of(reference, fibres, ()))
     for name, values in before.items():
         assert_allclose(after[name], values, rtol=1e-9, atol=1e-9, err_msg=name)
 

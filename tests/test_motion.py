@@ -1,9 +1,9 @@
-"""A bone turns rigidly about its axis, right-handed, linearly between keyframes, and rests before and after them."""
+"""A bone turns about its axis, right-handed, or slides along a direction: rigidly, linearly between keyframes, at rest outside."""
 
 import numpy as np
 import pytest
 
-from fem_reference.motion import Rotation, apply
+from fem_reference.motion import Rotation, Translation, apply
 
 AXIS, CENTRE = (1.0, -2.0, 0.5), (10.0, 20.0, -3.0)
 TURN = Rotation(AXIS, CENTRE, (0.0, 10.0, 30.0), (0.0, 1.0, -0.5))
@@ -44,3 +44,30 @@ def test_positive_angle_is_right_handed() -> None:
 def test_length_of_the_axis_does_not_matter(scale: float) -> None:
     x, y, z = (scale * entry for entry in AXIS)
     assert Rotation((x, y, z), CENTRE, TURN.frames, TURN.angles).pose(7) == pytest.approx(TURN.pose(7), abs=1e-12)
+
+
+# 2 and 1 and 2 mm along the direction for 3 mm of distance.
+SLIDE = Translation((2.0, -1.0, 2.0), (0.0, 10.0, 30.0), (0.0, 90.0, -30.0))
+
+
+@pytest.mark.parametrize(
+    ("frame", "distance"), [(-5, 0), (0, 0), (5, 45), (10, 90), (20, 30), (25, 0), (30, -30), (99, -30)]
+)
+def test_distance_is_linear_between_keyframes(frame: float, distance: float) -> None:
+    pose = SLIDE.pose(frame)
+    assert np.array_equal(pose[:3, :3], np.eye(3))
+    assert pose[3].tolist() == [0, 0, 0, 1]
+    points = np.array([[1.0, 2, 3], [-7, 0, 5]])
+    assert apply(pose, points) - points == pytest.approx(
+        np.tile(np.array([2, -1, 2]) * distance / 3, (2, 1)), abs=1e-13
+    )
+
+
+def test_rest_before_a_slide_is_exact() -> None:
+    assert np.array_equal(SLIDE.pose(0), np.eye(4))
+
+
+@pytest.mark.parametrize("scale", [1e-8, 1e8])
+def test_length_of_the_direction_does_not_matter(scale: float) -> None:
+    x, y, z = (scale * entry for entry in SLIDE.direction)
+    assert Translation((x, y, z), SLIDE.frames, SLIDE.distances).pose(7) == pytest.approx(SLIDE.pose(7), abs=1e-12)

@@ -101,6 +101,13 @@ def test_rest_stays_at_rest():
         np.testing.assert_allclose(surface, spindle().points, rtol=0, atol=1e-12)
 
 
+def test_a_body_held_by_nothing_stays_at_rest():
+    setup = held_setup(None, None)
+    outcome, positions = run(Setup(setup.surface, setup.bones, (), setup.frames, None))
+    assert outcome.status == "converged"
+    assert np.abs(positions[10] - setup.surface.points).max() < 1e-9
+
+
 def test_bones_that_move_as_one_carry_the_body_along():
     # A closed surface that keeps its edges and angles is rigid, so that what is left once the bones rest is what
     # damping has not yet taken: with a tenth of the velocity lost in each of 300 steps, below a thousandth of 60 mm.

@@ -5,14 +5,22 @@ import pytest
 import small
 
 from fem_reference import casefile, files, problem
+from fem_reference.deformable import as_continuum
 from fem_reference.errors import InputError
 from fem_reference.geometry.embedding import embed
-from fem_reference.mesh import Polylines, boundary, enclosed_volume
+from fem_reference.geometry.rigid_bodies import Box, HalfSpace
+from fem_reference.mesh import Polylines, boundary, check_closed, enclosed_volume
 from fem_reference.motion import apply
+from fem_reference.overview import scene_facts
+from fem_reference.runs import Frame
+from fem_reference.solvers import fenicsx
 
 
 def build(case):
-    scene = casefile.read(case)
+    return build_scene(casefile.read(case))
+
+
+def build_scene(scene):
     return problem.build(scene, problem.setup(scene))
 
 
@@ -104,7 +112,7 @@ course = [{ frame = 0, amount = 0.0 }, { frame = 20, amount = 1.0 }]
 
 def test_directions_only_where_an_effect_needs_them(bar, built) -> None:
     assert built.directions is None
-    assert problem.as_continuum(built).fibre is None
+    assert as_continuum(built).fibre is None
     text = (bar / "case.toml").read_text()
     (bar / "case.toml").write_text(text.replace("[fibres]", f"{FIBRE}\n[fibres]"))
     along = build(bar).directions
@@ -116,7 +124,7 @@ def test_directions_only_where_an_effect_needs_them(bar, built) -> None:
 
 
 def test_as_a_continuum_its_bones_hold_their_facets_and_the_rest_is_free(built) -> None:
-    body = problem.as_continuum(built)
+    body = as_continuum(built)
     skin, _ = boundary(built.mesh.tets)
     parts = [tuple(sorted(facet)) for facets in body.mesh.facets.values() for facet in facets.tolist()]
     assert sorted(parts) == sorted(tuple(sorted(facet)) for facet in skin.tolist())
@@ -136,5 +144,126 @@ def test_a_stiffness_of_an_attachment_reaches_the_body(bar) -> None:
     scene = casefile.read(bar)
     soft = scene.attachment[1].model_copy(update={"stiffness": 0.1})
     scene = scene.model_copy(update={"attachment": (scene.attachment[0], soft)})
-    body = problem.as_continuum(problem.build(scene, problem.setup(scene)))
+    body = as_continuum(problem.build(scene, problem.setup(scene)))
     assert [entry.stiffness for entry in body.prescribed] == [None, 0.1]
+
+
+SQUEEZED = """
+title = "A box between plates"
+proves = "that bones may have a closed form and hold nothing"
+fibres.polylines = { file = "mesh:box/fibres.vtk", unit = "mm" }
+
+[muscle]
+surface = "mesh:box/box.ply"
+unit = "mm"
+tet_size = "20 mm"
+mesher = "block"
+
+[[bone]]
+name = "floor"
+half_space = { point = "0, 10, 0 mm", normal = [0, 1, 0] }
+
+[[bone]]
+name = "lid"
+box = { centre = "0, 140, 0 mm", size = "400, 100, 400 mm" }
+motion.direction = [0, -1, 0]
+motion.keyframes = [{ frame = 0, distance = "0 mm" }, { frame = 100, distance = "40 mm" }]
+
+[[effect]]
+name = "neo_hooke"
+mu = "10 kPa"
+
+[[effect]]
+name = "incompressible"
+bulk = "1 MPa"
+
+[[effect]]
+name = "contact"
+stiffness = "1 MPa/mm"
+
+[frames]
+first = 0
+last = 100
+every = 50
+
+[reference]
+solver = "fenicsx"
+
+[[expect]]
+of = "reference"
+metric = "volume"
+statistic = "deviation"
+frame = "any"
+truth = "0 %"
+within = "90 %"
+kind = "property"
+because = "it is a body"
+
+[spoil]
+key = "effect[0].mu"
+value = "9 kPa"
+because = "it is softer"
+"""
+
+
+@pytest.fixture(scope="module")
+def squeezed(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("problem") / "squeezed"
+    folder.mkdir()
+    (folder / "case.toml").write_text(SQUEEZED)
+    return casefile.read(folder)
+
+
+def test_bones_of_closed_form_are_their_own_distance(squeezed) -> None:
+    floor, lid = problem.setup(squeezed).bones
+    assert floor.shape == floor.solid == HalfSpace((0, 10, 0), (0, 1, 0))
+    assert lid.shape == lid.solid == Box((0, 140, 0), (400, 100, 400), 0)
+    for bone in (floor, lid):
+        assert check_closed(bone.surface) is bone.surface
+    assert lid.pose(50) == pytest.approx(np.array([[1, 0, 0, 0], [0, 1, 0, -20], [0, 0, 1, 0], [0, 0, 0, 1]]))
+    assert np.array_equal(floor.pose(50), np.eye(4))
+
+
+def test_a_body_may_be_held_by_nothing(squeezed) -> None:
+    built = build_scene(squeezed)
+    assert built.held == ()
+    assert built.mesh.facets == {}
+    body = as_continuum(built)
+    assert body.prescribed == ()
+    assert list(body.mesh.facets) == ["free"]
+    assert len(body.mesh.facets["free"]) == len(boundary(built.mesh.tets)[0])
+
+
+def test_a_block_is_meshed_as_one_and_its_fibres_stay_where_they_are(squeezed) -> None:
+    built = build_scene(squeezed)
+    assert built.mesh_facts["maker"] == "block"
+    assert len(built.mesh.tets) == 6 * 5 * 4 * 5
+    assert built.mesh_facts["volume_mm3"] == pytest.approx(100 * 80 * 100)
+    given = files.read_polylines(squeezed.file("mesh:box/fibres.vtk", "fibres"), 1.0)
+    assert np.array_equal(built.fibres.points, given.points)
+
+
+def test_what_is_no_block_is_refused_at_the_key_of_the_surface(bar) -> None:
+    scene = casefile.read(bar)
+    scene = scene.model_copy(update={"muscle": scene.muscle.model_copy(update={"mesher": "block"})})
+    with pytest.raises(InputError, match=r"case.toml: muscle.surface: .*bar.vtp: got \d+ triangles in no face"):
+        build_scene(scene)
+
+
+def test_show_says_what_bones_are_and_how_they_move(squeezed, bar) -> None:
+    facts = scene_facts(squeezed, problem.setup(squeezed))
+    assert facts["muscle"]["mesher"] == "block"
+    assert facts["attachments"] == {}
+    assert facts["bones"] == {
+        "floor": "half space of point (0, 10, 0), normal (0, 1, 0), mm, rests",
+        "lid": "box of centre (0, 140, 0), size (400, 100, 400), rounding 0, mm, slides along (0, -1, 0), "
+        "mm at frame: 0 at 0, 40 at 100",
+    }
+    turning = casefile.read(bar)
+    assert "turns about (5, 5, 30) mm along" in scene_facts(turning, problem.setup(turning))["bones"]["lid"]
+
+
+def test_a_frame_of_a_body_held_by_nothing_tells_nothing_of_attachments(squeezed) -> None:
+    built = build_scene(squeezed)
+    frame = Frame(0, np.array(built.surface.points), scalars={"energy": 1.0})
+    assert fenicsx._with_held(built, frame).scalars == {"energy": 1.0}

@@ -13,6 +13,8 @@ import pytest
 from fem_reference import casefile, report
 from fem_reference.comparison import Comparison
 from fem_reference.errors import MissingSoftware
+from fem_reference.geometry.rigid_bodies import HalfSpace
+from fem_reference.geometry.tessellation import tessellated
 from fem_reference.judge import Verdict
 from fem_reference.mesh import Polylines, Surface
 from fem_reference.metrics import Measure, Yardstick
@@ -22,6 +24,7 @@ from fem_reference.report.curves import curves
 from fem_reference.report.tables import COLUMNS, seconds_per_frame
 from fem_reference.report.words import duration, number
 from fem_reference.runs import Outcome, Run
+from fem_reference.study import ErrorBar, ErrorBars
 
 NUMBERS = (0, 10, 20, 30, 40)
 NAN = float("nan")
@@ -130,13 +133,13 @@ def comparison(tmp_path, monkeypatch) -> Comparison:
         "reference", "fenicsx", moved, scalars={"min_det_F_points": 1 - steps[:, 0, 0] / 8}, origin=origin
     )
     quick, torn = a_run("quick", "pbd", moved + steps * [0, 0, 1.0]), a_run("torn", "recorded", torn, "diverged")
-    plate = Body("plate", Surface(rest.points - [0, 0, 25], rest.triangles), scene.bone[0].motion.rotation())
+    plate = Body("plate", Surface(rest.points - [0, 0, 25], rest.triangles), scene.bone[0].motion.poses())
     return Comparison(
         scene=scene,
         setup=Setup(rest, (plate,), (), NUMBERS, None),
         reference=reference,
         candidates=(quick, torn),
-        yardstick=Yardstick.of(reference, Polylines([[0, 0, 0], [5, 0, 0], [0, 1, 0], [5, 1, 0]], [0, 2, 4])),
+        yardstick=Yardstick.of(reference, Polylines([[0, 0, 0], [5, 0, 0], [0, 1, 0], [5, 1, 0]], [0, 2, 4]), ()),
         deviations={run.name: measured(run, moved) for run in (quick, torn)},
         changes={run.name: measured(run, rest.points) for run in (reference, quick, torn)},
         extension_error=Measure("fibre_length", "extension_error", "mm", np.arange(5) / 8, ("fibre 1",) * 5),
@@ -151,7 +154,9 @@ def alone(comparison: Comparison) -> Comparison:
 def test_summary_has_the_documented_keys_and_survives_json(comparison):
     told = report.summary(comparison)
     assert json.loads(json.dumps(told, allow_nan=False)) == told
-    assert list(told) == ["case", "solver", "status", "message", "verdict", "cost", "measures", "from_rest", "verdicts"]
+    keys = ["case", "solver", "status", "message", "verdict", "cost", "measures", "from_rest", "verdicts", "error_bars"]
+    assert list(told) == keys
+    assert told["error_bars"] == []
     assert (told["case"], told["solver"], told["status"], told["verdict"]) == ("press", "fenicsx", "converged", "pass")
     assert told["cost"]["quick"] == {"seconds": 12.0, "seconds_solve": 8.0, "iterations": 40.0}
     assert {row["candidate"] for row in told["from_rest"]} == {"reference", "quick", "torn"}
@@ -275,6 +280,23 @@ def test_cameras_look_at_the_widest_side_away_from_the_bones(comparison, up):
     np.testing.assert_allclose(views @ turn, [[0, 0, up], [0, -1, 0]], atol=1e-9)
 
 
+def test_cameras_look_along_the_coordinates_where_two_axes_are_as_long(comparison):
+    body = comparison.setup.surface
+    points = body.points / [30, 20, 10] * [20, 8, 20] + np.random.default_rng(4).normal(size=body.points.shape) * 1e-12
+    plate = Body("plate", body.moved_to(body.points - [300, 200, 100]), None)
+    np.testing.assert_allclose(gallery.directions(body.moved_to(points), (plate,)), [[0, 1, 0], [1, 0, 0]], atol=0.01)
+
+
+def test_cameras_do_not_look_through_plates(comparison):
+    # Half axes 30, 20, 10 again, now between plates across z: seen along y and x. With one plate alone, from its other side.
+    body = comparison.setup.surface
+    floor, lid = (HalfSpace((0, 0, -10 * up), (0, 0, up)) for up in (1, -1))
+    bones = tuple(Body("plate", tessellated(solid, body.points, "plate"), None, solid=solid) for solid in (floor, lid))
+    np.testing.assert_allclose(np.abs(gallery.directions(body, bones)), [[0, 1, 0], [1, 0, 0]], atol=1e-9)
+    np.testing.assert_allclose(gallery.directions(body, bones[:1])[0], [0, 0, 1], atol=1e-9)
+    np.testing.assert_allclose(gallery.directions(body, bones[1:])[0], [0, 0, -1], atol=1e-9)
+
+
 def test_pictures_show_the_candidate_in_the_colours_of_the_bar(comparison, monkeypatch):
     from PIL import Image
 
@@ -300,6 +322,47 @@ def test_curves_tell_where_a_run_is_not_a_number(comparison):
     assert "not a number" in drawn["Surface of torn: distance to the reference"]
     assert "not a number" not in drawn["Surface of quick: distance to the reference"]
     assert all(svg.startswith("<svg viewBox=") for svg in drawn.values())
+
+
+def with_bars(comparison: Comparison) -> Comparison:
+    """A tenth of each greatest value of "quick", not known in the last frame, of the reference and of deviations from it."""
+    bars = [
+        ErrorBar(
+            of, one.metric, one.statistic, one.unit, known, 1.25, "oscillates", {"tetrahedra": 0.5, "load steps": NAN}
+        )
+        for of in ("change", "deviation")
+        for one in comparison.deviations["quick"]
+        for known in [np.append(np.abs(one.values[:-1]) / 10, NAN)]
+    ]
+    return replace(comparison, error_bars=ErrorBars(NUMBERS, (2.0, 2.5, 3.125), tuple(bars)))
+
+
+def test_how_well_the_reference_is_known_is_told(comparison):
+    assert "With <code>--error-bar</code> the reference is solved" in page.render(comparison)
+    text = page.render(with_bars(comparison))
+    assert "2, 2.50, 3.12 mm" in text
+    assert "one other cause of error halved at a time (load steps)" in text
+    assert "--error-bar" not in text
+    # The worst frame of "quick" is the last, where the bar is not known; that of "torn" is the one before.
+    assert '<small>± <span class="bad">not a number</span>' in text
+    assert text.count('<td class="text">oscillates</td>') == 2 * len(comparison.deviations["quick"])
+    rows = report.summary(with_bars(comparison))["error_bars"]
+    found = [row for row in rows if (row["of"], row["metric"], row["statistic"]) == ("change", "volume", "deviation")]
+    assert [row["value"] for row in found] == [
+        0,
+        pytest.approx(1 / 70),
+        pytest.approx(2 / 70),
+        pytest.approx(3 / 70),
+        None,
+    ]
+    assert (found[0]["order"], found[0]["course"], found[0]["unit"]) == (1.25, "oscillates", "%")
+
+
+def test_curves_have_a_band_as_wide_as_the_error_bar(comparison):
+    bare, banded = curves(comparison), curves(with_bars(comparison))
+    told = {curve.title: "error bar" in curve.svg for curve in banded}
+    assert told == {curve.title: not curve.title.startswith("Smallest det F") for curve in banded}
+    assert not any("error bar" in curve.svg for curve in bare)
 
 
 def test_a_scene_that_differs_from_its_file_is_told(comparison):

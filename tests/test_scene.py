@@ -9,9 +9,12 @@ from pathlib import Path
 import pytest
 
 from fem_reference import casefile
+from fem_reference.bones import CLOSED_FORMS
 from fem_reference.errors import InputError
 from fem_reference.field.problem import build as build_field
 from fem_reference.field.scene import FieldScene
+from fem_reference.geometry.rigid_bodies import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere, solid
+from fem_reference.motion import Rotation, Translation
 from fem_reference.scene import DATA_SETTING, HOME, Scene, home
 
 SCENE = """
@@ -93,6 +96,13 @@ because = "it is compressible then"
 OPTIONAL = ("interval", "newton_iterations", "stretch")
 NEEDED = list(dict.fromkeys(line for line in SCENE.splitlines() if " = " in line and not line.startswith(OPTIONAL)))
 FILES = ("bar.ply", "wall.ply", "lever.ply", "end.csv")
+ROD = {"start": "0, 0, 0 mm", "end": "0, 3, 4 cm", "radius": "2 mm"}
+TURN = {
+    "axis": [0, 0, 2],
+    "centre": "1, 2, 3 cm",
+    "keyframes": [{"frame": 0, "angle": "0 deg"}, {"frame": 9, "angle": "1 deg"}],
+}
+SLIDE = {"direction": [0, -3, 0], "keyframes": [{"frame": 0, "distance": "0 mm"}, {"frame": 9, "distance": "1 cm"}]}
 COURSE = [{"frame": 0, "amount": 0}, {"frame": 10, "amount": 1}]
 PRESSURE = {"name": "pressure", "on": "free", "pressure": "1 kPa", "course": COURSE}
 POLYLINES = {"file": "fibres.vtk", "unit": "mm"}
@@ -125,7 +135,9 @@ def test_scene_holds_what_the_file_says(bar: Path) -> None:
     assert (scene.muscle.unit, scene.muscle.tet_size) == pytest.approx((10.0, 20.0))
     assert scene.bone[0].motion is None
     assert scene.bone[1].motion is not None
-    assert scene.bone[1].motion.rotation().angles == pytest.approx((0.0, math.pi / 2))
+    assert scene.bone[1].motion.poses() == Rotation(
+        (0.0, 0.0, 2.0), (10.0, 20.0, 30.0), (0.0, 10.0), (0.0, pytest.approx(math.pi / 2))
+    )
     assert scene.bone[1].motion.centre == pytest.approx((10.0, 20.0, 30.0))
     assert [effect.model_dump() for effect in scene.effects] == [
         {"mu": pytest.approx(0.03)},
@@ -152,6 +164,59 @@ def test_candidates_may_be_none(bar: Path) -> None:
     assert casefile.read(edited(bar, SCENE[start:end], "")).candidate == ()
 
 
+FORMS = [
+    ({"half_space": {"point": "1, 2, 3 cm", "normal": [0, 2, 0]}}, HalfSpace((10, 20, 30), (0, 2, 0))),
+    ({"box": {"centre": "0, 0, 1 mm", "size": "4, 1, 4 cm"}}, Box((0, 0, 1), (40, 10, 40), 0)),
+    ({"box": {"centre": "0, 0, 1 mm", "size": "4, 1, 4 cm", "rounding": "5 mm"}}, Box((0, 0, 1), (40, 10, 40), 5)),
+    ({"sphere": {"centre": "0, 0, 1 mm", "radius": "3 cm"}}, Sphere((0, 0, 1), 30)),
+    ({"capsule": ROD}, Capsule((0, 0, 0), (0, 30, 40), 2)),
+    ({"cylinder": ROD}, Cylinder((0, 0, 0), (0, 30, 40), 2)),
+]
+
+
+@pytest.mark.parametrize(("table", "body"), FORMS, ids=lambda entry: type(entry).__name__)
+def test_a_bone_may_have_a_closed_form(bar: Path, table: dict[str, object], body: Obstacle) -> None:
+    scene = changed(bar, "bone[0]", {"name": "wall"} | table)
+    assert solid(scene.bone[0]) == body
+    assert solid(scene.bone[1]) is None
+
+
+def test_a_bone_may_slide(bar: Path) -> None:
+    motion = changed(bar, "bone[1].motion", SLIDE).bone[1].motion
+    assert motion is not None
+    assert motion.poses() == Translation((0.0, -3.0, 0.0), (0.0, 9.0), (0.0, 10.0))
+
+
+def test_what_the_first_case_shows_in_comments_can_be_read(bar: Path) -> None:
+    comments = [
+        line[2:] for line in (HOME / "cases/hip_flexion/case.toml").read_text().splitlines() if line[:2] == "# "
+    ]
+    shown = [line for line in comments if line.split(" = ")[0] in CLOSED_FORMS]
+    assert len(shown) == len(CLOSED_FORMS)
+    for line in shown:
+        assert solid(changed(bar, "bone[0]", {"name": "wall"} | tomllib.loads(line)).bone[0]) is not None
+    slide = "\n".join(line for line in comments if line.split(" = ")[0] in ("direction", "keyframes"))
+    assert changed(bar, "bone[1].motion", tomllib.loads(slide)).bone[1].motion is not None
+    meshers = [line for line in comments if line.startswith("mesher = ")]
+    muscle = {"surface": "bar.ply", "unit": "cm", "tet_size": "2 cm"} | tomllib.loads(meshers[0])
+    assert changed(bar, "muscle", muscle).muscle.mesher == "block"
+
+
+def test_attachments_may_be_none(bar: Path) -> None:
+    start, end = SCENE.index("[[attachment]]"), SCENE.index("[[effect]]")
+    text = SCENE[:start] + SCENE[end:]
+    with pytest.raises(InputError, match=r'fibres.traced.start: got "start", want a name that is there: there is none'):
+        casefile.read(written(bar, text))
+    traced = text[text.index("[fibres.traced]") : text.index("[frames]")]
+    lines = 'fibres.polylines = { file = "fibres.vtk", unit = "mm" }\n'
+    assert casefile.read(written(bar, lines + text.replace(traced, ""))).attachment == ()
+
+
+def written(folder: Path, text: str) -> Path:
+    (folder / "case.toml").write_text(text, encoding="utf-8")
+    return folder
+
+
 NAN, INF = math.nan, math.inf
 WRONG = [
     # key, what stands there instead, what the message says
@@ -161,8 +226,8 @@ WRONG = [
     ("muscle.tet_size", 2.0, "muscle.tet_size: got 2.0, want a length"),
     ("effect[0].mu", "30 mm", 'effect[0].mu: got "30 mm", want a pressure with its unit, such as "30 kPa"'),
     ("effect[0].mu", "-30 kPa", 'effect[0].mu: got "-30 kPa", want more than zero'),
-    ("effect[0].name", "hooke", 'effect[0].name: got "hooke", want one of active_tension, fibre_active'),
-    ("effect", ["hooke"], 'effect[0].name: got "hooke", want one of active_tension, fibre_active'),
+    ("effect[0].name", "hooke", 'effect[0].name: got "hooke", want one of active_tension, contact, fibre_active'),
+    ("effect", ["hooke"], 'effect[0].name: got "hooke", want one of active_tension, contact, fibre_active'),
     ("effect", "hooke", 'effect: got "hooke", want'),
     ("effect", [], "effect: got [], want"),
     ("effect[1]", {"name": "neo_hooke", "mu": "1 kPa"}, 'effect[1].name: got "neo_hooke" a second time, want every'),
@@ -196,6 +261,104 @@ WRONG = [
         "bone[1].motion.keyframes[0].angle",
         "1 deg",
         "bone[1].motion: got a bone turned at the first frame, want angle 0 there",
+    ),
+    (
+        "muscle",
+        {"surface": "bar.ply", "unit": "cm", "tet_size": "2 cm", "mesher": "gmsh"},
+        'muscle.mesher: got "gmsh", want',
+    ),
+    (
+        "bone[1].motion",
+        SLIDE | {"direction": [0, 0, 0]},
+        "bone[1].motion.direction: got [0, 0, 0], want a direction that",
+    ),
+    ("bone[1].motion", SLIDE | {"direction": [0, 1]}, "bone[1].motion.direction"),
+    ("bone[1].motion", SLIDE | {"axis": [0, 0, 1]}, 'want either "axis" and "centre" (a rotation) or "direction" (a'),
+    (
+        "bone[1].motion",
+        SLIDE | {"centre": "0, 0, 0 mm"},
+        'want either "axis" and "centre" (a rotation) or "direction" (a',
+    ),
+    ("bone[1].motion", SLIDE | TURN, "bone[1].motion.keyframes: got"),
+    ("bone[1].motion", SLIDE | TURN | {"keyframes": SLIDE["keyframes"]}, "bone[1].motion: got {"),
+    (
+        "bone[1].motion",
+        TURN | {"keyframes": SLIDE["keyframes"]},
+        'want "frame" and "angle" in each keyframe of a rotation',
+    ),
+    (
+        "bone[1].motion",
+        SLIDE | {"keyframes": [{"frame": 0, "distance": "0 mm"}, {"frame": 9}]},
+        'want "frame" and "distance" in each keyframe of a translation',
+    ),
+    (
+        "bone[1].motion",
+        SLIDE | {"keyframes": [{"frame": 0, "distance": "0 mm"}, {"frame": 9, "distance": "1 mm", "angle": "1 deg"}]},
+        'want "frame" and "distance" in each keyframe of a translation',
+    ),
+    (
+        "bone[1].motion",
+        SLIDE | {"keyframes": [{"frame": 0, "distance": "1 deg"}, {"frame": 9, "distance": "1 mm"}]},
+        'bone[1].motion.keyframes[0].distance: got "1 deg", want a length with its unit',
+    ),
+    (
+        "bone[1].motion",
+        SLIDE | {"keyframes": [{"frame": 0, "distance": "2 mm"}, {"frame": 9, "distance": "1 mm"}]},
+        "bone[1].motion: got a bone moved at the first frame, want distance 0 there",
+    ),
+    (
+        "bone[0]",
+        {"name": "wall", "cylinder": ROD, "capsule": ROD},
+        'want exactly one of "surface", "half_space", "box", "sphere", "capsule", "cylinder"',
+    ),
+    ("bone[0]", {"name": "wall"}, "bone[0]: got {'name': 'wall'}, want exactly one of \"surface\", \"half_space\""),
+    ("bone[0]", {"name": "wall", "surface": "wall.ply"}, "bone[0]: got {"),
+    ("bone[0]", {"name": "wall", "surface": "wall.ply"}, 'want "unit" beside "surface" and only there'),
+    ("bone[0]", {"name": "wall", "capsule": ROD, "unit": "mm"}, 'want "unit" beside "surface" and only there'),
+    (
+        "bone[0]",
+        {"name": "wall", "capsule": ROD, "distance_error": "0.05 mm"},
+        'want "distance_error" beside "surface" only: a closed form has none',
+    ),
+    (
+        "bone[0]",
+        {"name": "wall", "half_space": {"point": "0, 0, 0 mm", "normal": [0, 0, 0]}},
+        "bone[0].half_space.normal: got [0, 0, 0], want a normal that is not zero",
+    ),
+    (
+        "bone[0]",
+        {"name": "wall", "half_space": {"point": "0, 0 mm", "normal": [0, 1, 0]}},
+        'bone[0].half_space.point: got "0, 0 mm", want three lengths with one unit',
+    ),
+    (
+        "bone[0]",
+        {"name": "wall", "box": {"centre": "0, 0, 0 mm", "size": "1, 0, 1 mm"}},
+        "want three lengths above zero",
+    ),
+    (
+        "bone[0]",
+        {"name": "wall", "box": {"centre": "0, 0, 0 mm", "size": "4, 2, 4 mm", "rounding": "1.1 mm"}},
+        'bone[0].box.rounding: got "1.1 mm", want a length from 0 to half of the shortest edge',
+    ),
+    (
+        "bone[0]",
+        {"name": "wall", "sphere": {"centre": "0, 0, 0 mm", "radius": "0 mm"}},
+        'bone[0].sphere.radius: got "0 mm", want more than zero',
+    ),
+    (
+        "bone[0]",
+        {"name": "wall", "sphere": {"centre": "0, 0, 0 mm", "radius": "1 mm", "colour": "red"}},
+        "bone[0].sphere.colour: got an unknown key, want one of centre, radius",
+    ),
+    (
+        "bone[0]",
+        {"name": "wall", "capsule": {"start": "0, 0, 0 mm"}},
+        "bone[0].capsule.end: got nothing, want this key",
+    ),
+    (
+        "bone[0]",
+        {"name": "wall", "cylinder": ROD | {"end": "0, 0, 0 mm"}},
+        'bone[0].cylinder.end: got "0, 0, 0 mm", want another point than the start',
     ),
     ("bone[1].name", "wall", 'bone: got the name "wall" twice, want every name once'),
     ("attachment[1].name", "start", 'attachment: got the name "start" twice, want every name once'),
@@ -256,8 +419,12 @@ def test_every_key_is_needed(bar: Path, line: str) -> None:
             "colour",
             "attachment, bone, candidate, effect, expect, fibres, frames, muscle, proves, reference, spoil, title",
         ),
-        ("[muscle]\n", "muscle.colour", "surface, tet_size, unit"),
-        ("[[bone]]\n", "bone[0].colour", "distance_error, motion, name, surface, unit"),
+        ("[muscle]\n", "muscle.colour", "mesher, surface, tet_size, unit"),
+        (
+            "[[bone]]\n",
+            "bone[0].colour",
+            "box, capsule, cylinder, distance_error, distance_rounding, half_space, motion, name, sphere, surface, unit",
+        ),
         ("[[attachment]]\n", "attachment[0].colour", "bone, name, outline, stiffness, vertices, within"),
         ("[[effect]]\n", "effect[0].colour", "mu"),
         ("[fibres.traced]\n", "fibres.traced.colour", "count, end, start"),
@@ -380,6 +547,12 @@ SOLUTION = {
     "muscle.unit": "m",
     "muscle.tet_size": "1 cm",
     "muscle.surface": "wall.ply",
+    "muscle": {"surface": "bar.ply", "unit": "cm", "tet_size": "2 cm", "mesher": "block"},
+    "bone[0]": {"name": "wall", "sphere": {"centre": "0, 0, 0 mm", "radius": "3 mm"}},
+    "bone[1].motion": {
+        "direction": [0, -1, 0],
+        "keyframes": [{"frame": 0, "distance": "0 mm"}, {"frame": 9, "distance": "1 mm"}],
+    },
     "bone[0].name": "floor",
     "bone[1].unit": "cm",
     "bone[1].surface": "wall.ply",

@@ -213,7 +213,7 @@ def counted(monkeypatch) -> list[float]:
 
 
 def test_store_gives_back_the_same_bits(counted: list[float], tmp_path: Path) -> None:
-    first, second = (cached(BALL, 0.1, 2.0, tmp_path / "new") for _ in range(2))
+    first, second = (cached(BALL, 0.1, 2.0, 0.0, tmp_path / "new") for _ in range(2))
     assert counted == [0.1]
     assert first.coefficients.tobytes() == second.coefficients.tobytes()
     assert not second.coefficients.flags.writeable
@@ -223,26 +223,26 @@ def test_store_gives_back_the_same_bits(counted: list[float], tmp_path: Path) ->
 
 
 def test_store_tells_surfaces_errors_and_margins_apart(counted: list[float], tmp_path: Path) -> None:
-    cached(BALL, 0.1, 2.0, tmp_path)
-    cached(BALL, 0.2, 2.0, tmp_path)
-    cached(BALL, 0.1, 3.0, tmp_path)
-    cached(BALL.moved_to(1.001 * BALL.points), 0.1, 2.0, tmp_path)
-    cached(Surface(BALL.points, np.roll(BALL.triangles, 1, axis=0)), 0.1, 2.0, tmp_path)
+    cached(BALL, 0.1, 2.0, 0.0, tmp_path)
+    cached(BALL, 0.2, 2.0, 0.0, tmp_path)
+    cached(BALL, 0.1, 3.0, 0.0, tmp_path)
+    cached(BALL.moved_to(1.001 * BALL.points), 0.1, 2.0, 0.0, tmp_path)
+    cached(Surface(BALL.points, np.roll(BALL.triangles, 1, axis=0)), 0.1, 2.0, 0.0, tmp_path)
     assert len(counted) == 5
 
 
 @pytest.mark.parametrize("damage", ["cut", "empty", "text", "bit"])
 def test_damaged_files_are_made_anew(counted: list[float], tmp_path: Path, caplog, damage: str) -> None:
-    cached(BALL, 0.1, 2.0, tmp_path)
+    cached(BALL, 0.1, 2.0, 0.0, tmp_path)
     (path,) = tmp_path.iterdir()
     whole = path.read_bytes()
     flipped = bytearray(whole)
     flipped[len(whole) // 4] ^= 1
     path.write_bytes({"cut": whole[:-300], "empty": b"", "text": b"not a grid", "bit": bytes(flipped)}[damage])
-    again = cached(BALL, 0.1, 2.0, tmp_path)
+    again = cached(BALL, 0.1, 2.0, 0.0, tmp_path)
     assert len(counted) == 2
     assert "damaged, made anew" in caplog.text
-    cached(BALL, 0.1, 2.0, tmp_path)
+    cached(BALL, 0.1, 2.0, 0.0, tmp_path)
     assert len(counted) == 2
     assert np.isfinite(again.coefficients).all()
 

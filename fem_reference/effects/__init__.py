@@ -198,6 +198,10 @@ class Load(Effect):
         raise NotImplementedError(f"{type(self).__name__} has no traction")
 
 
+class Interaction(Effect):
+    """An effect between a body and the rigid bodies around it, which a problem makes of a scene."""
+
+
 class Prestrain(Effect):
     """An effect that changes what is elastic of the deformation."""
 

@@ -11,6 +11,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from fem_reference.bones import CLOSED_FORMS, Bone
 from fem_reference.errors import InputError
 from fem_reference.mesh import Floats
 
@@ -137,6 +138,15 @@ class Cylinder:
         curvature = np.einsum("nab,nai,nbj->nij", bend, frame, frame)
         curvature += _over(slope[:, 0, None, None] * round_about, from_axis)
         return Sampled(distance, np.einsum("na,nai->ni", slope, frame), curvature)
+
+
+_KINDS = {"half_space": HalfSpace, "box": Box, "sphere": Sphere, "capsule": Capsule, "cylinder": Cylinder}
+
+
+def solid(bone: Bone) -> Obstacle | None:
+    """The body of closed form that a ``bone`` of a scene is; None where it is a surface in a file."""
+    given = ((way, getattr(bone, way)) for way in CLOSED_FORMS)
+    return next((_KINDS[way](**form.model_dump()) for way, form in given if form is not None), None)
 
 
 def _orthant(beyond: Floats) -> Sampled:

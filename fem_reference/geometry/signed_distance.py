@@ -11,7 +11,7 @@ from pathlib import Path
 
 import igl
 import numpy as np
-from scipy.ndimage import spline_filter, zoom
+from scipy.ndimage import gaussian_filter, spline_filter, zoom
 
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.rigid_bodies import Sampled, Vector
@@ -94,14 +94,18 @@ def _weights(within: Floats) -> Floats:
     return np.stack([powers, slopes, bends], axis=1) @ _SPLINES.T
 
 
-def build(surface: Surface, spacing: float, margin: float) -> Grid:
+def build(surface: Surface, spacing: float, margin: float, rounding: float = 0.0) -> Grid:
     """The distance to a closed ``surface``, negative inside, on nodes ``spacing`` apart, meant within ``margin`` of it [mm].
 
+    ``rounding`` [mm]: the standard deviation s of the Gaussian mean that is taken of it, as flat triangles are no smooth body
+    to slide along; where the surface has a mean curvature of 1/r, that moves it inward by s^2/r. It counts as error.
     Which way single triangles run does not matter. InputError where the surface bounds no body, as ``check_closed`` says.
     """
     surface = _one_way(surface)
     low, shape = _extent(surface, spacing, margin)
     values = _on_nodes(surface, low, shape, spacing, margin)
+    if rounding > 0:
+        values = gaussian_filter(values, rounding / spacing, mode="nearest")
     grid = Grid(_coefficients(values), tuple((low - spacing).tolist()), spacing, margin, np.nan, np.nan)
     largest, mean = _errors(grid, surface)
     return replace(grid, error=largest, mean_error=mean)
@@ -125,17 +129,19 @@ def resolve(surface: Surface, error: float, margin: float) -> Grid:
     return grid
 
 
-def cached(surface: Surface, error: float, margin: float, folder: Path) -> Grid:
-    """As ``resolve``, kept in ``folder`` under a hash of all that it depends on, this file among it.
+def cached(surface: Surface, error: float, margin: float, rounding: float, folder: Path) -> Grid:
+    """As ``build`` with the spacing of ``resolve``, kept in ``folder`` under a hash of all that it depends on, this file among it.
 
     A file that is damaged is made anew.
     """
     code = np.frombuffer(Path(__file__).read_bytes(), np.uint8)
-    name = fingerprint(surface.points, surface.triangles, np.array([error, margin]), code)
+    name = fingerprint(surface.points, surface.triangles, np.array([error, margin, rounding]), code)
     path = folder / f"distance_{name[:32]}.npz"
     grid = _read(path)
     if grid is None:
         grid = resolve(surface, error, margin)
+        if rounding > 0:
+            grid = build(surface, grid.spacing, margin, rounding)
         _write(path, grid)
     return grid
 

@@ -50,7 +50,7 @@ def tetrahedralise(surface: Surface, size: float) -> TetMesh:
     """
     origin, axes = _own_frame(surface.points)
     local = np.round((surface.points - origin) @ axes, _ROUNDED) + 0.0  # + 0.0: no negative zeros
-    _check_size(surface.moved_to(local), size)
+    check_size(surface.moved_to(local), size)
     crossing = len(self_intersections(surface))
     if crossing:
         log.warning("%s: %d triangles of the given surface pass through it", surface.place, crossing)
@@ -58,7 +58,7 @@ def tetrahedralise(surface: Surface, size: float) -> TetMesh:
     return TetMesh(mesh.points @ axes.T + origin, mesh.tets, maker=mesh.maker)
 
 
-def _check_size(surface: Surface, size: float) -> None:
+def check_size(surface: Surface, size: float) -> None:
     """InputError where it takes more than ``_MOST_TETS`` regular tets to fill a surface, or ``size`` is above its smallest extent.
 
     In the frame that its vertices span, so that turning the surface changes nothing.

@@ -1,6 +1,7 @@
 """What is measured: one file per metric, named as in scene files and JSON. A metric cannot tell who made a run.
 
-Contract (tests/test_metrics.py): zero against itself, a known change gives a known value, NaN stays NaN, units stated.
+Contract (tests/test_metrics.py): zero against itself, a known change gives a known value, NaN stays NaN, units stated. One
+metric, penetration, is of the run alone: against itself too it is what it is.
 """
 
 import importlib
@@ -8,9 +9,11 @@ import pkgutil
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fem_reference.geometry.extension import Extension
 from fem_reference.mesh import Floats, Polylines, vertex_areas
+from fem_reference.problem import Body
 from fem_reference.runs import Run
 
 
@@ -34,24 +37,31 @@ class Measure:
 @dataclass(frozen=True, eq=False)
 class Yardstick:
     """What every run of a scene is measured with, the same for all: ``areas`` (n,) [mm2] around the surface's vertices at rest,
-    the ``fibres`` at rest and the ``extension`` that carries a surface's displacement to their points, and ``travel`` [mm], the
-    greatest displacement of the reference's surface over its frames.
+    the ``fibres`` at rest and the ``extension`` that carries a surface's displacement to their points, ``travel`` [mm], the
+    greatest displacement of the reference's surface over its frames, and the ``bones``, with the vertices that are ``free`` (n,)
+    of them.
     """
 
     areas: Floats
     fibres: Polylines
     extension: Extension
     travel: float
+    bones: tuple[Body, ...]
+    free: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, reference: Run, fibres: Polylines) -> "Yardstick":
-        """The yardstick of a reference run."""
+    def of(
+        cls, reference: Run, fibres: Polylines, bones: tuple[Body, ...], free: NDArray[np.bool_] | None = None
+    ) -> "Yardstick":
+        """The yardstick of a reference run; without ``free`` (n,), nothing is held."""
         rest = reference.surface
         return cls(
             areas=vertex_areas(rest.points, rest.triangles),
             fibres=fibres,
             extension=Extension.to(fibres.points, rest),
             travel=float(np.nanmax(np.linalg.norm(reference.positions - rest.points, axis=2))),
+            bones=bones,
+            free=np.ones(len(rest.points), bool) if free is None else free,
         )
 
 

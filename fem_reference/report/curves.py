@@ -14,14 +14,18 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from fem_reference.comparison import Comparison
+from fem_reference.mesh import Floats
 from fem_reference.metrics import Measure
 from fem_reference.report.tables import find, inversion, runs
 from fem_reference.report.words import words
+from fem_reference.study import Of
 
 REFERENCE = "#222222"
 # Okabe and Ito's palette for all kinds of colour vision, without its black and yellow.
 PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 _NOT_A_NUMBER = "not a number"
+BAND = "#00000018"
+_KNOWN = "error bar"
 LOOK: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "fem_reference",
@@ -60,6 +64,8 @@ def curves(comparison: Comparison) -> list[Curve]:
     fibres = {run.name: find(changes[run.name], "fibre_length", "mean") for run in runs(comparison)}
     edges = {run.name: find(changes[run.name], "edge_extension", "mean") for run in runs(comparison)}
     angles = {run.name: find(changes[run.name], "dihedral_angle", "mean_magnitude") for run in runs(comparison)}
+    depths = {run.name: find(changes[run.name], "penetration", "deepest") for run in runs(comparison)}
+    inside = {run.name: find(changes[run.name], "penetration", "volume") for run in runs(comparison)}
     drawn = [
         _of_runs(comparison, "volume", "Change of volume from rest", volume),
         _of_runs(comparison, "fibres", "Change of fibre length from rest, mean over the fibres", fibres),
@@ -70,6 +76,8 @@ def curves(comparison: Comparison) -> list[Curve]:
     drawn.append(_inversion(comparison, smallest, "Smallest det F of the reference (inside out below 0)"))
     drawn.append(_of_runs(comparison, "edges", "Extension of the surface's edges from rest, mean by area", edges))
     drawn.append(_of_runs(comparison, "angles", "Bending at the edges from rest, mean magnitude by area", angles))
+    drawn.append(_of_runs(comparison, "depth", "Depth inside a bone of the deepest vertex that none holds", depths))
+    drawn.append(_of_runs(comparison, "inside", "Volume inside bones, but for what they hold", inside))
     return [curve for curve in drawn if curve is not None]
 
 
@@ -85,6 +93,8 @@ def _of_runs(comparison: Comparison, name: str, title: str, measures: dict[str, 
         for i, run in enumerate(runs(comparison)):
             if run.name in found:
                 colour = REFERENCE if i == 0 else PALETTE[(i - 1) % len(PALETTE)]
+                if i == 0:
+                    _band(axes, comparison, "change", found[run.name], found[run.name].values)
                 _line(axes, run.numbers, found[run.name], run.name, color=colour, linewidth=2.4 if i == 0 else 1.5)
 
     return _drawing(name, title, next(iter(found.values())).unit, draw) if found else None
@@ -99,6 +109,7 @@ def _surface(comparison: Comparison, i: int, title: str) -> Curve | None:
         for measure, label, style in found:
             if measure is not None:
                 colour = PALETTE[i % len(PALETTE)]
+                _band(axes, comparison, "deviation", measure, np.zeros(len(run.numbers)), style)
                 _line(axes, run.numbers, measure, label, color=colour, linestyle=style)
         axes.set_ylim(bottom=0)
 
@@ -121,6 +132,21 @@ def _inversion(comparison: Comparison, measures: tuple[Measure, ...], title: str
     return _drawing("inversion", title, "", draw) if measures else None
 
 
+def _band(
+    axes: Axes, comparison: Comparison, of: Of, measure: Measure, middle: Floats, linestyle: str | None = None
+) -> None:
+    """How well the reference is known, around ``middle`` (f,), where that is stated; with a ``linestyle`` its upper edge too."""
+    bars = comparison.error_bars
+    bar = bars and bars.find(of, measure.metric, measure.statistic)
+    if not bar:
+        return
+    numbers, upper = np.asarray(comparison.reference.numbers), middle + bar.values
+    told = _KNOWN in axes.get_legend_handles_labels()[1]
+    axes.fill_between(numbers, middle - bar.values, upper, color=BAND, linewidth=0, label="_" if told else _KNOWN)
+    if linestyle:
+        axes.plot(numbers, upper, color="#888888", linewidth=1.0, linestyle=linestyle)
+
+
 def _line(axes: Axes, numbers: tuple[int, ...], measure: Measure, label: str, **look: str | float) -> None:
     """A measure over frames; a cross on the frame axis where it is not finite."""
     frames, values = np.asarray(numbers), np.asarray(measure.values, float)
@@ -141,7 +167,7 @@ def _drawing(name: str, title: str, unit: str, draw: Callable[[Axes], None]) -> 
         draw(axes)
         axes.margins(x=0.02)
         axes.set_xlabel("frame")
-        axes.set_ylabel(unit)
+        axes.set_ylabel(unit.replace("mm3", "mm³"))
         axes.xaxis.set_major_locator(MaxNLocator(nbins=8, integer=True, steps=[1, 2, 5, 10]))
         _legend(figure, axes)
         text = io.StringIO()

@@ -24,6 +24,8 @@ log = logging.getLogger(__name__)
 
 PACKAGES = "libegl1 libegl-mesa0 libgl1-mesa-dri"
 _SECONDS = 600
+# Where a surface is as wide along two axes, those of the coordinates are taken: this tells them apart, far above round-off.
+_TIES = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,16 +69,27 @@ def directions(surface: Surface, bones: tuple[Body, ...]) -> Floats:
     """Unit vectors (2, 3) towards the cameras: along the smallest and the middle principal axis of the surface.
 
     From the first its silhouette is largest, the second is a quarter turn about its long axis from there. Both cameras
-    stand on the side away from the bones' vertices.
+    stand on the side away from the bones' vertices. An axis along which a bone of closed form hides the surface comes last.
     """
     middle = surface.points.mean(axis=0)
-    _, axes = np.linalg.eigh(np.cov((surface.points - middle).T))
-    views = axes.T[:2]
+    spread = np.cov((surface.points - middle).T)
+    _, axes = np.linalg.eigh(spread + _TIES * np.trace(spread) * np.diag([0, 1, 2]))
     others = np.vstack([bone.surface.points for bone in bones])
     radius = np.linalg.norm(surface.points - middle, axis=1).max()
     near = others[np.linalg.norm(others - middle, axis=1) < 1.5 * radius]
     away = middle - (near if len(near) else others).mean(axis=0)
-    return np.asarray(views * np.where(views @ away < 0, -1.0, 1.0)[:, None])
+    views = axes.T * np.where(axes.T @ away < 0, -1.0, 1.0)[:, None]
+    hidden = [_hidden(surface.points, view * radius, bones) for view in views]
+    return np.asarray(views[np.argsort(hidden, kind="stable")[:2]])
+
+
+def _hidden(points: Floats, way: Floats, bones: tuple[Body, ...]) -> bool:
+    """Whether most of ``points`` (n, 3) have a bone of closed form before them within four times the ``way`` (3,) to the camera."""
+    behind = np.zeros(len(points), bool)
+    for solid in (bone.solid for bone in bones if bone.solid is not None):
+        for step in np.arange(1, 17) / 4:
+            behind |= solid.sample(points + step * way).distance < 0
+    return bool(behind.mean() > 0.5)
 
 
 def _worst(comparison: Comparison, run: Run) -> Iterator[Shot]:
@@ -103,7 +116,7 @@ def _job(setup: Setup, surface: Surface, wanted: list[Shot]) -> dict[str, Any]:
     """The arrays of a job, as ``pictures`` names them."""
     job: dict[str, Any] = {
         "triangles": surface.triangles,
-        "directions": directions(surface, setup.bones),
+        "directions": directions(setup.surface, setup.bones),
         "bones": len(setup.bones),
         "shots": len(wanted),
     }

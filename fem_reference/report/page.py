@@ -4,6 +4,7 @@ import base64
 import json
 import math
 from dataclasses import dataclass
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -18,11 +19,12 @@ from fem_reference.errors import InputError, MissingSoftware
 from fem_reference.metrics import Measure
 from fem_reference.report import gallery, pictures
 from fem_reference.report.curves import curves, label_of
-from fem_reference.report.tables import find, inversion, runs, seconds_per_frame
+from fem_reference.report.tables import find, inversion, known, runs, seconds_per_frame
 from fem_reference.report.templates import template
 from fem_reference.report.words import listed, ratio, words
 from fem_reference.runs import Run
 from fem_reference.scene import Scene
+from fem_reference.study import Of
 
 # The columns of the first table: metric, statistic, the words above a group and above the column, unit.
 COLUMNS = (
@@ -33,6 +35,7 @@ COLUMNS = (
     ("surface_deviation", "p95", "Surface", "95 % below", "mm"),
     ("surface_deviation", "max", "Surface", "worst vertex", "mm"),
     ("surface_deviation", "hausdorff", "Surface", "Hausdorff", "mm"),
+    ("penetration", "deepest", "In bones", "deepest", "mm"),
 )
 
 
@@ -70,6 +73,10 @@ def render(comparison: Comparison) -> str:
         colours=_colours(),
         ticks=ticks,
         curves=curves(comparison),
+        bars=known(comparison),
+        bar_at=partial(_bar_at, comparison),
+        parts=_parts(comparison),
+        variations=listed(_parts(comparison)[1:]) if _parts(comparison)[1:] else "",
         costs=_costs(comparison),
         changes=_changes(comparison.scene),
         origins=[(run, _flat(run.origin)) for run in runs(comparison)],
@@ -102,6 +109,18 @@ def least(measure: Measure) -> float:
     """The smallest value of a measure over the frames where it is a number, NaN where it nowhere is."""
     known = measure.values[np.isfinite(measure.values)]
     return float(known.min()) if len(known) else math.nan
+
+
+def _bar_at(comparison: Comparison, of: Of, metric: str, statistic: str, frame: int) -> float | None:
+    """The error bar of a statistic at a frame number, None where nobody asked."""
+    bars = comparison.error_bars
+    found = None if bars is None else bars.find(of, metric, statistic)
+    return None if bars is None or found is None else float(found.values[bars.numbers.index(frame)])
+
+
+def _parts(comparison: Comparison) -> list[str]:
+    """What was varied for the error bars, tetrahedra first."""
+    return list(dict.fromkeys(name for bar in known(comparison) for name in bar.parts))
 
 
 def ticks(top: float) -> list[tuple[float, float]]:

@@ -12,6 +12,7 @@ from fem_reference.comparison import Comparison
 from fem_reference.judge import Verdict
 from fem_reference.metrics import Measure
 from fem_reference.runs import Run
+from fem_reference.study import ErrorBar
 
 COLUMNS = ("candidate", "metric", "statistic", "frame", "value", "unit")
 
@@ -20,7 +21,8 @@ def summary(comparison: Comparison) -> dict[str, Any]:
     """Everything that was measured, as valid JSON: a number that is not finite is None.
 
     ``measures`` holds each candidate's deviation from the reference, and under ``"reference"`` its own change from rest
-    with the inversion numbers that its solver recorded; ``from_rest`` the change from rest of every run.
+    with the inversion numbers that its solver recorded; ``from_rest`` the change from rest of every run; ``error_bars`` how
+    well the reference is known, empty where nobody asked.
     """
     reference = comparison.reference
     deviations = [row for run in comparison.candidates for row in _rows(run, comparison.deviations[run.name])]
@@ -35,6 +37,7 @@ def summary(comparison: Comparison) -> dict[str, Any]:
         "measures": from_rest[reference.name] + _rows(reference, inversion(reference)) + deviations,
         "from_rest": [row for rows in from_rest.values() for row in rows],
         "verdicts": [_verdict(verdict) for verdict in comparison.verdicts],
+        "error_bars": [row for bar in known(comparison) for row in _bar_rows(comparison, bar)],
     }
 
 
@@ -66,6 +69,11 @@ def find(measures: Iterable[Measure], metric: str, statistic: str) -> Measure | 
     return next((found for found in measures if (found.metric, found.statistic) == (metric, statistic)), None)
 
 
+def known(comparison: Comparison) -> tuple[ErrorBar, ...]:
+    """The error bars of the reference, none where nobody asked."""
+    return () if comparison.error_bars is None else comparison.error_bars.bars
+
+
 def inversion(run: Run) -> tuple[Measure, ...]:
     """The smallest det F per frame [1] that a solver recorded (scalars ``min_det_F...``), as measures."""
     names = [name for name in run.scalars if name.startswith("min_det_F")]
@@ -93,6 +101,16 @@ def _rows(run: Run, measures: Iterable[Measure]) -> list[dict[str, Any]]:
     ]
 
 
+def _bar_rows(comparison: Comparison, bar: ErrorBar) -> list[dict[str, Any]]:
+    """One row a frame, each with how the sizes of tetrahedra behave."""
+    columns = {"of": bar.of, "metric": bar.metric, "statistic": bar.statistic, "unit": bar.unit}
+    course = {"order": finite(bar.order), "course": bar.course}
+    return [
+        columns | {"frame": number, "value": finite(value)} | course
+        for number, value in zip(comparison.reference.numbers, bar.values, strict=True)
+    ]
+
+
 def _verdict(verdict: Verdict) -> dict[str, Any]:
     expectation = verdict.expectation
     return {
@@ -106,6 +124,7 @@ def _verdict(verdict: Verdict) -> dict[str, Any]:
         "truth": verdict.truth,
         "within": verdict.within,
         "unit": verdict.unit,
+        "error_bar": None if verdict.error_bar is None else finite(verdict.error_bar),
         "kind": expectation.kind,
         "because": expectation.because,
     }

@@ -17,12 +17,13 @@ import numpy as np
 
 from fem_reference.children import command
 from fem_reference.continuum import check_element
+from fem_reference.deformable import as_continuum
 from fem_reference.effects import Effect
 from fem_reference.errors import MissingSoftware
 from fem_reference.geometry.embedding import Locator
 from fem_reference.mesh import Floats, Ints
 from fem_reference.motion import apply
-from fem_reference.problem import Problem, as_continuum
+from fem_reference.problem import Problem
 from fem_reference.records import join
 from fem_reference.runs import Frame, Outcome, Sink
 from fem_reference.solvers.fenicsx.field import FieldSettings, solve_field
@@ -63,15 +64,24 @@ def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
     with tempfile.TemporaryDirectory(prefix="fem_reference-") as folder:
         job = Path(folder) / "job.pickle"
         job.write_bytes(pickle.dumps(Job(body, settings, _samples(problem))))
-        outcome = _run(_command(settings, job), settings, lambda frame: sink(_with_held(problem, frame)))
+        outcome = _run(_command(settings, job), settings, lambda frame: _pass_on(problem, frame, sink))
     key = " (muscle.tet_size)" if outcome.message.endswith("smaller cells") else ""  # which a scene calls them
     return replace(outcome, message=outcome.message + key, cost={"seconds_mesh": problem.seconds} | outcome.cost)
+
+
+def _pass_on(problem: Problem, frame: Frame, sink: Sink) -> None:
+    """A frame that is wanted; what relaxes before the first is not."""
+    if frame.number in problem.frames:
+        sink(_with_held(problem, replace(frame, number=int(frame.number))))
 
 
 def _with_held(problem: Problem, frame: Frame) -> Frame:
     """The frame with what the mesh makes of the attachments: how far the surface vertices that bones hold are from where the
     bones have them, ``held_off_rms`` and ``held_off_max`` [mm]. Tets hold facets, which cover the attachments only roughly.
+    As it is where no bone holds anything.
     """
+    if not problem.held:
+        return frame
     off = np.concatenate(
         [
             np.linalg.norm(

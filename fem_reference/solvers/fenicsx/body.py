@@ -113,6 +113,8 @@ class Body:
                 self.contact.pushes.settle()
             return Attempt(None, iterations)
         self.unknowns.x.array[:] = before
+        if self.contact:
+            self.contact.pushes.go_back()
         if through is not None:
             return Attempt("diverged", iterations, f"Newton's method converged, but {through}")
         if reason > 0:
@@ -127,7 +129,7 @@ class Body:
         for hold in self.held:
             hold.move_to(frame)
         if self.contact:
-            self.contact.frame = frame
+            self.contact.go_to(frame)
         self.newton.solve()
         snes = self.newton.solver
         return int(snes.getConvergedReason()), int(snes.getIterationNumber())
@@ -152,7 +154,7 @@ class Body:
         vector.scatter_reverse(la.InsertMode.add)
         now = np.array(self.unknowns.x.array)
         if self.contact:
-            vector.array[:] += self.contact.gathered()
+            vector.array[:] += self.contact.everywhere(self.contact.pushes.tractions())
         held = {hold.entry.name: hold.force(vector.array, now) for hold in self.held}
         held |= self.contact.pushes.forces() if self.contact else {}
         forces = {name: self.comm.allreduce(force, MPI.SUM) for name, (force, _) in held.items()}

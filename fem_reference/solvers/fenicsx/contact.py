@@ -12,6 +12,7 @@ from petsc4py import PETSc
 
 from fem_reference.contact import Contact, Obstruction
 from fem_reference.mesh import Floats
+from fem_reference.motion import apply
 from fem_reference.solvers.fenicsx.pushed_points import PushedPoints
 
 # A point is looked for at so many places of its way through an obstruction's frame between two states.
@@ -32,7 +33,7 @@ class Push:
 
 
 def push(law: Contact, obstruction: Obstruction, points: Floats, frame: float, allowed: Floats) -> Push:
-    """What ``obstruction`` does, where it is at ``frame``, to the ``points`` (n, 3) [mm], which feel ``allowed`` (n,) less depth."""
+    """What ``obstruction`` does, where it is at ``frame``, to ``points`` (n, 3) [mm] that feel ``allowed`` (n,) less depth."""
     pose = obstruction.pose(frame)
     turn = pose[:3, :3]
     local = (points - pose[:3, 3]) @ turn
@@ -47,14 +48,20 @@ class Pushes:
     """What obstructions do to this rank's pushed points."""
 
     def __init__(
-        self, law: Contact, obstructions: tuple[Obstruction, ...], points: PushedPoints, unknowns: fem.Function, frame: float
+        self,
+        law: Contact,
+        obstructions: tuple[Obstruction, ...],
+        points: PushedPoints,
+        unknowns: fem.Function,
+        frame: float,
     ) -> None:
         """``frame``: where the body rests."""
         self.law, self.obstructions, self.points, self.unknowns, self.frame = law, obstructions, points, unknowns, frame
         none = np.zeros(len(points.areas))
         at_rest = [push(law, entry, points.rest, frame, none) for entry in obstructions]
         self.overlaps = [np.maximum(law.smoothing - one.gap, 0) if law.relaxed else none for one in at_rest]
-        self.now = self.settled = at_rest
+        self.now = at_rest
+        self.settle()
 
     def update(self, frame: float) -> None:
         """What obstructions do with the unknowns as they are and the obstructions where they are at ``frame``."""
@@ -65,14 +72,24 @@ class Pushes:
             for entry, overlap in zip(self.obstructions, self.overlaps, strict=True)
         ]
 
-    def residual(self, moves: Floats | None = None) -> Floats:
-        """The weak form of what they do, over this rank's unknowns, ghosts too; of ``moves`` of the unknowns too, linearly."""
-        traction = np.sum([one.traction for one in self.now], axis=0)
-        if moves is not None and moves.any():
-            way = np.einsum("nk,nki->ni", self.points.basis, moves[self.points.dofs])
-            traction = traction + np.einsum("nij,nj->ni", np.sum([one.slope for one in self.now], axis=0), way)
-        pushed = np.flatnonzero(traction.any(axis=1))
-        forces = -self.points.areas[pushed, None] * traction[pushed]
+    def tractions(self) -> Floats:
+        """What all of them do together (n, 3) [MPa]."""
+        return np.asarray(np.sum([one.traction for one in self.now], axis=0))
+
+    def predicted(self, frame: float, moves: Floats) -> Floats:
+        """As ``tractions``, if the unknowns made ``moves`` and the obstructions went on to ``frame``, linearly in both."""
+        points = self.points.positions(self.unknowns.x.array)
+        way = np.einsum("nk,nki->ni", self.points.basis, moves[self.points.dofs])
+        found = self.tractions()
+        for entry, one in zip(self.obstructions, self.now, strict=True):
+            step = entry.pose(frame) @ np.linalg.inv(entry.pose(self.frame))
+            found += np.einsum("nij,nj->ni", one.slope, way - (apply(step, points) - points))
+        return found
+
+    def residual(self, tractions: Floats) -> Floats:
+        """The weak form of ``tractions`` (n, 3) over this rank's unknowns, ghosts too."""
+        pushed = np.flatnonzero(tractions.any(axis=1))
+        forces = -self.points.areas[pushed, None] * tractions[pushed]
         found = np.zeros(len(self.unknowns.x.array))
         np.add.at(found, self.points.dofs[pushed], self.points.basis[pushed, :, None] * forces[:, None, :])
         return found
@@ -131,14 +148,18 @@ class Pushes:
 
     def settle(self) -> None:
         """Take the present state as the one that the next step starts from."""
-        self.settled = self.now
+        self.settled, self.settled_at = self.now, self.frame
+
+    def go_back(self) -> None:
+        """Take up the settled state again, as the unknowns have."""
+        self.now, self.frame = self.settled, self.settled_at
 
     def tunnelled(self, comm: MPI.Comm, deeper: float) -> str | None:
         """Where a point went through an obstruction since the last settled state: on its straight way through the obstruction's
         frame it was ``deeper`` [mm] than at both ends. None where none did.
         """
-        mine = [found for i in range(len(self.obstructions)) if (found := self._through(i, deeper))]
-        found = [one for rank in comm.allgather(mine) for one in rank]
+        mine = [one for i in range(len(self.obstructions)) if (one := self._through(i, deeper))]
+        found: list[tuple[float, str]] = [one for rank in comm.allgather(mine) for one in rank]
         return max(found)[1] if found else None
 
     def _through(self, i: int, deeper: float) -> tuple[float, str] | None:
@@ -152,14 +173,22 @@ class Pushes:
             return None
         worst = int(np.argmax(excess))
         x, y, z = self.points.rest[moved[worst]]
-        return float(excess[worst]), f'the point that rests at ({x:.1f}, {y:.1f}, {z:.1f}) mm went through "{entry.name}"'
+        return float(
+            excess[worst]
+        ), f'the point that rests at ({x:.1f}, {y:.1f}, {z:.1f}) mm went through "{entry.name}"'
 
 
 class Watched:
-    """Newton's method of ``problem`` with the residual and the tangent of ``pushes`` added to what DOLFINx assembles."""
+    """Newton's method of ``problem`` with the residual and the tangent of ``pushes`` added to what DOLFINx assembles.
+
+    An obstruction that jumps to where it is at the next frame would meet points that have not moved yet, push them with forces
+    that are no measure of anything, and send the first iteration astray. So that one is linear: it starts from the settled
+    pushes and goes along with the obstructions.
+    """
 
     def __init__(self, problem: NonlinearProblem, pushes: Pushes, conditions: list[Any]) -> None:
         self.problem, self.pushes, self.conditions, self.frame = problem, pushes, conditions, pushes.frame
+        self.fresh = False
         unknowns = pushes.unknowns
         space = unknowns.function_space
         self.owned = space.dofmap.index_map.size_local * space.dofmap.index_map_bs
@@ -173,21 +202,34 @@ class Watched:
         matrix, preconditioner, (self.linearise, _, self.linear_context) = snes.getJacobian()
         snes.setJacobian(self.tangent, matrix, preconditioner)
 
+    def go_to(self, frame: float) -> None:
+        """What the next solve is for."""
+        self.frame, self.fresh = frame, True
+
     def residual(self, snes: Any, x: Any, b: Any) -> None:
         """What is out of balance at ``x``."""
         assign(x, self.problem.u)
         self.problem.u.x.scatter_forward()
-        self.pushes.update(self.frame)
         self.assemble(snes, x, b, **self.context)
-        # Where unknowns are not yet what is prescribed, the tangent is asked what their move will do.
-        moves = np.zeros(len(self.free))
-        for condition in self.conditions:
-            condition.set(moves, self.problem.u.x.array, 1.0)
-        b.array[:] += self.gathered(moves)[: self.owned] * self.free[: self.owned]
+        within = np.array(b.array)
+        if self.fresh:
+            self.fresh = False
+            moves = np.zeros(len(self.free))
+            for condition in self.conditions:
+                condition.set(moves, self.problem.u.x.array, 1.0)
+            b.array[:] = within + self.gathered(self.pushes.predicted(self.frame, moves))
+            if b.norm() > snes.atol:  # else nothing moves by itself, and only the new gaps tell
+                return
+        self.pushes.update(self.frame)
+        b.array[:] = within + self.gathered(self.pushes.tractions())
 
-    def gathered(self, moves: Floats | None = None) -> Floats:
-        """The residual of the pushes over this rank's unknowns, with what other ranks add to its own."""
-        self.work.array[:] = self.pushes.residual(moves)
+    def gathered(self, tractions: Floats) -> Floats:
+        """The weak form of ``tractions`` over this rank's own unknowns, with what other ranks add to it; 0 where prescribed."""
+        return np.asarray(self.everywhere(tractions)[: self.owned] * self.free[: self.owned])
+
+    def everywhere(self, tractions: Floats) -> Floats:
+        """The weak form of ``tractions`` over this rank's unknowns, where it is prescribed too."""
+        self.work.array[:] = self.pushes.residual(tractions)
         self.work.scatter_reverse(la.InsertMode.add)
         return np.asarray(self.work.array)
 

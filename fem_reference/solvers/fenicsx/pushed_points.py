@@ -7,8 +7,8 @@ import basix
 import numpy as np
 from dolfinx import fem
 
-from fem_reference.contact import Skin
 from fem_reference.continuum import Cells
+from fem_reference.geometry.skins import Skin
 from fem_reference.mesh import Floats, Ints
 
 
@@ -59,7 +59,7 @@ def on_facets(space: fem.FunctionSpace, parents: Ints, mesh: Cells, facets: Ints
 def on_skin(space: fem.FunctionSpace, parents: Ints, skin: Skin, local: dict[int, int]) -> PushedPoints:
     """The points of a ``skin`` whose cell is this rank's own; ``local``: its number here by that in the body's mesh."""
     mine = np.array([i for i, cell in enumerate(skin.cells) if int(cell) in local], np.int64)
-    cells = np.array([local[int(skin.cells[i])] for i in mine], np.int32)
+    cells = np.array([local[int(skin.cells[i])] for i in mine], np.int64)
     msh = space.mesh
     corners = msh.geometry.x[msh.geometry.dofmap[cells]]
     edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)

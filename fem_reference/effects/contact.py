@@ -1,0 +1,18 @@
+"""Bones push the muscle out of their way, without friction and with any sliding; what they hold of it is exempt."""
+
+from pydantic import Field
+
+from fem_reference.effects import Interaction
+from fem_reference.units import AreaStiffness, PositiveLength
+
+
+class Contact(Interaction):
+    """A pressure of the gap to each bone; see ``fem_reference.contact.Contact`` for the law.
+
+    ``stiffness`` [MPa/mm]: where the bone presses with p, the surface gets p / stiffness deep. ``smoothing`` [mm]: from this
+    distance on a bone is felt. ``bones``: their names, by default all.
+    """
+
+    stiffness: AreaStiffness
+    smoothing: PositiveLength = 0.1
+    bones: tuple[str, ...] | None = Field(default=None, min_length=1)

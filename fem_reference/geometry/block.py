@@ -1,0 +1,81 @@
+"""Grids of boxes, each cut into Kuhn's six tetrahedra, all the same way: they nest where one grid refines another.
+
+A cell is cut along the diagonal from its lowest to its highest corner, and so is every face of it.
+"""
+
+from itertools import permutations
+
+import numpy as np
+
+from fem_reference.errors import InputError
+from fem_reference.geometry.tetrahedra import check_size
+from fem_reference.mesh import Floats, Ints, Surface, TetMesh, enclosed_volume
+
+Counts = tuple[int, int, int]
+
+_SAME = 1e-6  # of the largest edge: what single precision leaves of a coordinate
+
+
+def fill(surface: Surface, size: float) -> TetMesh:
+    """The axis-aligned box that a closed outward ``surface`` is, as a grid of boxes with edges of about ``size`` [mm].
+
+    InputError where it is another body, or where ``size`` is far too small or too large.
+    """
+    low, high = _extent(surface)
+    check_size(surface, size)
+    x, y, z = (max(1, round(float(length) / size)) for length in high - low)
+    lattice, tets = kuhn((x, y, z))
+    return TetMesh(low + (high - low) * lattice / [x, y, z], tets, maker="block")
+
+
+def kuhn(counts: Counts) -> tuple[Ints, Ints]:
+    """The nodes (n, 3) of a lattice of ``counts`` cells along x, y and z, z fastest, and the tets (k, 4) of its cells."""
+    nodes = np.indices((counts[0] + 1, counts[1] + 1, counts[2] + 1)).reshape(3, -1).T
+    strides = np.array([(counts[1] + 1) * (counts[2] + 1), counts[2] + 1, 1])
+    lowest = np.indices(counts).reshape(3, -1).T @ strides
+    tets = []
+    for order in permutations(range(3)):
+        way = np.cumsum([0, *strides[list(order)]])
+        upright = np.linalg.det(np.eye(3)[list(order)]) > 0
+        tets.append(lowest[:, None] + (way if upright else way[[0, 2, 1, 3]]))
+    return nodes, np.stack(tets, axis=1).reshape(-1, 4)
+
+
+def lattice_skin(counts: Counts) -> tuple[Ints, Ints]:
+    """The nodes (n, 3) on the faces of such a lattice, and outward triangles (m, 3) between them: the skin of its tets."""
+    sheets = [_sheet(counts, axis, end) for axis in range(3) for end in (0, 1)]
+    corners = np.concatenate(sheets).reshape(-1, 3)
+    nodes, triangles = np.unique(corners, axis=0, return_inverse=True)
+    return nodes, triangles.reshape(-1, 3)
+
+
+def _sheet(counts: Counts, axis: int, end: int) -> Ints:
+    """The corners (m, 3, 3) of the outward triangles on a face of a lattice across ``axis``, the low or the high ``end`` of it."""
+    one, other = (axis + 1) % 3, (axis + 2) % 3
+    lowest = np.zeros((counts[one] * counts[other], 3), np.int64)
+    lowest[:, [one, other]] = np.indices((counts[one], counts[other])).reshape(2, -1).T
+    lowest[:, axis] = end * counts[axis]
+    first, second = np.eye(3, dtype=np.int64)[[one, other]]
+    halves = np.array([[0 * first, first, first + second], [0 * first, first + second, second]])
+    return np.asarray((lowest[:, None, None] + (halves if end else halves[:, ::-1])).reshape(-1, 3, 3))
+
+
+def _extent(surface: Surface) -> tuple[Floats, Floats]:
+    """The lowest and the highest corner (3,) of the axis-aligned box that ``surface`` is; InputError where it is none.
+
+    Each triangle lies in one face of the box around them all, and together they go round it once.
+    """
+    low, high = surface.points.min(axis=0), surface.points.max(axis=0)
+    near = _SAME * float((high - low).max())
+    corners = surface.points[surface.triangles]
+    in_a_face = (np.abs(corners - low) <= near).all(axis=1) | (np.abs(corners - high) <= near).all(axis=1)
+    inside = np.flatnonzero(~in_a_face.any(axis=1))
+    want = 'the surface of an axis-aligned box, or the muscle.mesher "quality"'
+    if len(inside):
+        x, y, z = corners[inside[0]].mean(axis=0)
+        got = f"{len(inside)} triangles in no face of the box around it, the first at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
+        raise InputError(surface.place, got, want)
+    volume, wanted = enclosed_volume(surface.points, surface.triangles), float(np.prod(high - low))
+    if not abs(volume - wanted) <= wanted / 2:
+        raise InputError(surface.place, f"{volume:.6g} mm3 in a box of {wanted:.6g} mm3", want)
+    return low, high

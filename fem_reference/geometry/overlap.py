@@ -1,0 +1,130 @@
+"""How much of a closed surface's inside lies within a rigid body: counted at random points, spread evenly over small cubes."""
+
+from collections.abc import Callable
+
+import igl
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_reference.mesh import Floats, Surface
+
+# The first cubes are at most this long [mm], and one in so many of the longest extent of the surface.
+_FIRST_EDGE, _FIRST_CUBES = 10.0, 20
+# In a box of more first cubes, a cubic metre or more, nothing is counted.
+_TOO_MANY = 1e6
+# Cubes are cut smaller in so many rounds, each time to at most this many; so many points at most are drawn in them.
+_ROUNDS, _MOST = 3, 8000
+# A triangle is looked at in parts of down to an eighth of its size.
+_PARTINGS = 3
+
+Distance = Callable[[Floats], Floats]
+
+
+def shared_volume(surface: Surface, counts: NDArray[np.bool_], distance: Distance) -> float:
+    """The volume [mm3] of what ``surface`` winds round, where ``distance`` of points (n, 3) [mm] is below zero, and the nearest
+    triangle is one that ``counts`` (m,); 0 where no triangle that counts comes into the body, as where it is swallowed whole. NaN
+    where the surface has blown up beyond a cubic metre.
+
+    Space is cut into cubes, those that may hold a part of it into smaller ones, and 4000 to 8000 random points are drawn in
+    these, the same every time. On average the count is exact. Its standard deviation is at most half of what one point stands
+    for, times the root of the number of points in cubes on the border of the overlap.
+    """
+    extent = np.ptp(surface.points, axis=0)
+    if extent.max() == 0 or not _touches(surface, counts, distance):
+        return 0.0
+    if np.prod(extent / _FIRST_EDGE) > _TOO_MANY:
+        return np.nan
+    sides = _Sides(surface, counts)
+    centres, edge = _first_cubes(surface.points)
+    for _ in range(_ROUNDS):
+        centres = centres[distance(centres) < _reach(edge)]
+        centres = centres[sides.may_count(centres, _reach(edge))]
+        parts = int(np.cbrt(_MOST / max(1, len(centres))))
+        if len(centres) == 0 or parts < 2:
+            break
+        centres, edge = _cut(centres, edge, parts)
+    each = max(1, _MOST // max(1, len(centres)))
+    points = np.repeat(centres, each, axis=0)
+    points += edge * np.random.default_rng(0).uniform(-0.5, 0.5, points.shape)
+    points = points[distance(points) < 0]
+    return float(edge**3 / each * sides.count(points).sum())
+
+
+def _touches(surface: Surface, counts: NDArray[np.bool_], distance: Distance) -> bool:
+    """Whether a triangle that counts comes into the body: looked for at its vertices, and near the body at ever smaller parts."""
+    triangles = surface.triangles[counts]
+    corners, away = surface.points[triangles], distance(surface.points)[triangles]
+    for _ in range(_PARTINGS):
+        if (away < 0).any():
+            return True
+        longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+        corners = _quartered(corners[away.min(axis=1) < longest])
+        away = distance(corners.reshape(-1, 3)).reshape(-1, 3)
+    return bool((away < 0).any())
+
+
+def _quartered(corners: Floats) -> Floats:
+    """Triangles with ``corners`` (m, 3, 3), each cut into four at the middles of its sides, (4 m, 3, 3)."""
+    middles = (corners + np.roll(corners, -1, axis=1)) / 2
+    ends = [np.stack([corners[:, k], middles[:, k], middles[:, k - 1]], axis=1) for k in range(3)]
+    return np.concatenate([*ends, middles])
+
+
+class _Sides:
+    """The triangles of a surface that count and those that do not, ready to be asked for distances."""
+
+    def __init__(self, surface: Surface, counts: NDArray[np.bool_]) -> None:
+        self.surface, self.trees = surface, []
+        for triangles in (surface.triangles[counts], surface.triangles[~counts]):
+            tree = igl.AABB()
+            if len(triangles):
+                tree.init(surface.points, triangles)
+            self.trees.append((tree, triangles))
+
+    def may_count(self, centres: Floats, reach: float) -> NDArray[np.bool_]:
+        """Which of the balls of radius ``reach`` about ``centres`` (n, 3) may hold something that counts, (n,)."""
+        counting, other = self._distances(centres)
+        found = counting - other <= 2 * reach
+        deep = found & (np.minimum(counting, other) > reach)
+        found[deep] = self._inside(centres[deep])
+        return np.asarray(found)
+
+    def count(self, points: Floats) -> NDArray[np.bool_]:
+        """Which of ``points`` (n, 3) are inside and nearest to a triangle that counts, (n,)."""
+        found = self._inside(points)
+        counting, other = self._distances(points[found])
+        found[found] = counting <= other
+        return found
+
+    def _inside(self, points: Floats) -> NDArray[np.bool_]:
+        if len(points) == 0:
+            return np.zeros(0, bool)
+        return np.asarray(igl.fast_winding_number(self.surface.points, self.surface.triangles, points) > 0.5)
+
+    def _distances(self, points: Floats) -> list[Floats]:
+        """Distance (n,) [mm] of ``points`` (n, 3) to the triangles that count, and to the others; infinite where there are none."""
+        return [
+            np.sqrt(tree.squared_distance(self.surface.points, triangles, points)[0])
+            if len(triangles) and len(points)
+            else np.full(len(points), np.inf)
+            for tree, triangles in self.trees
+        ]
+
+
+def _first_cubes(points: Floats) -> tuple[Floats, float]:
+    """Centres (n, 3) of cubes that fill the box around ``points``, and their edge [mm]."""
+    low, extent = points.min(axis=0), np.ptp(points, axis=0)
+    edge = min(_FIRST_EDGE, float(extent.max()) / _FIRST_CUBES)
+    numbers = tuple(int(count) for count in np.maximum(1, np.ceil(extent / edge)))
+    return low + edge * (np.moveaxis(np.indices(numbers), 0, -1).reshape(-1, 3) + 0.5), edge
+
+
+def _cut(centres: Floats, edge: float, parts: int) -> tuple[Floats, float]:
+    """Every cube cut into ``parts`` along each axis: centres (n, 3) and edge [mm]."""
+    steps = (np.moveaxis(np.indices((parts,) * 3), 0, -1).reshape(-1, 3) + 0.5) / parts - 0.5
+    return (centres[:, None] + edge * steps).reshape(-1, 3), edge / parts
+
+
+def _reach(edge: float) -> float:
+    """From the centre of a cube to its corners [mm]."""
+    return float(np.sqrt(3) / 2 * edge)

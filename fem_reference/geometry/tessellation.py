@@ -1,0 +1,103 @@
+"""Closed triangle surfaces of rigid bodies of closed form: for pictures, and for what asks a bone for its surface.
+
+Their vertices lie on the body. A ball, a capsule and a box are all one: the corner parts of a sphere, moved apart.
+"""
+
+import numpy as np
+
+from fem_reference.geometry.block import lattice_skin
+from fem_reference.geometry.rigid_bodies import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere, Vector
+from fem_reference.mesh import Floats, Ints, Surface
+
+# Sides of a full turn, a multiple of eight: triangles then lie at most 0.36 % of the radius inside the body.
+TURN = 64
+# Of a half-space, how far its square reaches from the middle of what is beside it, and how thick it is, over the size of that.
+_REACH, _THICKNESS = 1.5, 0.1
+
+
+def tessellated(solid: Obstacle, beside: Floats, place: str, turn: int = TURN) -> Surface:
+    """The outward surface of a ``solid`` with ``turn`` sides a full turn; errors in it are told of ``place``.
+
+    A half-space has no end: it is a slab, closed as every other body is, that reaches past the points ``beside`` (n, 3) [mm]; of
+    its vertices only those in the plane lie on the body.
+    """
+    match solid:
+        case HalfSpace():
+            points, triangles = _slab(solid, beside)
+        case Box():
+            points, triangles = _rounded(solid.size, solid.rounding, turn)
+            points = points + solid.centre
+        case Sphere():
+            points, triangles = _rounded((2 * solid.radius,) * 3, solid.radius, turn)
+            points = points + solid.centre
+        case Capsule():
+            width, middle, frame = 2 * solid.radius, *_placed(solid.start, solid.end)
+            length = float(np.linalg.norm(np.subtract(solid.end, solid.start)))
+            points, triangles = _rounded((width, width, length + width), solid.radius, turn)
+            points = points @ frame + middle
+        case Cylinder():
+            points, triangles = _prism(solid, turn)
+        case _:
+            raise TypeError(f"{type(solid).__name__} has no closed form that is known here")
+    return Surface(points, triangles, place)
+
+
+def _slab(half_space: HalfSpace, beside: Floats) -> tuple[Floats, Ints]:
+    """A square in the plane under the middle of ``beside``, and as much of what is behind it."""
+    middle = (beside.max(axis=0) + beside.min(axis=0)) / 2
+    size = float(np.linalg.norm(np.ptp(beside, axis=0)))
+    frame = _frame(np.asarray(half_space.normal, float))
+    foot = middle - ((middle - half_space.point) @ frame[2]) * frame[2]
+    lattice, triangles = lattice_skin((1, 1, 1))
+    points = (lattice - [0.5, 0.5, 1]) * [2 * _REACH * size, 2 * _REACH * size, _THICKNESS * size]
+    return points @ frame + foot, triangles
+
+
+def _rounded(size: Vector, rounding: float, turn: int) -> tuple[Floats, Ints]:
+    """A box about the origin of outer ``size`` whose edges and corners have the radius ``rounding``."""
+    corners = [_ticks(length / 2 - rounding, rounding, turn // 8) for length in size]
+    lattice, triangles = lattice_skin(tuple(len(tangents) - 1 for tangents, _ in corners))  # type: ignore[arg-type]
+    way = np.stack([tangents[lattice[:, axis]] for axis, (tangents, _) in enumerate(corners)], axis=1)
+    middle = np.stack([centres[lattice[:, axis]] for axis, (_, centres) in enumerate(corners)], axis=1)
+    return middle + rounding * way / np.linalg.norm(way, axis=1)[:, None], triangles
+
+
+def _ticks(half: float, rounding: float, count: int) -> tuple[Floats, Floats]:
+    """Along an axis, the corners about -``half`` and ``half``, each in ``count`` steps of equal angles from the middle of a face to
+    the edge of a cube: the tangents of the angles, and which centre each belongs to. Two corners about one centre share a middle.
+    """
+    if rounding == 0:
+        return np.array([-1.0, 1.0]), np.array([-half, half])
+    steps = np.tan(np.linspace(0, np.pi / 4, count + 1))
+    shared = 1 if half == 0 else 0
+    tangents = np.concatenate([-steps[::-1], steps[shared:]])
+    centres = np.concatenate([np.full(len(steps), -half), np.full(len(steps) - shared, half)])
+    return tangents, centres
+
+
+def _prism(cylinder: Cylinder, turn: int) -> tuple[Floats, Ints]:
+    """Both ends of the cylinder as fans about their centres, and its side."""
+    angles = 2 * np.pi * np.arange(turn) / turn
+    length = float(np.linalg.norm(np.subtract(cylinder.end, cylinder.start)))
+    ring = cylinder.radius * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(turn)])
+    up = np.array([0.0, 0.0, length / 2])
+    low = np.arange(turn)
+    after, bottom, top = np.roll(low, -1), np.full(turn, 2 * turn), np.full(turn, 2 * turn + 1)
+    fans = [(bottom, after, low), (top, low + turn, after + turn)]
+    side = [(low, after, after + turn), (low, after + turn, low + turn)]
+    triangles = np.concatenate([np.column_stack(corners) for corners in (*fans, *side)])
+    middle, frame = _placed(cylinder.start, cylinder.end)
+    return np.concatenate([ring - up, ring + up, [-up, up]]) @ frame + middle, triangles
+
+
+def _placed(start: Vector, end: Vector) -> tuple[Floats, Floats]:
+    """The middle (3,) of a segment, and a frame along it."""
+    return np.add(start, end) / 2, _frame(np.subtract(end, start, dtype=float))
+
+
+def _frame(way: Floats) -> Floats:
+    """Three right-handed unit vectors in rows (3, 3), the last along ``way`` (3,)."""
+    third = way / np.linalg.norm(way)
+    first = np.cross(np.eye(3)[np.abs(third).argmin()], third)
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(third, first), third])
