@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fem_reference import __version__, casefile, field_verbs, files, judge, metrics, report, runs, solvers
+from fem_reference import __version__, casefile, field_verbs, files, judge, metrics, refinement, report, runs, solvers
 from fem_reference.comparison import compare
 from fem_reference.errors import InputError, MissingSoftware
 from fem_reference.execution import Bench, complete
@@ -100,7 +100,7 @@ def _parser() -> argparse.ArgumentParser:
         sub.add_argument("--out", type=Path, metavar="DIR", help="where pages and stored runs go (default: reports)")
         sub.add_argument("--json", type=Path, metavar="FILE", help="write what is printed as JSON")
         sub.add_argument("--quiet", action="store_true", help="show no progress")
-        sub.set_defaults(verb=verb, ranks=None)
+        sub.set_defaults(verb=verb, ranks=None, error_bar=False)
         return sub
 
     demo = add("demo", _demo, f"the main job: the case {MAIN_JOB}, its reference against its candidates", case=False)
@@ -114,6 +114,9 @@ def _parser() -> argparse.ArgumentParser:
         help="a candidate of the case or a folder of frames; may be repeated",
     )
     comparison.add_argument("--unit", default="mm", help="unit of length of the frames in DIR (default: mm)")
+    for judging in (run, comparison):
+        known = "how well the reference is known: solve it on coarser tetrahedra and with finer steps too"
+        judging.add_argument("--error-bar", action="store_true", help=known)
     for solving in (demo, run, comparison):
         ranks = "MPI processes of the reference (default: 2 where there are)"
         solving.add_argument("--ranks", type=int, metavar="N", help=ranks)
@@ -144,6 +147,7 @@ def _own_candidates(scene: Scene) -> list[tuple[Candidate, str]]:
 def _compare(options: argparse.Namespace) -> int:
     scene = _scene(options)
     if isinstance(scene, FieldScene):
+        _refuse_error_bar(options)
         return _told(field_verbs.compare(scene, options.candidate, _out(options)), options)
     wanted = options.candidate or [candidate.name for candidate in scene.candidate]
     return _judge(scene, options, [_candidate(scene, text, options.unit) for text in wanted])
@@ -166,13 +170,20 @@ def _candidate(scene: Scene, text: str, unit: str) -> tuple[Candidate, str]:
 def _run(options: argparse.Namespace) -> int:
     scene = _scene(options)
     if isinstance(scene, FieldScene):
+        _refuse_error_bar(options)
         return _told(field_verbs.run(scene, options.solver, _out(options)), options)
     if options.solver is None or options.solver == scene.reference.solver:
         return _judge(scene, options, [])
+    _refuse_error_bar(options)
     bench = Bench(scene, _out(options) / "runs", options.ranks)
     run = bench.obtain(options.solver, _choice(scene, options.solver), f"--solver {options.solver}")
     _tell(run_facts(scene, run), run_text(run), options)
     return DONE if run.outcome.status == "converged" else SOLVER_FAILED
+
+
+def _refuse_error_bar(options: argparse.Namespace) -> None:
+    if options.error_bar:
+        raise InputError("--error-bar", "a scalar case or another solver", "the reference of a muscle")
 
 
 def _choice(scene: Scene, solver: str) -> SolverChoice:
@@ -219,9 +230,10 @@ def _judge(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candida
     solved = {
         entry.name: bench.obtain(entry.name, entry, place) for entry, place in chosen if entry.solver != "recorded"
     }
+    bars = (refinement.obtain if options.error_bar else refinement.stored)(bench, reference)
     numbers = scene.frames.numbers
     candidates = tuple(complete((read | solved)[entry.name], numbers) for entry, _ in chosen)
-    result = compare(scene, bench.setup(), complete(reference, numbers), candidates)
+    result = compare(scene, bench.setup(), complete(reference, numbers), candidates, bars)
     page = report.write(result, _out(options) / scene.name)
     _tell(report.summary(result), comparison_text(result, page), options)
     if any(run.outcome.status != "converged" for run in (reference, *candidates)):

@@ -28,6 +28,7 @@ log = logging.getLogger(__name__)
 _AFTER_THE_RUN = (
     "metrics",
     "report",
+    "study.py",
     "judge.py",
     "comparison.py",
     "catalogue.py",
@@ -37,6 +38,7 @@ _AFTER_THE_RUN = (
     "cli.py",
     "__main__.py",
     "execution.py",
+    "refinement.py",
     "field_execution.py",
     "field_verbs.py",
 )

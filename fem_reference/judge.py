@@ -1,11 +1,12 @@
 """measure + truth + tolerance -> pass, fail or cannot say."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from math import pi
 from typing import Literal
 
 from fem_reference.errors import InputError
+from fem_reference.mesh import Floats
 from fem_reference.metrics import Measure, units
 from fem_reference.records import join
 from fem_reference.scene import Expectation, Scene
@@ -16,13 +17,15 @@ _KINDS = {
     "mm": ("a length", 1.0),
     "%": ("a fraction", 100.0),
     "mm3": ("a volume", 1.0),
-    "deg": ("an angle", 180 / pi),
+    "deg": ("an angle", 180 / math.pi),
 }
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """How an expectation came out: the ``word``, and the ``value`` in ``unit`` at ``frame`` that decided it."""
+    """How an expectation came out: the ``word``, and the ``value`` in ``unit`` at ``frame`` that decided it; ``error_bar``, how
+    well the reference is known there, NaN where nobody knows and None where nobody asked.
+    """
 
     word: Word
     expectation: Expectation
@@ -31,6 +34,7 @@ class Verdict:
     within: float
     unit: str
     frame: int
+    error_bar: float | None = None
 
 
 def judge(value: float, truth: float, within: float, error_bar: float = 0.0) -> Word:
@@ -72,18 +76,28 @@ def check(scene: Scene) -> None:
             raise InputError(f"{place}.frame", expectation.frame, want)
 
 
-def verdict(expectation: Expectation, measures: Iterable[Measure], numbers: tuple[int, ...]) -> Verdict:
-    """The verdict on a checked ``expectation`` from the measures of the run that it is of, over frame ``numbers``."""
+def verdict(
+    expectation: Expectation, measures: Iterable[Measure], numbers: tuple[int, ...], bars: Floats | None = None
+) -> Verdict:
+    """The verdict on a checked ``expectation`` from the measures of the run that it is of, over frame ``numbers``; ``bars`` (f,)
+    are the reference's error bars of what it expects, None where nobody asked for them.
+    """
     name = (expectation.metric, expectation.statistic)
     found = next(measure for measure in measures if (measure.metric, measure.statistic) == name)
     truth, within = (_number(text, found.unit) for text in (expectation.truth, expectation.within))
     frames = range(len(numbers)) if expectation.frame == "any" else [numbers.index(expectation.frame)]
     values = [float(found.values[frame]) for frame in frames]
-    words = [judge(value, truth, within) for value in values]
-    # The frame that decides: the first that fails, else the one furthest from the truth.
+    known = [0.0 if bars is None else float(bars[frame]) for frame in frames]
+    words = [judge(value, truth, within, bar) for value, bar in zip(values, known, strict=True)]
+    word = overall(words)
+    # The frame that decides: the first that fails, else that with the greatest bar of those that cannot be told, else the one
+    # furthest from the truth.
     furthest = max(range(len(values)), key=lambda k: abs(values[k] - truth))
-    decides = words.index("fail") if "fail" in words else furthest
-    return Verdict(overall(words), expectation, values[decides], truth, within, found.unit, numbers[frames[decides]])
+    widest = max(range(len(values)), key=lambda k: math.inf if math.isnan(known[k]) else known[k])
+    decides = words.index("fail") if word == "fail" else widest if word == "cannot say" else furthest
+    bar = None if bars is None else known[decides]
+    frame = numbers[frames[decides]]
+    return Verdict(word, expectation, values[decides], truth, within, found.unit, frame, bar)
 
 
 def _number(text: str, unit: str) -> float:

@@ -49,7 +49,7 @@ class VertexList(Record):
 
 
 class Outline(Record):
-    """Landmarks around an attachment: vertices within ``reach`` of the patch that the ordered points of each cloud span."""
+    """Landmarks around an attachment: vertices within ``reach`` of the patch that the points of each cloud span on the bone."""
 
     file: str
     unit: LengthUnit

@@ -21,9 +21,12 @@ HIP = np.array([146.0, 238.0, -431.0])  # [mm]
 RING = [(6, 6), (14, 14), (14, 6), (6, 14), (10, 5), (10, 15)]  # [mm], not in the order of their angles
 
 
-def _pick(folder: Path, surface: Surface = BLOCK, **way: Any) -> np.ndarray:
+GROUND = FLOOR.moved_to(FLOOR.points + np.array([0, 0, 1.0]))  # right below the block
+
+
+def _pick(folder: Path, surface: Surface = BLOCK, bone: Surface = FLOOR, **way: Any) -> np.ndarray:
     attachment = Attachment(name="origin", bone="floor", **way)
-    return pick(Scene.model_construct(folder=folder, attachment=(attachment,)), 0, surface, FLOOR)
+    return pick(Scene.model_construct(folder=folder, attachment=(attachment,)), 0, surface, bone)
 
 
 def _listed(folder: Path, text: str, **keys: Any) -> np.ndarray:
@@ -35,7 +38,7 @@ def _outline(
     folder: Path, text: str, reach: str = "1 mm", clouds: tuple[str, ...] = ("A",), unit: str = "mm"
 ) -> np.ndarray:
     (folder / "marks.csv").write_text(text)
-    return _pick(folder, outline={"file": "marks.csv", "unit": unit, "clouds": clouds, "reach": reach})
+    return _pick(folder, bone=GROUND, outline={"file": "marks.csv", "unit": unit, "clouds": clouds, "reach": reach})
 
 
 def _marks(points: np.ndarray, cloud: str = "A") -> str:
@@ -108,7 +111,33 @@ def test_an_outline_does_not_depend_on_unit_order_or_place(tmp_path: Path) -> No
     (tmp_path / "marks.csv").write_text(_marks(turn.apply(points) + HIP))
     outline = {"file": "marks.csv", "unit": "mm", "clouds": ("A",), "reach": "2.5 mm"}
     turned = BLOCK.moved_to(turn.apply(BLOCK.points) + HIP)
-    assert_array_equal(_pick(tmp_path, turned, outline=outline), found)
+    ground = GROUND.moved_to(turn.apply(GROUND.points) + HIP)
+    assert_array_equal(_pick(tmp_path, turned, ground, outline=outline), found)
+
+
+def test_an_outline_over_a_hollow_lies_on_the_bone(tmp_path: Path) -> None:
+    # The muscle fills a bowl of radius 60 mm, 10 mm deep, up to a sphere 6 mm above it; the landmarks stand on the rim, 10 mm above
+    # the bottom: flat between them, the patch would touch the upper side.
+    rim = 60 * np.sin(np.arccos(5 / 6))
+    angles = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    marks = np.stack([rim * np.cos(angles), rim * np.sin(angles), np.full(24, 10.0)], axis=1)
+    x, y = np.meshgrid(np.linspace(-40, 40, 81), np.linspace(-40, 40, 81))
+    cell = np.arange(81 * 81).reshape(81, 81)
+    a, b, c, d = (part.ravel() for part in (cell[:-1, :-1], cell[:-1, 1:], cell[1:, :-1], cell[1:, 1:]))
+    triangles = np.concatenate([np.stack([a, b, d], axis=1), np.stack([a, d, c], axis=1)])
+    bowl = Surface(
+        np.stack([x.ravel(), y.ravel(), 60 - np.sqrt(3600 - x.ravel() ** 2 - y.ravel() ** 2)], axis=1), triangles
+    )
+    both = Surface(np.concatenate([bowl.points, bowl.points + np.array([0, 0, 6.0])]), bowl.triangles)
+    (tmp_path / "marks.csv").write_text(_marks(marks))
+    outline = {"file": "marks.csv", "unit": "mm", "clouds": ("A",), "reach": "2 mm"}
+    found = _pick(tmp_path, both, bowl, outline=outline)
+    radius = np.linalg.norm(both.points[:, :2], axis=1)
+    # A polygon of 24 sides reaches cos(7.5 degrees) of its radius, and its points move inwards, not out, when laid down: by the
+    # sphere's normal, up to 10 mm times its slope. The upper side stays at least 4 mm away from the bone.
+    assert set(np.flatnonzero(radius[: len(bowl.points)] < 0.8 * rim)) <= set(found)
+    assert found.max() < len(bowl.points)
+    assert radius[found].max() < rim + 2
 
 
 def test_two_clouds_are_two_patches(tmp_path: Path) -> None:
@@ -170,8 +199,16 @@ def test_the_area_converges_as_the_tets_shrink() -> None:
 def test_the_origins_of_gluteus_maximus(data: Path, tmp_path: Path) -> None:
     muscle = check_closed(files.read_surface(data / "hip/muscles/gluteus_maximus.vtk", 1.0))
     clouds = tuple(f"LC_SET_Ori_{i}_R_M081_Glut_Max" for i in (1, 2))
-    outline = {"file": str(data / "hip/landmarks.csv"), "unit": "mm", "clouds": clouds}
-    near, far = (set(_pick(tmp_path, muscle, outline=outline | {"reach": reach})) for reach in ("5 mm", "10 mm"))
+    bones = [files.read_surface(data / f"hip/bones/{name}.ply", 1.0) for name in ("iliac_r", "sacrum")]
+    table = {"file": str(data / "hip/landmarks.csv"), "unit": "mm"}
+    near, far = (
+        {
+            vertex
+            for cloud, bone in zip(clouds, bones, strict=True)
+            for vertex in _pick(tmp_path, muscle, bone, outline=table | {"clouds": (cloud,), "reach": reach})
+        }
+        for reach in ("5 mm", "10 mm")
+    )
     rows = [row for row in files.read_rows(data / "hip/landmarks.csv") if row[0] in clouds]
     landmarks = np.array([row[2:] for row in rows], float)
     to_landmarks = np.linalg.norm(muscle.points[:, None] - landmarks, axis=2)

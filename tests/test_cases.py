@@ -19,6 +19,18 @@ FIELDS = {
     "surface_figure": "listing",
 }
 
+# The report's other muscles, each with tetrahedra coarse enough for a test.
+MUSCLES = {
+    "adductor_brevis": "5 mm",
+    "gluteus_maximus_anatomical": "14 mm",
+    "gluteus_medius": "9 mm",
+    "gluteus_medius_anatomical": "9 mm",
+    "iliacus_anatomical": "6 mm",
+}
+
+# What the report's program held moves there past each other: without contact the reference ends at frame 82.
+UNSOLVED = ("iliacus",)
+
 
 @pytest.mark.parametrize("name", FIELDS)
 def test_spoiled_scalar_cases_fail(name, tmp_path) -> None:
@@ -77,7 +89,7 @@ def rows(facts, metric, statistic):
 
 
 def test_every_case_is_run_here() -> None:
-    assert casefile.cases() == sorted(["gluteus_maximus", "hip_flexion", *FIELDS])
+    assert casefile.cases() == sorted(["gluteus_maximus", "hip_flexion", *FIELDS, *MUSCLES, *UNSOLVED])
 
 
 def test_hip_flexion_spoiled_fails(tmp_path, monkeypatch) -> None:
@@ -94,7 +106,8 @@ def test_main_job(tmp_path) -> None:
     frames = {row["frame"] for row in facts["measures"] if row["candidate"] == "pbd"}
     assert frames == set(range(0, 201, 10))
     metrics = {row["metric"] for row in facts["measures"] if row["candidate"] == "pbd"}
-    assert metrics == {"dihedral_angle", "edge_extension", "fibre_length", "inversion", "surface_deviation", "volume"}
+    surface = {"dihedral_angle", "edge_extension", "inversion", "surface_deviation", "volume"}
+    assert metrics == surface | {"fibre_length", "penetration"}
     page = (tmp_path / "hip_flexion" / "report.html").read_text()
     assert page.count("data:image/webp") >= 4, "the pictures are missing"
 
@@ -117,9 +130,9 @@ def test_gluteus_maximus_against_the_recorded_output(data, tmp_path) -> None:
     facts = json.loads(target.read_text())
     assert (status, facts["verdict"], facts["status"]) == (cli.DONE, "pass", "converged")
     volume = rows(facts, "volume", "deviation")
-    assert sorted(volume) == list(range(0, 201, 10))
+    assert sorted(volume) == list(range(0, 301, 10))
     assert max(map(abs, volume.values())) < 0.5
-    assert rows(facts, "surface_deviation", "max")[200] < 0.01
+    assert rows(facts, "surface_deviation", "max")[300] < 0.05
     # The report's program states its greatest displacement, 132.5 mm at iteration 100, of vertices that both hold alike.
     assert rows(facts, "surface_deviation", "max")[100] == pytest.approx(132.5, abs=1)
 
@@ -143,3 +156,22 @@ def test_gluteus_maximus_spoiled_fails(data, tmp_path, monkeypatch) -> None:
     coarse = {"frames.last": 110, "frames.every": 110, "expect[1].frame": 110, "muscle.tet_size": "14 mm"}
     status, _ = run(casefile.read("gluteus_maximus", changes=coarse, spoiled=True), tmp_path, monkeypatch)
     assert status == cli.VERDICT_FAIL
+
+
+@pytest.mark.parametrize("name", MUSCLES)
+def test_muscles_of_the_report(data, name, tmp_path, monkeypatch) -> None:
+    assert data.is_dir()
+    scene = casefile.read(name, changes=FEW | {"muscle.tet_size": MUSCLES[name]})
+    status, facts = run(scene, tmp_path, monkeypatch)
+    assert (status, facts["verdict"], facts["status"]) == (cli.DONE, "pass", "converged")
+    assert scene.frames.numbers == (0, 100, 200, 300)
+
+
+@pytest.mark.parametrize("name", MUSCLES)
+def test_muscles_of_the_report_spoiled_fail(data, name, tmp_path, monkeypatch) -> None:
+    assert data.is_dir()
+    changes = FEW | {"muscle.tet_size": MUSCLES[name]}
+    status, facts = run(casefile.read(name, changes=changes, spoiled=True), tmp_path, monkeypatch)
+    assert status == cli.VERDICT_FAIL
+    # Not for another reason: the soft muscle returns to rest all the same.
+    assert {verdict["metric"] for verdict in facts["verdicts"] if verdict["verdict"] == "fail"} == {"volume"}

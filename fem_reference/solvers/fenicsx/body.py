@@ -21,8 +21,6 @@ from fem_reference.solvers.fenicsx.holds import Hold
 from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.stepping import Attempt
 
-# A load step in which a point gets so much deeper [mm] into an obstruction than it is at both ends goes through it: it is cut.
-DEEPER = 0.5
 _NOT_A_NUMBER = -4  # how PETSc's SNES ends there; the name of the constant depends on its version
 
 
@@ -107,7 +105,7 @@ class Body:
         before = np.array(self.unknowns.x.array)
         reason, iterations = self._solve(frame)
         smallest = self.determinants.smallest()
-        through = self.contact.pushes.tunnelled(self.comm, DEEPER) if self.contact and reason > 0 else None
+        through = self.contact.pushes.tunnelled(self.comm) if self.contact and reason > 0 else None
         if reason > 0 and smallest.value > 0 and through is None:
             if self.contact:
                 self.contact.pushes.settle()

@@ -22,7 +22,8 @@ _WAYPOINTS = 8
 @dataclass(frozen=True, eq=False)
 class Push:
     """What one obstruction does at n points: ``gap`` (n,) [mm], negative inside, ``pressure`` (n,) [MPa per rest area],
-    ``traction`` (n, 3) and its ``slope`` (n, 3, 3) [MPa/mm]; ``local`` (n, 3) [mm], the points in the obstruction's rest frame.
+    ``traction`` (n, 3) and its ``slope`` (n, 3, 3) [MPa/mm]; in the obstruction's rest frame the points, ``local`` (n, 3) [mm],
+    and the gradients of the gap, ``outward`` (n, 3).
     """
 
     gap: Floats
@@ -30,6 +31,7 @@ class Push:
     traction: Floats
     slope: Floats
     local: Floats
+    outward: Floats
 
 
 def push(law: Contact, obstruction: Obstruction, points: Floats, frame: float, allowed: Floats) -> Push:
@@ -41,7 +43,7 @@ def push(law: Contact, obstruction: Obstruction, points: Floats, frame: float, a
     pressure, change = law.pressure(sampled.distance + allowed)
     normal, curvature = sampled.gradient @ turn.T, turn @ sampled.curvature @ turn.T
     slope = change[:, None, None] * normal[:, :, None] * normal[:, None, :] + pressure[:, None, None] * curvature
-    return Push(sampled.distance, pressure, pressure[:, None] * normal, slope, local)
+    return Push(sampled.distance, pressure, pressure[:, None] * normal, slope, local, sampled.gradient)
 
 
 class Pushes:
@@ -60,7 +62,8 @@ class Pushes:
         none = np.zeros(len(points.areas))
         at_rest = [push(law, entry, points.rest, frame, none) for entry in obstructions]
         self.overlaps = [np.maximum(law.smoothing - one.gap, 0) if law.relaxed else none for one in at_rest]
-        self.now = at_rest
+        self.now: list[Push] = []
+        self.update(frame)
         self.settle()
 
     def update(self, frame: float) -> None:
@@ -154,28 +157,32 @@ class Pushes:
         """Take up the settled state again, as the unknowns have."""
         self.now, self.frame = self.settled, self.settled_at
 
-    def tunnelled(self, comm: MPI.Comm, deeper: float) -> str | None:
+    def tunnelled(self, comm: MPI.Comm) -> str | None:
         """Where a point went through an obstruction since the last settled state: on its straight way through the obstruction's
-        frame it was ``deeper`` [mm] than at both ends. None where none did.
+        frame it was inside, deeper than at both ends, and it left on the other side. None where none did.
         """
-        mine = [one for i in range(len(self.obstructions)) if (one := self._through(i, deeper))]
+        mine = [one for i in range(len(self.obstructions)) if (one := self._through(i))]
         found: list[tuple[float, str]] = [one for rank in comm.allgather(mine) for one in rank]
         return max(found)[1] if found else None
 
-    def _through(self, i: int, deeper: float) -> tuple[float, str] | None:
+    def _through(self, i: int) -> tuple[float, str] | None:
         before, now, entry = self.settled[i], self.now[i], self.obstructions[i]
-        moved = np.flatnonzero(np.linalg.norm(now.local - before.local, axis=1) > deeper)
+        ways = now.local - before.local
+        # A gap is not known far away: what points outward there is the way back, and the way on.
+        outward = [
+            np.where(one.outward.any(axis=1)[:, None], one.outward, sign * ways)
+            for one, sign in ((before, -1), (now, 1))
+        ]
+        turned = np.flatnonzero(np.einsum("ni,ni->n", *outward) < 0)
         shares = np.linspace(0, 1, _WAYPOINTS + 2)[1:-1, None, None]
-        way = (1 - shares) * before.local[moved] + shares * now.local[moved]
-        on_way = entry.shape.sample(way.reshape(-1, 3)).distance.reshape(_WAYPOINTS, -1).min(axis=0, initial=np.inf)
-        excess = np.minimum(np.minimum(before.gap, now.gap)[moved], 0) - on_way
-        if len(moved) == 0 or not excess.max() > deeper:
+        points = before.local[turned] + shares * ways[turned]
+        on_way = entry.shape.sample(points.reshape(-1, 3)).distance.reshape(_WAYPOINTS, -1).min(axis=0, initial=np.inf)
+        excess = np.minimum(np.minimum(before.gap, now.gap)[turned], 0) - on_way
+        if not excess.max(initial=0.0) > self.law.smoothing:
             return None
         worst = int(np.argmax(excess))
-        x, y, z = self.points.rest[moved[worst]]
-        return float(
-            excess[worst]
-        ), f'the point that rests at ({x:.1f}, {y:.1f}, {z:.1f}) mm went through "{entry.name}"'
+        x, y, z = self.points.rest[turned[worst]]
+        return float(excess[worst]), f'the point that rests at ({x:.1f}, {y:.1f}, {z:.1f}) mm went through "{entry.name}"'
 
 
 class Watched:

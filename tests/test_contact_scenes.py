@@ -1,0 +1,119 @@
+"""Contact in a scene: a bar that bends against a ball is pushed aside, starts outside it, and takes no step through it."""
+
+import numpy as np
+import pytest
+import small
+
+from fem_reference import casefile, problem
+from fem_reference.contact import Contact, Obstruction
+from fem_reference.continuum import Continuum
+from fem_reference.deformable import as_continuum
+from fem_reference.errors import InputError
+from fem_reference.geometry.rigid_bodies import Box
+from fem_reference.motion import apply
+from fem_reference.solvers import fenicsx
+from fem_reference.verification import parts, shapes
+from fem_reference.verification.contact import Slide
+
+BALL = '[[bone]]\nname = "ball"\nsphere = {{ centre = "5, {y}, 30 mm", radius = "4 mm" }}\n\n[[attachment]]\nname = "origin"'
+CONTACT = '[[effect]]\nname = "contact"\nstiffness = "1 MPa/mm"\nsmoothing = "0.1 mm"\n\n[fibres]'
+
+
+def scene(folder, y: float, contact: str = CONTACT):
+    """The bar's side is at y = -1.06 mm where the ball is; the ball reaches to ``y`` + 4."""
+    path = small.write(folder) / "case.toml"
+    text = path.read_text().replace('[[attachment]]\nname = "origin"', BALL.format(y=y).replace("\n[[a", "[[a"), 1)
+    path.write_text(text.replace("[fibres]", contact, 1).replace("last = 20", "last = 10"))
+    return casefile.read(folder)
+
+
+def solved(case, ranks: int = 1):
+    """The frames of a scene and the depth of the deepest free vertex in the ball in each [mm]."""
+    rest = problem.setup(case)
+    built = problem.build(case, rest)
+    frames = []
+    settings = fenicsx.Settings(ranks=ranks, first_step=5, residual=1e-9)
+    assert fenicsx.solve(built, settings, frames.append).status == "converged"
+    ball = rest.bones[-1]
+    return frames, [-ball.shape.sample(frame.surface[rest.free]).distance.min() for frame in frames]
+
+
+@pytest.fixture(scope="module")
+def needs_fenicsx() -> None:
+    pytest.importorskip("dolfinx_solver", reason="FEniCSx is not installed")
+
+
+@pytest.mark.usefixtures("needs_fenicsx")
+def test_a_bone_pushes_the_muscle_aside(tmp_path) -> None:
+    free, deep = solved(scene(tmp_path / "free", -5.5, "[fibres]"))
+    pushed, shallow = solved(scene(tmp_path / "pushed", -5.5))
+    assert deep[-1] > 0.5
+    last = pushed[-1].scalars
+    # At a pressure p the surface gets p / stiffness deep where it is asked; vertices lie between such points, half a tet apart.
+    assert 0 < last["penetration"] <= last["contact_pressure"] / 1.0 + 1e-9
+    assert shallow[-1] < last["penetration"] + 0.05
+    assert last["force_ball"] > 0
+    assert pushed[0].scalars["contact_area"] == 0
+    assert "overlap_at_rest" not in last
+    assert free[0].surface == pytest.approx(pushed[0].surface, abs=1e-12)
+
+
+@pytest.mark.usefixtures("needs_fenicsx")
+def test_ranks_change_nothing(tmp_path) -> None:
+    # Newton's residual is 1e-9 N on a body of 10 kPa and 10 mm: 1e-8 mm.
+    case = scene(tmp_path / "bar", -5.5)
+    one, two = (solved(case, ranks)[0][-1] for ranks in (1, 2))
+    assert two.surface == pytest.approx(one.surface, abs=1e-6)
+    assert two.scalars["force_ball"] == pytest.approx(one.scalars["force_ball"], rel=1e-6)
+    assert two.scalars["contact_area"] == pytest.approx(one.scalars["contact_area"], rel=1e-9)
+
+
+@pytest.mark.usefixtures("needs_fenicsx")
+def test_what_overlaps_at_rest_is_relaxed_first_and_told(tmp_path) -> None:
+    case = scene(tmp_path / "bar", -4.6)  # 0.46 mm deep
+    assert as_continuum(problem.build(case, problem.setup(case))).frames == (-10.0, 0, 5, 10)
+    frames, depths = solved(case)
+    assert [frame.number for frame in frames] == [0, 5, 10]
+    first = frames[0].scalars
+    assert first["overlap_at_rest"] == pytest.approx(0.46, abs=0.05)  # points are half a tet, 3 mm, apart
+    assert first["penetration"] < 0.1
+    assert depths[0] < first["penetration"] + 0.05
+
+
+def test_bones_push_only_what_they_do_not_hold(tmp_path) -> None:
+    case = scene(tmp_path / "bar", -5.5)
+    rest = problem.setup(case)
+    body = as_continuum(problem.build(case, rest))
+    assert [entry.name for entry in body.obstructions] == ["floor", "lid", "ball"]
+    assert [type(effect).__name__ for effect in body.effects] == ["NeoHooke", "Incompressible"]
+    heights = body.contact.on.points[:, 2]
+    assert 2 < heights.min() < heights.max() < 38  # the ends are held, and triangles are 3.3 mm high
+    turned = body.obstructions[1].pose(10)
+    assert apply(turned, np.array([[5.0, 5, 30]])) == pytest.approx(np.array([[5, 5, 30]]))
+
+
+def test_only_some_bones_push(tmp_path) -> None:
+    some = CONTACT.replace("\n\n", '\nbones = ["ball"]\n\n')
+    case = scene(tmp_path / "bar", -5.5, some)
+    assert [entry.name for entry in as_continuum(problem.build(case, problem.setup(case))).obstructions] == ["ball"]
+    with pytest.raises(InputError, match=r'effect\[2\]\.bones: got "bal", want one of floor, lid, ball'):
+        scene(tmp_path / "other", -5.5, some.replace("ball", "bal"))
+
+
+def test_a_step_through_a_plate_is_cut(fem_lab) -> None:
+    # A plate 0.2 mm thin jumps over the top of a block in one step: at both ends of the step it touches nothing.
+    mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), "tetrahedron")
+    held = parts.SYMMETRY
+    plate = Obstruction("plate", Box((0.5, 0.5, 1.2), (4.0, 4.0, 0.2), 0.0), Slide((0.0, 0.0, -0.5)))
+    body = Continuum(
+        mesh,
+        parts.neo_hooke(0.01, 10.0),
+        held,
+        (0.0, 1.0),
+        contact=Contact("z1", 1.0, 0.01),
+        obstructions=(plate,),
+    )
+    state = fem_lab.solve(body, "P2/P1", first_step=1.0, residual=1e-11).last
+    assert state.scalars["cut_backs"] > 0
+    assert state.forces["plate"][2] < 0
+    assert state.points[:, 2].max() == pytest.approx(0.6, abs=0.05)

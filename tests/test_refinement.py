@@ -1,0 +1,199 @@
+"""An error bar is asked for by the command line, made of runs on other sizes and with finer numerics, and kept beside its run."""
+
+import json
+import logging
+from pathlib import Path
+
+import numpy as np
+import pytest
+import small
+
+from fem_reference import casefile, cli, refinement, report, study
+from fem_reference.errors import InputError
+from fem_reference.execution import Bench
+from fem_reference.report import gallery
+from fem_reference.runs import Frame, Outcome
+from fem_reference.scene import Scene
+from fem_reference.solvers import fenicsx
+
+CONTACT = '\n[[effect]]\nname = "contact"\nstiffness = "100 kPa/mm"\nsmoothing = "0.2 mm"\n'
+LOAD_STEP = 1e-5
+WRITE = report.write
+
+
+def swell(problem, settings, sink) -> Outcome:
+    """In place of the reference: all points move away from the origin, by more the larger the tetrahedra and the load steps are."""
+    facts = problem.mesh_facts
+    length = (facts["volume_mm3"] / facts["tets"]) ** (1 / 3)
+    for number in problem.frames:
+        factor = 1 + number * (1e-3 + 1e-4 * length + LOAD_STEP * settings.first_step)
+        sink(Frame(number, problem.surface.points * factor, problem.fibres.points * factor))
+    return Outcome("converged", "done", {"seconds": 1.0})
+
+
+@pytest.fixture
+def case(tmp_path, monkeypatch) -> Path:
+    """The small scene, solved by ``swell``, without its page."""
+    monkeypatch.setattr(fenicsx, "require", lambda _: None)
+    monkeypatch.setattr(fenicsx, "solve", swell)
+    monkeypatch.setattr(report, "write", lambda _, folder: folder)
+    return small.write(tmp_path / "bar")
+
+
+def call(case: Path, *words: str):
+    out = case.parent / "out"
+    target = out / "facts.json"
+    target.unlink(missing_ok=True)
+    status = cli.main([words[0], str(case), *words[1:], "--out", str(out), "--json", str(target), "--quiet"])
+    return status, json.loads(target.read_text()) if target.exists() else None
+
+
+def rows(facts, of, metric, statistic):
+    found = [
+        row for row in facts["error_bars"] if (row["of"], row["metric"], row["statistic"]) == (of, metric, statistic)
+    ]
+    return np.array([row["value"] for row in found]), found[0]["order"], found[0]["course"]
+
+
+def scene_of(case: Path, more: str = "") -> Scene:
+    path = case / "case.toml"
+    path.write_text(path.read_text() + more)
+    return casefile.read_muscle(case)
+
+
+def test_the_bar_covers_an_error_that_is_known(case, capsys, monkeypatch) -> None:
+    monkeypatch.setattr(report, "write", WRITE)
+    monkeypatch.setattr(gallery, "_command", lambda _job, _folder: ["/nowhere/python"])
+    status, facts = call(case, "run")
+    assert (status, facts["error_bars"], facts["verdicts"][0]["error_bar"]) == (cli.VERDICT_FAIL, [], None)  # it swells
+    page = case.parent / "out" / "bar" / "report.html"
+    assert "With <code>--error-bar</code> the reference is solved" in page.read_text()
+    status, facts = call(case, "run", "--error-bar")
+    assert (status, facts["verdict"]) == (cli.DONE, "cannot say")
+    values, order, course = rows(facts, "change", "surface_deviation", "max")
+    bench = Bench(casefile.read_muscle(case), case.parent / "out" / "runs")
+    built = bench.problem()
+    length = (built.mesh_facts["volume_mm3"] / built.mesh_facts["tets"]) ** (1 / 3)
+    furthest = np.linalg.norm(built.surface.points, axis=1).max()
+    # Of first order in the tetrahedra, 1.25 times their error; halving load steps of 5 changes half their error, twice that is all.
+    wanted = np.array([0, 5, 10, 15, 20]) * furthest * (1.25e-4 * length + 5 * LOAD_STEP)
+    assert values == pytest.approx(wanted, rel=1e-6)
+    assert (order, course) == (pytest.approx(1, abs=1e-6), "converges")
+    printed = capsys.readouterr().out
+    assert "how well the reference is known" in printed
+    assert "order 1.0, converges" in printed
+    text = page.read_text()
+    assert "6, 7.50, 9.38 mm" in text
+    assert "with one other cause of error halved at a time (load steps)" in text
+    assert ">error bar</text>" in text
+
+
+def test_it_is_kept_with_its_run_until_the_metrics_change_or_the_file_is_damaged(case, monkeypatch, capsys) -> None:
+    call(case, "run", "--error-bar")
+    first, _, _ = rows(call(case, "compare")[1], "deviation", "surface_deviation", "rms")
+    assert (first[1:] > 0).all()
+    monkeypatch.setattr(refinement, "_measuring_hash", lambda: "others")
+    assert call(case, "run")[1]["error_bars"] == []
+    (path,) = (case.parent / "out" / "runs" / "bar").glob(f"*/{study.FILE}")
+    path.write_text("{")
+    capsys.readouterr()
+    assert call(case, "run")[0] == cli.BAD_INPUT
+    assert "error_bar.json: got JSONDecodeError" in capsys.readouterr().err
+    again, _, _ = rows(call(case, "run", "--error-bar")[1], "deviation", "surface_deviation", "rms")
+    assert np.array_equal(again, first)
+
+
+def test_the_judge_says_nothing_below_three_bars(case) -> None:
+    path, within = case / "case.toml", "0.5 %"
+    bar = call(case, "run", "--error-bar")[1]["verdicts"][0]["error_bar"]
+    for times, silent in ((2.99, True), (3.01, False)):
+        other = f"{times * bar} %"
+        path.write_text(path.read_text().replace(f'"{within}"', f'"{other}"'))
+        assert (call(case, "run")[1]["verdict"] == "cannot say") == silent
+        within = other
+
+
+def test_progress_says_which_run_and_how_many(case, caplog) -> None:
+    caplog.set_level(logging.INFO, logger="fem_reference")
+    bench = Bench(casefile.read_muscle(case), case.parent / "runs")
+    assert refinement.obtain(bench, bench.obtain("reference", bench.scene.reference, "reference")) is not None
+    assert "error bar: run 1 of 3, tetrahedra of 7.5 mm; at most about" in caplog.text
+    assert "error bar: run 3 of 3, load steps" in caplog.text
+
+
+def test_a_run_that_failed_has_none(case, monkeypatch) -> None:
+    def fail(problem, _settings, sink) -> Outcome:
+        sink(Frame(0, problem.surface.points, problem.fibres.points))
+        return Outcome("diverged", "no")
+
+    monkeypatch.setattr(fenicsx, "solve", fail)
+    status, facts = call(case, "run", "--error-bar")
+    assert (status, facts["error_bars"]) == (cli.SOLVER_FAILED, [])
+
+
+def test_a_coarser_run_that_fails_leaves_frames_without_a_bar(case, monkeypatch) -> None:
+    finest = []
+
+    def fail(problem, settings, sink) -> Outcome:
+        finest.append(problem.mesh_facts["tets"])
+        if problem.mesh_facts["tets"] == finest[0]:
+            return swell(problem, settings, sink)
+        sink(Frame(0, problem.surface.points, problem.fibres.points))
+        return Outcome("diverged", "no")
+
+    monkeypatch.setattr(fenicsx, "solve", fail)
+    _, facts = call(case, "run", "--error-bar")
+    values, _, _ = rows(facts, "change", "surface_deviation", "max")
+    assert values.tolist()[1:] == [None] * 4
+    assert (facts["verdict"], facts["verdicts"][0]["error_bar"]) == ("cannot say", None)
+
+
+def test_sizes_that_make_no_other_mesh_are_refused(case, monkeypatch) -> None:
+    monkeypatch.setattr(refinement, "_length", lambda _: 1.0)
+    bench = Bench(casefile.read_muscle(case), case.parent / "runs")
+    reference = bench.obtain("reference", bench.scene.reference, "reference")
+    with pytest.raises(InputError, match=r"muscle.tet_size: got meshes of .* tetrahedra, want a size that coarser"):
+        refinement.obtain(bench, reference)
+
+
+def test_a_scene_that_cannot_be_coarser_is_named(case, monkeypatch) -> None:
+    real = refinement._resized
+    monkeypatch.setattr(refinement, "_resized", lambda scene, size: real(scene, size * 10))
+    bench = Bench(casefile.read_muscle(case), case.parent / "runs")
+    reference = bench.obtain("reference", bench.scene.reference, "reference")
+    with pytest.raises(InputError, match=r"error bar, tetrahedra of 7.5 mm: got a scene that cannot be set up"):
+        refinement.obtain(bench, reference)
+
+
+@pytest.mark.parametrize("words", [("run", "--solver", "pbd"), ("run",), ("compare",)])
+def test_it_is_of_the_reference_of_a_muscle(case, capsys, words) -> None:
+    name = str(case) if "--solver" in words else "rod"
+    assert cli.main([words[0], name, *words[1:], "--error-bar", "--out", str(case.parent / "out")]) == cli.BAD_INPUT
+    assert "--error-bar: got a scalar case or another solver, want the reference of a muscle" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("every", "between"), [(10, 5), (5, 1), (9, 3), (1, 1)])
+def test_load_steps_are_at_most_half_as_long(case, every, between) -> None:
+    scene = scene_of(case)
+    frames = scene.frames.model_copy(update={"last": 90, "every": every})
+    (steps,) = refinement.variations(scene.model_copy(update={"frames": frames}), 5.0)
+    assert steps.changes["frames"].every == between
+    assert set(frames.numbers) <= set(steps.changes["frames"].numbers)
+    assert steps.changes["reference"].settings["first_step"] == 2.5
+
+
+def test_what_takes_no_load_steps_has_none_varied(case) -> None:
+    assert refinement.variations(scene_of(case), None) == ()
+
+
+def test_contact_is_varied_cause_by_cause(case) -> None:
+    scene = scene_of(case, CONTACT)
+    varied = {entry.name: entry.changes for entry in refinement.variations(scene, 5.0)}
+    assert list(varied) == ["load steps", "contact stiffness", "contact smoothing", "distances to bones"]
+    assert [effect.stiffness for effect in varied["contact stiffness"]["effect"][2:]] == [pytest.approx(0.2)]
+    assert [effect.smoothing for effect in varied["contact smoothing"]["effect"][2:]] == [pytest.approx(0.1)]
+    assert varied["contact stiffness"]["effect"][:2] == scene.effects[:2]
+    assert [bone.distance_error for bone in varied["distances to bones"]["bone"]] == [0.025, 0.025]
+    # Each is another scene, which has another key: no run is mistaken for another.
+    keys = {scene.model_copy(update=changes).key for changes in varied.values()}
+    assert len(keys | {scene.key}) == 5
