@@ -38,7 +38,7 @@ class Variation:
 
 def variations(scene: Scene, first_step: float | None) -> tuple[Variation, ...]:
     """What is varied apart from tetrahedra: load steps, where the reference takes them (``first_step``), and with contact its
-    stiffness and smoothing, and how well the distances to surfaces of bones are known.
+    stiffness and smoothing, and how well the distances to surfaces of bones are known and how far they are rounded.
     """
     found = [] if first_step is None else [Variation("load steps", _finer_steps(scene, first_step))]
     if any(isinstance(effect, Contact) for effect in scene.effects):
@@ -67,9 +67,10 @@ def _scaled(scene: Scene, key: str, factor: float) -> tuple[Effect, ...]:
 
 
 def _closer(scene: Scene) -> tuple[Bone, ...]:
-    """The bones of a scene, the distances to their surfaces known twice as well; closed forms are exact."""
+    """The bones of a scene, the distances to their surfaces known twice as well and half as round; closed forms are exact."""
+    halved = ("distance_error", "distance_rounding")
     return tuple(
-        bone.model_copy(update={"distance_error": bone.distance_error / 2}) if bone.surface else bone
+        bone.model_copy(update={key: getattr(bone, key) / 2 for key in halved}) if bone.surface else bone
         for bone in scene.bone
     )
 

@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 from fem_reference import files
 from fem_reference.errors import InputError
 from fem_reference.mesh import Floats
-from fem_reference.metrics import Measure, Yardstick, at_rest, measure
+from fem_reference.metrics import Measure, Yardstick, at_rest, measure, of_itself
 from fem_reference.runs import Run
 
 Of = Literal["change", "deviation"]
@@ -92,7 +92,9 @@ class Ladder:
 
 
 def error_bars(ladder: Ladder, yardstick: Yardstick) -> ErrorBars:
-    """The bars of every statistic of every metric, of changes and of deviations: that of the sizes and what variations add."""
+    """The bars of every statistic of every metric, of changes and of deviations: that of the sizes and what variations add. What
+    is said of a run itself has none: it is known.
+    """
     fine, medium, coarse = (_surface(run) for run in ladder.runs)
     others = {name: _surface(run) for name, run in ladder.varied.items()}
 
@@ -106,6 +108,8 @@ def error_bars(ladder: Ladder, yardstick: Yardstick) -> ErrorBars:
         near, far = differences(medium, fine, measured), differences(coarse, medium, measured)
         varied = {name: differences(run, coarse, measured) for name, run in others.items()}
         for i, one in enumerate(measured(fine, fine)):
+            if of_itself(one.metric):
+                continue
             values, order, course = of_sizes(near[i], far[i], ladder.lengths, rounding(one.unit))
             parts = {_SIZES: values} | {name: VARIATION * np.abs(found[i]) for name, found in varied.items()}
             greatest = {name: float(part.max()) for name, part in parts.items()}
@@ -126,7 +130,7 @@ def _of_changes(run: Run, other: Run, measured: _Measured) -> list[Floats]:
 
 def _of_deviations(run: Run, other: Run, measured: _Measured) -> list[Floats]:
     """By how much (f,) each statistic of ``other`` against ``run`` is more than against itself: what becomes of a deviation when
-    the reference is another. Nothing, where a statistic asks nothing of the reference, as penetration does.
+    the reference is another.
     """
     return [one.values - same.values for one, same in zip(measured(other, run), measured(other, other), strict=True)]
 

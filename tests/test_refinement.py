@@ -194,6 +194,7 @@ def test_contact_is_varied_cause_by_cause(case) -> None:
     assert [effect.smoothing for effect in varied["contact smoothing"]["effect"][2:]] == [pytest.approx(0.1)]
     assert varied["contact stiffness"]["effect"][:2] == scene.effects[:2]
     assert [bone.distance_error for bone in varied["distances to bones"]["bone"]] == [0.025, 0.025]
+    assert [bone.distance_rounding for bone in varied["distances to bones"]["bone"]] == [0.5, 0.5]
     # Each is another scene, which has another key: no run is mistaken for another.
     keys = {scene.model_copy(update=changes).key for changes in varied.values()}
     assert len(keys | {scene.key}) == 5

@@ -76,6 +76,11 @@ def units() -> dict[str, str]:
     return {f"{name}.{statistic}": unit for name, module in modules.items() for statistic, unit in module.UNITS.items()}
 
 
+def of_itself(name: str) -> bool:
+    """Whether the metric ``name`` says something of a run alone, whatever it is measured against."""
+    return getattr(importlib.import_module(f"{__name__}.{name}"), "OF_ITSELF", False)
+
+
 def measure(run: Run, reference: Run, yardstick: Yardstick) -> tuple[Measure, ...]:
     """Every statistic of every metric of ``run`` against ``reference``, frame by frame; both must have the same frames."""
     modules = (importlib.import_module(f"{__name__}.{name}") for name in names())

@@ -19,6 +19,7 @@ from fem_reference.problem import Body
 from fem_reference.runs import Run
 
 UNITS = {"deepest": "mm", "volume": "mm3"}
+OF_ITSELF = True
 
 log = logging.getLogger(__name__)
 
