@@ -144,6 +144,7 @@ def _scene(table: dict[str, Any], path: Path) -> Scene | FieldScene:
     scene = Scene(name=path.parent.name, folder=path.parent, **dict(inside))
     _check_names(scene)
     _check_rest(scene)
+    _check_time(scene)
     return scene
 
 
@@ -221,3 +222,11 @@ def _check_rest(scene: Scene) -> None:
             slid = np.array_equal(pose[:3, :3], np.eye(3))
             what, want = ("moved", "distance 0 there") if slid else ("turned", "angle 0 there")
             raise InputError(join(scene.place, f"bone[{i}].motion"), f"a bone {what} at the first frame", want)
+
+
+def _check_time(scene: Scene) -> None:
+    """Where time matters to an effect, the scene says how fast it passes."""
+    for i, effect in enumerate(scene.effects):
+        if "interval" in effect.needs and scene.frames.interval is None:
+            want = f"the time from a frame number to the next, which effect[{i}] ({effect.title}) needs"
+            raise InputError(join(scene.place, "frames.interval"), "nothing", want)

@@ -44,6 +44,8 @@ def check(body: "Continuum", element: str) -> None:
     _check_regions(body.mesh, tuple(used))
     if body.fibre is None and any("fibre" in effect.needs for effect in body.effects):
         raise InputError("fibre", "nothing", "fibre directions, which an effect needs")
+    if body.interval is None and any("interval" in effect.needs for effect in body.effects):
+        raise InputError("interval", "nothing", "the time from a frame number to the next, which an effect needs")
 
 
 def _check_prescribed(prescribed: tuple["Prescribed", ...]) -> None:
@@ -162,7 +164,8 @@ class ByCell:
 @dataclass(frozen=True, eq=False)
 class Continuum:
     """A body of ``mesh`` with its ``effects``; at ``frames[0]`` it rests. A load acts on the facets that its ``on`` names; by
-    ``contact``, where there is one, every obstruction pushes.
+    ``contact``, where there is one, every obstruction pushes. ``interval`` [s]: from a frame number to the next, where time
+    matters.
     """
 
     mesh: Cells
@@ -172,6 +175,7 @@ class Continuum:
     fibre: Directions | None = None
     contact: Contact | None = None
     obstructions: tuple[Obstruction, ...] = ()
+    interval: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,7 +41,7 @@ def as_continuum(problem: Problem) -> Continuum:
     )
     fibre = None if problem.directions is None else ByCell(problem.directions)
     acting = tuple(effect for effect in problem.effects if not isinstance(effect, Interaction))
-    body = Continuum(cells, acting, prescribed, problem.frames, fibre)
+    body = Continuum(cells, acting, prescribed, problem.frames, fibre, interval=problem.interval)
     return body if problem.contact is None else _among_bones(body, problem, problem.contact)
 
 

@@ -24,6 +24,7 @@ _INSIDE = {
     "a density": "tonne/mm^3",
     "an acceleration": "mm/s^2",
     "a stiffness per area": "MPa/mm",
+    "a damping per volume": "MPa*s/mm^2",
 }
 # A number, then what may be a unit.
 _NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.ASCII)
@@ -76,6 +77,7 @@ _EXAMPLE = {
     "a density": '"1060 kg/m3"',
     "an acceleration": '"9.81 m/s^2"',
     "a stiffness per area": '"100 kPa/mm"',
+    "a damping per volume": '"1 Pa s/mm^2"',
 }
 _EXAMPLE_OF_THREE = {
     "a length": '"146, 238, -431 mm"',
@@ -122,6 +124,7 @@ Pressure = Annotated[float, BeforeValidator(partial(quantity, kind="a pressure")
 PositivePressure = Annotated[float, BeforeValidator(partial(positive, kind="a pressure"))]
 PressureVector = Annotated[tuple[float, float, float], BeforeValidator(partial(three, kind="a pressure"))]
 AreaStiffness = Annotated[float, BeforeValidator(partial(positive, kind="a stiffness per area"))]
+VolumeDamping = Annotated[float, BeforeValidator(partial(positive, kind="a damping per volume"))]
 Density = Annotated[float, BeforeValidator(partial(positive, kind="a density"))]
 AccelerationVector = Annotated[tuple[float, float, float], BeforeValidator(partial(three, kind="an acceleration"))]
 Time = Annotated[float, BeforeValidator(partial(positive, kind="a time"))]

@@ -26,6 +26,7 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     "traction": {"on": "top", "force": "0, 6.25, 1 kPa", "course": COURSE},
     "contact": {"stiffness": "500 kPa/mm", "smoothing": "0.3 mm", "bones": ["femur"]},
     "prestretch": {"stretch": 1.1, "course": COURSE},
+    "damping": {"coefficient": "2 Pa s/mm^2"},
 }
 OTHER: dict[str, Any] = {
     "p1": 0.06,
@@ -43,15 +44,22 @@ OTHER: dict[str, Any] = {
     "acceleration": "0, 1, -9.81 m/s^2",
     "force": "1, 6.25, 1 kPa",
     "stretch": 1.2,
+    "coefficient": "7 MPa s/mm^2",
     "course": [{"frame": 0, "amount": 0.2}],
     "on": "bottom",
 }  # of other parameters it is 7 MPa
-POSITIVE = ["mu", "bulk", "stress", "c3", "c5", "tension", "k1", "c", "density"]
-KINDS = {"MPa": "pressure", "rad": "an angle", "tonne/mm^3": "a density", "mm/s^2": "acceleration"}
+POSITIVE = ["mu", "bulk", "stress", "c3", "c5", "tension", "k1", "c", "density", "coefficient"]
+KINDS = {
+    "MPa": "pressure",
+    "rad": "an angle",
+    "tonne/mm^3": "a density",
+    "mm/s^2": "acceleration",
+    "MPa*s/mm^2": "a damping",
+}
 # What acts by an expression at a point of the body; an interaction does not.
 EXPRESSED = [name for name in PARAMETERS if not issubclass(effects.find(name), Interaction)]
 ENERGIES = [name for name in PARAMETERS if issubclass(effects.find(name), Energy)]
-ELASTIC = [name for name in ENERGIES if name != "gravity"]
+ELASTIC = [name for name in ENERGIES if name not in ("gravity", "damping")]
 COURSED = [name for name in PARAMETERS if issubclass(effects.find(name), Coursed)]
 SLACK = ["fibre_passive", "fibre_passive_febio", "holzapfel_ogden"]
 
@@ -62,7 +70,8 @@ ALONG = np.array([1.0, 0.0, 0.0])
 
 
 def state(F: np.ndarray, pressure: float = 0.3, fibre: np.ndarray = FIBRE, amount: float = 1.0) -> State:
-    return State(F=F, displacement=(0.3, -0.2, 0.5), pressure=pressure, fibre=fibre, amount=amount)
+    moved = {"displacement": (0.3, -0.2, 0.5), "before": (0.2, 0.1, 0.5), "rate": 4.0}
+    return State(F=F, pressure=pressure, fibre=fibre, amount=amount, **moved)
 
 
 def make(name: str, **changes: Any) -> Any:

@@ -1,6 +1,7 @@
 """What effects do: stress is the slope of the energy and follows the law as published; loads, courses and prestrain."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -181,6 +182,20 @@ def test_incompressible_pressure_is_bulk_times_volume_change() -> None:
 
 
 # Loads, courses, prestrain
+
+
+def test_damping_is_a_drag_against_the_way_of_a_step() -> None:
+    # Minus the slope in the displacement is the force: coefficient times way over time, against the way (0.1, -0.3, 0) mm.
+    effect, at, slopes = make("damping"), state(np.eye(3)), []
+    for push in 1e-3 * np.eye(3):
+        ends = (replace(at, displacement=np.array(at.displacement) + sign * push) for sign in (1, -1))
+        after, before = (effect.energy(end) for end in ends)
+        slopes.append((before - after) / 2e-3)
+    assert slopes == pytest.approx(
+        [-2e-6 * 4 * 0.1, 2e-6 * 4 * 0.3, 0], rel=1e-9, abs=1e-18
+    )  # exact for a square but for rounding
+    assert effect.energy(replace(at, rate=0.0)) == 0
+    assert (effect.stored, make("gravity").stored) == (False, True)
 
 
 def test_gravity_is_weight_times_height() -> None:

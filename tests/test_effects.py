@@ -4,7 +4,7 @@ expressions take symbols. What the laws say is in test_effect_laws.py.
 
 import operator
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -181,8 +181,9 @@ def test_expressions_take_symbols(name: str) -> None:
     effect = make(name)
     symbolic = effect.model_copy(update={key: symbols(value) for key, value, _ in effect.parameters if key != "course"})
     for F in deformations():
-        at = State(F=F.tolist(), displacement=(0.3, -0.2, 0.5), pressure=0.3, fibre=FIBRE.tolist(), amount=0.5)
-        parts = {key: symbols(getattr(at, key)) for key in ("F", "displacement", "pressure", "fibre", "amount")}
+        at = replace(state(F, amount=0.5), F=F.tolist(), fibre=FIBRE.tolist())
+        keys = ("F", "displacement", "pressure", "fibre", "amount", "before", "rate")
+        parts = {key: symbols(getattr(at, key)) for key in keys}
         found = outcome(symbolic, State(**parts, functions=SymbolFunctions()))
         got = np.vectorize(lambda entry: float(plain(entry)))(np.array(found, object))
         np.testing.assert_allclose(got, np.array(outcome(effect, at)), rtol=1e-13, atol=1e-18)

@@ -378,6 +378,17 @@ def test_a_reference_turned_inside_out_is_told(comparison):
     assert re.search(r"at points falls to \N{MINUS SIGN}0.250: there the reference is turned", page.render(turned))
 
 
+def test_a_reference_that_is_unstable_is_told(comparison):
+    def rendered(modes):
+        scalars = {"negative_modes": np.array(modes)}
+        return page.render(replace(alone(comparison), reference=replace(comparison.reference, scalars=scalars)))
+
+    assert "unstable equilibrium" not in page.render(alone(comparison)) + rendered([0, 0, 0, NAN, 0])
+    assert re.search(
+        r"unstable equilibrium at 2 of . frames: its energy falls in\s+up to 3 dir", rendered([0, 1, 3, NAN, 0])
+    )
+
+
 def test_least_of_nothing_known_is_not_a_number():
     assert np.isnan(page.least(Measure("inversion", "min_det_F", "1", np.array([NAN, NAN]))))
 

@@ -132,6 +132,7 @@ def test_types_say_their_unit() -> None:
         "PositivePressure": "MPa",
         "PressureVector": "MPa",
         "AreaStiffness": "MPa/mm",
+        "VolumeDamping": "MPa*s/mm^2",
         "Density": "tonne/mm^3",
         "AccelerationVector": "mm/s^2",
         "Time": "s",

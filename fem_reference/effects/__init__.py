@@ -67,7 +67,8 @@ class State:
 
     ``F``: the deformation gradient, ``F[i][k] = dx_i / dX_k``; ``displacement``: (3,) [mm]; ``pressure``: the mixed pressure
     unknown [MPa], None where no effect brings it; ``fibre``: the unit vector (3,) along the fibres at rest, None where there is
-    none; ``amount``: how much of the effect acts (see :meth:`Effect.amount`).
+    none; ``amount``: how much of the effect acts (see :meth:`Effect.amount`); ``before``: the displacement (3,) [mm] that the load
+    step starts from, and ``rate`` [1/s] one over the time that it takes, 0 where no time passes.
     """
 
     F: Sequence[Sequence[Any]]
@@ -75,6 +76,8 @@ class State:
     pressure: Any = None
     fibre: Any = None
     amount: Any = 1.0
+    before: Sequence[Any] = (0.0, 0.0, 0.0)
+    rate: Any = 0.0
     functions: Functions = field(default_factory=Numpy)
 
     @property
@@ -136,7 +139,8 @@ class Knot(Record):
 class Effect(Record):
     """A frozen record of parameters of what acts in a body.
 
-    ``unknowns``: names of the fields that it brings; ``needs``: what it asks of the rest state, ``"fibre"``.
+    ``unknowns``: names of the fields that it brings; ``needs``: what it asks of the rest state, ``"fibre"``, or of
+    the frames, ``"interval"``: the time from a frame number to the next.
     """
 
     unknowns: ClassVar[tuple[str, ...]] = ()
@@ -176,7 +180,9 @@ class Coursed(Effect):
 
 
 class Energy(Effect):
-    """An effect with an energy per rest volume."""
+    """An effect with an energy per rest volume; ``stored``: whether it can be had back."""
+
+    stored: ClassVar[bool] = True
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa] at ``state``."""

@@ -1,8 +1,8 @@
-"""A box to squeeze between plates, and straight fibres in it.
+"""A box to squeeze between plates, straight fibres in it, and where to hold it loosely.
 
     python meshes/box/build.py
 
-writes box.ply, fibres.vtk and card.toml beside this file. Lengths in mm; y is the way plates squeeze it.
+writes box.ply, fibres.vtk, sides.csv and card.toml beside this file. Lengths in mm; y is the way plates squeeze it.
 
 The faces of the box are cut into squares of 5 mm, and each of those into two triangles along the diagonal from its lowest to its
 highest corner: as grids of boxes of 5, 10 or 20 mm are that are cut into Kuhn's tetrahedra, so that those nest in it.
@@ -21,6 +21,9 @@ STEP = 10  # between the points of a fibre
 # Where the fibres along y are, (x, z), and those along x, (y, z).
 ALONG_Y = [(x, z) for x in (-35, 0, 35) for z in (-30, 30)]
 ALONG_X = [(y, z) for y in (20, 50, 80) for z in (-10, 10)]
+
+# Half the extent in y and z, about the middle, of what is held of the faces across x.
+HALF = np.array([20, 30])
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -52,6 +55,13 @@ def fibres() -> list[Floats]:
     along_y = [np.column_stack([np.full(len(y), a), y, np.full(len(y), b)]) for a, b in ALONG_Y]
     along_x = [np.column_stack([x, np.full(len(x), a), np.full(len(x), b)]) for a, b in ALONG_X]
     return along_y + along_x
+
+
+def sides(points: Floats) -> list[int]:
+    """The vertices in the middle of the two faces across x."""
+    middle = (LOW + HIGH) / 2
+    on_face = np.isin(points[:, 0], (LOW[0], HIGH[0]))
+    return np.flatnonzero(on_face & (np.abs(points[:, 1:] - middle[1:]) <= HALF).all(axis=1)).tolist()
 
 
 def ply(points: Floats, triangles: Ints) -> bytes:
@@ -94,14 +104,18 @@ def main() -> None:
     """Write the box, its fibres and their card."""
     points, triangles = build()["box"]
     lines = fibres()
+    held = sides(points)
     volume = float(np.prod(HIGH - LOW))
     surface, threads = ply(points, triangles), vtk(lines)
+    listed = "\n".join(["vertex", *map(str, held), ""]).encode()
     size = f"triangles = {len(triangles)}\nvolume_mm3 = {volume:.3f}"
     text = "# A box to squeeze. Written by build.py: change that, not this.\n"
     text += entry("box.ply", "box of 100 x 80 x 100, y from 10 to 90, in squares of 5", size, surface)
     text += entry(
         "fibres.vtk", "straight lines in the box, six along y and six along x", f"lines = {len(lines)}", threads
     )
+    text += entry("sides.csv", "vertices in the middle of the faces across x", f"vertices = {len(held)}", listed)
+    (FOLDER / "sides.csv").write_bytes(listed)
     (FOLDER / "box.ply").write_bytes(surface)
     (FOLDER / "fibres.vtk").write_bytes(threads)
     (FOLDER / "card.toml").write_text(text, encoding="utf-8")

@@ -134,6 +134,8 @@ def _frame(event: dict[str, Any]) -> Frame:
     scalars = event["scalars"]
     smallest = min(scalars["min_det_F_quadrature"], scalars["min_det_F_vertices"])
     note = f"{scalars['newton_iterations']:.0f} Newton iterations, det F at least {smallest:.2g}"
+    if scalars.get("negative_modes", 0) > 0:
+        note += f", unstable equilibrium (negative modes: {scalars['negative_modes']:.0f})"
     with np.load(event["file"]) as arrays:
         pulls = {
             name.replace("force ", "force_"): float(np.linalg.norm(arrays[name]))

@@ -15,10 +15,12 @@ from mpi4py import MPI
 from fem_reference.continuum import ELEMENTS, Continuum
 from fem_reference.mesh import Floats, Ints
 from fem_reference.solvers.fenicsx import compiling, forms, meshes, pushed_points
+from fem_reference.solvers.fenicsx.clock import Clock
 from fem_reference.solvers.fenicsx.contact import Pushes, Watched
 from fem_reference.solvers.fenicsx.determinants import Determinants
 from fem_reference.solvers.fenicsx.holds import Hold
 from fem_reference.solvers.fenicsx.settings import BodySettings
+from fem_reference.solvers.fenicsx.stability import Stability, has_energy
 from fem_reference.stepping import Attempt
 
 _NOT_A_NUMBER = -4  # how PETSc's SNES ends there; the name of the constant depends on its version
@@ -40,6 +42,7 @@ class Body:
         self.displacement = fem.Function(self.displacement_space)
         form = forms.Form(self.mesh, body, self.unknowns, settings, self.cells)
         self.amounts = form.amounts
+        self.clock = Clock(body, form.before, form.rate)
         self.volume_form, self.energy_form = compiling.form(form.volume), compiling.form(form.energy)
         self.rest_volume = self.integral(self.volume_form)
         self.internal = compiling.form(form.residual)
@@ -47,7 +50,9 @@ class Body:
         self.determinants = Determinants(self.mesh, self.cells, form.determinant, form.rule[0], body.mesh.kind)
         springs = sum((hold.springs(form.measure(hold.entry.on)) for hold in self.held), 0)
         slope = ufl.derivative(springs, self.unknowns) if springs else 0
-        self.newton = self._newton(form.residual + springs, form.tangent + slope, settings)
+        symmetric = has_energy(body)
+        self.newton = self._newton(form.residual + springs, form.tangent + slope, settings, symmetric)
+        self.stability = Stability(self.newton, self.unknowns) if symmetric else None
         self.contact = self._contact(body, form) if body.contact else None
         self.nodes = meshes.Nodes(body.mesh, self.cells, ufl.split(self.unknowns)[0])
 
@@ -67,8 +72,8 @@ class Body:
     def _conditions(self) -> list[Any]:
         return [condition for hold in self.held for condition in hold.conditions]
 
-    def _newton(self, equations: Any, tangent: Any, settings: BodySettings) -> NonlinearProblem:
-        """Newton's method, each step whole and by a sparse LU factorisation (MUMPS).
+    def _newton(self, equations: Any, tangent: Any, settings: BodySettings, symmetric: bool) -> NonlinearProblem:
+        """Newton's method, each step whole and by a sparse factorisation (MUMPS): LDL^T of a symmetric tangent, else LU.
 
         A line search would weigh out-of-balance forces [N] against volumes [mm3]: it stalls where bodies bend or are soft.
         """
@@ -80,7 +85,7 @@ class Body:
             "snes_stol": 0.0,
             "snes_max_it": settings.newton_iterations,
             "ksp_type": "preonly",
-            "pc_type": "lu",
+            "pc_type": "cholesky" if symmetric else "lu",  # with MUMPS the former is LDL^T
             "pc_factor_mat_solver_type": "mumps",
         }
         return NonlinearProblem(
@@ -103,10 +108,12 @@ class Body:
         quadrature point or a vertex, is inverted whatever Newton's method says.
         """
         before = np.array(self.unknowns.x.array)
+        self.clock.start(frame, before)
         reason, iterations = self._solve(frame)
         smallest = self.determinants.smallest()
         through = self.contact.pushes.tunnelled(self.comm) if self.contact and reason > 0 else None
         if reason > 0 and smallest.value > 0 and through is None:
+            self.clock.settle(frame)
             if self.contact:
                 self.contact.pushes.settle()
             return Attempt(None, iterations)
@@ -141,6 +148,15 @@ class Body:
             "volume_ratio": self.integral(self.volume_form) / self.rest_volume,
             "energy": self.integral(self.energy_form),
         }
+
+    def negative_modes(self) -> float | None:
+        """In how many directions the energy falls, with damping those in which it does so by more than a factor e over all frames;
+        None where the tangent is not symmetric.
+        """
+        if self.stability is None:
+            return None
+        with self.clock.slow():
+            return self.stability.negative_modes()
 
     def integral(self, form: Any) -> float:
         """A compiled form, summed over the ranks."""

@@ -182,7 +182,9 @@ class Pushes:
             return None
         worst = int(np.argmax(excess))
         x, y, z = self.points.rest[turned[worst]]
-        return float(excess[worst]), f'the point that rests at ({x:.1f}, {y:.1f}, {z:.1f}) mm went through "{entry.name}"'
+        return float(
+            excess[worst]
+        ), f'the point that rests at ({x:.1f}, {y:.1f}, {z:.1f}) mm went through "{entry.name}"'
 
 
 class Watched:

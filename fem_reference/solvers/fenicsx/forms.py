@@ -9,7 +9,7 @@ import ufl
 from dolfinx import fem, mesh
 
 from fem_reference.continuum import Continuum
-from fem_reference.effects import Effect, Load, State, total_energy
+from fem_reference.effects import Effect, Energy, Load, State, total_energy
 from fem_reference.mesh import Floats, Ints
 from fem_reference.solvers.fenicsx import meshes, quadrature
 from fem_reference.solvers.fenicsx.settings import BodySettings
@@ -33,9 +33,10 @@ class UflFunctions:
 
 
 class Form:
-    """``energy`` and ``volume`` as integrals, ``residual`` as what vanishes in equilibrium, det F as ``determinant``; ``amounts``
-    by effect, constants to be set; ``rule``: points (q, 3) and weights (q,) of the quadrature, of ``degree``; ``regions``: by
-    name, this rank's facets.
+    """``energy`` that is stored and ``volume`` as integrals, ``residual`` as what vanishes in equilibrium, det F as
+    ``determinant``; to be set: ``amounts`` by effect, ``rate`` [1/s] of the load step and the unknowns ``before`` it (None where
+    time does not matter); ``rule``: points (q, 3) and weights (q,) of the quadrature, of ``degree``; ``regions``: by name, this
+    rank's facets.
     """
 
     def __init__(
@@ -46,15 +47,18 @@ class Form:
         self.rule = quadrature.rule(settings.element, settings.quadrature_degree)
         self.degree = settings.quadrature_degree or quadrature.DEGREE[settings.element]
         self.dx, self.ds = _measures(msh, self.regions, self.rule, self.degree)
-        self.amounts = [fem.Constant(msh, 1.0) for _ in body.effects]
+        self.amounts = [fem.Constant(msh, effect.amount(body.frames[0])) for effect in body.effects]
         effects = [_symbolic(effect, msh) for effect in body.effects]
         acting = list(zip(effects, self.amounts, strict=True))
-        state = _state(unknowns, self._fibre(body, cells))
+        timed = any("interval" in effect.needs for effect in effects)
+        self.before, self.rate = fem.Function(unknowns.function_space) if timed else None, fem.Constant(msh, 0.0)
+        state = _state(unknowns, self._fibre(body, cells), self.before, self.rate)
         self.determinant = state.J
-        self.volume, self.energy = state.J * self.dx, total_energy(acting, state) * self.dx
+        stored = [(effect, amount) for effect, amount in acting if not isinstance(effect, Energy) or effect.stored]
+        self.volume, self.energy = state.J * self.dx, total_energy(stored, state) * self.dx
         test = ufl.TestFunction(unknowns.function_space)
         step = ufl.TrialFunction(unknowns.function_space)
-        self.residual = ufl.derivative(self.energy, unknowns, test)
+        self.residual = ufl.derivative(total_energy(acting, state) * self.dx, unknowns, test)
         for effect, amount in acting:
             if isinstance(effect, Load):
                 traction = effect.traction(replace(state, amount=amount), list(ufl.FacetNormal(msh)))
@@ -95,14 +99,17 @@ def _measures(msh: mesh.Mesh, regions: dict[str, Ints], rule: Rule, degree: int)
     )
 
 
-def _state(unknowns: fem.Function, fibre: list[Any] | None) -> State:
+def _state(unknowns: fem.Function, fibre: list[Any] | None, before: fem.Function | None, rate: fem.Constant) -> State:
     displacement, *others = ufl.split(unknowns)
+    passed = (0.0, 0.0, 0.0) if before is None else [ufl.split(before)[0][i] for i in range(3)]
     F = ufl.Identity(3) + ufl.grad(displacement)
     return State(
         F=[[F[i, k] for k in range(3)] for i in range(3)],
         displacement=[displacement[i] for i in range(3)],
         pressure=others[0] if others else None,
         fibre=fibre,
+        before=passed,
+        rate=rate,
         functions=UflFunctions(),
     )
 

@@ -19,7 +19,9 @@ from fem_reference.solvers.fenicsx import compiling  # isort: skip - after the d
 from fem_reference.solvers.fenicsx.body import Body  # isort: skip
 from fem_reference.stepping import Attempt, Step, march  # isort: skip
 
-_PHASES = ("SNESFunctionEval", "SNESJacobianEval", "MatSolve", "MatLUFactorSym", "MatLUFactorNum")
+_ASSEMBLY = ("SNESFunctionEval", "SNESJacobianEval")
+_NUMERIC = ("MatLUFactorNum", "MatCholFctrNum")  # of the two kinds of factorisation
+_FACTORISATION = ("MatLUFactorSym", "MatCholFctrSym", *_NUMERIC)
 
 
 class Worker:
@@ -33,8 +35,9 @@ class Worker:
         self.before = _spent()
         self.body = Body(job.body, job.settings)
         self.set_up = time.perf_counter() - begin
-        self.solving = 0.0
+        self.solving = self.checking = 0.0
         self.counts = {"newton_iterations": 0, "load_steps": 0, "cut_backs": 0}
+        self.unstable: dict[float, float] = {}  # negative modes by frame
 
     def run(self) -> None:
         """March through the frames and report how it ended."""
@@ -51,7 +54,9 @@ class Worker:
                 self.report(status=reached.status, message=self.sentence(reached), cost=self.cost())
                 return
             self.report_frame(reached)
-        self.report(status="converged", message=f"all {len(frames)} frames reached", cost=self.cost())
+        self.report(
+            status="converged", message=f"all {len(frames)} frames reached{self.instability()}", cost=self.cost()
+        )
 
     def attempt(self, frame: float) -> Attempt:
         """Solve at ``frame`` from the last state; on failure go back to it."""
@@ -60,11 +65,30 @@ class Worker:
         self.solving += time.perf_counter() - begin
         return result
 
+    def negative_modes(self) -> dict[str, float]:
+        """In how many directions the energy falls from the present state, where that can be told; it is no part of solving."""
+        begin, then = time.perf_counter(), _spent()
+        modes = self.body.negative_modes()
+        self.before = {name: self.before[name] + now - then[name] for name, now in _spent().items()}
+        self.checking += time.perf_counter() - begin
+        return {} if modes is None else {"negative_modes": modes}
+
+    def instability(self) -> str:
+        """What is to be told of unstable states, nothing where there are none."""
+        if not self.unstable:
+            return ""
+        most, first = max(self.unstable.values()), min(self.unstable)
+        return (
+            f"; in {len(self.unstable)} of them the equilibrium is unstable, first at frame {first:g} "
+            f"(negative modes: up to {most:.0f})"
+        )
+
     def sentence(self, reached: Step) -> str:
         """Why a frame could not be reached, where, and what to try."""
         return (
             f"{reached.sentence} beyond frame {reached.at:.2f} with steps down to {self.settings.smallest_step}; "
-            f"in the last good state det F is smallest, {self.body.determinants.smallest()}; "
+            f"in the last good state det F is smallest, {self.body.determinants.smallest()}"
+            f"{self.instability().replace('of them', 'of the frames reached')}; "
             "try a smaller motion or smaller cells"
         )
 
@@ -77,7 +101,9 @@ class Worker:
         arrays |= {f"moment {name}": moment for name, moment in moments.items()}
         counts = {"newton_iterations": float(reached.iterations), "cut_backs": float(reached.cutbacks)}
         path = self.folder / f"frame_{reached.frame}.npz"
-        scalars = self.body.scalars() | counts
+        scalars = self.body.scalars() | counts | self.negative_modes()
+        if scalars.get("negative_modes", 0) > 0:
+            self.unstable[reached.frame] = scalars["negative_modes"]
         if self.body.comm.rank == 0:
             np.savez(path, allow_pickle=False, **arrays)
         self.report(frame=reached.frame, file=str(path), scalars=scalars)
@@ -95,9 +121,10 @@ class Worker:
         return {
             "seconds_set_up": self.set_up,
             "seconds_solve": self.solving,
-            "seconds_assembly": seconds["SNESFunctionEval"] + seconds["SNESJacobianEval"],
-            "seconds_factorisation": seconds["MatLUFactorSym"] + seconds["MatLUFactorNum"],
+            "seconds_assembly": sum(seconds[name] for name in _ASSEMBLY),
+            "seconds_factorisation": sum(seconds[name] for name in _FACTORISATION),
             "seconds_back_substitution": seconds["MatSolve"],
+            "seconds_stability": self.checking,
             "factorisations": seconds["count"],
             **{name: float(count) for name, count in self.counts.items()},
             "unknowns": float(self.body.size),
@@ -109,8 +136,9 @@ class Worker:
 
 def _spent() -> dict[str, float]:
     """Seconds by PETSc's events so far, and under ``count`` the number of factorisations."""
-    events = {name: PETSc.Log.Event(name).getPerfInfo() for name in _PHASES}
-    count = {"count": float(events["MatLUFactorNum"]["count"])}
+    names = (*_ASSEMBLY, "MatSolve", *_FACTORISATION)
+    events = {name: PETSc.Log.Event(name).getPerfInfo() for name in names}
+    count = {"count": float(sum(events[name]["count"] for name in _NUMERIC))}
     return {name: float(event["time"]) for name, event in events.items()} | count
 
 

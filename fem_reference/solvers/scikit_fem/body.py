@@ -47,6 +47,9 @@ def solve_body(body: Continuum, settings: BodySettings) -> Solved:
     check(body, settings.element)
     if body.contact is not None:
         raise InputError("contact", "obstructions", "a body without, as this solver knows no contact")
+    timed = [effect.title for effect in body.effects if "interval" in effect.needs]
+    if timed:
+        raise InputError("effects", ", ".join(timed), "effects without rates, as this solver knows no time")
     begin = time.perf_counter()
     march_of = _March(body, settings)
     states = [march_of.state(Step(body.frames[0], 0, 0, 0))]

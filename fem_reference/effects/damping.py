@@ -1,0 +1,26 @@
+"""Drag of the ground on matter that moves: what nothing holds does not run away, and an unstable state is left in time."""
+
+from typing import Any, ClassVar
+
+from fem_reference.effects import Energy, State
+from fem_reference.units import VolumeDamping
+
+
+class Damping(Energy):
+    """A force per rest volume of ``-coefficient v``, v the velocity relative to the ground.
+
+    Over a load step v is ``rate (u - before)`` (implicit Euler), which is the slope of ``coefficient / 2 rate |u - before|^2``:
+    a potential of the step, which no matter stores.
+
+    ``coefficient``: [MPa s/mm^2].
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("interval",)
+    stored: ClassVar[bool] = False
+
+    coefficient: VolumeDamping
+
+    def energy(self, state: State) -> Any:
+        """The potential of the step per rest volume [MPa]."""
+        way = sum((now - before) ** 2 for now, before in zip(state.displacement, state.before, strict=True))
+        return self.coefficient / 2 * state.rate * way

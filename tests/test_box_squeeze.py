@@ -1,0 +1,58 @@
+"""The squeezed box: plates press with the force of the homogeneous state, and the run says that this state is unstable."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from fem_reference import casefile
+from fem_reference.execution import Bench
+
+MU, BULK, AREA = 0.01, 10.0, 1e4  # [MPa], [mm2]
+
+
+def homogeneous(height: float) -> tuple[float, float]:
+    """The stretch across and the force [N] of the plates, where K (J - 1) + mu J^(-5/3) (l^2 - h^2) / 3 = 0: nothing pulls across."""
+
+    def across(stretch: float) -> float:
+        J = height * stretch**2
+        return BULK * (J - 1) + MU * J ** (-5 / 3) * (stretch**2 - height**2) / 3
+
+    stretch = brentq(across, 0.9 * height**-0.5, 1.1 * height**-0.5, xtol=1e-14)
+    J = height * stretch**2
+    return stretch, MU * J ** (-5 / 3) * (stretch**2 - height**2) * stretch**2 * AREA
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    pytest.importorskip("dolfinx_solver", reason="FEniCSx is not installed")
+    scene = casefile.read("box_squeeze", changes={"frames.every": 50})
+    return Bench(scene, tmp_path_factory.mktemp("box")).obtain("reference", scene.reference, "reference")
+
+
+def test_it_is_squeezed_homogeneously(run) -> None:
+    assert run.outcome.status == "converged"
+    at = run.positions[run.numbers.index(100)]
+    height = np.ptp(at[:, 1])
+    # The gap is 10 mm; where the plates press with 0.64 MPa a contact of 20 MPa/mm gives way by 0.03 mm on either side.
+    assert 10 < height < 10.1
+    stretch, force = homogeneous(height / 80)
+    assert np.ptp(at[:, 0]) / 100 == pytest.approx(stretch, rel=1e-3)  # drag is a ten-thousandth of the elastic stress
+    assert np.ptp(at[:, 2]) / 100 == pytest.approx(stretch, rel=1e-3)
+    rest = run.surface.points
+    assert at[:, 0] == pytest.approx(stretch * rest[:, 0], abs=0.05)
+    for name in ("force_top", "force_bottom"):
+        assert run.scalars[name][run.numbers.index(100)] == pytest.approx(force, rel=1e-3)
+    assert homogeneous(0.125)[0] == pytest.approx(np.sqrt(0.99733 * 8), rel=1e-5)
+
+
+def test_it_returns_to_rest(run) -> None:
+    for frame in (200, 250, 300):
+        assert np.abs(run.positions[run.numbers.index(frame)] - run.surface.points).max() < 1e-6
+
+
+def test_the_run_says_that_it_is_unstable_below_half_the_height(run) -> None:
+    modes = dict(zip(run.numbers, run.scalars["negative_modes"], strict=True))
+    assert [modes[frame] for frame in (0, 50, 200, 300)] == [0, 0, 0, 0]  # 55 mm high at 50
+    assert modes[100] >= 2
+    assert "unstable" in run.outcome.message
+
