@@ -11,10 +11,11 @@ from fem_reference.field.example import Example, FieldMeasure, FieldVerdict
 from fem_reference.field.problem import FieldProblem
 from fem_reference.field.runs import FieldRun
 from fem_reference.field.scene import FieldScene
+from fem_reference.geometry.sectors import held_area, held_shares
 from fem_reference.judge import overall
-from fem_reference.mesh import enclosed_volume, vertex_areas
+from fem_reference.mesh import Surface, enclosed_volume
 from fem_reference.motion import RigidMotion, Translation
-from fem_reference.problem import Body, Setup
+from fem_reference.problem import Body, Held, Setup
 from fem_reference.report.words import exact
 from fem_reference.runs import Run
 from fem_reference.scene import Scene
@@ -24,7 +25,6 @@ from fem_reference.study import ErrorBar
 def scene_facts(scene: Scene, setup: Setup) -> dict[str, Any]:
     """Everything that a person asks of a case before solving it, as words and numbers by name."""
     surface = setup.surface
-    areas = vertex_areas(surface.points, surface.triangles)
     return {
         "case": scene.name,
         "title": scene.title,
@@ -37,7 +37,7 @@ def scene_facts(scene: Scene, setup: Setup) -> dict[str, Any]:
         },
         "bones": {bone.name: f"{_shape(bone)}, {_motion(bone.motion)}" for bone in setup.bones},
         "attachments": {
-            held.attachment: f"{len(held.vertices)} vertices, {areas[held.vertices].sum():.0f} mm2, held by {held.bone.name} "
+            held.attachment: f"{len(held.vertices)} vertices, {_area(surface, held):.0f} mm2, held by {held.bone.name} "
             + ("exactly" if held.stiffness is None else f"by springs of {held.stiffness:g} MPa/mm")
             for held in setup.held
         },
@@ -50,6 +50,10 @@ def scene_facts(scene: Scene, setup: Setup) -> dict[str, Any]:
             for e in scene.expect
         ],
     }
+
+
+def _area(surface: Surface, held: Held) -> float:
+    return held_area(surface, held_shares(surface, held.vertices))
 
 
 def _parameters(effect: Effect) -> dict[str, str]:

@@ -21,6 +21,7 @@ from fem_reference.geometry.embedding import Locator
 from fem_reference.geometry.fibres import directions, nearest_directions, trace
 from fem_reference.geometry.intersections import self_intersections
 from fem_reference.geometry.rigid_bodies import Obstacle, solid
+from fem_reference.geometry.sectors import held_area, held_shares
 from fem_reference.geometry.signed_distance import cached
 from fem_reference.geometry.skins import Skin, skin_of
 from fem_reference.geometry.tessellation import tessellated
@@ -37,7 +38,6 @@ from fem_reference.mesh import (
     tet_qualities,
     tet_volumes,
     triangle_areas,
-    vertex_areas,
 )
 from fem_reference.motion import RigidMotion
 from fem_reference.records import join
@@ -142,14 +142,11 @@ def setup(scene: Scene) -> Setup:
 def build(scene: Scene, rest: Setup) -> Problem:
     """The whole problem of a scene: its setup ``rest``, filled with tetrahedra and fibres."""
     begin = time.perf_counter()
-    fill = {"quality": tetrahedralise, "block": block.fill}[scene.muscle.mesher]
-    bare = fill(rest.surface, scene.muscle.tet_size)
-    facets = {held.attachment: facets_under(bare, rest.surface, held.vertices) for held in rest.held}
+    mesh = _filled(scene, rest)
     for i, held in enumerate(rest.held):
-        if len(facets[held.attachment]) == 0:
+        if len(mesh.facets[held.attachment]) == 0:
             place = join(scene.place, f"attachment[{i}]")
             raise InputError(place, "an area smaller than the tetrahedra resolve", "a smaller muscle.tet_size")
-    mesh = replace(bare, facets=facets)
     fibres = _fibres(scene, mesh)
     return Problem(
         rest.surface,
@@ -160,11 +157,23 @@ def build(scene: Scene, rest: Setup) -> Problem:
         mesh=mesh,
         effects=scene.effects,
         fibres=fibres,
-        mesh_facts=_mesh_facts(rest, mesh),
+        mesh_facts=_mesh_facts(rest, mesh, scene.muscle.tet_size / 2),
         seconds=time.perf_counter() - begin,
         directions=_directions(scene, mesh, fibres),
         skin=_skin(scene, rest, mesh),
     )
+
+
+def _filled(scene: Scene, rest: Setup) -> TetMesh:
+    """The tets, with the facets that each attachment holds: up to its rim where the mesher keeps it, else those under it."""
+    shares = {held.attachment: held_shares(rest.surface, held.vertices) for held in rest.held}
+    if scene.muscle.mesher == "block":
+        mesh = block.fill(rest.surface, scene.muscle.tet_size)
+    else:
+        mesh = tetrahedralise(rest.surface, scene.muscle.tet_size, shares)
+    if set(mesh.facets) == set(shares):
+        return mesh
+    return replace(mesh, facets={name: facets_under(mesh, rest.surface, held) for name, held in shares.items()})
 
 
 def _skin(scene: Scene, rest: Setup, mesh: TetMesh) -> Skin | None:
@@ -238,8 +247,10 @@ def _inside(mesh: TetMesh, fibres: Polylines) -> Polylines:
     return Polylines(points, fibres.offsets)
 
 
-def _mesh_facts(rest: Setup, mesh: TetMesh) -> dict[str, float | str]:
-    """Who made the mesh, its size and quality, and for each attachment the area held on the surface and on the tets."""
+def _mesh_facts(rest: Setup, mesh: TetMesh, far: float) -> dict[str, float | str]:
+    """Who made the mesh, its size and quality, and for each attachment the area held on the surface and on the tets and how many
+    of its vertices are more than ``far`` [mm] from the facets held: islands that tets do not resolve.
+    """
     qualities = tet_qualities(mesh.points, mesh.tets)
     facts: dict[str, float | str] = {
         "maker": mesh.maker,
@@ -251,10 +262,10 @@ def _mesh_facts(rest: Setup, mesh: TetMesh) -> dict[str, float | str]:
         "quality_5_percent": float(np.percentile(qualities, 5)),
         "volume_mm3": float(tet_volumes(mesh.points, mesh.tets).sum()),
     }
-    areas = vertex_areas(rest.surface.points, rest.surface.triangles)
     for held in rest.held:
-        facts[f"{held.attachment}_area_mm2"] = float(areas[held.vertices].sum())
-        facts[f"{held.attachment}_area_on_tets_mm2"] = float(
-            triangle_areas(mesh.points, mesh.facets[held.attachment]).sum()
-        )
+        name, facets = held.attachment, mesh.facets[held.attachment]
+        off = distances(rest.surface.points[held.vertices], Surface(mesh.points, facets)).distance
+        facts[f"{name}_area_mm2"] = held_area(rest.surface, held_shares(rest.surface, held.vertices))
+        facts[f"{name}_area_on_tets_mm2"] = float(triangle_areas(mesh.points, facets).sum())
+        facts[f"{name}_vertices_beside_facets"] = float((off > far).sum())
     return facts

@@ -15,6 +15,7 @@ from fem_reference.errors import InputError
 from fem_reference.geometry import tetrahedra
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.intersections import self_intersections
+from fem_reference.geometry.sectors import held_area, held_shares
 from fem_reference.geometry.tetrahedra import tetrahedralise
 from fem_reference.mesh import (
     Surface,
@@ -24,6 +25,7 @@ from fem_reference.mesh import (
     enclosed_volume,
     tet_qualities,
     tet_volumes,
+    triangle_areas,
 )
 
 HIP = np.array([146.0, 238.0, -431.0])  # [mm]
@@ -75,6 +77,44 @@ def test_the_mesh_moves_with_the_surface(mesh: TetMesh) -> None:
     assert_allclose(moved.points, turn.apply(mesh.points) + HIP, atol=1e-5)
 
 
+def _cap(surface: Surface) -> dict[str, np.ndarray]:
+    """How far the corners of triangles are held by the vertices of one side of a body."""
+    return {"cap": held_shares(surface, np.flatnonzero(_bumpy().points @ np.array([0.6, 0.0, 0.8]) > 20))}
+
+
+def test_facets_keep_the_area_of_attachments_and_move_with_the_surface() -> None:
+    turn, surface = Rotation.random(rng=np.random.default_rng(14)), _bumpy()
+    moved_surface = surface.moved_to(turn.apply(surface.points) + HIP)
+    mesh, moved = (tetrahedralise(body, 8.0, _cap(body)) for body in (surface, moved_surface))
+    _check(mesh, surface, 8.0)
+    area = triangle_areas(mesh.points, mesh.facets["cap"]).sum()
+    assert_allclose(area, held_area(surface, _cap(surface)["cap"]), rtol=1e-3)
+    assert {tuple(facet) for facet in np.sort(mesh.facets["cap"], axis=1).tolist()} < {
+        tuple(facet) for facet in np.sort(boundary(mesh.tets)[0], axis=1).tolist()
+    }
+    assert_array_equal(moved.facets["cap"], mesh.facets["cap"])
+    assert_allclose(moved.points, turn.apply(mesh.points) + HIP, atol=1e-5)
+
+
+def test_facets_point_outwards() -> None:
+    facets = (mesh := tetrahedralise(_bumpy(), 8.0, _cap(_bumpy()))).facets["cap"]
+    directed = {tuple(np.roll(facet, -facet.argmin()).tolist()) for facet in boundary(mesh.tets)[0]}
+    assert {tuple(np.roll(facet, -facet.argmin()).tolist()) for facet in facets} < directed
+
+
+def test_rims_that_would_pass_through_the_surface_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    def crossing(coarse: Surface, *_: object) -> tuple[Surface, np.ndarray]:
+        points = coarse.points.copy()
+        points[0] = 3 * points.mean(axis=0) - 2 * points[0]  # far beyond the other side
+        return coarse.moved_to(points), np.ones(len(coarse.triangles), np.int64)
+
+    monkeypatch.setattr(tetrahedra, "with_rims", crossing)
+    mesh = tetrahedralise(_bumpy(), 8.0, _cap(_bumpy()))
+    assert mesh.maker == "gmsh"
+    assert mesh.facets == {}
+    _check(mesh, _bumpy(), 8.0)
+
+
 def test_the_same_surface_gives_the_same_mesh(mesh: TetMesh) -> None:
     again = tetrahedralise(_bumpy(), 8.0)
     assert_array_equal(again.points, mesh.points)
@@ -105,13 +145,14 @@ def test_a_surface_through_itself_is_meshed_by_the_other_mesher(caplog: pytest.L
     dirty = Surface(points, ball.triangles, "dirty.ply")
     assert len(self_intersections(dirty)) > 0
     with caplog.at_level(logging.WARNING):
-        mesh = tetrahedralise(dirty, 16.0)
+        mesh = tetrahedralise(dirty, 16.0, {"all": np.ones(dirty.triangles.shape)})
     assert (
         "dirty.ply: fTetWild meshes it, differently each time, for gmsh cannot: 12 triangles pass through"
         in caplog.text
     )
     assert "dirty.ply: 12 triangles of the given surface pass through it" in caplog.text
     assert mesh.maker == "fTetWild"
+    assert mesh.facets == {}
     assert_allclose(tet_volumes(mesh.points, mesh.tets).sum(), enclosed_volume(points, ball.triangles), rtol=0.05)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from fem_reference import files
 from fem_reference.errors import InputError
 from fem_reference.geometry.distance import distances
+from fem_reference.geometry.sectors import shares_at
 from fem_reference.mesh import Floats, Ints, Surface, TetMesh, boundary
 from fem_reference.records import join
 from fem_reference.scene import Outline, Scene, VertexList
@@ -50,19 +51,17 @@ def pick(scene: Scene, i: int, surface: Surface, bone_surface: Surface) -> Ints:
     return np.flatnonzero(distances(surface.points, patches).distance <= outline.reach)
 
 
-def facets_under(mesh: TetMesh, surface: Surface, vertices: Ints) -> Ints:
-    """The boundary triangles (m, 3) of ``mesh``, outward, that lie under the attached ``vertices`` (k,) of ``surface``.
+def facets_under(mesh: TetMesh, surface: Surface, shares: Floats) -> Ints:
+    """The boundary triangles (m, 3) of ``mesh``, outward, that lie under the held part of ``surface``, where the tets do not follow
+    its rim.
 
-    A triangle does where the attached share at the closest point of the surface, averaged over seven samples, is above
-    a half.
+    A triangle does where the held share at the closest point of the surface, averaged over seven samples, is above a half;
+    ``shares`` (k, 3) are those of the corners of the triangles of ``surface``.
     """
     triangles, _ = boundary(mesh.tets)
-    attached = np.zeros(len(surface.points))
-    attached[vertices] = 1.0
-    samples = np.einsum("qk,mkd->mqd", _SAMPLES, mesh.points[triangles])
-    under = distances(samples.reshape(-1, 3), surface)
-    shares = np.sum(attached[surface.triangles[under.triangle]] * under.barycentric, axis=1)
-    return triangles[shares.reshape(len(triangles), -1).mean(axis=1) > 1 / 2]
+    samples = np.einsum("qk,mkd->mqd", _SAMPLES, mesh.points[triangles]).reshape(-1, 3)
+    at = shares_at(samples, surface, shares).reshape(len(triangles), -1)
+    return triangles[at.mean(axis=1) > 1 / 2]
 
 
 def _listed(path: Path, chosen: VertexList, count: int) -> Ints:

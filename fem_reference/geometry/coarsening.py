@@ -59,10 +59,15 @@ def slide(points: Floats, triangles: Ints) -> Floats:
     total = _around(areas, triangles, len(points))[:, None]
     pulled = _around(areas[:, None] * points[triangles].mean(axis=1), triangles, len(points))
     step = np.where(total > 0, pulled / np.maximum(total, _TINY) - points, 0.0)
+    return np.asarray(points + free_part(points, triangles, np.arange(len(points)), step))
+
+
+def free_part(points: Floats, triangles: Ints, chosen: Ints, steps: Floats) -> Floats:
+    """What ``steps`` (k, 3) of the ``chosen`` points (k,) have along the free directions there, (k, 3)."""
     shares, directions = np.linalg.eigh(_normal_tensors(points, triangles))
     free = shares < _FREE * shares.sum(axis=1, keepdims=True)
-    along = np.einsum("nij,ni->nj", directions, step) * free
-    return np.asarray(points + np.einsum("nij,nj->ni", directions, along))
+    along = np.einsum("nij,ni->nj", directions[chosen], steps) * free[chosen]
+    return np.asarray(np.einsum("nij,nj->ni", directions[chosen], along))
 
 
 def _normal_tensors(points: Floats, triangles: Ints) -> Floats:
@@ -88,10 +93,13 @@ def inflate(points: Floats, triangles: Ints, volume: float) -> Floats:
     return points
 
 
-def flip_edges(points: Floats, triangles: Ints) -> Ints:
-    """``triangles`` (m, 3) of a closed surface after flips towards Delaunay, until none is left (at most 20 passes)."""
+def flip_edges(points: Floats, triangles: Ints, labels: Ints | None = None) -> Ints:
+    """``triangles`` (m, 3) of a closed surface after flips towards Delaunay, until none is left (at most 20 passes).
+
+    Edges between triangles of different ``labels`` (m,) stay, so that the labels hold for the triangles that come out.
+    """
     for _ in range(20):
-        flipped = _flip_once(points, triangles)
+        flipped = _flip_once(points, triangles, labels)
         if flipped is triangles:
             break
         triangles = flipped
@@ -118,10 +126,12 @@ class _Hinges:
         return cls(a, b, triangles.ravel()[one], triangles.ravel()[other], one // 3, other // 3)
 
 
-def _flip_once(points: Floats, triangles: Ints) -> Ints:
+def _flip_once(points: Floats, triangles: Ints, labels: Ints | None) -> Ints:
     """Edges worth a flip flipped, the best first, each triangle at most once; the same array where none is."""
     hinge = _Hinges.of(triangles)
     gain = _flip_gain(points, hinge)
+    if labels is not None:
+        gain = np.where(labels[hinge.left] == labels[hinge.right], gain, 0.0)
     there = set(zip(np.minimum(hinge.a, hinge.b).tolist(), np.maximum(hinge.a, hinge.b).tolist(), strict=True))
     touched, flipped = np.zeros(len(triangles), bool), triangles.copy()
     order = np.argsort(-gain, kind="stable")

@@ -8,6 +8,8 @@ import logging
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +21,7 @@ from fem_reference.errors import InputError
 from fem_reference.geometry.coarsening import coarsen
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.intersections import self_intersections
+from fem_reference.geometry.rims import with_rims
 from fem_reference.mesh import (
     TET_FACES,
     Floats,
@@ -40,13 +43,14 @@ _MAKERS = {"gmsh": "gmsh", "tetwild": "fTetWild"}
 _SHARES = (1.0, 0.9, 1.1, 0.8, 1.25)  # of the number of triangles wanted, tried in turn
 
 
-def tetrahedralise(surface: Surface, size: float) -> TetMesh:
-    """Tetrahedra of about ``size`` [mm] inside a closed outward ``surface``, with their ``maker``; ``facets`` stay empty.
+def tetrahedralise(surface: Surface, size: float, shares: Mapping[str, Floats] | None = None) -> TetMesh:
+    """Tetrahedra of about ``size`` [mm] inside a closed outward ``surface``, with their ``maker``.
 
-    A surface finer than ``size`` is coarsened to it first. gmsh fills a surface that does not pass through itself and
-    keeps its triangles. The mesh moves with the surface: it is made in a frame that the surface's own vertices span. Where
-    gmsh cannot, fTetWild makes a mesh of its own near the surface, another one each time (its issue 72). InputError where
-    no mesher succeeds, and at once where ``size`` is far too small or too large.
+    A surface finer than ``size`` is coarsened to it first, with edges along the rims of the attachments whose ``shares`` (m, 3)
+    of the corners are given. gmsh fills a surface that does not pass through itself and keeps its triangles: ``facets`` are
+    those of the attachments, by name; else they stay empty. The mesh moves with the surface: it is made in a frame that the
+    surface's own vertices span. Where gmsh cannot, fTetWild makes a mesh of its own near the surface, another one each time
+    (its issue 72). InputError where no mesher succeeds, and at once where ``size`` is far too small or too large.
     """
     origin, axes = _own_frame(surface.points)
     local = np.round((surface.points - origin) @ axes, _ROUNDED) + 0.0  # + 0.0: no negative zeros
@@ -54,8 +58,8 @@ def tetrahedralise(surface: Surface, size: float) -> TetMesh:
     crossing = len(self_intersections(surface))
     if crossing:
         log.warning("%s: %d triangles of the given surface pass through it", surface.place, crossing)
-    mesh = _mesh(surface.moved_to(local), size)
-    return TetMesh(mesh.points @ axes.T + origin, mesh.tets, maker=mesh.maker)
+    mesh = _mesh(surface.moved_to(local), size, shares or {})
+    return TetMesh(mesh.points @ axes.T + origin, mesh.tets, mesh.facets, mesh.maker)
 
 
 def check_size(surface: Surface, size: float) -> None:
@@ -92,33 +96,53 @@ def _farthest(vectors: Floats) -> int:
     return int(np.flatnonzero(lengths >= lengths.max() * (1 - 1e-6))[0])
 
 
-def _mesh(surface: Surface, size: float) -> TetMesh:
-    coarse = _coarsened(surface, size)
+def _mesh(surface: Surface, size: float, shares: Mapping[str, Floats]) -> TetMesh:
+    coarse, labels = _coarsened(surface, size, shares)
     crossing = len(self_intersections(coarse))
     if crossing:
         reason = f"{crossing} triangles pass through the surface"
     else:
         try:
             log.info("%s: gmsh fills %d triangles", surface.place, len(coarse.triangles))
-            return _checked(_run("gmsh", coarse, size), coarse)
+            mesh = _checked(_run("gmsh", coarse, size), coarse)
+            return replace(mesh, facets=_labelled(mesh, coarse, labels, list(shares)))
         except InputError as error:
             reason = str(error)
     log.warning("%s: fTetWild meshes it, differently each time, for gmsh cannot: %s", surface.place, reason)
     return _checked(_run("tetwild", surface, size), surface)
 
 
-def _coarsened(surface: Surface, size: float) -> Surface:
-    """The surface with as many triangles as equilateral ones of side ``size`` cover it; as it is where it has less.
+def _labelled(mesh: TetMesh, coarse: Surface, labels: Ints, names: list[str]) -> dict[str, Ints]:
+    """The triangles of ``coarse`` with each label, by name; nothing where it has no rims or the mesh does not begin with its
+    points.
+    """
+    count = len(coarse.points)
+    if not labels.any() or not np.array_equal(mesh.points[:count], coarse.points):
+        return {}
+    return {name: coarse.triangles[labels == label] for label, name in enumerate(names, start=1)}
 
-    Where that surface passes through itself, one of a few other counts may give one that does not.
+
+def _coarsened(surface: Surface, size: float, shares: Mapping[str, Floats]) -> tuple[Surface, Ints]:
+    """The surface with as many triangles as equilateral ones of side ``size`` cover it, or as it is where it has less, with edges
+    along the rims of attachments; and the labels of its triangles, 0 where free.
+
+    Where that surface passes through itself, one of a few other counts may give one that does not, or one without rims.
     """
     count = triangle_areas(surface.points, surface.triangles).sum() / (size**2 * np.sqrt(3) / 4)
-    if count >= len(surface.triangles):
-        return surface
-    for share in _SHARES:
-        coarse = coarsen(surface, int(share * count))
-        if len(self_intersections(coarse)) == 0:
-            break
+    fine = count >= len(surface.triangles)
+    for rims in (shares, {}) if shares else ({},):
+        for share in (1.0,) if fine else _SHARES:
+            coarse = surface if fine else coarsen(surface, int(share * count))
+            labels = np.zeros(len(coarse.triangles), np.int64)
+            if rims:
+                coarse, labels = with_rims(coarse, surface, rims, size)
+            if len(self_intersections(coarse)) == 0:
+                return _near(coarse, surface, size), labels
+    return _near(coarse, surface, size), labels
+
+
+def _near(coarse: Surface, surface: Surface, size: float) -> Surface:
+    """The coarse surface; InputError where it leaves out a part of the ``surface``."""
     lost = distances(surface.points, coarse).distance.max()
     log.info("%s: coarsened to %d triangles, at most %.2g mm off", surface.place, len(coarse.triangles), lost)
     if not lost <= size / 2:
@@ -191,7 +215,7 @@ def _largest_part(tets: Ints, place: str) -> Ints:
 
 
 def _gmsh(points: Floats, triangles: Ints, size: float) -> tuple[Floats, Ints]:
-    """Points and tets that fill a closed surface, its triangles kept."""
+    """Points and tets that fill a closed surface, its triangles kept, its points first and in their order."""
     import gmsh
 
     gmsh.initialize()
@@ -212,11 +236,12 @@ def _gmsh(points: Floats, triangles: Ints, size: float) -> tuple[Floats, Ints]:
     gmsh.model.geo.synchronize()
     gmsh.model.mesh.generate(3)
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    order = np.argsort(tags)
     index = np.zeros(int(tags.max()) + 1, np.int64)
-    index[tags.astype(np.int64)] = np.arange(len(tags))
+    index[tags[order].astype(np.int64)] = np.arange(len(tags))
     tets = gmsh.model.mesh.getElementsByType(4)[1].astype(np.int64)
     gmsh.finalize()
-    return coordinates.reshape(-1, 3), index[tets].reshape(-1, 4)
+    return coordinates.reshape(-1, 3)[order], index[tets].reshape(-1, 4)
 
 
 def _tetwild(points: Floats, triangles: Ints, size: float) -> tuple[Floats, Ints]:

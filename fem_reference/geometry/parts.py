@@ -1,0 +1,197 @@
+"""Parts of a coarse surface: its triangles and the rims between them made well-shaped, its areas and volume kept."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+
+from fem_reference.geometry.coarsening import flip_edges, free_part, inflate, slide
+from fem_reference.geometry.distance import distances
+from fem_reference.mesh import Floats, Ints, Surface, triangle_areas
+
+Bools = NDArray[np.bool_]
+
+_ROUNDS = 4  # of collapses, flips and slides
+_SHORT = 0.4  # Of an edge at a rim that is collapsed, in sizes of a triangle.
+_STRAIGHT = np.cos(np.radians(50))  # A rim that turns more at a point has a corner there.
+_SAME_SIDE = 0.5  # The least cosine between the normals of a triangle before and after a collapse.
+_TINY = np.finfo(float).tiny
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """A surface whose triangles each belong to one part: ``labels`` (m,) are 0 where free, i + 1 in attachment i; ``rim`` (n,)
+    are the points where parts meet.
+    """
+
+    points: Floats
+    triangles: Ints
+    labels: Ints
+    rim: Bools
+
+    @property
+    def surface(self) -> Surface:
+        """All parts together."""
+        return Surface(self.points, self.triangles)
+
+    def area(self, label: int) -> float:
+        """Of the triangles with this label [mm2]."""
+        return float(triangle_areas(self.points, self.triangles[self.labels == label]).sum())
+
+
+def between(triangles: Ints, labels: Ints, count: int) -> Bools:
+    """Which of ``count`` points lie between triangles of different labels."""
+    low, high = np.full(count, np.iinfo(np.int64).max), np.full(count, -1)
+    np.minimum.at(low, triangles.ravel(), np.repeat(labels, 3))
+    np.maximum.at(high, triangles.ravel(), np.repeat(labels, 3))
+    return low < high
+
+
+def relaxed(parts: Parts, fine: Surface, size: float) -> Parts:
+    """The parts after short edges at rims collapsed, edges flipped and points slid, those of a rim along it only, on ``fine``."""
+    for _ in range(_ROUNDS):
+        parts = collapsed(parts, _SHORT * size)
+        triangles = flip_edges(parts.points, parts.triangles, parts.labels)
+        slid = slide(parts.points, triangles)
+        slid = np.where(parts.rim[:, None], _along_rims(parts), slid)
+        parts = replace(parts, points=distances(slid, fine).closest, triangles=triangles)
+    return replace(parts, triangles=flip_edges(parts.points, parts.triangles, parts.labels))
+
+
+def _rim_edges(parts: Parts) -> Ints:
+    """The edges (e, 2) between triangles of different labels."""
+    ends = np.sort(parts.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    labels = np.repeat(parts.labels, 3)[np.lexsort(ends.T)].reshape(-1, 2)
+    pairs = ends[np.lexsort(ends.T)].reshape(-1, 2, 2)
+    return np.asarray(pairs[labels[:, 0] != labels[:, 1], 0])
+
+
+def _along_rims(parts: Parts) -> Floats:
+    """Points (n, 3) where those on a rim moved along it towards the middle between their neighbours; corners and ends stay."""
+    edges = _rim_edges(parts)
+    count = len(parts.points)
+    both = np.concatenate([edges, edges[:, ::-1]])
+    links = coo_array((np.ones(len(both)), tuple(both.T)), shape=(count, count)).tocsr()
+    inner = np.flatnonzero(np.diff(links.indptr) == 2)
+    neighbours = links.indices[links.indptr[inner][:, None] + np.arange(2)]
+    points = np.array(parts.points)
+    before, after = parts.points[neighbours[:, 0]] - points[inner], parts.points[neighbours[:, 1]] - points[inner]
+    lengths = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
+    straight = -np.einsum("ij,ij->i", before, after) > _STRAIGHT * lengths
+    way = after - before
+    share = np.einsum("ij,ij->i", before + after, way) / np.maximum(np.einsum("ij,ij->i", way, way), _TINY) / 2
+    points[inner] += np.where(straight, share, 0.0)[:, None] * way
+    return points
+
+
+def collapsed(parts: Parts, short: float) -> Parts:
+    """The parts without the edges below ``short`` [mm] that end on a rim, where the surface and the rims stay what they are."""
+    ends = np.unique(np.sort(parts.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    lengths = np.linalg.norm(parts.points[ends[:, 0]] - parts.points[ends[:, 1]], axis=1)
+    next_on_rim: list[list[int]] = [[] for _ in parts.points]
+    for one, other in _rim_edges(parts).tolist():
+        next_on_rim[one].append(other)
+        next_on_rim[other].append(one)
+    around = _around_points(parts.triangles, len(parts.points))
+    target, touched = np.arange(len(parts.points)), np.zeros(len(parts.points), bool)
+    gone = np.zeros(len(parts.triangles), bool)
+    for i in np.argsort(lengths, kind="stable")[: np.count_nonzero(lengths < short)]:
+        goes, stays = sorted(ends[i].tolist(), key=lambda point: (parts.rim[point], len(next_on_rim[point]) != 2))
+        if not parts.rim[stays] or (parts.rim[goes] and not _straight(parts.points, next_on_rim[goes], goes, stays)):
+            continue
+        near = np.unique(parts.triangles[around[goes] + around[stays]])
+        if touched[near].any() or not _may_collapse(parts, around, goes, stays):
+            continue
+        target[goes] = stays
+        gone[[triangle for triangle in around[goes] if triangle in around[stays]]] = True
+        touched[near] = True
+    used, triangles = np.unique(target[parts.triangles[~gone]], return_inverse=True)
+    return Parts(parts.points[used], triangles.reshape(-1, 3), parts.labels[~gone], parts.rim[used])
+
+
+def _straight(points: Floats, neighbours: list[int], goes: int, stays: int) -> bool:
+    """Whether ``goes`` has two ``neighbours`` on a rim, one of which ``stays``, and the rim hardly turns there."""
+    if len(neighbours) != 2 or stays not in neighbours:
+        return False
+    before, after = points[goes] - points[neighbours[0]], points[neighbours[1]] - points[goes]
+    return bool(before @ after > _STRAIGHT * np.linalg.norm(before) * np.linalg.norm(after))
+
+
+def _around_points(triangles: Ints, count: int) -> list[list[int]]:
+    """The triangles around each of ``count`` points."""
+    around: list[list[int]] = [[] for _ in range(count)]
+    for i, corners in enumerate(triangles.tolist()):
+        for corner in corners:
+            around[corner].append(i)
+    return around
+
+
+def _may_collapse(parts: Parts, around: list[list[int]], goes: int, stays: int) -> bool:
+    """Whether ``goes`` may move onto ``stays``: the surface stays manifold, its sharp edges stay, no triangle turns or gets flatter
+    than the flattest was.
+    """
+    points, triangles = parts.points, parts.triangles
+    here, there = set(triangles[around[goes]].ravel().tolist()), set(triangles[around[stays]].ravel().tolist())
+    if len(here & there) != 4 or len(here | there) < 6:  # the two ends and two others; more than a tetrahedron
+        return False
+    old = triangles[around[goes]]
+    shift = (points[stays] - points[goes])[None]
+    free = free_part(points, old, np.array([goes]), shift)
+    if np.linalg.norm(shift - free) > np.linalg.norm(shift) / 3:
+        return False
+    left = np.array([triangle for triangle in around[goes] if triangle not in around[stays]])
+    before = triangles[left]
+    after = np.where(before == goes, stays, before)
+    one, other = _normals(points, before), _normals(points, after)
+    cosines = np.einsum("ij,ij->i", one, other)
+    return bool(
+        (cosines > _SAME_SIDE).all() and _flatness(points, after).min() >= min(_flatness(points, old).min(), 0.5)
+    )
+
+
+def _normals(points: Floats, triangles: Ints) -> Floats:
+    """Unit normals (m, 3)."""
+    a, b, c = (points[triangles[:, corner]] for corner in range(3))
+    normals = np.cross(b - a, c - a)
+    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _TINY))
+
+
+def _flatness(points: Floats, triangles: Ints) -> Floats:
+    """4 sqrt(3) area over the sum of the squared sides of each triangle, (m,): 1 for an equilateral one, 0 for a flat one."""
+    sides = points[triangles] - points[np.roll(triangles, 1, axis=1)]
+    return np.asarray(
+        4 * np.sqrt(3) * triangle_areas(points, triangles) / np.maximum(np.sum(sides**2, axis=(1, 2)), _TINY)
+    )
+
+
+def widened(parts: Parts, areas: list[float], volume: float, most: float) -> Floats:
+    """Points (n, 3) after the rim of each part moved outwards by one distance, so that it has its area of ``areas`` [mm2], and all
+    along their normals, so that they enclose ``volume`` [mm3]: a polygon in a circle is too small. The rims move by at most
+    ``most`` [mm] a round.
+    """
+    for _ in range(_ROUNDS):
+        points = np.array(parts.points)
+        for label, area in enumerate(areas, start=1):
+            ways, length = _outwards(parts, label)
+            if length > 0:
+                points += ways * np.clip((area - parts.area(label)) / length, -most, most)
+        parts = replace(parts, points=inflate(points, parts.triangles, volume))
+    return parts.points
+
+
+def _outwards(parts: Parts, label: int) -> tuple[Floats, float]:
+    """Unit vectors (n, 3) out of the part with this label, in its plane, 0 off its rim; the length of the rim [mm]."""
+    triangles = parts.triangles[parts.labels == label]
+    ends = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    corners = parts.points[triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = np.repeat(normals / np.linalg.norm(normals, axis=1, keepdims=True), 3, axis=0)
+    _, which, count = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
+    alone = count[which.ravel()] == 1
+    along = parts.points[ends[alone, 1]] - parts.points[ends[alone, 0]]
+    ways = np.zeros_like(parts.points)
+    for end in ends[alone].T:
+        np.add.at(ways, end, np.cross(along, normals[alone]))
+    ways /= np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), _TINY)
+    return ways, float(np.linalg.norm(along, axis=1).sum())

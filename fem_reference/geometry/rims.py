@@ -1,0 +1,275 @@
+"""Rims of attachments as edges of a coarse surface: where a bone's hold ends, so do the triangles that it holds."""
+
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, diags_array
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu
+
+from fem_reference.geometry.coarsening import flip_edges, free_part
+from fem_reference.geometry.distance import distances
+from fem_reference.geometry.parts import Parts, between, relaxed, widened
+from fem_reference.geometry.sectors import held_area, sectors, shares_at
+from fem_reference.mesh import Floats, Ints, Surface, enclosed_volume, triangle_areas
+
+log = logging.getLogger(__name__)
+
+Bools = NDArray[np.bool_]
+
+# Chosen on the report's muscles and our own hip. In sizes of a triangle: how far the shares are smoothed. More rounds off corners.
+_SMOOTHED = 0.1
+# A vertex nearer to a crossing than this share of the edge moves there. Above 0.35 triangles degenerate, below 0.25 slivers stay.
+_NEAR = 0.3
+# Nearer than this a vertex that must not move counts as on the rim where it is.
+_THERE = 0.2
+# Over a piece of an attachment, or a gap in it, wider than this share of it an edge is cut.
+_NARROW = 0.3
+_REFINED = 2  # times that narrow pieces and gaps are looked for
+_ISLAND = 0.1  # squares of the size: the area from which an island of an attachment is kept
+_WIDENED = 0.1  # sizes of a triangle by which a rim moves outwards at most, in each of a few rounds
+_SAMPLES = 17  # of the shares along an edge
+_TRIALS = 10  # of the level whose area is nearest
+
+
+def with_rims(coarse: Surface, fine: Surface, shares: Mapping[str, Floats], size: float) -> tuple[Surface, Ints]:
+    """``coarse`` with edges along the rim of each attachment, and the label (m,) of each of its triangles: 0 free, i + 1 held by
+    attachment i.
+
+    ``shares`` (k, 3) say how far the corners of the triangles of ``fine`` are held. They are smoothed over a tenth of ``size``
+    [mm], which drops single vertices and pinholes; the rim is the level of them that encloses the area they have. Vertices near
+    it move onto it and edges across it are cut there (Labelle and Shewchuk 2007, doi 10.1145/1276377.1276448, for surfaces).
+    """
+    parts = Parts(
+        coarse.points, coarse.triangles, np.zeros(len(coarse.triangles), np.int64), np.zeros(len(coarse.points), bool)
+    )
+    for label, (name, held) in enumerate(shares.items(), start=1):
+        area = held_area(fine, held)
+        smooth = _smoothed(fine, held, _SMOOTHED * size)
+        parts = _seeded(parts, fine, smooth, _ISLAND * size**2)
+        parts = _best(parts, fine, smooth, label, area)
+        log.info("%s: %s held on %.1f of %.1f mm2", fine.place, name, parts.area(label), area)
+    parts = relaxed(parts, fine, size)
+    areas = [held_area(fine, held) for held in shares.values()]
+    points = widened(parts, areas, enclosed_volume(fine.points, fine.triangles), _WIDENED * size)
+    return Surface(points, parts.triangles, coarse.place), parts.labels
+
+
+def _smoothed(surface: Surface, shares: Floats, length: float) -> Floats:
+    """The ``shares`` (m, 3) after one implicit step of diffusion over ``length`` [mm], not across sharp edges."""
+    nodes = sectors(surface)
+    count = int(nodes.max()) + 1
+    corners = surface.points[surface.triangles]
+    mass = np.bincount(nodes.ravel(), np.repeat(triangle_areas(surface.points, surface.triangles) / 3, 3), count)
+    given = np.zeros(count)
+    given[nodes] = shares
+    rows, columns, weights = [], [], []
+    for here, left, right in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        one, other = corners[:, left] - corners[:, here], corners[:, right] - corners[:, here]
+        across = np.maximum(np.linalg.norm(np.cross(one, other), axis=1), np.finfo(float).tiny)
+        rows.append(nodes[:, left])
+        columns.append(nodes[:, right])
+        weights.append(np.clip(np.einsum("ij,ij->i", one, other) / across, 0, 10) / 2)
+    half = coo_array((np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns))), shape=(count, count))
+    links = (half + half.T).tocsr()
+    stiffness = diags_array(np.asarray(links.sum(axis=1)).ravel()) - links
+    mass = np.maximum(mass, mass.mean() * 1e-9)
+    solved = splu((diags_array(mass) + length**2 * stiffness).tocsc()).solve(mass * given)
+    return np.asarray(solved[nodes])
+
+
+def _seeded(parts: Parts, fine: Surface, shares: Floats, least: float) -> Parts:
+    """The parts with a point in the middle of each island of an attachment, of at least ``least`` [mm2], that has none."""
+    number = _islands(fine, shares)
+    held = number >= 0
+    sizes = np.bincount(
+        number[held], np.repeat(triangle_areas(fine.points, fine.triangles) / 3, 3).reshape(-1, 3)[held]
+    )
+    nearest = distances(parts.points, fine)
+    corner = nearest.barycentric.argmax(axis=1)
+    sizes[np.maximum(number[nearest.triangle, corner], 0)[number[nearest.triangle, corner] >= 0]] = 0
+    for island in np.flatnonzero(sizes >= least):
+        peak = fine.triangles[number == island][shares[number == island].argmax()]
+        at = int(distances(fine.points[[peak]], parts.surface).triangle[0])
+        a, b, c = parts.triangles[at]
+        new = len(parts.points)
+        triangles = np.concatenate([np.delete(parts.triangles, at, axis=0), [[a, b, new], [b, c, new], [c, a, new]]])
+        labels = np.concatenate([np.delete(parts.labels, at), np.repeat(parts.labels[at], 3)])
+        points = np.concatenate([parts.points, fine.points[[peak]]])
+        triangles = flip_edges(points, triangles, labels)
+        parts = Parts(points, triangles, labels, between(triangles, labels, len(points)))
+    return parts
+
+
+def _islands(fine: Surface, shares: Floats) -> Ints:
+    """The number (m, 3) of the connected island of shares above a half that each corner is in, -1 outside all."""
+    held = np.zeros(len(fine.points), bool)
+    held[fine.triangles[shares > 1 / 2]] = True
+    ends = fine.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    ends = ends[held[ends].all(axis=1)]
+    links = coo_array((np.ones(len(ends), bool), tuple(ends.T)), shape=(len(held), len(held)))
+    part = connected_components(links, directed=False)[1][fine.triangles]
+    return np.where(shares > 1 / 2, part, -1)
+
+
+def _best(parts: Parts, fine: Surface, shares: Floats, label: int, area: float) -> Parts:
+    """The parts with the rim at the level whose area comes nearest to ``area`` [mm2], by bisection."""
+    for _ in range(_REFINED):
+        parts = _refined(parts, fine, _Edges.of(parts, fine, shares))
+    edges = _Edges.of(parts, fine, shares)
+    best, low, high = None, 0.0, 1.0
+    for _ in range(_TRIALS):
+        level = (low + high) / 2
+        found = _cut(parts, fine, edges.at(level), label)
+        if best is None or abs(found.area(label) - area) < abs(best.area(label) - area):
+            best = found
+        low, high = (level, high) if found.area(label) > area else (low, level)
+    assert best is not None
+    return best
+
+
+def _refined(parts: Parts, fine: Surface, edges: "_Edges") -> Parts:
+    """The parts with edges cut that pass over a narrow piece of an attachment or a gap in it: where, in between, they are on the
+    other side of the level of a half for a good part of their length.
+    """
+    other = (edges.along > 1 / 2) != (edges.along[:, :1] > 1 / 2)
+    narrow = np.flatnonzero((other.mean(axis=1) > _NARROW) & ~other[:, -1])
+    at = (other[narrow] @ np.arange(_SAMPLES) / other[narrow].sum(axis=1) / (_SAMPLES - 1))[:, None]
+    a, b = (parts.points[edges.ends[narrow, i]] for i in (0, 1))
+    points, triangles, parent = _split(parts, fine, edges, narrow, a * (1 - at) + b * at)
+    labels = parts.labels[parent]
+    triangles = flip_edges(points, triangles, labels)
+    return Parts(points, triangles, labels, between(triangles, labels, len(points)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Edges:
+    """Shares along the edges of a surface: ``ends`` (e, 2), ``of_triangles`` (m, 3), the edge opposite to each corner, ``along``
+    (e, s) samples from end to end, ``at_points`` (n,) and ``at_middles`` (m,) of triangles.
+    """
+
+    ends: Ints
+    of_triangles: Ints
+    along: Floats
+    at_points: Floats
+    at_middles: Floats
+
+    @classmethod
+    def of(cls, parts: Parts, fine: Surface, shares: Floats) -> "_Edges":
+        sides = np.sort(parts.triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
+        ends, which = np.unique(sides, axis=0, return_inverse=True)
+        fractions = np.linspace(0, 1, _SAMPLES)[:, None]
+        samples = parts.points[ends[:, 0]][:, None] * (1 - fractions) + parts.points[ends[:, 1]][:, None] * fractions
+        at_points = shares_at(parts.points, fine, shares)
+        along = shares_at(samples[:, 1:-1].reshape(-1, 3), fine, shares).reshape(len(ends), -1)
+        along = np.column_stack([at_points[ends[:, 0]], along, at_points[ends[:, 1]]])
+        middles = parts.points[parts.triangles].mean(axis=1)
+        return cls(ends, which.reshape(-1, 3), along, at_points, shares_at(middles, fine, shares))
+
+    def at(self, level: float) -> "_Crossings":
+        above = self.along - level
+        change = (above[:, :-1] > 0) != (above[:, 1:] > 0)
+        crossed = change.any(axis=1)
+        fractions = []
+        for step in (change.argmax(axis=1), change.shape[1] - 1 - change[:, ::-1].argmax(axis=1)):
+            before, after = (np.take_along_axis(above, step[:, None] + i, axis=1)[:, 0] for i in (0, 1))
+            part = before / np.where(crossed, before - after, 1.0)
+            fractions.append(np.where(crossed, (step + part) / (_SAMPLES - 1), np.nan))
+        signs = np.where(self.at_points > level, 1, -1)
+        return _Crossings(self.ends, self.of_triangles, np.column_stack(fractions), signs, self.at_middles > level)
+
+
+@dataclass(frozen=True, eq=False)
+class _Crossings:
+    """Where edges first and last cross a level: at ``fractions`` (e, 2) of their length, NaN where they do not; ``signs`` (n,) of
+    the points, and whether the middles of triangles are ``within`` (m,).
+    """
+
+    ends: Ints
+    of_triangles: Ints
+    fractions: Floats
+    signs: Ints
+    within: Bools
+
+
+def _cut(parts: Parts, fine: Surface, crossings: _Crossings, label: int) -> Parts:
+    """The parts with triangles cut along the crossings; those inside that were free get the ``label``."""
+    points, signs = _snapped(parts, fine, crossings)
+    ends = crossings.ends
+    split = np.flatnonzero(signs[ends[:, 0]] * signs[ends[:, 1]] < 0)
+    at = crossings.fractions[split, :1]
+    a, b = (points[ends[split, i]] for i in (0, 1))
+    parts = replace(parts, points=points)
+    points, triangles, parent = _split(parts, fine, crossings, split, a * (1 - at) + b * at)
+    signs = np.concatenate([signs, np.zeros(len(split), np.int64)])
+    total = signs[triangles].sum(axis=1)
+    within = np.where(total == 0, crossings.within[parent], total > 0)
+    labels = np.where(within & (parts.labels[parent] == 0), label, parts.labels[parent])
+    return Parts(points, triangles, labels, between(triangles, labels, len(points)))
+
+
+def _snapped(parts: Parts, fine: Surface, crossings: _Crossings) -> tuple[Floats, Ints]:
+    """Points (n, 3) after those near a crossing moved there, unless that leaves a sharp edge or another rim; signs (n,), 0 on the
+    rim.
+    """
+    across = ~np.isnan(crossings.fractions[:, 0])
+    ends, fractions = crossings.ends[across], crossings.fractions[across]
+    point = np.concatenate([ends[:, 0], ends[:, 1]])
+    share = np.concatenate([fractions[:, 0], 1 - fractions[:, 1]])
+    way = parts.points[ends[:, 1]] - parts.points[ends[:, 0]]
+    shift = np.concatenate([way, -way]) * share[:, None]
+    free = free_part(parts.points, parts.triangles, point, shift)
+    stuck = parts.rim[point] | (np.linalg.norm(shift - free, axis=1) > np.linalg.norm(shift, axis=1) / 3)
+    near = share < np.where(stuck, np.where(parts.rim[point], _NEAR, _THERE), _NEAR)
+    order = np.lexsort([np.linalg.norm(shift, axis=1), stuck, point])
+    order = order[near[order]]
+    moved, first = np.unique(point[order], return_index=True)
+    chosen = order[first]
+    signs, points = crossings.signs.copy(), np.array(parts.points)
+    signs[moved] = 0
+    goes = ~stuck[chosen]
+    points[moved[goes]] = distances(points[moved[goes]] + shift[chosen[goes]], fine).closest
+    return points, signs
+
+
+def _split(
+    parts: Parts, fine: Surface, edges: "_Edges | _Crossings", chosen: Ints, middles: Floats
+) -> tuple[Floats, Ints, Ints]:
+    """Points and triangles after the ``chosen`` edges (k,) are cut at points of ``fine`` nearest to ``middles`` (k, 3), and the
+    triangle that each is part of.
+    """
+    new = np.full(len(edges.ends), -1)
+    new[chosen] = len(parts.points) + np.arange(len(chosen))
+    points = np.concatenate([parts.points, distances(middles, fine).closest])
+    return points, *_divided(points, parts.triangles, new[edges.of_triangles])
+
+
+def _divided(points: Floats, triangles: Ints, cuts: Ints) -> tuple[Ints, Ints]:
+    """Triangles cut at the points ``cuts`` (m, 3) on the edges opposite to their corners, -1 for none; and the
+    triangle that each is part of.
+    """
+    count = (cuts >= 0).sum(axis=1)
+    pieces, parents = [triangles[count == 0]], [np.flatnonzero(count == 0)]
+    one = np.flatnonzero(count == 1)
+    a, b, c, middle, _, _ = _turned(triangles, cuts, one, (cuts[one] >= 0).argmax(axis=1))
+    pieces += [np.column_stack([a, b, middle]), np.column_stack([a, middle, c])]
+    two = np.flatnonzero(count == 2)
+    a, b, c, _, on_ca, on_ab = _turned(triangles, cuts, two, (cuts[two] < 0).argmax(axis=1))
+    pieces.append(np.column_stack([a, on_ab, on_ca]))
+    shorter = np.linalg.norm(points[b] - points[on_ca], axis=1) <= np.linalg.norm(points[c] - points[on_ab], axis=1)
+    pieces.append(np.where(shorter[:, None], np.column_stack([b, on_ca, on_ab]), np.column_stack([c, on_ca, on_ab])))
+    pieces.append(np.where(shorter[:, None], np.column_stack([b, c, on_ca]), np.column_stack([b, c, on_ab])))
+    three = np.flatnonzero(count == 3)
+    a, b, c, on_bc, on_ca, on_ab = _turned(triangles, cuts, three, np.zeros(len(three), np.int64))
+    corners = ((a, on_ab, on_ca), (on_ab, b, on_bc), (on_ca, on_bc, c), (on_ab, on_bc, on_ca))
+    pieces += [np.column_stack(piece) for piece in corners]
+    return np.concatenate(pieces), np.concatenate([*parents, one, one, two, two, two, three, three, three, three])
+
+
+def _turned(triangles: Ints, cuts: Ints, chosen: Ints, first: Ints) -> tuple[Ints, ...]:
+    """Corners (k,) of the ``chosen`` triangles, and the cuts opposite to them, from corner ``first`` on."""
+    turn = (first[:, None] + np.arange(3)) % 3
+    return (*triangles[chosen[:, None], turn].T, *cuts[chosen[:, None], turn].T)

@@ -1,0 +1,59 @@
+"""Smooth sectors around the vertices of a surface, and how far an attachment's vertices hold its triangles."""
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from fem_reference.geometry.distance import distances
+from fem_reference.mesh import Floats, Ints, Surface, triangle_areas
+
+# Two triangles meet in a sharp edge where their normals are more than this apart.
+_SHARP = np.cos(np.radians(45))
+
+
+def sectors(surface: Surface) -> Ints:
+    """The number (m, 3) of the sector that each corner of a triangle is in: around a vertex, from sharp edge to sharp edge."""
+    triangles = surface.triangles
+    a, b, c = (surface.points[triangles[:, corner]] for corner in range(3))
+    normals = np.cross(b - a, c - a)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
+    sides = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)  # side 3 t + i leaves corner i of triangle t
+    _, which, count = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
+    which = which.ravel()
+    order = np.argsort(which, kind="stable")
+    one, other = order[count[which[order]] == 2].reshape(-1, 2).T
+    smooth = np.einsum("ij,ij->i", normals[one // 3], normals[other // 3]) > _SHARP
+    one, other = one[smooth], other[smooth]
+    after_one, after_other = (side - side % 3 + (side + 1) % 3 for side in (one, other))
+    ends = np.concatenate([one, after_one]), np.concatenate([after_other, other])
+    links = coo_array((np.ones(len(ends[0]), bool), ends), shape=(triangles.size, triangles.size))
+    return np.asarray(connected_components(links, directed=False)[1], np.int64).reshape(-1, 3)
+
+
+def held_shares(surface: Surface, vertices: Ints) -> Floats:
+    """Whether each corner (m, 3) of the triangles of ``surface`` is held by attached ``vertices`` (k,): 1 or 0.
+
+    A vertex on a sharp edge holds only the sides of the edge on which it holds a whole triangle, if there is one: the end of a
+    muscle, and not a strip of the belly around it that has no width of its own.
+    """
+    attached = np.zeros(len(surface.points), bool)
+    attached[vertices] = True
+    triangles = surface.triangles
+    whole = attached[triangles].all(axis=1)
+    number = sectors(surface)
+    sector_whole = np.zeros(int(number.max()) + 1, bool)
+    sector_whole[number[whole]] = True
+    vertex_whole = np.zeros(len(surface.points), bool)
+    vertex_whole[triangles[whole]] = True
+    return np.where(attached[triangles] & (sector_whole[number] | ~vertex_whole[triangles]), 1.0, 0.0)
+
+
+def held_area(surface: Surface, shares: Floats) -> float:
+    """The area [mm2] that the ``shares`` (m, 3) of the corners hold of ``surface``."""
+    return float(triangle_areas(surface.points, surface.triangles) @ shares.mean(axis=1))
+
+
+def shares_at(points: Floats, surface: Surface, shares: Floats) -> Floats:
+    """The ``shares`` (m, 3) of the corners of ``surface`` at its points nearest to ``points`` (n, 3); (n,)."""
+    nearest = distances(points, surface)
+    return np.asarray(np.sum(shares[nearest.triangle] * nearest.barycentric, axis=1))
