@@ -54,7 +54,10 @@ def _finer_steps(scene: Scene, first_step: float) -> dict[str, Any]:
     every = scene.frames.every
     divisor = next(k for k in range(2, every + 2) if every % k == 0 or k > every)
     between = every // divisor if every > 1 else 1
-    reference = scene.reference.model_copy(update={"first_step": first_step / 2})
+    halved = {"first_step": first_step / 2}
+    if (largest := scene.reference.settings.get("largest_step")) is not None:
+        halved["largest_step"] = largest / 2
+    reference = scene.reference.model_copy(update=halved)
     return {"frames": scene.frames.model_copy(update={"every": between}), "reference": reference}
 
 

@@ -1,5 +1,6 @@
 """Adaptive load steps from frame to frame: halve on failure, grow on easy steps, never skip a requested frame."""
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -34,17 +35,24 @@ class Step:
 
 
 def march(
-    attempt: Callable[[float], Attempt], frames: tuple[float, ...], first_step: float, smallest_step: float
+    attempt: Callable[[float], Attempt],
+    frames: tuple[float, ...],
+    first_step: float,
+    smallest_step: float,
+    largest_step: float | None = None,
 ) -> Iterator[Step]:
     """Go from ``frames[0]`` (where the body rests) through every frame; ``attempt`` solves at a load, from the last state that
-    converged, and must leave that state untouched where it fails. Ends after the first frame that cannot be reached.
+    converged, and must leave that state untouched where it fails. No step is above ``largest_step``. Ends after the first frame
+    that cannot be reached.
     """
-    at, step = float(frames[0]), first_step
+    largest = math.inf if largest_step is None else largest_step
+    at, step = float(frames[0]), min(first_step, largest)
     for frame in frames[1:]:
         steps = iterations = cutbacks = 0
         while at < frame:
             left = frame - at
-            size = left / max(1, round(left / step + 0.3))  # equal steps to the frame, none a sliver
+            count = max(1, round(left / step + 0.3), math.ceil(left / largest - 1e-9))
+            size = left / count  # equal steps to the frame, none a sliver
             result = attempt(frame if size == left else at + size)
             iterations += result.iterations
             if result.failure is not None:

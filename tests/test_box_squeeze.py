@@ -11,7 +11,7 @@ MU, BULK, AREA = 0.01, 10.0, 1e4  # [MPa], [mm2]
 
 
 def homogeneous(height: float) -> tuple[float, float]:
-    """The stretch across and the force [N] of the plates, where K (J - 1) + mu J^(-5/3) (l^2 - h^2) / 3 = 0: nothing pulls across."""
+    """The stretch l across and the force [N] of the plates: nothing pulls across, K (J - 1) + mu J^(-5/3) (l^2 - h^2) / 3 = 0."""
 
     def across(stretch: float) -> float:
         J = height * stretch**2
@@ -55,4 +55,3 @@ def test_the_run_says_that_it_is_unstable_below_half_the_height(run) -> None:
     assert [modes[frame] for frame in (0, 50, 200, 300)] == [0, 0, 0, 0]  # 55 mm high at 50
     assert modes[100] >= 2
     assert "unstable" in run.outcome.message
-

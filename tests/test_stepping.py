@@ -1,5 +1,7 @@
 """Adaptive load steps: every frame is hit, failures are cut, easy steps grow, and what cannot be reached is said."""
 
+from itertools import pairwise
+
 from fem_reference.stepping import Attempt, march
 
 
@@ -13,6 +15,13 @@ def test_easy_steps_hit_every_frame_at_once() -> None:
     assert tried == [10, 20]
     assert [entry.frame for entry in reached] == [10, 20]
     assert [entry.iterations for entry in reached] == [3, 3]
+
+
+def test_no_step_is_above_the_largest() -> None:
+    tried = [0.0]
+    list(march(lambda at: tried.append(at) or Attempt(None, 2), (0, 10, 11), 1.0, 0.5, 3.0))
+    assert max(later - earlier for earlier, later in pairwise(tried)) <= 3
+    assert tried[-2:] == [10, 11]
 
 
 def test_large_steps_never_skip_a_frame() -> None:

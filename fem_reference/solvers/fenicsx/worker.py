@@ -43,7 +43,7 @@ class Worker:
         """March through the frames and report how it ended."""
         frames, settings = self.job.body.frames, self.settings
         self.report_frame(Step(frames[0], 0, 0, 0))
-        for reached in march(self.attempt, frames, settings.first_step, settings.smallest_step):
+        for reached in march(self.attempt, frames, settings.first_step, settings.smallest_step, settings.largest_step):
             for name, count in (
                 ("newton_iterations", reached.iterations),
                 ("load_steps", reached.steps),
@@ -54,9 +54,9 @@ class Worker:
                 self.report(status=reached.status, message=self.sentence(reached), cost=self.cost())
                 return
             self.report_frame(reached)
-        self.report(
-            status="converged", message=f"all {len(frames)} frames reached{self.instability()}", cost=self.cost()
-        )
+        law = self.job.body.contact
+        wanted = len(frames) - (law is not None and law.relaxed is not None)  # what relaxes before the first is none
+        self.report(status="converged", message=f"all {wanted} frames reached{self.instability()}", cost=self.cost())
 
     def attempt(self, frame: float) -> Attempt:
         """Solve at ``frame`` from the last state; on failure go back to it."""
@@ -91,6 +91,11 @@ class Worker:
             f"{self.instability().replace('of them', 'of the frames reached')}; "
             "try a smaller motion or smaller cells"
         )
+
+    def deepest(self) -> str:
+        """Where contact is deepest, if there is any."""
+        contact = self.body.contact
+        return f", and contact is deepest, {contact.pushes.deepest(self.body.comm)}" if contact else ""
 
     def report_frame(self, reached: Step) -> None:
         """Write the frame's positions and forces beside the job and tell of it."""
