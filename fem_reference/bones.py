@@ -146,8 +146,9 @@ class Bone(Record):
             raise ValueError(f"exactly one of {_quoted(ways)}")
         if (self.surface is None) != (self.unit is None):
             raise ValueError('"unit" beside "surface" and only there')
-        if self.surface is None and "distance_error" in self.model_fields_set:
-            raise ValueError('"distance_error" beside "surface" only: a closed form has none')
+        for key in ("distance_error", "distance_rounding"):
+            if self.surface is None and key in self.model_fields_set:
+                raise ValueError(f'"{key}" beside "surface" only: a closed form has none')
         return self
 
 

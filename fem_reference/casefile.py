@@ -12,6 +12,7 @@ from fem_reference.effects import Coursed, Effect, FieldEffect, Load
 from fem_reference.effects import find as find_effect
 from fem_reference.effects import names as effect_names
 from fem_reference.effects.contact import Contact
+from fem_reference.effects.damping import Damping
 from fem_reference.errors import InputError
 from fem_reference.field.scene import FieldScene, FieldSceneFile
 from fem_reference.records import Record, join, parse
@@ -185,9 +186,23 @@ def _check_names(scene: Scene) -> None:
         for name in effect.bones or ()
     ]
     _check_used(bones, pushing, scene.place)
+    _check_forces(scene)
     loads = [(f"effect[{i}].on", effect.on) for i, effect in enumerate(scene.effects) if isinstance(effect, Load)]
     _check_used([*attachments, FREE], loads, scene.place)
     _check_used(candidates, [(f"expect[{i}].of", entry.of) for i, entry in enumerate(scene.expect)], scene.place)
+
+
+def _check_forces(scene: Scene) -> None:
+    """Forces are told by the name of who exerts them, and something keeps the muscle from drifting."""
+    bones = [bone.name for bone in scene.bone]
+    pushed = any(isinstance(effect, Contact) for effect in scene.effects)
+    for i, attachment in enumerate(scene.attachment):
+        if pushed and attachment.name in bones:
+            place = join(scene.place, f"attachment[{i}].name")
+            raise InputError(place, f'"{attachment.name}", which a bone that pushes has too', "a name of its own")
+    if not scene.attachment and not any(isinstance(effect, Damping) for effect in scene.effects):
+        want = 'an attachment, soft as it may be, or the effect "damping": without either the muscle drifts'
+        raise InputError(join(scene.place, "attachment"), "none", want)
 
 
 def _candidate_names(scene: Scene | FieldScene) -> list[str]:

@@ -177,6 +177,12 @@ class Continuum:
     obstructions: tuple[Obstruction, ...] = ()
     interval: float | None = None
 
+    @property
+    def first(self) -> float:
+        """The first frame that is wanted: what overlaps at rest is relaxed before it."""
+        relaxed = self.contact.relaxed if self.contact else None
+        return self.frames[0] if relaxed is None else relaxed[1]
+
 
 @dataclass(frozen=True, eq=False)
 class Reached:

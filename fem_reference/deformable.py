@@ -1,5 +1,6 @@
 """The muscle of a problem as a body that finite elements deform: held by bones, and pushed by them."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,6 +26,30 @@ class Follows:
     def __call__(self, points: Floats, frame: float) -> Floats:
         """The displacement (n, 3) [mm] of rest points (n, 3) at a frame number."""
         return apply(self.bone.pose(frame), points) - points
+
+
+@dataclass(frozen=True)
+class From:
+    """A ``pose`` by frame number that begins at the ``first``, whatever motion it has before."""
+
+    first: float
+    pose: Callable[[float], Floats]
+
+    def __call__(self, frame: float) -> Floats:
+        """The 4 x 4 matrix at ``frame``."""
+        return self.pose(max(frame, self.first))
+
+
+@dataclass(frozen=True)
+class FromFirst:
+    """A ``course`` of displacement that begins at frame ``first``."""
+
+    first: float
+    course: Callable[[Floats, float], Floats]
+
+    def __call__(self, points: Floats, frame: float) -> Floats:
+        """The displacement (n, 3) [mm] of rest points (n, 3) at a frame number."""
+        return self.course(points, max(frame, self.first))
 
 
 def as_continuum(problem: Problem) -> Continuum:
@@ -54,5 +79,6 @@ def _among_bones(body: Continuum, problem: Problem, effect: ContactEffect) -> Co
     before = first - RELAXING if nearest < effect.smoothing else None
     law = Contact(problem.skin, effect.stiffness, effect.smoothing, None if before is None else (before, first))
     frames = body.frames if before is None else (before, *body.frames)
-    obstructions = tuple(Obstruction(bone.name, bone.shape, bone.pose) for bone in bones)
-    return replace(body, frames=frames, contact=law, obstructions=obstructions)
+    obstructions = tuple(Obstruction(bone.name, bone.shape, From(first, bone.pose)) for bone in bones)
+    prescribed = tuple(replace(entry, course=FromFirst(first, entry.course)) for entry in body.prescribed)
+    return replace(body, frames=frames, prescribed=prescribed, contact=law, obstructions=obstructions)

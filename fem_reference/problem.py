@@ -22,7 +22,7 @@ from fem_reference.geometry.fibres import directions, nearest_directions, trace
 from fem_reference.geometry.intersections import self_intersections
 from fem_reference.geometry.rigid_bodies import Obstacle, solid
 from fem_reference.geometry.sectors import held_area, held_shares
-from fem_reference.geometry.signed_distance import cached
+from fem_reference.geometry.signed_distance import Grid, cached
 from fem_reference.geometry.skins import Skin, skin_of
 from fem_reference.geometry.tessellation import tessellated
 from fem_reference.geometry.tetrahedra import tetrahedralise
@@ -45,9 +45,14 @@ from fem_reference.scene import Scene
 
 log = logging.getLogger(__name__)
 
-# Up to here [mm] from a bone the distance to it is meant; where grids of distances are kept.
+# Up to here [mm] from a bone the distance to it is meant.
 DISTANCE_MARGIN = 12.0
-DISTANCES = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fem_reference" / "distances"
+
+
+def kept_distances() -> Path:
+    """The folder where grids of distances are kept; it may be deleted."""
+    cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111 - Path.home() may raise
+    return Path(cache) / "fem_reference" / "distances"
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +72,9 @@ class Body:
     def shape(self) -> Obstacle:
         """The signed distance to the surface, in the frame of rest; InputError where the surface of a file is not closed."""
         named = replace(self.surface, place=f'bone "{self.name}": {self.surface.place}')
-        return self.solid or cached(named, self.distance_error, DISTANCE_MARGIN, self.distance_rounding, DISTANCES)
+        return self.solid or cached(
+            named, self.distance_error, DISTANCE_MARGIN, self.distance_rounding, kept_distances()
+        )
 
     def pose(self, frame: float) -> Floats:
         """The 4 x 4 matrix that takes rest positions to positions at ``frame``."""
@@ -142,6 +149,8 @@ def setup(scene: Scene) -> Setup:
 def build(scene: Scene, rest: Setup) -> Problem:
     """The whole problem of a scene: its setup ``rest``, filled with tetrahedra and fibres."""
     begin = time.perf_counter()
+    contact = next((effect for effect in scene.effects if isinstance(effect, ContactEffect)), None)
+    distances_known = {} if contact is None else _distance_facts(rest)
     mesh = _filled(scene, rest)
     for i, held in enumerate(rest.held):
         if len(mesh.facets[held.attachment]) == 0:
@@ -157,11 +166,22 @@ def build(scene: Scene, rest: Setup) -> Problem:
         mesh=mesh,
         effects=scene.effects,
         fibres=fibres,
-        mesh_facts=_mesh_facts(rest, mesh, scene.muscle.tet_size / 2),
+        mesh_facts=_mesh_facts(rest, mesh, scene.muscle.tet_size / 2) | distances_known,
         seconds=time.perf_counter() - begin,
         directions=_directions(scene, mesh, fibres),
         skin=_skin(scene, rest, mesh),
     )
+
+
+def _distance_facts(rest: Setup) -> dict[str, float | str]:
+    """How well the distance to each bone of a file is known: spacing of its grid, root mean square and greatest error [mm]."""
+    grids = {bone.name: bone.shape for bone in rest.bones}
+    return {
+        f"{name}_distance_{key}_mm": getattr(grid, key)
+        for name, grid in grids.items()
+        if isinstance(grid, Grid)
+        for key in ("spacing", "mean_error", "error")
+    }
 
 
 def _filled(scene: Scene, rest: Setup) -> TetMesh:

@@ -2,6 +2,7 @@
 
 import hashlib
 import logging
+import math
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -36,11 +37,12 @@ class Variation:
     changes: dict[str, Any]
 
 
-def variations(scene: Scene, first_step: float | None) -> tuple[Variation, ...]:
-    """What is varied apart from tetrahedra: load steps, where the reference takes them (``first_step``), and with contact its
+def variations(scene: Scene, settings: Any) -> tuple[Variation, ...]:
+    """What is varied apart from tetrahedra: load steps, where the reference's ``settings`` have them, and with contact its
     stiffness and smoothing, and how well the distances to surfaces of bones are known and how far they are rounded.
     """
-    found = [] if first_step is None else [Variation("load steps", _finer_steps(scene, first_step))]
+    steps = hasattr(settings, "largest_step")
+    found = [Variation("load steps", _finer_steps(scene, settings))] if steps else []
     if any(isinstance(effect, Contact) for effect in scene.effects):
         found.append(Variation("contact stiffness", {"effect": _scaled(scene, "stiffness", 2.0)}))
         found.append(Variation("contact smoothing", {"effect": _scaled(scene, "smoothing", 0.5)}))
@@ -49,16 +51,11 @@ def variations(scene: Scene, first_step: float | None) -> tuple[Variation, ...]:
     return tuple(found)
 
 
-def _finer_steps(scene: Scene, first_step: float) -> dict[str, Any]:
-    """At most half the load steps: no step goes beyond a frame, so that frames between those wanted bound it."""
-    every = scene.frames.every
-    divisor = next(k for k in range(2, every + 2) if every % k == 0 or k > every)
-    between = every // divisor if every > 1 else 1
-    halved = {"first_step": first_step / 2}
-    if (largest := scene.reference.settings.get("largest_step")) is not None:
-        halved["largest_step"] = largest / 2
-    reference = scene.reference.model_copy(update=halved)
-    return {"frames": scene.frames.model_copy(update={"every": between}), "reference": reference}
+def _finer_steps(scene: Scene, settings: Any) -> dict[str, Any]:
+    """At most half the load steps: no step goes beyond a frame, so that ``frames.every`` bounds it as well."""
+    largest = min(scene.frames.every, settings.largest_step or math.inf) / 2
+    steps = {"first_step": settings.first_step / 2, "largest_step": largest}
+    return {"reference": scene.reference.model_copy(update=steps)}
 
 
 def _scaled(scene: Scene, key: str, factor: float) -> tuple[Effect, ...]:
@@ -93,7 +90,7 @@ def obtain(bench: Bench, reference: Run) -> ErrorBars | None:
     return bars
 
 
-def stored(_bench: Bench, reference: Run) -> ErrorBars | None:
+def stored(reference: Run) -> ErrorBars | None:
     """The error bars stored beside a reference run, None without any that are of this run and of these metrics."""
     if reference.folder is None:
         return None
@@ -107,7 +104,7 @@ def _ladder(bench: Bench, reference: Run) -> Ladder:
     scene, size = bench.scene, bench.scene.muscle.tet_size
     sizes = (size, size * RATIO, size * RATIO**2)
     settings = bench.settings(scene.reference, "reference")
-    varied = variations(scene, getattr(settings, "first_step", None))
+    varied = variations(scene, settings)
     # Newton's method in less than quadratic time of the unknowns: a cubed ratio is at most what coarser tetrahedra save.
     spent = reference.outcome.cost.get("seconds", 0.0)
     seconds = [spent / RATIO**3, *[spent / RATIO**6] * (1 + len(varied))]

@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 from fem_reference import files
 from fem_reference.errors import InputError
 from fem_reference.mesh import Floats
-from fem_reference.metrics import Measure, Yardstick, at_rest, measure, of_itself
+from fem_reference.metrics import Measure, Yardstick, at_rest, measure, names, of_itself
 from fem_reference.runs import Run
 
 Of = Literal["change", "deviation"]
@@ -28,8 +28,9 @@ FILE = "error_bar.json"
 FORMAT = 1
 # Of a grid convergence index over three meshes (Roache 1998, Verification and Validation in Computational Science, ch. 5).
 SAFETY = 1.25
-# Bones hold whole facets, so that the rim of what they hold is where it should be to within a facet: an error of first order, which
-# may come in on any mesh. A higher observed order is no ground for a smaller bar; below the lowest one none is seen.
+# At the rim of what a bone holds, where a held and a free surface meet, displacement goes with the root of the distance (Grisvard 1985,
+# Elliptic Problems in Nonsmooth Domains): an error of first order, whatever the degree. A higher observed order is no ground for a
+# smaller bar; below the lowest one none is seen.
 LOWEST_ORDER, HIGHEST_ORDER = 0.5, 1.0
 # What is left of an error of first order, when halving its cause changes the result by 1.
 VARIATION = 2.0
@@ -98,9 +99,11 @@ def error_bars(ladder: Ladder, yardstick: Yardstick) -> ErrorBars:
     fine, medium, coarse = (_surface(run) for run in ladder.runs)
     others = {name: _surface(run) for name, run in ladder.varied.items()}
 
+    comparing = [name for name in names() if not of_itself(name)]
+
     @cache
     def measured(run: Run, other: Run | None) -> tuple[Measure, ...]:
-        return measure(run, at_rest(run) if other is None else other, yardstick)
+        return measure(run, at_rest(run) if other is None else other, yardstick, comparing)
 
     bars = []
     kinds: tuple[tuple[Of, _Differences], ...] = (("change", _of_changes), ("deviation", _of_deviations))
@@ -108,8 +111,6 @@ def error_bars(ladder: Ladder, yardstick: Yardstick) -> ErrorBars:
         near, far = differences(medium, fine, measured), differences(coarse, medium, measured)
         varied = {name: differences(run, coarse, measured) for name, run in others.items()}
         for i, one in enumerate(measured(fine, fine)):
-            if of_itself(one.metric):
-                continue
             values, order, course = of_sizes(near[i], far[i], ladder.lengths, rounding(one.unit))
             parts = {_SIZES: values} | {name: VARIATION * np.abs(found[i]) for name, found in varied.items()}
             greatest = {name: float(part.max()) for name, part in parts.items()}

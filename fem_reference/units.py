@@ -25,6 +25,7 @@ _INSIDE = {
     "an acceleration": "mm/s^2",
     "a stiffness per area": "MPa/mm",
     "a damping per volume": "MPa*s/mm^2",
+    "a viscosity": "MPa*s",
 }
 # A number, then what may be a unit.
 _NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.ASCII)
@@ -78,6 +79,7 @@ _EXAMPLE = {
     "an acceleration": '"9.81 m/s^2"',
     "a stiffness per area": '"100 kPa/mm"',
     "a damping per volume": '"1 Pa s/mm^2"',
+    "a viscosity": '"300 kPa s"',
 }
 _EXAMPLE_OF_THREE = {
     "a length": '"146, 238, -431 mm"',
@@ -125,6 +127,7 @@ PositivePressure = Annotated[float, BeforeValidator(partial(positive, kind="a pr
 PressureVector = Annotated[tuple[float, float, float], BeforeValidator(partial(three, kind="a pressure"))]
 AreaStiffness = Annotated[float, BeforeValidator(partial(positive, kind="a stiffness per area"))]
 VolumeDamping = Annotated[float, BeforeValidator(partial(positive, kind="a damping per volume"))]
+Viscosity = Annotated[float, BeforeValidator(partial(positive, kind="a viscosity"))]
 Density = Annotated[float, BeforeValidator(partial(positive, kind="a density"))]
 AccelerationVector = Annotated[tuple[float, float, float], BeforeValidator(partial(three, kind="an acceleration"))]
 Time = Annotated[float, BeforeValidator(partial(positive, kind="a time"))]

@@ -27,6 +27,7 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     "contact": {"stiffness": "500 kPa/mm", "smoothing": "0.3 mm", "bones": ["femur"]},
     "prestretch": {"stretch": 1.1, "course": COURSE},
     "damping": {"coefficient": "2 Pa s/mm^2"},
+    "viscosity": {"eta": "300 kPa s"},
 }
 OTHER: dict[str, Any] = {
     "p1": 0.06,
@@ -45,21 +46,23 @@ OTHER: dict[str, Any] = {
     "force": "1, 6.25, 1 kPa",
     "stretch": 1.2,
     "coefficient": "7 MPa s/mm^2",
+    "eta": "7 MPa s",
     "course": [{"frame": 0, "amount": 0.2}],
     "on": "bottom",
 }  # of other parameters it is 7 MPa
-POSITIVE = ["mu", "bulk", "stress", "c3", "c5", "tension", "k1", "c", "density", "coefficient"]
+POSITIVE = ["mu", "bulk", "stress", "c3", "c5", "tension", "k1", "c", "density", "coefficient", "eta"]
 KINDS = {
     "MPa": "pressure",
     "rad": "an angle",
     "tonne/mm^3": "a density",
     "mm/s^2": "acceleration",
     "MPa*s/mm^2": "a damping",
+    "MPa*s": "a viscosity",
 }
 # What acts by an expression at a point of the body; an interaction does not.
 EXPRESSED = [name for name in PARAMETERS if not issubclass(effects.find(name), Interaction)]
 ENERGIES = [name for name in PARAMETERS if issubclass(effects.find(name), Energy)]
-ELASTIC = [name for name in ENERGIES if name not in ("gravity", "damping")]
+ELASTIC = [name for name in ENERGIES if name not in ("gravity", "damping", "viscosity")]
 COURSED = [name for name in PARAMETERS if issubclass(effects.find(name), Coursed)]
 SLACK = ["fibre_passive", "fibre_passive_febio", "holzapfel_ogden"]
 
@@ -67,10 +70,11 @@ SLACK = ["fibre_passive", "fibre_passive_febio", "holzapfel_ogden"]
 TURN = Rotation.from_rotvec([0.4, -1.1, 0.7]).as_matrix()
 FIBRE = np.array([2.0, 3.0, 6.0]) / 7
 ALONG = np.array([1.0, 0.0, 0.0])
+BEFORE = ((1.2, 0.1, 0.0), (-0.2, 0.8, 0.3), (0.1, 0.0, 1.1))
 
 
 def state(F: np.ndarray, pressure: float = 0.3, fibre: np.ndarray = FIBRE, amount: float = 1.0) -> State:
-    moved = {"displacement": (0.3, -0.2, 0.5), "before": (0.2, 0.1, 0.5), "rate": 4.0}
+    moved = {"displacement": (0.3, -0.2, 0.5), "before": (0.2, 0.1, 0.5), "F_before": BEFORE, "rate": 4.0}
     return State(F=F, pressure=pressure, fibre=fibre, amount=amount, **moved)
 
 

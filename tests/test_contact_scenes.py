@@ -117,3 +117,44 @@ def test_a_step_through_a_plate_is_cut(fem_lab) -> None:
     assert state.scalars["cut_backs"] > 0
     assert state.forces["plate"][2] < 0
     assert state.points[:, 2].max() == pytest.approx(0.6, abs=0.05)
+
+
+@pytest.mark.parametrize("start", np.linspace(3.0, 33.0, 11))
+def test_no_way_through_a_thin_plate_is_missed(start: float) -> None:
+    # A plate 1 mm thin, ways of 36 mm from 3 to 33 mm before it: at most half a millimetre deep, and out on the other side.
+    pytest.importorskip("dolfinx_solver", reason="FEniCSx is not installed")
+    from fem_reference.solvers.fenicsx.contact import nearest_on_way
+
+    plate = Obstruction("plate", Box((0.0, 0.0, 0.0), (90.0, 90.0, 1.0), 0.0), Slide((0.0, 0.0, 0.0)))
+    starts, ways = np.array([[0.3, 0.2, start], [0.0, 0.0, 40.0]]), np.array([[1.0, 2.0, -36.0]] * 2)
+    through, short = nearest_on_way(plate, starts, ways, 0.1)
+    assert -0.5 <= through < -0.3
+    assert 3.5 <= short < 4.2  # it ends 3.5 mm above the plate, up to nine tenths of the last gap after the last look
+
+
+@pytest.mark.usefixtures("needs_fenicsx")
+def test_what_relaxes_waits_for_the_first_frame(tmp_path) -> None:
+    # The lid would turn before frame 0 if its keyframes began earlier; at rest it is where frame 0 has it.
+    path = tmp_path / "bar" / "case.toml"
+    scene(tmp_path / "bar", -4.6)
+    turning = path.read_text().replace(
+        '{ frame = 0, angle = "0 rad" }', '{ frame = -20, angle = "0.3 rad" }, { frame = 0, angle = "0 rad" }'
+    )
+    path.write_text(turning)
+    case = casefile.read(path)
+    body = as_continuum(problem.build(case, problem.setup(case)))
+    assert body.first == 0
+    assert body.obstructions[1].pose(-10.0) == pytest.approx(np.eye(4))
+    top = np.array([[5.0, 5.0, 40.0]])
+    assert body.prescribed[1].course(top, -10.0) == pytest.approx(np.zeros((1, 3)))
+    assert np.abs(body.prescribed[1].course(top, 5.0)).max() > 0.1
+
+
+def test_a_bone_that_pushes_and_an_attachment_have_names_of_their_own(tmp_path) -> None:
+    path = tmp_path / "bar" / "case.toml"
+    scene(tmp_path / "bar", -5.5)
+    path.write_text(
+        path.read_text().replace('name = "origin"', 'name = "floor"').replace('start = "origin"', 'start = "floor"')
+    )
+    with pytest.raises(InputError, match=r'attachment\[0\]\.name: got "floor", which a bone that pushes has too'):
+        casefile.read(path)

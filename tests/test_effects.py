@@ -182,7 +182,7 @@ def test_expressions_take_symbols(name: str) -> None:
     symbolic = effect.model_copy(update={key: symbols(value) for key, value, _ in effect.parameters if key != "course"})
     for F in deformations():
         at = replace(state(F, amount=0.5), F=F.tolist(), fibre=FIBRE.tolist())
-        keys = ("F", "displacement", "pressure", "fibre", "amount", "before", "rate")
+        keys = ("F", "displacement", "pressure", "fibre", "amount", "before", "F_before", "rate")
         parts = {key: symbols(getattr(at, key)) for key in keys}
         found = outcome(symbolic, State(**parts, functions=SymbolFunctions()))
         got = np.vectorize(lambda entry: float(plain(entry)))(np.array(found, object))

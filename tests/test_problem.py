@@ -200,10 +200,15 @@ bulk = "1 MPa"
 name = "contact"
 stiffness = "1 MPa/mm"
 
+[[effect]]
+name = "damping"
+coefficient = "1 Pa s/mm^2"
+
 [frames]
 first = 0
 last = 100
 every = 50
+interval = "1 s"
 
 [reference]
 solver = "fenicsx"

@@ -15,6 +15,8 @@ from fem_reference.report import gallery
 from fem_reference.runs import Frame, Outcome
 from fem_reference.scene import Scene
 from fem_reference.solvers import fenicsx
+from fem_reference.solvers.fenicsx import Settings
+from fem_reference.stepping import Attempt, march
 
 CONTACT = '\n[[effect]]\nname = "contact"\nstiffness = "100 kPa/mm"\nsmoothing = "0.2 mm"\n'
 LOAD_STEP = 1e-5
@@ -172,29 +174,41 @@ def test_it_is_of_the_reference_of_a_muscle(case, capsys, words) -> None:
     assert "--error-bar: got a scalar case or another solver, want the reference of a muscle" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("every", "between"), [(10, 5), (5, 1), (9, 3), (1, 1)])
-def test_load_steps_are_at_most_half_as_long(case, every, between) -> None:
+@pytest.mark.parametrize(("every", "largest"), [(10, None), (9, 4.0), (1, None)])
+def test_load_steps_are_at_most_half_as_long(case, every, largest) -> None:
     scene = scene_of(case)
     frames = scene.frames.model_copy(update={"last": 90, "every": every})
-    (steps,) = refinement.variations(scene.model_copy(update={"frames": frames}), 5.0)
-    assert steps.changes["frames"].every == between
-    assert set(frames.numbers) <= set(steps.changes["frames"].numbers)
-    assert steps.changes["reference"].settings["first_step"] == 2.5
+    settings = Settings(first_step=5.0, largest_step=largest)
+    (steps,) = refinement.variations(scene.model_copy(update={"frames": frames}), settings)
+    changed = steps.changes["reference"].settings
+    taken = [0.0]
+    list(
+        march(
+            lambda at: taken.append(at) or Attempt(None, 2),
+            frames.numbers,
+            changed["first_step"],
+            0.1,
+            changed["largest_step"],
+        )
+    )
+    assert max(np.diff(taken)) <= min(every, largest or every) / 2
+    assert set(frames.numbers) <= set(taken)
 
 
 def test_what_takes_no_load_steps_has_none_varied(case) -> None:
-    assert refinement.variations(scene_of(case), None) == ()
+    assert refinement.variations(scene_of(case), object()) == ()
 
 
 def test_contact_is_varied_cause_by_cause(case) -> None:
     scene = scene_of(case, CONTACT)
-    varied = {entry.name: entry.changes for entry in refinement.variations(scene, 5.0)}
+    varied = {entry.name: entry.changes for entry in refinement.variations(scene, Settings(first_step=5.0))}
     assert list(varied) == ["load steps", "contact stiffness", "contact smoothing", "distances to bones"]
     assert [effect.stiffness for effect in varied["contact stiffness"]["effect"][2:]] == [pytest.approx(0.2)]
     assert [effect.smoothing for effect in varied["contact smoothing"]["effect"][2:]] == [pytest.approx(0.1)]
     assert varied["contact stiffness"]["effect"][:2] == scene.effects[:2]
     assert [bone.distance_error for bone in varied["distances to bones"]["bone"]] == [0.025, 0.025]
     assert [bone.distance_rounding for bone in varied["distances to bones"]["bone"]] == [0.5, 0.5]
-    # Each is another scene, which has another key: no run is mistaken for another.
+    # Each is another scene with another key, or has other settings: no run is mistaken for another.
     keys = {scene.model_copy(update=changes).key for changes in varied.values()}
-    assert len(keys | {scene.key}) == 5
+    assert len(keys | {scene.key}) == 4
+    assert varied["load steps"]["reference"] != scene.reference

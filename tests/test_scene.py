@@ -209,7 +209,11 @@ def test_attachments_may_be_none(bar: Path) -> None:
         casefile.read(written(bar, text))
     traced = text[text.index("[fibres.traced]") : text.index("[frames]")]
     lines = 'fibres.polylines = { file = "fibres.vtk", unit = "mm" }\n'
-    assert casefile.read(written(bar, lines + text.replace(traced, ""))).attachment == ()
+    text = lines + text.replace(traced, "")
+    with pytest.raises(InputError, match=r"case.toml: attachment: got none, want an attachment, .* or the effect"):
+        casefile.read(written(bar, text))
+    slow = '[[effect]]\nname = "damping"\ncoefficient = "1 Pa s/mm^2"\n\n[frames]'
+    assert casefile.read(written(bar, text.replace("[frames]", slow))).attachment == ()
 
 
 def written(folder: Path, text: str) -> Path:

@@ -133,6 +133,7 @@ def test_types_say_their_unit() -> None:
         "PressureVector": "MPa",
         "AreaStiffness": "MPa/mm",
         "VolumeDamping": "MPa*s/mm^2",
+        "Viscosity": "MPa*s",
         "Density": "tonne/mm^3",
         "AccelerationVector": "mm/s^2",
         "Time": "s",

@@ -68,7 +68,8 @@ class State:
     ``F``: the deformation gradient, ``F[i][k] = dx_i / dX_k``; ``displacement``: (3,) [mm]; ``pressure``: the mixed pressure
     unknown [MPa], None where no effect brings it; ``fibre``: the unit vector (3,) along the fibres at rest, None where there is
     none; ``amount``: how much of the effect acts (see :meth:`Effect.amount`); ``before``: the displacement (3,) [mm] that the load
-    step starts from, and ``rate`` [1/s] one over the time that it takes, 0 where no time passes.
+    step starts from, ``F_before`` its deformation gradient, and ``rate`` [1/s] one over the time that it takes, 0 where no time
+    passes.
     """
 
     F: Sequence[Sequence[Any]]
@@ -77,6 +78,7 @@ class State:
     fibre: Any = None
     amount: Any = 1.0
     before: Sequence[Any] = (0.0, 0.0, 0.0)
+    F_before: Sequence[Sequence[Any]] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     rate: Any = 0.0
     functions: Functions = field(default_factory=Numpy)
 
@@ -218,11 +220,12 @@ class Prestrain(Effect):
 
 def total_energy(acting: Sequence[tuple[Effect, Any]], state: State) -> Any:
     """The sum of the energies per rest volume [MPa] of ``acting``, (effect, amount) each, at ``state``, whose F is the whole
-    deformation gradient.
+    deformation gradient. A prestrain changes F before the step as it does F now: its own course moves nothing.
     """
     for effect, amount in acting:
         if isinstance(effect, Prestrain):
-            state = replace(state, F=effect.elastic(replace(state, amount=amount)))
+            now, before = (effect.elastic(replace(state, F=F, amount=amount)) for F in (state.F, state.F_before))
+            state = replace(state, F=now, F_before=before)
     energies = [(effect, amount) for effect, amount in acting if isinstance(effect, Energy)]
     return sum(effect.energy(replace(state, amount=amount)) for effect, amount in energies)
 

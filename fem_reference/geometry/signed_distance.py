@@ -142,7 +142,10 @@ def cached(surface: Surface, error: float, margin: float, rounding: float, folde
         grid = resolve(surface, error, margin)
         if rounding > 0:
             grid = build(surface, grid.spacing, margin, rounding)
-        _write(path, grid)
+        try:
+            _write(path, grid)
+        except OSError as error:
+            logger.warning("%s: not kept: %s", path, error)
     return grid
 
 

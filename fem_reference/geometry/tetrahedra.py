@@ -137,6 +137,10 @@ def _coarsened(surface: Surface, size: float, shares: Mapping[str, Floats]) -> t
             if rims:
                 coarse, labels = with_rims(coarse, surface, rims, size)
             if len(self_intersections(coarse)) == 0:
+                if shares and not rims:
+                    log.warning(
+                        "%s: without the rims of attachments, which would pass through the surface", surface.place
+                    )
                 return _near(coarse, surface, size), labels
     return _near(coarse, surface, size), labels
 

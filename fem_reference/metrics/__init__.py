@@ -6,6 +6,7 @@ metric, penetration, is of the run alone: against itself too it is what it is.
 
 import importlib
 import pkgutil
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,9 +82,11 @@ def of_itself(name: str) -> bool:
     return getattr(importlib.import_module(f"{__name__}.{name}"), "OF_ITSELF", False)
 
 
-def measure(run: Run, reference: Run, yardstick: Yardstick) -> tuple[Measure, ...]:
-    """Every statistic of every metric of ``run`` against ``reference``, frame by frame; both must have the same frames."""
-    modules = (importlib.import_module(f"{__name__}.{name}") for name in names())
+def measure(run: Run, reference: Run, yardstick: Yardstick, wanted: Iterable[str] | None = None) -> tuple[Measure, ...]:
+    """Every statistic of every metric (or of those ``wanted``) of ``run`` against ``reference``, frame by frame; both must have
+    the same frames.
+    """
+    modules = (importlib.import_module(f"{__name__}.{name}") for name in (names() if wanted is None else wanted))
     return tuple(statistic for module in modules for statistic in module.measure(run, reference, yardstick))
 
 

@@ -64,14 +64,21 @@ def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
     with tempfile.TemporaryDirectory(prefix="fem_reference-") as folder:
         job = Path(folder) / "job.pickle"
         job.write_bytes(pickle.dumps(Job(body, settings, _samples(problem))))
-        outcome = _run(_command(settings, job), settings, lambda frame: _pass_on(problem, frame, sink))
+        passed: list[int] = []
+        outcome = _run(_command(settings, job), settings, lambda frame: _pass_on(problem, frame, sink, passed))
+    if outcome.status != "converged" and body.frames[0] < body.first and not passed:
+        begin = (
+            "while what overlaps bones at rest was relaxed, before the first frame (which is shown as it was given): "
+        )
+        outcome = replace(outcome, message=begin + outcome.message)
     key = " (muscle.tet_size)" if outcome.message.endswith("smaller cells") else ""  # which a scene calls them
     return replace(outcome, message=outcome.message + key, cost={"seconds_mesh": problem.seconds} | outcome.cost)
 
 
-def _pass_on(problem: Problem, frame: Frame, sink: Sink) -> None:
-    """A frame that is wanted; what relaxes before the first is not."""
+def _pass_on(problem: Problem, frame: Frame, sink: Sink, passed: list[int]) -> None:
+    """A frame that is wanted, its number noted in ``passed``; what relaxes before the first is not."""
     if frame.number in problem.frames:
+        passed.append(int(frame.number))
         sink(_with_held(problem, replace(frame, number=int(frame.number))))
 
 

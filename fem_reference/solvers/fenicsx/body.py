@@ -150,12 +150,13 @@ class Body:
         }
 
     def negative_modes(self) -> float | None:
-        """In how many directions the energy falls, with damping those in which it does so by more than a factor e over all frames;
-        None where the tangent is not symmetric.
+        """In how many directions the energy falls, with drag or viscosity those in which it does so by more than a factor e over
+        all frames, were it held still from now on: the viscous stress of this step is left out. None where the tangent is not
+        symmetric.
         """
         if self.stability is None:
             return None
-        with self.clock.slow():
+        with self.clock.slow(np.array(self.unknowns.x.array)):
             return self.stability.negative_modes()
 
     def integral(self, form: Any) -> float:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+import numpy as np
 from dolfinx import fem
 
 from fem_reference.continuum import Continuum
@@ -27,13 +28,15 @@ class Clock:
         self.at = frame
 
     @contextmanager
-    def slow(self) -> Iterator[None]:
-        """Meanwhile a step would take as long as all frames."""
-        now = float(self.rate.value)
-        if self.before is not None:
-            self.rate.value = self._rate(self.whole)
+    def slow(self, unknowns: Floats) -> Iterator[None]:
+        """Meanwhile a step would start from ``unknowns`` and take as long as all frames."""
+        if self.before is None:
+            yield
+            return
+        now, passed = float(self.rate.value), np.array(self.before.x.array)
+        self.before.x.array[:], self.rate.value = unknowns, self._rate(self.whole)
         yield
-        self.rate.value = now
+        self.before.x.array[:], self.rate.value = passed, now
 
     def _rate(self, frames: float) -> float:
         assert self.interval is not None  # checked where an effect needs it

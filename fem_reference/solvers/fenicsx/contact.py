@@ -11,12 +11,10 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from fem_reference.contact import Contact, Obstruction
+from fem_reference.geometry.signed_distance import FAR
 from fem_reference.mesh import Floats
 from fem_reference.motion import apply
 from fem_reference.solvers.fenicsx.pushed_points import PushedPoints
-
-# A point is looked for at so many places of its way through an obstruction's frame between two states.
-_WAYPOINTS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +144,10 @@ class Pushes:
             for entry, one in zip(self.obstructions, self.now, strict=True)
             if len(points)
         ]
-        depth, name, (x, y, z) = max(one for rank in comm.allgather(mine) for one in rank)
+        found = [one for rank in comm.allgather(mine) for one in rank]
+        if not found:
+            return "nowhere"
+        depth, name, (x, y, z) = max(found)
         return f'{max(depth, 0.0):.2f} mm in "{name}" at ({x:.1f}, {y:.1f}, {z:.1f}) mm'
 
     def settle(self) -> None:
@@ -174,9 +175,7 @@ class Pushes:
             for one, sign in ((before, -1), (now, 1))
         ]
         turned = np.flatnonzero(np.einsum("ni,ni->n", *outward) < 0)
-        shares = np.linspace(0, 1, _WAYPOINTS + 2)[1:-1, None, None]
-        points = before.local[turned] + shares * ways[turned]
-        on_way = entry.shape.sample(points.reshape(-1, 3)).distance.reshape(_WAYPOINTS, -1).min(axis=0, initial=np.inf)
+        on_way = nearest_on_way(entry, before.local[turned], ways[turned], self.law.smoothing)
         excess = np.minimum(np.minimum(before.gap, now.gap)[turned], 0) - on_way
         if not excess.max(initial=0.0) > self.law.smoothing:
             return None
@@ -185,6 +184,24 @@ class Pushes:
         return float(
             excess[worst]
         ), f'the point that rests at ({x:.1f}, {y:.1f}, {z:.1f}) mm went through "{entry.name}"'
+
+
+def nearest_on_way(obstruction: Obstruction, starts: Floats, ways: Floats, least: float) -> Floats:
+    """The smallest gap (n,) [mm] on straight ``ways`` (n, 3) from ``starts`` (n, 3): each is walked in strides as long as the gap
+    allows without missing anything, at least ``least`` [mm].
+    """
+    smallest = np.full(len(starts), np.inf)
+    lengths = np.linalg.norm(ways, axis=1)
+    walked = np.zeros(len(starts))
+    going = np.arange(len(starts))
+    while len(going):
+        shares = walked[going] / np.maximum(lengths[going], least)
+        gaps = obstruction.shape.sample(starts[going] + shares[:, None] * ways[going]).distance
+        smallest[going] = np.minimum(smallest[going], gaps)
+        # The gradient of a sampled distance is a unit vector but for a tenth; beyond its grid strides are short.
+        walked[going] += np.where(gaps < FAR, np.maximum(0.9 * np.abs(gaps), least), 1.0)
+        going = going[walked[going] < lengths[going]]
+    return smallest
 
 
 class Watched:

@@ -101,17 +101,23 @@ def _measures(msh: mesh.Mesh, regions: dict[str, Ints], rule: Rule, degree: int)
 
 def _state(unknowns: fem.Function, fibre: list[Any] | None, before: fem.Function | None, rate: fem.Constant) -> State:
     displacement, *others = ufl.split(unknowns)
-    passed = (0.0, 0.0, 0.0) if before is None else [ufl.split(before)[0][i] for i in range(3)]
-    F = ufl.Identity(3) + ufl.grad(displacement)
+    passed = ufl.as_vector((0.0, 0.0, 0.0)) if before is None else ufl.split(before)[0]
     return State(
-        F=[[F[i, k] for k in range(3)] for i in range(3)],
+        F=_gradient(displacement),
         displacement=[displacement[i] for i in range(3)],
         pressure=others[0] if others else None,
         fibre=fibre,
-        before=passed,
+        before=[passed[i] for i in range(3)],
+        F_before=_gradient(displacement if before is None else passed),
         rate=rate,
         functions=UflFunctions(),
     )
+
+
+def _gradient(displacement: Any) -> list[list[Any]]:
+    """The deformation gradient (3, 3)."""
+    F = ufl.Identity(3) + ufl.grad(displacement)
+    return [[F[i, k] for k in range(3)] for i in range(3)]
 
 
 def _symbolic(effect: Effect, msh: mesh.Mesh) -> Effect:

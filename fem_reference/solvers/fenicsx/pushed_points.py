@@ -1,6 +1,6 @@
 """The material points that rigid bodies push on: where they are in the cells, and how displacement reaches them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import basix
@@ -30,7 +30,7 @@ class PushedPoints:
 
     def take(self, chosen: Ints) -> "PushedPoints":
         """Some of the points."""
-        return PushedPoints(*(getattr(self, name)[chosen] for name in ("rest", "areas", "cells", "basis", "dofs")))
+        return PushedPoints(*(getattr(self, entry.name)[chosen] for entry in fields(self)))
 
 
 def on_facets(space: fem.FunctionSpace, parents: Ints, mesh: Cells, facets: Ints, degree: int) -> PushedPoints:
@@ -53,7 +53,8 @@ def on_facets(space: fem.FunctionSpace, parents: Ints, mesh: Cells, facets: Ints
         areas = np.linalg.norm(across, axis=2) * weights
         repeated = np.repeat(cells, len(points))
         parts.append(_points(space, parents, repeated, np.tile(within, (len(cells), 1)), places, areas))
-    return PushedPoints(*(np.concatenate([getattr(part, name) for part in parts]) for name in _FIELDS))
+    columns = ([getattr(part, entry.name) for part in parts] for entry in fields(PushedPoints))
+    return PushedPoints(*(np.concatenate(column) for column in columns))
 
 
 def on_skin(space: fem.FunctionSpace, parents: Ints, skin: Skin, local: dict[int, int]) -> PushedPoints:
@@ -66,9 +67,6 @@ def on_skin(space: fem.FunctionSpace, parents: Ints, skin: Skin, local: dict[int
     points = skin.points[mine]
     within = np.linalg.solve(edges, (points - corners[:, 0])[:, :, None])[:, :, 0]
     return _points(space, parents, cells, within, points, skin.areas[mine])
-
-
-_FIELDS = ("rest", "areas", "cells", "basis", "dofs")
 
 
 def _points(

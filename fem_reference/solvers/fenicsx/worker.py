@@ -54,8 +54,7 @@ class Worker:
                 self.report(status=reached.status, message=self.sentence(reached), cost=self.cost())
                 return
             self.report_frame(reached)
-        law = self.job.body.contact
-        wanted = len(frames) - (law is not None and law.relaxed is not None)  # what relaxes before the first is none
+        wanted = sum(frame >= self.job.body.first for frame in frames)
         self.report(status="converged", message=f"all {wanted} frames reached{self.instability()}", cost=self.cost())
 
     def attempt(self, frame: float) -> Attempt:
@@ -87,7 +86,7 @@ class Worker:
         """Why a frame could not be reached, where, and what to try."""
         return (
             f"{reached.sentence} beyond frame {reached.at:.2f} with steps down to {self.settings.smallest_step}; "
-            f"in the last good state det F is smallest, {self.body.determinants.smallest()}"
+            f"in the last good state det F is smallest, {self.body.determinants.smallest()}{self.deepest()}"
             f"{self.instability().replace('of them', 'of the frames reached')}; "
             "try a smaller motion or smaller cells"
         )
@@ -107,7 +106,7 @@ class Worker:
         counts = {"newton_iterations": float(reached.iterations), "cut_backs": float(reached.cutbacks)}
         path = self.folder / f"frame_{reached.frame}.npz"
         scalars = self.body.scalars() | counts | self.negative_modes()
-        if scalars.get("negative_modes", 0) > 0:
+        if scalars.get("negative_modes", 0) > 0 and reached.frame >= self.job.body.first:
             self.unstable[reached.frame] = scalars["negative_modes"]
         if self.body.comm.rank == 0:
             np.savez(path, allow_pickle=False, **arrays)

@@ -1,0 +1,37 @@
+"""Viscosity of the matrix, in parallel with its elastic law (Kelvin and Voigt): short waves of an unstable state grow no faster
+than long ones.
+"""
+
+from typing import Any, ClassVar
+
+from fem_reference.effects import Energy, State
+from fem_reference.units import Viscosity as Coefficient
+
+
+class Viscosity(Energy):
+    """A Cauchy stress of ``2 eta D``, D the rate of deformation with its share of volume, of which incompressible matter has none.
+
+    Over a load step D is ``rate e`` (implicit Euler), ``e = (f^T f - 1)/2`` the Green strain of ``f = F F_before^-1``, and the
+    stress the slope of ``eta rate |e|^2`` per volume before the step: a potential of the step, which no matter stores and turning
+    does not change. It is that law to first order in the step.
+
+    ``eta``: [MPa s].
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("interval",)
+    stored: ClassVar[bool] = False
+
+    eta: Coefficient
+
+    def energy(self, state: State) -> Any:
+        """The potential of the step per rest volume [MPa]."""
+        before = State(F=state.F_before)
+        axes, grown = before.cofactors, _difference(state.C, before.C)
+        half = [[sum(axes[i][k] * grown[k][m] for k in range(3)) for m in range(3)] for i in range(3)]
+        strain = [[sum(half[i][m] * axes[j][m] for m in range(3)) for j in range(3)] for i in range(3)]
+        square = sum(entry**2 for row in strain for entry in row)  # of 2 J_before^2 e
+        return self.eta / 4 * state.rate * square / before.J**3
+
+
+def _difference(now: Any, before: Any) -> list[list[Any]]:
+    return [[now[i][k] - before[i][k] for k in range(3)] for i in range(3)]
