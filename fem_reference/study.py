@@ -28,9 +28,9 @@ FILE = "error_bar.json"
 FORMAT = 1
 # Of a grid convergence index over three meshes (Roache 1998, Verification and Validation in Computational Science, ch. 5).
 SAFETY = 1.25
-# At the rim of what a bone holds, where a held and a free surface meet, displacement goes with the root of the distance (Grisvard 1985,
-# Elliptic Problems in Nonsmooth Domains): an error of first order, whatever the degree. A higher observed order is no ground for a
-# smaller bar; below the lowest one none is seen.
+# At the rim of what a bone holds, where a held and a free surface meet, displacement goes with the root of the distance (Grisvard
+# 1985, Elliptic Problems in Nonsmooth Domains): an error of first order, whatever the degree. A higher observed order is no ground
+# for a smaller bar; below the lowest one none is seen.
 LOWEST_ORDER, HIGHEST_ORDER = 0.5, 1.0
 # What is left of an error of first order, when halving its cause changes the result by 1.
 VARIATION = 2.0

@@ -36,9 +36,9 @@ def measure(run: Run, _reference: Run, yardstick: Yardstick) -> tuple[Measure, .
     bones, without what is nearest to a triangle with a vertex that is not free; 0 where nothing is inside.
 
     Depth is as exact as the field of the bone (``Grid.mean_error``, rounding counted); only vertices are asked. Volume is counted
-    at random points, see ``shared_volume``: on the muscles of a hip 12 counts from 5 to 24 000 mm3 came within 1 % of a count with fifty
-    times the points, smaller ones within 6 %. NaN in a frame whose surface encloses no finite volume, and in all where a bone is
-    not closed: it has no inside.
+    at random points, see ``shared_volume``: on the muscles of a hip 12 counts from 5 to 24 000 mm3 came within 1 % of a count with
+    fifty times the points, smaller ones within 6 %. NaN in a frame whose surface encloses no finite volume, and in all where a
+    bone is not closed: it has no inside.
     """
     return _measured(run, yardstick)
 
