@@ -66,7 +66,9 @@ def _change(table: dict[str, Any], key: str, value: Any, place: str) -> None:
         inside[last]  # a change replaces what is there
         inside[last] = value
     except (KeyError, IndexError, TypeError) as error:
-        raise InputError(join(place, key), "nothing", "a key of this scene") from error
+        raise InputError(
+            join(place, key), "nothing", "a key that this scene has; an optional one must stand in its file"
+        ) from error
 
 
 def setting(text: str) -> tuple[str, Any]:

@@ -190,7 +190,7 @@ class Reached:
     ``forces`` (3,) [N] that hold it there, along the prescribed components, and their ``moments`` (3,) [N mm] about the origin (at
     nodes of two regions that prescribe the same component, the force counts in both), and what obstructions exert; ``scalars``:
     min_det_F_quadrature, min_det_F_vertices, volume_ratio, energy [N mm] of what acts inside, newton_iterations, cut_backs; with
-    contact the deepest penetration [mm], the greatest contact_pressure [MPa] and the contact_area at rest [mm2].
+    contact the greatest contact_depth [mm] and contact_pressure [MPa] and the contact_area at rest [mm2].
     """
 
     frame: float

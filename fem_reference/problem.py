@@ -22,7 +22,7 @@ from fem_reference.geometry.fibres import directions, nearest_directions, trace
 from fem_reference.geometry.intersections import self_intersections
 from fem_reference.geometry.rigid_bodies import Obstacle, solid
 from fem_reference.geometry.sectors import held_area, held_shares
-from fem_reference.geometry.signed_distance import Grid, cached
+from fem_reference.geometry.signed_distance import Grid, cached, signed_distances
 from fem_reference.geometry.skins import Skin, skin_of
 from fem_reference.geometry.tessellation import tessellated
 from fem_reference.geometry.tetrahedra import tetrahedralise
@@ -151,6 +151,8 @@ def build(scene: Scene, rest: Setup) -> Problem:
     begin = time.perf_counter()
     contact = next((effect for effect in scene.effects if isinstance(effect, ContactEffect)), None)
     distances_known = {} if contact is None else _distance_facts(rest)
+    if contact is not None:
+        _check_outside(scene, rest, contact)
     mesh = _filled(scene, rest)
     for i, held in enumerate(rest.held):
         if len(mesh.facets[held.attachment]) == 0:
@@ -171,6 +173,15 @@ def build(scene: Scene, rest: Setup) -> Problem:
         directions=_directions(scene, mesh, fibres),
         skin=_skin(scene, rest, mesh),
     )
+
+
+def _check_outside(scene: Scene, rest: Setup, contact: ContactEffect) -> None:
+    """InputError where a bone that pushes is wholly inside the muscle: there is no way out of it."""
+    for i, bone in enumerate(rest.bones):
+        if contact.bones is not None and bone.name not in contact.bones:
+            continue
+        if signed_distances(bone.surface.points, rest.surface).max() < 0:
+            raise InputError(join(scene.place, f"bone[{i}]"), "a bone wholly inside the muscle", "one that is not")
 
 
 def _distance_facts(rest: Setup) -> dict[str, float | str]:

@@ -50,8 +50,8 @@ def test_a_bone_pushes_the_muscle_aside(tmp_path) -> None:
     assert deep[-1] > 0.5
     last = pushed[-1].scalars
     # At a pressure p the surface gets p / stiffness deep where it is asked; vertices lie between such points, half a tet apart.
-    assert 0 < last["penetration"] <= last["contact_pressure"] / 1.0 + 1e-9
-    assert shallow[-1] < last["penetration"] + 0.05
+    assert 0 < last["contact_depth"] <= last["contact_pressure"] / 1.0 + 1e-9
+    assert shallow[-1] < last["contact_depth"] + 0.05
     assert last["force_ball"] > 0
     assert pushed[0].scalars["contact_area"] == 0
     assert "overlap_at_rest" not in last
@@ -76,8 +76,8 @@ def test_what_overlaps_at_rest_is_relaxed_first_and_told(tmp_path) -> None:
     assert [frame.number for frame in frames] == [0, 5, 10]
     first = frames[0].scalars
     assert first["overlap_at_rest"] == pytest.approx(0.46, abs=0.05)  # points are half a tet, 3 mm, apart
-    assert first["penetration"] < 0.1
-    assert depths[0] < first["penetration"] + 0.05
+    assert first["contact_depth"] < 0.1
+    assert depths[0] < first["contact_depth"] + 0.05
 
 
 def test_bones_push_only_what_they_do_not_hold(tmp_path) -> None:
@@ -158,3 +158,9 @@ def test_a_bone_that_pushes_and_an_attachment_have_names_of_their_own(tmp_path) 
     )
     with pytest.raises(InputError, match=r'attachment\[0\]\.name: got "floor", which a bone that pushes has too'):
         casefile.read(path)
+
+
+def test_a_bone_that_the_muscle_swallows_is_refused(tmp_path) -> None:
+    case = scene(tmp_path / "bar", 5.0)
+    with pytest.raises(InputError, match=r"case.toml: bone\[2\]: got a bone wholly inside the muscle"):
+        problem.build(case, problem.setup(case))

@@ -35,9 +35,11 @@ def test_forces_and_moments_balance(fem_lab) -> None:
     # Without friction a ball pushes towards its centre: no moment about it.
     centre = np.array([0.3, 0.5, 1.35])
     assert state.moments["ball"] - np.cross(centre, state.forces["ball"]) == pytest.approx([0, 0, 0], abs=1e-12)
-    assert 0 < state.scalars["penetration"] < 0.1
+    assert 0 < state.scalars["contact_depth"] < 0.1
     assert 0 < state.scalars["contact_area"] < 1
-    assert state.scalars["contact_pressure"] == pytest.approx(state.scalars["penetration"], rel=1e-9)  # 1 MPa/mm, deep
+    assert state.scalars["contact_pressure"] == pytest.approx(
+        state.scalars["contact_depth"], rel=1e-9
+    )  # 1 MPa/mm, deep
 
 
 def test_a_body_is_felt_where_its_pose_has_it(fem_lab) -> None:
@@ -54,7 +56,7 @@ def test_a_body_is_felt_where_its_pose_has_it(fem_lab) -> None:
 def test_what_is_far_away_does_nothing(fem_lab) -> None:
     state = solved(fem_lab, Obstruction("moon", Sphere((0.0, 0.0, 9.0), 1.0), Slide((0.0, 0.0, -1.0))))
     assert not state.forces["moon"].any()
-    assert [state.scalars[name] for name in ("penetration", "contact_pressure", "contact_area")] == [0, 0, 0]
+    assert [state.scalars[name] for name in ("contact_depth", "contact_pressure", "contact_area")] == [0, 0, 0]
 
 
 def test_the_second_opinion_knows_no_contact() -> None:

@@ -179,7 +179,10 @@ def spoken(capsys, *arguments: str) -> tuple[int, str, str]:
         (["run", "rod", "--solver", "pbd"], 'got "pbd", which does not solve scalar fields'),
         (["run", "hip_flexion", "--solver", "listing"], 'got "listing", which does not solve muscles'),
         (["run", "rod", "--set", "peclet"], '--set: got "peclet", want KEY=VALUE'),
-        (["run", "rod", "--set", "candidate[1].speed=2"], "candidate[1].speed: got nothing, want a key of this scene"),
+        (
+            ["run", "rod", "--set", "candidate[1].speed=2"],
+            "candidate[1].speed: got nothing, want a key that this scene has",
+        ),
         (["run", "rod", "--set", "expect[0].measure=beauty"], 'expect[0].measure: got "beauty", want one of'),
         (["run", "rod", "--set", "expect[0].of=nobody"], 'expect[0].of: got "nobody", want one of reference'),
         (["run", "rod", "--set", "effect[0].name=neo_hooke"], 'got "neo_hooke", want one of advection, diffusion'),

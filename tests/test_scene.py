@@ -487,7 +487,7 @@ def test_changes_replace_values(bar: Path) -> None:
 
 @pytest.mark.parametrize("key", ["", "frames.final", "effect[7].mu", "effect.mu", "frames.last.more", "title[0]"])
 def test_change_of_a_key_that_is_not_there(bar: Path, key: str) -> None:
-    with pytest.raises(InputError, match="got nothing, want a key of this scene"):
+    with pytest.raises(InputError, match="got nothing, want a key that this scene has"):
         casefile.read(bar, changes={key: 1})
 
 

@@ -9,8 +9,8 @@ from fem_reference.units import AreaStiffness, PositiveLength
 class Contact(Interaction):
     """A pressure of the gap to each bone; see ``fem_reference.contact.Contact`` for the law.
 
-    ``stiffness`` [MPa/mm]: where the bone presses with p, the surface gets p / stiffness deep. ``smoothing`` [mm]: from this
-    distance on a bone is felt. ``bones``: their names, by default all.
+    ``stiffness`` [MPa/mm]: where the bone presses with p, the surface gets at most p / stiffness deep. ``smoothing`` [mm]: from
+    this distance on a bone is felt. ``bones``: their names, by default all.
     """
 
     stiffness: AreaStiffness

@@ -1,6 +1,5 @@
 """Rims of attachments as edges of a coarse surface: where a bone's hold ends, so do the triangles that it holds."""
 
-import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -15,8 +14,6 @@ from fem_reference.geometry.distance import distances
 from fem_reference.geometry.parts import Parts, between, relaxed, widened
 from fem_reference.geometry.sectors import held_area, sectors, shares_at
 from fem_reference.mesh import Floats, Ints, Surface, enclosed_volume, triangle_areas
-
-log = logging.getLogger(__name__)
 
 Bools = NDArray[np.bool_]
 
@@ -46,12 +43,11 @@ def with_rims(coarse: Surface, fine: Surface, shares: Mapping[str, Floats], size
     parts = Parts(
         coarse.points, coarse.triangles, np.zeros(len(coarse.triangles), np.int64), np.zeros(len(coarse.points), bool)
     )
-    for label, (name, held) in enumerate(shares.items(), start=1):
+    for label, held in enumerate(shares.values(), start=1):
         area = held_area(fine, held)
         smooth = _smoothed(fine, held, _SMOOTHED * size)
         parts = _seeded(parts, fine, smooth, _ISLAND * size**2)
         parts = _best(parts, fine, smooth, label, area)
-        log.info("%s: %s held on %.1f of %.1f mm2", fine.place, name, parts.area(label), area)
     parts = relaxed(parts, fine, size)
     areas = [held_area(fine, held) for held in shares.values()]
     points = widened(parts, areas, enclosed_volume(fine.points, fine.triangles), _WIDENED * size)

@@ -49,7 +49,7 @@ def plate(lab: Lab, element: str, stiffness: float) -> Finding:
     above = Obstruction("plate", HalfSpace((0.0, 0.0, 1.0), (0.0, 0.0, -1.0)), Slide((0.0, 0.0, -PLATE_WAY)))
     body = Continuum(mesh, neo_hooke(MU, PLATE_BULK), SYMMETRY, (0.0, 1.0), contact=law, obstructions=(above,))
     state = lab.solve(body, element, first_step=0.2, residual=1e-12).last
-    return Finding(float(state.forces["plate"][2]), note=f"{state.scalars['penetration']:.4f} mm deep")
+    return Finding(float(state.forces["plate"][2]), note=f"{state.scalars['contact_depth']:.4f} mm deep")
 
 
 def _plate_truth() -> float:
@@ -88,7 +88,7 @@ def _peak(state: Reached) -> float:
 def _measured(lab: Lab, n: int, value: Any, radius: float = RADIUS) -> Finding:
     state = pressed(lab, n, radius)
     return Finding(
-        value(state), note=f"the ball is {1000 * state.scalars['penetration']:.1f} micrometres deep in the body"
+        value(state), note=f"the ball is {1000 * state.scalars['contact_depth']:.1f} micrometres deep in the body"
     )
 
 

@@ -78,6 +78,8 @@ def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
 def _pass_on(problem: Problem, frame: Frame, sink: Sink, passed: list[int]) -> None:
     """A frame that is wanted, its number noted in ``passed``; what relaxes before the first is not."""
     if frame.number in problem.frames:
+        if not passed and (overlap := frame.scalars.get("overlap_at_rest", 0.0)) > 0:
+            frame = replace(frame, note=f"{frame.note}, {overlap:.2g} mm of overlap with bones at rest pushed out")
         passed.append(int(frame.number))
         sink(_with_held(problem, replace(frame, number=int(frame.number))))
 

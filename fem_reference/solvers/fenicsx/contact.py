@@ -119,7 +119,7 @@ class Pushes:
         }
 
     def scalars(self, comm: MPI.Comm) -> dict[str, float]:
-        """The deepest ``penetration`` [mm] and largest ``contact_pressure`` [MPa] at a point, the rest area that is pushed,
+        """The greatest ``contact_depth`` [mm] and largest ``contact_pressure`` [MPa] at a point, the rest area that is pushed,
         ``contact_area`` [mm2], and how deep the deepest point that is pushed was at rest, ``overlap_at_rest`` [mm].
         """
         pushed = np.zeros(len(self.points.areas), bool)
@@ -130,7 +130,7 @@ class Pushes:
             pressure = max(pressure, float(one.pressure.max(initial=0.0)))
             overlap = max(overlap, float(before.max(initial=0.0)) - self.law.smoothing)
         found = {
-            "penetration": comm.allreduce(depth, MPI.MAX),
+            "contact_depth": comm.allreduce(depth, MPI.MAX),
             "contact_pressure": comm.allreduce(pressure, MPI.MAX),
             "contact_area": comm.allreduce(float(self.points.areas[pushed].sum()), MPI.SUM),
         }
