@@ -21,12 +21,12 @@ FIELDS = {
 
 # The report's muscles and its box, each with tetrahedra coarse enough for a test.
 MUSCLES = {
-    "adductor_brevis": "6 mm",
+    "adductor_brevis": "5 mm",
     "box_squeeze_report": "20 mm",
-    "gluteus_maximus_anatomical": "16 mm",
-    "gluteus_medius": "11 mm",
-    "gluteus_medius_anatomical": "11 mm",
-    "iliacus_anatomical": "7 mm",
+    "gluteus_maximus_anatomical": "14 mm",
+    "gluteus_medius": "9 mm",
+    "gluteus_medius_anatomical": "9 mm",
+    "iliacus_anatomical": "6 mm",
 }
 
 # What the report's program held moves there past each other, by springs as well: the reference ends before the muscle is bent.
@@ -126,8 +126,6 @@ def test_gluteus_maximus_against_the_recorded_output(data, tmp_path) -> None:
             "--json",
             str(target),
             "--quiet",
-            "--set",
-            "muscle.tet_size=12 mm",
         ]
     )
     facts = json.loads(target.read_text())
@@ -163,15 +161,13 @@ def test_muscles_of_the_report(data, name, tmp_path, monkeypatch) -> None:
     assert scene.frames.numbers == (0, 100, 200, 300)
 
 
-@pytest.mark.parametrize("name", ["gluteus_maximus", *MUSCLES])
+# Those held anatomically have the effects, and the spoil, of those held as in the report.
+@pytest.mark.parametrize("name", ["adductor_brevis", "box_squeeze_report", "gluteus_maximus", "gluteus_medius"])
 def test_muscles_of_the_report_spoiled_fail(data, name, tmp_path, monkeypatch) -> None:
     assert data.is_dir()
-    changes = {
-        "frames.last": 100,
-        "frames.every": 100,
-        "expect[1].frame": 100,
-        "muscle.tet_size": MUSCLES.get(name, "16 mm"),
-    }
+    last = 110 if name == "gluteus_maximus" else 100  # where it expects something of a recorded candidate
+    changes = {"frames.last": last, "frames.every": last, "expect[1].frame": last}
+    changes["muscle.tet_size"] = MUSCLES.get(name, "14 mm")
     status, facts = run(casefile.read(name, changes=changes, spoiled=True), tmp_path, monkeypatch)
     assert status == cli.VERDICT_FAIL
     spoiled = "penetration" if name == "adductor_brevis" else "volume"
@@ -183,9 +179,9 @@ def test_muscles_of_the_report_spoiled_fail(data, name, tmp_path, monkeypatch) -
 def test_the_box_spoiled_fails(tmp_path, monkeypatch) -> None:
     status, facts = run(casefile.read("box_squeeze", changes=FEW, spoiled=True), tmp_path, monkeypatch)
     assert status == cli.VERDICT_FAIL
-    deepest = rows(facts, "penetration", "deepest")
-    assert deepest[100] > 0.5  # mm, where 0.1 is allowed
-    assert deepest[300] == 0
+    volume = rows(facts, "volume", "deviation")
+    assert volume[100] == pytest.approx(2 * -0.267, abs=0.02)  # percent; half the bulk modulus
+    assert volume[300] == pytest.approx(0, abs=1e-6)
 
 
 def test_the_unsolved_case_says_where_and_why_and_keeps_what_it_reached(data, tmp_path, monkeypatch) -> None:
