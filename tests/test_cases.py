@@ -171,7 +171,9 @@ def test_muscles_of_the_report_spoiled_fail(data, name, tmp_path, monkeypatch) -
     status, facts = run(casefile.read(name, changes=changes, spoiled=True), tmp_path, monkeypatch)
     assert status == cli.VERDICT_FAIL
     spoiled = "penetration" if name == "adductor_brevis" else "volume"
-    others = {"surface_deviation", "penetration"} - {spoiled}  # not back at rest yet; coarse tets do not bend around bones
+    others = {"surface_deviation", "penetration"} - {
+        spoiled
+    }  # not back at rest yet; coarse tets do not bend around bones
     failed = {verdict["metric"] for verdict in facts["verdicts"] if verdict["verdict"] == "fail"}
     assert failed - others == {spoiled}
 
