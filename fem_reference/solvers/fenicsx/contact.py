@@ -10,8 +10,7 @@ from dolfinx.fem.petsc import NonlinearProblem, assign
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fem_reference.contact import Contact, Obstruction
-from fem_reference.geometry.signed_distance import FAR
+from fem_reference.contact import Contact, Obstruction, nearest_on_way
 from fem_reference.mesh import Floats
 from fem_reference.motion import apply
 from fem_reference.solvers.fenicsx.pushed_points import PushedPoints
@@ -184,24 +183,6 @@ class Pushes:
         return float(
             excess[worst]
         ), f'the point that rests at ({x:.1f}, {y:.1f}, {z:.1f}) mm went through "{entry.name}"'
-
-
-def nearest_on_way(obstruction: Obstruction, starts: Floats, ways: Floats, least: float) -> Floats:
-    """The smallest gap (n,) [mm] on straight ``ways`` (n, 3) from ``starts`` (n, 3): each is walked in strides as long as the gap
-    allows without missing anything, at least ``least`` [mm].
-    """
-    smallest = np.full(len(starts), np.inf)
-    lengths = np.linalg.norm(ways, axis=1)
-    walked = np.zeros(len(starts))
-    going = np.arange(len(starts))
-    while len(going):
-        shares = walked[going] / np.maximum(lengths[going], least)
-        gaps = obstruction.shape.sample(starts[going] + shares[:, None] * ways[going]).distance
-        smallest[going] = np.minimum(smallest[going], gaps)
-        # The gradient of a sampled distance is a unit vector but for a tenth; beyond its grid strides are short.
-        walked[going] += np.where(gaps < FAR, np.maximum(0.9 * np.abs(gaps), least), 1.0)
-        going = going[walked[going] < lengths[going]]
-    return smallest
 
 
 class Watched:
