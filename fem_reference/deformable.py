@@ -11,21 +11,10 @@ from fem_reference.effects import Interaction
 from fem_reference.effects.contact import Contact as ContactEffect
 from fem_reference.mesh import Floats, boundary
 from fem_reference.motion import apply
-from fem_reference.problem import Body, Problem
+from fem_reference.problem import Problem
 
 # Frame numbers before the first one over which what overlaps at rest is pushed out of the bones.
 RELAXING = 10.0
-
-
-@dataclass(frozen=True)
-class Follows:
-    """The displacement of what ``bone`` holds."""
-
-    bone: Body
-
-    def __call__(self, points: Floats, frame: float) -> Floats:
-        """The displacement (n, 3) [mm] of rest points (n, 3) at a frame number."""
-        return apply(self.bone.pose(frame), points) - points
 
 
 @dataclass(frozen=True)
@@ -41,15 +30,14 @@ class From:
 
 
 @dataclass(frozen=True)
-class FromFirst:
-    """A ``course`` of displacement that begins at frame ``first``."""
+class Follows:
+    """The displacement of what a bone holds that has a ``pose`` by frame number."""
 
-    first: float
-    course: Callable[[Floats, float], Floats]
+    pose: Callable[[float], Floats]
 
     def __call__(self, points: Floats, frame: float) -> Floats:
         """The displacement (n, 3) [mm] of rest points (n, 3) at a frame number."""
-        return self.course(points, max(frame, self.first))
+        return apply(self.pose(frame), points) - points
 
 
 def as_continuum(problem: Problem) -> Continuum:
@@ -60,8 +48,11 @@ def as_continuum(problem: Problem) -> Continuum:
     taken = {tuple(facet) for facet in np.sort(held, axis=1).tolist()}
     free = skin[[tuple(facet) not in taken for facet in np.sort(skin, axis=1).tolist()]]
     cells = Cells(mesh.points, mesh.tets, "tetrahedron", 1, {**mesh.facets, "free": free})
+    first = problem.frames[0]
     prescribed = tuple(
-        Prescribed(entry.attachment, entry.attachment, (0, 1, 2), Follows(entry.bone), entry.stiffness)
+        Prescribed(
+            entry.attachment, entry.attachment, (0, 1, 2), Follows(From(first, entry.bone.pose)), entry.stiffness
+        )
         for entry in problem.held
     )
     fibre = None if problem.directions is None else ByCell(problem.directions)
@@ -73,12 +64,11 @@ def as_continuum(problem: Problem) -> Continuum:
 def _among_bones(body: Continuum, problem: Problem, effect: ContactEffect) -> Continuum:
     """The body with the bones that push on it; where they overlap it at rest, it is relaxed before the first frame."""
     assert problem.skin is not None  # built with the effect
-    bones = [bone for bone in problem.bones if effect.bones is None or bone.name in effect.bones]
+    bones = [bone for bone in problem.bones if effect.is_by(bone.name)]
     first, points = body.frames[0], problem.skin.points
     nearest = min((bone.shape.sample(points).distance.min(initial=np.inf) for bone in bones), default=np.inf)
     before = first - RELAXING if nearest < effect.smoothing else None
     law = Contact(problem.skin, effect.stiffness, effect.smoothing, None if before is None else (before, first))
     frames = body.frames if before is None else (before, *body.frames)
     obstructions = tuple(Obstruction(bone.name, bone.shape, From(first, bone.pose)) for bone in bones)
-    prescribed = tuple(replace(entry, course=FromFirst(first, entry.course)) for entry in body.prescribed)
-    return replace(body, frames=frames, prescribed=prescribed, contact=law, obstructions=obstructions)
+    return replace(body, frames=frames, contact=law, obstructions=obstructions)

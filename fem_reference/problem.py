@@ -178,9 +178,7 @@ def build(scene: Scene, rest: Setup) -> Problem:
 def _check_outside(scene: Scene, rest: Setup, contact: ContactEffect) -> None:
     """InputError where a bone that pushes is wholly inside the muscle: there is no way out of it."""
     for i, bone in enumerate(rest.bones):
-        if contact.bones is not None and bone.name not in contact.bones:
-            continue
-        if signed_distances(bone.surface.points, rest.surface).max() < 0:
+        if contact.is_by(bone.name) and signed_distances(bone.surface.points, rest.surface).max() < 0:
             raise InputError(join(scene.place, f"bone[{i}]"), "a bone wholly inside the muscle", "one that is not")
 
 

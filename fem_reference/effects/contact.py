@@ -16,3 +16,7 @@ class Contact(Interaction):
     stiffness: AreaStiffness
     smoothing: PositiveLength = 0.1
     bones: tuple[str, ...] | None = Field(default=None, min_length=1)
+
+    def is_by(self, bone: str) -> bool:
+        """Whether the bone of this name pushes."""
+        return self.bones is None or bone in self.bones
