@@ -11,7 +11,7 @@ import numpy as np
 from fem_reference.effects import Coursed, Effect, FieldEffect, Load
 from fem_reference.effects import find as find_effect
 from fem_reference.effects import names as effect_names
-from fem_reference.effects.contact import Contact
+from fem_reference.effects.contact import Contact, among
 from fem_reference.effects.damping import Damping
 from fem_reference.errors import InputError
 from fem_reference.field.scene import FieldScene, FieldSceneFile
@@ -197,7 +197,7 @@ def _check_names(scene: Scene) -> None:
 def _check_forces(scene: Scene) -> None:
     """Forces are told by the name of who exerts them, and something keeps the muscle from drifting."""
     bones = [bone.name for bone in scene.bone]
-    pushed = any(isinstance(effect, Contact) for effect in scene.effects)
+    pushed = among(scene.effects) is not None
     for i, attachment in enumerate(scene.attachment):
         if pushed and attachment.name in bones:
             place = join(scene.place, f"attachment[{i}].name")

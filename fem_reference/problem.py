@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fem_reference import files
 from fem_reference.effects import Effect
 from fem_reference.effects.contact import Contact as ContactEffect
+from fem_reference.effects.contact import among
 from fem_reference.errors import InputError
 from fem_reference.geometry import block
 from fem_reference.geometry.attachments import facets_under, pick
@@ -134,7 +135,7 @@ class Problem(Setup):
     @property
     def contact(self) -> ContactEffect | None:
         """The effect by which bones push, None where they do not."""
-        return next((effect for effect in self.effects if isinstance(effect, ContactEffect)), None)
+        return among(self.effects)
 
 
 def setup(scene: Scene) -> Setup:
@@ -149,7 +150,7 @@ def setup(scene: Scene) -> Setup:
 def build(scene: Scene, rest: Setup) -> Problem:
     """The whole problem of a scene: its setup ``rest``, filled with tetrahedra and fibres."""
     begin = time.perf_counter()
-    contact = next((effect for effect in scene.effects if isinstance(effect, ContactEffect)), None)
+    contact = among(scene.effects)
     distances_known = {} if contact is None else _distance_facts(rest)
     if contact is not None:
         _check_outside(scene, rest, contact)
@@ -207,7 +208,7 @@ def _filled(scene: Scene, rest: Setup) -> TetMesh:
 
 def _skin(scene: Scene, rest: Setup, mesh: TetMesh) -> Skin | None:
     """What bones push on, where they do: the surface that they do not hold, at points half a tet apart or nearer."""
-    if not any(isinstance(effect, ContactEffect) for effect in scene.effects):
+    if among(scene.effects) is None:
         return None
     return skin_of(rest.surface, rest.free, mesh, scene.muscle.tet_size / 2)
 

@@ -12,7 +12,7 @@ from typing import Any
 from fem_reference import study
 from fem_reference.bones import Bone
 from fem_reference.effects import Effect
-from fem_reference.effects.contact import Contact
+from fem_reference.effects.contact import Contact, among
 from fem_reference.errors import InputError
 from fem_reference.execution import Bench, complete
 from fem_reference.metrics import Yardstick
@@ -43,7 +43,7 @@ def variations(scene: Scene, settings: Any) -> tuple[Variation, ...]:
     """
     steps = hasattr(settings, "largest_step")
     found = [Variation("load steps", _finer_steps(scene, settings))] if steps else []
-    if any(isinstance(effect, Contact) for effect in scene.effects):
+    if among(scene.effects) is not None:
         found.append(Variation("contact stiffness", {"effect": _scaled(scene, "stiffness", 2.0)}))
         found.append(Variation("contact smoothing", {"effect": _scaled(scene, "smoothing", 0.5)}))
         if any(bone.surface for bone in scene.bone):

@@ -1,8 +1,10 @@
 """Bones push the muscle out of their way, without friction and with any sliding; what they hold of it is exempt."""
 
+from collections.abc import Iterable
+
 from pydantic import Field
 
-from fem_reference.effects import Interaction
+from fem_reference.effects import Effect, Interaction
 from fem_reference.units import AreaStiffness, PositiveLength
 
 
@@ -20,3 +22,8 @@ class Contact(Interaction):
     def is_by(self, bone: str) -> bool:
         """Whether the bone of this name pushes."""
         return self.bones is None or bone in self.bones
+
+
+def among(acting: Iterable[Effect]) -> Contact | None:
+    """The contact among the effects of a scene, None where bones do not push."""
+    return next((effect for effect in acting if isinstance(effect, Contact)), None)

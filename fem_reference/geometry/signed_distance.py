@@ -144,8 +144,8 @@ def cached(surface: Surface, error: float, margin: float, rounding: float, folde
             grid = build(surface, grid.spacing, margin, rounding)
         try:
             _write(path, grid)
-        except OSError as error:
-            logger.warning("%s: not kept: %s", path, error)
+        except OSError as why:
+            logger.warning("%s: not kept: %s", path, why)
     return grid
 
 
