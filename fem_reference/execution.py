@@ -35,7 +35,7 @@ _AFTER_THE_RUN = (
     "truths.py",
     "verification",
     "overview.py",
-    "cli.py",
+    "cli",
     "__main__.py",
     "execution.py",
     "refinement.py",

@@ -3,6 +3,7 @@
 import json
 import logging
 import math
+import os
 import re
 import sys
 import threading
@@ -13,7 +14,7 @@ from typing import get_args
 
 import pytest
 
-from fem_reference import cli, truths
+from fem_reference import cli, report, truths
 from fem_reference.catalogue import Entry, Finding, Kind, order
 from fem_reference.errors import InputError, MissingSoftware
 from fem_reference.verification import runner
@@ -311,7 +312,7 @@ def test_a_page_that_cannot_be_written_leaves_what_was_measured_told(verify, mon
         raise OSError("no space left")
 
     target = verify.folder / "facts.json"
-    monkeypatch.setattr(cli.report, "write_verification", full)
+    monkeypatch.setattr(report, "write_verification", full)
     status, told, _ = verify("bars", "--json", str(target))
     assert status == cli.BAD_INPUT
     assert "no space left" in told.err
@@ -332,7 +333,7 @@ def test_an_output_below_a_file_is_refused_before_anything_is_measured(option, v
 def test_a_folder_that_cannot_be_written_into_is_refused_before_anything_is_measured(
     verify, capsys, monkeypatch
 ) -> None:
-    monkeypatch.setattr(cli.os, "access", lambda *_: False)  # the tests may run as root, who can write anywhere
+    monkeypatch.setattr(os, "access", lambda *_: False)  # the tests may run as root, who can write anywhere
     assert cli.main(["verify", "bars", "--out", str(verify.folder / "new")]) == cli.BAD_INPUT
     assert "cannot be written into" in capsys.readouterr().err
     assert verify.made.lab.made == 0

@@ -1,0 +1,77 @@
+"""The command line: the only place that prints, shows progress and exits."""
+
+import argparse
+import logging
+import os
+import signal
+import sys
+from pathlib import Path
+
+from fem_reference.cli import verbs
+from fem_reference.cli.parser import parser
+from fem_reference.cli.telling import (
+    BAD_INPUT,
+    DONE,
+    INTERRUPTED,
+    SOLVER_FAILED,
+    TERMINATED,
+    VERDICT_FAIL,
+    out,
+)
+from fem_reference.errors import InputError, MissingSoftware
+
+__all__ = ["BAD_INPUT", "DONE", "INTERRUPTED", "SOLVER_FAILED", "TERMINATED", "VERDICT_FAIL", "entry", "main"]
+
+
+def entry() -> None:
+    """The installed command."""
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))  # so that what is under way is cleaned up
+    sys.exit(main(sys.argv[1:]))
+
+
+def main(arguments: list[str]) -> int:
+    """Carry out a command line; returns the exit status."""
+    options = parser().parse_args(arguments)
+    _show_progress(on=not options.quiet)
+    try:
+        _check_outputs(options)
+        status: int = options.verb(options)
+    except (InputError, OSError) as error:
+        print(f"fem-reference: {error}", file=sys.stderr)
+        return BAD_INPUT
+    except MissingSoftware as error:
+        print(f"fem-reference: {error}", file=sys.stderr)
+        return SOLVER_FAILED
+    except KeyboardInterrupt:
+        print("fem-reference: interrupted; a run that was not finished is solved again next time", file=sys.stderr)
+        return INTERRUPTED
+    return status
+
+
+def _check_outputs(options: argparse.Namespace) -> None:
+    """InputError where an output cannot be written, before anything is measured; makes nothing."""
+    _check_folder("--out", out(options), written=options.verb is not verbs.list_all)
+    if options.json is None:
+        return
+    if options.json.is_dir():
+        raise InputError("--json", f'"{options.json}", a folder', "a file")
+    if not options.json.exists():
+        _check_folder("--json", options.json.parent, written=True)
+
+
+def _check_folder(place: str, folder: Path, *, written: bool) -> None:
+    """InputError at ``place`` unless ``folder`` is one or can be made, and can be written into where it will be."""
+    there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not there.is_dir():
+        raise InputError(place, f'"{folder}", where "{there}" is a file', "a folder")
+    if written and not os.access(there, os.W_OK | os.X_OK):
+        raise InputError(place, f'"{folder}", where "{there}" cannot be written into', "a folder that can")
+
+
+def _show_progress(*, on: bool) -> None:
+    """Our own log lines, and nobody else's, on standard error."""
+    log = logging.getLogger("fem_reference")
+    log.setLevel(logging.INFO if on else logging.WARNING)
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(logging.Formatter("%(message)s"))
+    log.handlers[:] = [handler]

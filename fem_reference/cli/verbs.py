@@ -1,0 +1,190 @@
+"""What each verb does; it prints what came of it and returns the exit status."""
+
+import argparse
+import re
+from pathlib import Path
+
+from fem_reference import (
+    casefile,
+    comparison,
+    field_verbs,
+    files,
+    judge,
+    metrics,
+    refinement,
+    report,
+    runs,
+    solvers,
+)
+from fem_reference.cli.telling import DONE, SOLVER_FAILED, VERDICT_FAIL, lines, out, tell
+from fem_reference.errors import InputError
+from fem_reference.execution import Bench, complete
+from fem_reference.field.scene import FieldScene
+from fem_reference.field_execution import FieldBench
+from fem_reference.field_verbs import Told
+from fem_reference.overview import comparison_text, field_scene_facts, run_facts, run_text, scene_facts
+from fem_reference.records import parse
+from fem_reference.scene import Candidate, Scene, SolverChoice
+from fem_reference.verification import verb as verification
+
+MAIN_JOB = "hip_flexion"
+
+
+def demo(options: argparse.Namespace) -> int:
+    """The main job."""
+    scene = casefile.read_muscle(MAIN_JOB)
+    return _judge(scene, options, _own_candidates(scene))
+
+
+def _own_candidates(scene: Scene) -> list[tuple[Candidate, str]]:
+    """The candidates of the scene, each with its place."""
+    return [(candidate, f"candidate[{i}]") for i, candidate in enumerate(scene.candidate)]
+
+
+def compare(options: argparse.Namespace) -> int:
+    """Measure candidates against the reference."""
+    scene = _scene(options)
+    if isinstance(scene, FieldScene):
+        _refuse_error_bar(options)
+        return _told(field_verbs.compare(scene, options.candidate, out(options)), options)
+    wanted = options.candidate or [candidate.name for candidate in scene.candidate]
+    return _judge(scene, options, [_candidate(scene, text, options.unit) for text in wanted])
+
+
+def _candidate(scene: Scene, text: str, unit: str) -> tuple[Candidate, str]:
+    """The candidate of the scene with this name, else the recorded frames in this folder; and the place that chooses it."""
+    names = [candidate.name for candidate in scene.candidate]
+    if text in names:
+        return scene.candidate[names.index(text)], f"candidate[{names.index(text)}]"
+    path = Path(text)
+    if not path.exists():
+        raise InputError("--candidate", f'"{text}"', f"a folder of frames, or one of {', '.join(names)}")
+    folder = path.resolve()
+    name = re.sub(r"[^\w.-]+", "_", folder.stem if folder.is_file() else folder.name) or "candidate"
+    table = {"name": name, "solver": "recorded", "folder": str(folder), "unit": unit}
+    return parse(Candidate, table, "--candidate"), "--candidate"
+
+
+def run(options: argparse.Namespace) -> int:
+    """Solve a case, and judge what it expects of the reference."""
+    scene = _scene(options)
+    if isinstance(scene, FieldScene):
+        _refuse_error_bar(options)
+        return _told(field_verbs.run(scene, options.solver, out(options)), options)
+    if options.solver is None or options.solver == scene.reference.solver:
+        return _judge(scene, options, [])
+    _refuse_error_bar(options)
+    bench = Bench(scene, out(options) / "runs", options.ranks)
+    run = bench.obtain(options.solver, _choice(scene, options.solver), f"--solver {options.solver}")
+    tell(run_facts(scene, run), run_text(run), options)
+    return DONE if run.outcome.status == "converged" else SOLVER_FAILED
+
+
+def _refuse_error_bar(options: argparse.Namespace) -> None:
+    if options.error_bar:
+        raise InputError("--error-bar", "a scalar case or another solver", "the reference of a muscle")
+
+
+def _choice(scene: Scene, solver: str) -> SolverChoice:
+    """How the scene chooses ``solver``: its settings as a candidate, else no settings."""
+    return next((entry for entry in scene.candidate if entry.solver == solver), SolverChoice(solver=solver))
+
+
+def _scene(options: argparse.Namespace) -> Scene | FieldScene:
+    """The scene of the case, with what ``--set`` changes of it."""
+    return casefile.read(options.case, changes=dict(map(casefile.setting, options.set)))
+
+
+def _told(told: Told, options: argparse.Namespace) -> int:
+    """Tell what came of scalar cases or of a verification; returns the exit status."""
+    tell(told.facts, told.text, options)
+    if told.word == "failed":
+        return SOLVER_FAILED
+    return VERDICT_FAIL if told.word == "fail" else DONE
+
+
+def page(options: argparse.Namespace) -> int:
+    """Write a page over several cases."""
+    return _told(field_verbs.page(options.name, out(options)), options)
+
+
+def verify(options: argparse.Namespace) -> int:
+    """Measure problems whose answers are known."""
+    measured = verification.verify(options.names, options.spoil)
+    status = _told(verification.told(measured), options)  # what took so long to measure is told whatever the page does
+    name = "verify_part" if options.names or options.spoil else "verify"  # a part does not stand in the whole's place
+    print(f"page: {report.write_verification(measured, out(options), name)}")
+    return status
+
+
+def _judge(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
+    """Reference and candidates -> page, JSON and exit status. What is bad in the input shows before anything is solved."""
+    names = ["reference", *(entry.name for entry, _ in chosen)]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(
+                "--candidate", f'"{name}" twice', 'folders and candidates of different names, none of them "reference"'
+            )
+    bench = _checked_bench(scene, options, chosen)
+    read = {entry.name: bench.read(entry.name, entry, place) for entry, place in chosen if entry.solver == "recorded"}
+    reference = bench.obtain("reference", scene.reference, "reference")
+    solved = {
+        entry.name: bench.obtain(entry.name, entry, place) for entry, place in chosen if entry.solver != "recorded"
+    }
+    bars = refinement.obtain(bench, reference) if options.error_bar else refinement.stored(reference)
+    numbers = scene.frames.numbers
+    candidates = tuple(complete((read | solved)[entry.name], numbers) for entry, _ in chosen)
+    result = comparison.compare(scene, bench.setup(), complete(reference, numbers), candidates, bars)
+    page = report.write(result, out(options) / scene.name)
+    tell(report.summary(result), comparison_text(result, page), options)
+    if any(run.outcome.status != "converged" for run in (reference, *candidates)):
+        return SOLVER_FAILED
+    return VERDICT_FAIL if result.word == "fail" else DONE
+
+
+def _checked_bench(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> Bench:
+    """The bench of a scene whose expectations, reference and ``chosen`` candidates can all be read."""
+    judge.check(scene)
+    bench = Bench(scene, out(options) / "runs", options.ranks)
+    for choice, place in [(scene.reference, "reference"), *chosen]:
+        bench.settings(choice, place)
+    return bench
+
+
+def list_all(options: argparse.Namespace) -> int:
+    """Say what there is."""
+    scenes = {name: casefile.read(name).title for name in casefile.cases()}
+    stored = [_stored(path.parent) for path in sorted((out(options) / "runs").glob("*/*/run.json"))]
+    facts = {"cases": scenes, "solvers": solvers.names(), "metrics": metrics.names(), "runs": stored}
+    width = max(map(len, scenes))
+    lines = ["cases:", *(f"  {name:{width}}  {title}" for name, title in scenes.items())]
+    lines += [f"solvers: {', '.join(facts['solvers'])}", f"metrics: {', '.join(facts['metrics'])}"]
+    lines += ["stored runs:", *(f"  {path}" for path in stored)] if stored else []
+    tell(facts, "\n".join(lines), options)
+    return DONE
+
+
+def _stored(folder: Path) -> str:
+    """A stored run, with its status where it did not converge."""
+    status = runs.status(folder)
+    return str(folder) if status == "converged" else f"{folder} ({status})"
+
+
+def show(options: argparse.Namespace) -> int:
+    """Say what a case is made of."""
+    scene = _scene(options)
+    if isinstance(scene, FieldScene):
+        facts = field_scene_facts(scene, FieldBench(scene, out(options)).problem)
+        tell(facts, "\n".join(lines(facts)), options)
+        return DONE
+    bench = _checked_bench(scene, options, _own_candidates(scene))
+    facts = scene_facts(scene, bench.setup())
+    if options.out is not None:
+        built, folder = bench.problem(), options.out / scene.name
+        folder.mkdir(parents=True, exist_ok=True)
+        files.write_surface(folder / "surface.vtp", built.surface, built.surface.points)
+        files.write_polylines(folder / "fibres.vtp", built.fibres, built.fibres.points)
+        files.write_tets(folder / "tets.vtu", built.mesh, built.mesh.points)
+        facts |= {"mesh": built.mesh_facts, "folder": str(folder)}
+    tell(facts, "\n".join(lines(facts)), options)
+    return DONE
