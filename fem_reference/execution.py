@@ -7,6 +7,7 @@ import json
 import logging
 import os
 import platform
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -36,6 +37,10 @@ _AFTER_THE_RUN = (
     "verification",
     "overview.py",
     "cli",
+    "exchange",
+    "regression.py",
+    "benchmark.py",
+    "families.py",
     "__main__.py",
     "execution.py",
     "refinement.py",
@@ -100,7 +105,7 @@ class Bench:
     def key(self, solver: str, settings: Record) -> str:
         """A hash over all that determines a run: the scene, the solver's settings, and the code that makes runs."""
         numerics = {key: value for key, value in settings.model_dump(mode="json").items() if key not in _MACHINE_ONLY}
-        parts = [self.scene.key, solver, json.dumps(numerics, sort_keys=True), code_hash()]
+        parts = [self.scene.key, solver, json.dumps(numerics, sort_keys=True), code_hash(solver)]
         return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
     def origin(self, solver: str, settings: Record) -> dict[str, Any]:
@@ -113,7 +118,7 @@ class Bench:
             "settings": settings.model_dump(mode="json"),
             "effects": {effect.title: effect.model_dump(mode="json") for effect in acting} or "none",
             "fem_reference": __version__,
-            "code": code_hash(),
+            "code": code_hash(solver),
             "versions": versions(),
             "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
         }
@@ -155,14 +160,36 @@ def _stored(folder: Path, name: str) -> Run | None:
 
 
 @cache
-def code_hash() -> str:
-    """A hash over the source files that determine runs."""
+def code_hash(solver: str) -> str:
+    """A hash over the source files that determine the runs of ``solver``: those of other solvers do not."""
     root = Path(__file__).parent
+    others = {
+        path for path in (root / "solvers").rglob("*.py") if path.name != "__init__.py" or path.parent.name != "solvers"
+    }
     digest = hashlib.sha256()
-    for path in sorted(root.rglob("*.py")):
+    for path in sorted({*root.rglob("*.py")} - others | _files(root / "solvers", solver)):
         if path.relative_to(root).parts[0] not in _AFTER_THE_RUN:
             digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
+
+
+def _files(folder: Path, solver: str) -> set[Path]:
+    """The source files of a solver and of what it imports from the others below ``folder``."""
+    found, wanted = set[str](), {solver}
+    files = set[Path]()
+    while wanted:
+        found |= wanted
+        own = {
+            path
+            for name in wanted
+            for path in [folder / f"{name}.py", *(folder / name).rglob("*.py")]
+            if path.is_file()
+        }
+        files |= own
+        text = "\n".join(path.read_text(encoding="utf-8") for path in own)
+        names = {path.stem for path in folder.iterdir() if path.suffix == ".py" or path.is_dir()}
+        wanted = {name for name in names - found if re.search(rf"solvers(\.| import .*\b){name}\b", text)}
+    return files
 
 
 def versions() -> dict[str, str]:

@@ -60,7 +60,7 @@ class FieldBench:
             "solver": solver,
             "settings": settings.model_dump(mode="json"),
             "fem_reference": __version__,
-            "code": code_hash(),
+            "code": code_hash(solver),
             "versions": versions(),
         }
 

@@ -42,8 +42,19 @@ def test_the_key_names_what_determines_a_run(tmp_path) -> None:
 
 def test_the_key_changes_with_the_code(tmp_path, monkeypatch) -> None:
     base = key(bench(tmp_path))
-    monkeypatch.setattr(execution, "code_hash", lambda: "another")
+    monkeypatch.setattr(execution, "code_hash", lambda _: "another")
     assert key(bench(tmp_path)) != base
+
+
+def test_the_code_of_a_run_is_that_of_its_solver_and_what_it_imports() -> None:
+    folder = Path(execution.__file__).parent / "solvers"
+    of_pbd = execution._files(folder, "pbd")
+    assert {path.name for path in of_pbd} >= {"pbd.py", "pbd_kernels.py"}
+    assert not any("fenicsx" in path.parts or path.name == "listing.py" for path in of_pbd)
+    of_reference = execution._files(folder, "fenicsx")
+    assert of_reference >= {folder / "fenicsx" / "worker.py", folder / "fenicsx" / "body.py"}
+    assert not of_pbd & of_reference
+    assert len({execution.code_hash(name) for name in ("pbd", "fenicsx", "recorded")}) == 3
 
 
 def test_a_run_made_with_other_packages_is_made_again(tmp_path, monkeypatch, caplog) -> None:
