@@ -7,6 +7,14 @@ from pathlib import Path
 import pytest
 
 
+def pytest_configure() -> None:
+    """Each of the processes that share the tests keeps to a core of its own, and so do the solvers that it starts."""
+    worker = os.environ.get("PYTEST_XDIST_WORKER")  # gw0, gw1, ...
+    if worker is not None:
+        cores = sorted(os.sched_getaffinity(0))
+        os.sched_setaffinity(0, {cores[int(worker.removeprefix("gw")) % len(cores)]})
+
+
 @pytest.fixture(scope="session")
 def data() -> Path:
     """The folder of the report's own data, which is licensed apart from this project."""

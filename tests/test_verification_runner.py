@@ -115,7 +115,7 @@ def test_an_unknown_name_is_answered_shortly_however_many_there_are() -> None:
 
 
 def test_results_keep_their_order_and_every_thread_its_lab(monkeypatch) -> None:
-    monkeypatch.setattr(runner.os, "cpu_count", lambda: 8)
+    monkeypatch.setattr(runner.os, "sched_getaffinity", lambda _: set(range(8)))
     both, used = threading.Barrier(2, timeout=5), []
 
     def meet(lab):
@@ -143,7 +143,7 @@ def test_no_more_labs_than_work_or_cores(monkeypatch) -> None:
     assert labs.made == 0
     runner.run([entry("one")], labs)
     assert labs.made == 1
-    monkeypatch.setattr(runner.os, "cpu_count", lambda: 1)
+    monkeypatch.setattr(runner.os, "sched_getaffinity", lambda _: set(range(1)))
     runner.run([entry("one"), entry("two")], labs)
     assert labs.made == 2
 
@@ -181,7 +181,7 @@ def test_a_truth_that_raises_fails_its_entry_alone() -> None:
 
 @pytest.mark.parametrize("error", [TypeError("ours"), KeyboardInterrupt("stop"), MissingSoftware("FEniCSx")])
 def test_what_is_no_failure_of_an_entry_ends_everything(error, monkeypatch) -> None:
-    monkeypatch.setattr(runner.os, "cpu_count", lambda: 1)
+    monkeypatch.setattr(runner.os, "sched_getaffinity", lambda _: set(range(1)))
     labs, measured = Labs(), []
     with pytest.raises(type(error), match=str(error)):
         runner.run([raising(error), entry("next", lambda _: measured.append(1))], labs)
@@ -190,7 +190,7 @@ def test_what_is_no_failure_of_an_entry_ends_everything(error, monkeypatch) -> N
 
 
 def test_a_thread_stops_after_its_entry_when_the_other_met_a_mistake(monkeypatch) -> None:
-    monkeypatch.setattr(runner.os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(runner.os, "sched_getaffinity", lambda _: set(range(2)))
     closed, measured = threading.Event(), []
 
     @contextmanager
@@ -212,7 +212,7 @@ def test_a_thread_stops_after_its_entry_when_the_other_met_a_mistake(monkeypatch
 
 
 def test_a_lab_that_cannot_be_made_closes_the_others(monkeypatch) -> None:
-    monkeypatch.setattr(runner.os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(runner.os, "sched_getaffinity", lambda _: set(range(2)))
     labs = Labs()
 
     def second_fails():
@@ -232,7 +232,7 @@ def test_a_spoiled_entry_is_measured_with_its_spoil() -> None:
 
 
 def test_progress_says_how_far_it_is(caplog, monkeypatch) -> None:
-    monkeypatch.setattr(runner.os, "cpu_count", lambda: 1)
+    monkeypatch.setattr(runner.os, "sched_getaffinity", lambda _: set(range(1)))
     with caplog.at_level(logging.INFO, "fem_reference"):
         runner.run([entry("bar"), entry("tip", 3.0)], Labs())
     assert caplog.messages == ["verify: 1 of 2, bar pass, 0 s, about 0 s left", "verify: 2 of 2, tip fail, 0 s"]

@@ -85,7 +85,7 @@ def run(
                 found[place] = last
                 _log_progress(last, len(found), len(wanted), time.perf_counter() - begin)
 
-    count = min(2, os.cpu_count() or 1, len(wanted))
+    count = min(2, len(os.sched_getaffinity(0)), len(wanted))
     with ThreadPoolExecutor(max(count, 1)) as pool, ExitStack() as stack:
         labs = [stack.enter_context(make_lab()) for _ in range(count)]
         stack.callback(waiting.clear)  # so that no thread goes on to the next entry while the labs close
