@@ -41,8 +41,10 @@ def compare(
     scene: Scene, setup: Setup, reference: Run, candidates: tuple[Run, ...], error_bars: ErrorBars | None = None
 ) -> Comparison:
     """Measure and judge runs that all have the frames of the scene (``not a number`` where a run did not reach one); with
-    ``error_bars`` nothing is judged that they are too wide for.
+    ``error_bars`` nothing is judged that they are too wide for. Of a run without a surface only what needs none is judged.
     """
+    if not reference.has_surface:
+        raise InputError(f"{reference.name}: surface", "a run of lines alone", "a reference that moves the surface")
     if reference.fibres is None:
         raise InputError(
             f"{reference.name}: fibres", "a run without an interior", "a reference that carries the fibres"
@@ -60,10 +62,16 @@ def compare(
         )
         for expectation in scene.expect
         for name in (deviations if expectation.of == "candidates" else [expectation.of])
-        if name in measured
+        if _is_measured(expectation, measured.get(name, ()))
     )
     error = extension_error(reference, yardstick)
     return Comparison(scene, setup, reference, candidates, yardstick, deviations, changes, error, verdicts, error_bars)
+
+
+def _is_measured(expectation: Expectation, measures: tuple[Measure, ...]) -> bool:
+    """Whether what is expected is among ``measures``: of a run without a surface much is not."""
+    wanted = (expectation.metric, expectation.statistic)
+    return any((measure.metric, measure.statistic) == wanted for measure in measures)
 
 
 def _bars(error_bars: ErrorBars | None, expectation: Expectation) -> Floats | None:

@@ -38,9 +38,10 @@ _AFTER_THE_RUN = (
     "overview.py",
     "cli",
     "exchange",
-    "regression.py",
+    "regression",
     "benchmark.py",
     "families.py",
+    "standings.py",
     "__main__.py",
     "execution.py",
     "refinement.py",
@@ -96,10 +97,11 @@ class Bench:
     def read(self, name: str, choice: SolverChoice, place: str) -> Run:
         """The run that somebody recorded, checked against the setup of the scene; it is read each time and not stored."""
         settings, frames, rest = self.settings(choice, place), list[Frame](), self.setup()
-        outcome = solvers.find(choice.solver, place).solve(rest, settings, frames.append)
-        positions = np.stack([frame.surface for frame in frames])
+        solver = solvers.find(choice.solver, place)
+        outcome = solver.solve(rest, settings, frames.append)
+        positions = np.stack([frame.surface for frame in frames if frame.surface is not None])
         numbers = tuple(frame.number for frame in frames)
-        origin = self.origin(choice.solver, settings)
+        origin = self.origin(choice.solver, settings) | solver.origin(settings)
         return Run(name, choice.solver, outcome, numbers, rest.surface, positions, origin=origin)
 
     def key(self, solver: str, settings: Record) -> str:

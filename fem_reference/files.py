@@ -130,14 +130,17 @@ def write_tets(path: Path, mesh: TetMesh, positions: Floats) -> None:
     _vtk_write(path, vtkXMLUnstructuredGridWriter(), data, mesh.points, positions)
 
 
-def write_field(path: Path, points: Floats, cells: Ints, data: dict[str, Floats]) -> None:
-    """VTU of ``cells`` (m, 2 or 3) between ``points`` (n, 1 to 3) with point ``data`` (n,) or (n, d) by name."""
+def write_field(
+    path: Path, points: Floats, cells: Ints, data: dict[str, Floats], cell_data: dict[str, Floats] | None = None
+) -> None:
+    """VTU or gmsh's MSH of ``cells`` (m, 2 to 4) between ``points`` (n, 1 to 3) with ``data`` (n, ...) and (m, ...) by name."""
     import meshio
 
     space = np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
-    kind = {2: "line", 3: "triangle"}[cells.shape[1]]
+    kind = {2: "line", 3: "triangle", 4: "tetra"}[cells.shape[1]]
+    of_cells = {name: [values] for name, values in (cell_data or {}).items()}
     with _whole(path) as part:
-        meshio.Mesh(space, [(kind, cells)], point_data=data).write(part)
+        meshio.Mesh(space, [(kind, cells)], data, of_cells).write(part, "gmsh" if path.suffix == ".msh" else None)
 
 
 def write_pvd(path: Path, frames: Sequence[tuple[int, str]]) -> None:

@@ -19,6 +19,7 @@ from fem_reference.problem import Body, Held, Setup
 from fem_reference.report.words import exact
 from fem_reference.runs import Run
 from fem_reference.scene import Scene
+from fem_reference.standings import Table
 from fem_reference.study import ErrorBar
 
 
@@ -230,3 +231,20 @@ def run_facts(scene: Scene, run: Run) -> dict[str, Any]:
 def run_text(run: Run) -> str:
     """The same in words."""
     return f"{run.name}: {run.outcome.status}, {run.outcome.message}\nstored in {run.folder}"
+
+
+def standings_text(table: Table) -> str:
+    """Who stands how on which scene, a line each."""
+    lines = []
+    for one in table.standings:
+        found = (one.worst("surface_deviation", "rms"), one.worst("volume", "deviation"))
+        told = [
+            f"{name} {value[0]:.3g} {unit}"
+            for name, unit, value in zip(("surface rms", "volume"), ("mm", "%"), found, strict=True)
+            if value is not None
+        ]
+        if one.seconds_per_frame:
+            told.insert(0, f"{1 / one.seconds_per_frame:.3g} frames/s")
+        known = " (its error bar)" if one.of_reference and one.measures else ""
+        lines.append(f"{one.case}: {one.family}, {one.name}: {one.outcome.status}, {', '.join(told)}{known}")
+    return "\n".join([*lines, *(f"{case}: left out, {reason}" for case, reason in table.missing.items())])

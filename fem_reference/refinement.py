@@ -79,7 +79,7 @@ def obtain(bench: Bench, reference: Run) -> ErrorBars | None:
     """The error bars of the ``reference`` of a bench: from runs in the store where they are, else solved now; stored beside it.
     None for a run that did not converge, and for one without an interior.
     """
-    if reference.outcome.status != "converged" or reference.fibres is None:
+    if reference.outcome.status != "converged" or reference.fibres is None or not reference.has_surface:
         log.info("error bar: none, of a reference that did not converge or has no interior")
         return None
     ladder = _ladder(bench, reference)

@@ -2,6 +2,7 @@
 
     <store>/<case>/<solver>-<key>/run.json        status, cost, origin, numbers per frame
                                  /surface.pvd     the user's surface over the frames, for ParaView; surface/frame_0010.vtp
+                                 /rest/           surface.vtp and fibres.vtp at rest, of a solver that moves no surface
                                  /fibres.pvd      fibre polylines, where the solver has an interior
                                  /tets.pvd        tetrahedra, where the solver has them
 
@@ -33,12 +34,12 @@ FORMAT = 1
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """One requested frame: positions [mm] of the surface (n, 3), and where the solver has them of the fibre points (m, 3) and
-    tet points (k, 3); ``scalars`` by name; ``note`` is what progress says of it.
+    """One requested frame: positions [mm] of the surface (n, 3), None of a solver of lines alone, and where the solver has them
+    of the fibre points (m, 3) and tet points (k, 3); ``scalars`` by name; ``note`` is what progress says of it.
     """
 
     number: int
-    surface: Floats
+    surface: Floats | None
     fibres: Floats | None = None
     tets: Floats | None = None
     scalars: dict[str, float] = field(default_factory=dict)
@@ -62,7 +63,8 @@ class Run:
     """Frames that somebody's solver produced for a scene.
 
     ``numbers`` (f,), ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (its rest state), ``fibre_positions``
-    (f, m, 3) [mm] of the points of ``fibres`` or None for a surface-only solver, ``scalars`` by name (f,).
+    (f, m, 3) [mm] of the points of ``fibres`` or None for a surface-only solver, ``scalars`` by name (f,). A solver of lines
+    alone moves no surface: ``has_surface`` is False, and every entry of ``positions`` NaN.
     """
 
     name: str
@@ -76,6 +78,7 @@ class Run:
     scalars: dict[str, Floats] = field(default_factory=dict)
     origin: dict[str, Any] = field(default_factory=dict)
     folder: Path | None = None
+    has_surface: bool = True
 
 
 class Writer:
@@ -100,9 +103,11 @@ class Writer:
 
     def add(self, frame: Frame) -> None:
         """Store a frame: its files first, then the index files and run.json."""
-        parts: dict[str, Callable[[Path], None]] = {
-            "surface": lambda path: files.write_surface(path, self.surface, frame.surface)
-        }
+        parts: dict[str, Callable[[Path], None]] = {}
+        if (surface := frame.surface) is not None:
+            parts["surface"] = lambda path: files.write_surface(path, self.surface, surface)
+        elif not self.frames:
+            self._write_rest()
         if self.fibres is not None and (fibres := frame.fibres) is not None:
             lines = self.fibres
             parts["fibres"] = lambda path: files.write_polylines(path, lines, fibres)
@@ -127,6 +132,13 @@ class Writer:
         cost = {"seconds": time.perf_counter() - self.begin} | outcome.cost
         self.state |= {"status": outcome.status, "message": outcome.message, "cost": cost}
         self._write_state()
+
+    def _write_rest(self) -> None:
+        """The rest state, which the first frame of a solver without a surface is not."""
+        (self.folder / "rest").mkdir()
+        files.write_surface(self.folder / "rest" / "surface.vtp", self.surface, self.surface.points)
+        if self.fibres is not None:
+            files.write_polylines(self.folder / "rest" / "fibres.vtp", self.fibres, self.fibres.points)
 
     def _write_state(self) -> None:
         files.write_text(self.folder / "run.json", json.dumps(self.state, indent=1, allow_nan=False))
@@ -155,26 +167,33 @@ def load(folder: Path) -> Run:
         name, solver, origin, parts = state["name"], state["solver"], state["origin"], state["parts"]
     except (OSError, json.JSONDecodeError, KeyError, TypeError) as error:
         raise InputError(place, repr(error), "the run.json of a stored run") from error
-    paths = [folder / "surface" / f"frame_{number:04d}.vtp" for number in numbers]
-    surfaces = [files.read_surface(path, 1.0) for path in paths]
-    if not surfaces:
+    if not numbers:
         raise InputError(place, "a run without frames", "at least the rest frame")
+    names, has_surface = [f"frame_{number:04d}.vtp" for number in numbers], "surface" in parts
+    if has_surface:
+        surfaces = [files.read_surface(folder / "surface" / file, 1.0) for file in names]
+        surface, positions = surfaces[0], np.stack([moved.points for moved in surfaces])
+    else:
+        surface = files.read_surface(folder / "rest" / "surface.vtp", 1.0)
+        positions = np.full((len(numbers), *surface.points.shape), np.nan)
     fibres, fibre_positions = None, None
     if "fibres" in parts:
-        lines = [files.read_moved_polylines(folder / "fibres" / path.name, 1.0) for path in paths]
-        fibres, fibre_positions = lines[0], np.stack([line.points for line in lines])
+        lines = [files.read_moved_polylines(folder / "fibres" / file, 1.0) for file in names]
+        fibres = lines[0] if has_surface else files.read_polylines(folder / "rest" / "fibres.vtp", 1.0)
+        fibre_positions = np.stack([line.points for line in lines])
     return Run(
         name=name,
         solver=solver,
         outcome=outcome,
         numbers=numbers,
-        surface=surfaces[0],
-        positions=np.stack([surface.points for surface in surfaces]),
+        surface=surface,
+        positions=positions,
         fibres=fibres,
         fibre_positions=fibre_positions,
         scalars=scalars,
         origin=origin,
         folder=folder,
+        has_surface=has_surface,
     )
 
 

@@ -29,6 +29,7 @@ ORDER = [
     "contact",
     "continuum",
     "problem",
+    "exchange",
     "deformable",
     "stepping",
     "solvers",
@@ -36,10 +37,14 @@ ORDER = [
     "study",
     "judge",
     "comparison",
+    "regression",
+    "standings",
     "catalogue",
     "report",
     "execution",
     "refinement",
+    "families",
+    "benchmark",
     "field_execution",
     "overview",
     "field_verbs",
@@ -49,7 +54,7 @@ ORDER = [
     "__main__",
 ]
 # These see runs and never who made them.
-BLIND_TO_SOLVERS = ["metrics", "study", "judge", "comparison", "report"]
+BLIND_TO_SOLVERS = ["metrics", "study", "judge", "comparison", "regression", "standings", "report"]
 DOORS = {
     "dolfinx": ["solvers/fenicsx/"],
     "dolfinx_solver": ["solvers/fenicsx/"],
@@ -61,7 +66,7 @@ DOORS = {
     "pytetwild": ["geometry/tetrahedra.py"],
     "igl": ["geometry/"],
     "skfem": ["geometry/fibres.py", "solvers/scikit_fem/"],
-    "numba": ["solvers/pbd_kernels.py"],
+    "numba": [f"solvers/{name}_kernels.py" for name in ("pbd", "program", "collision", "xpbd", "arap", "spring")],
     "pyvista": ["report/pictures.py"],
     "vtk": ["files.py", "report/pictures.py"],
     "vtkmodules": ["files.py", "report/pictures.py"],

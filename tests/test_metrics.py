@@ -299,3 +299,14 @@ def test_what_is_not_a_number_never_passes(bad: float, interior: bool) -> None:
             assert np.isnan(each.values[1]), name
             assert each.worst == 1
     assert "vertex 17 at" in _find(measure(run, REFERENCE, YARDSTICK), "surface_deviation.max").where[1]
+
+
+def test_of_a_run_of_lines_alone_only_fibres_are_measured() -> None:
+    """Not even as not-a-number: nothing that it never gave is missed. Its lengths are its own, at rest as well."""
+    lines = _run([np.full_like(SPHERE.points, np.nan)] * 2, [_scaled(FIBRES.points, 0.9), _scaled(FIBRES.points, 1.1)])
+    lines, still = replace(lines, has_surface=False), _run([SPHERE.points] * 2, [FIBRES.points] * 2)
+    for other in (still, at_rest(lines)):
+        found = _values(lines, other, YARDSTICK)
+        assert set(found) == {f"fibre_length.{name}" for name in UNITS["fibre_length"]}
+        assert_allclose(found["fibre_length.mean_percent"], [-10, 10], rtol=1e-10)
+    assert measure(lines, still, YARDSTICK, ["volume"]) == ()

@@ -307,3 +307,54 @@ def test_what_the_reports_program_computed(data: Path) -> None:
     taken = read(data / "candidates/report_pbd_gluteus_maximus", tuple(range(0, 301, 10)), rest=rest)
     assert np.array_equal(taken[0].surface, rest.points)
     assert np.linalg.norm(taken[10].surface - rest.points, axis=1).max() > 10
+
+
+def said(folder: Path, text: str) -> Path:
+    (folder / "candidate.toml").write_text(text)
+    return folder
+
+
+def test_what_a_candidate_says_of_itself(tmp_path: Path) -> None:
+    sequence(said(tmp_path, 'name = "mine.2"\nversion = "2.1"\nunit = "cm"\nseconds_per_frame = 0.5\nthreads = 4\n'))
+    settings = recorded.Settings(folder=str(tmp_path), unit="cm")
+    rest = REST.moved_to(10 * REST.points)
+    taken: list[Frame] = []
+    outcome = recorded.solve(Setup(rest, (), (), FRAMES, None), settings, taken.append)
+    assert outcome.cost == {"seconds_per_frame": 0.5, "threads": 4}
+    assert np.allclose(taken[2].surface, 10 * moved(20), rtol=1e-15, atol=0)
+    assert recorded.about(tmp_path).name == "mine.2"
+    assert recorded.origin(settings) == {"candidate": {"name": "mine.2", "version": "2.1"}}
+
+
+def test_what_a_candidate_says_stands_beside_an_index_too(tmp_path: Path) -> None:
+    files.write_pvd(tmp_path / "frames.pvd", [])
+    assert recorded.about(said(tmp_path, "threads = 2") / "frames.pvd").threads == 2
+
+
+def test_a_candidate_may_say_nothing(tmp_path: Path) -> None:
+    assert recorded.about(tmp_path) == recorded.about(said(tmp_path, "")) == recorded.About()
+    assert recorded.origin(recorded.Settings(folder=str(tmp_path), unit="mm")) == {}
+    check(read(sequence(said(tmp_path, 'unit = "mm"'))))
+
+
+@pytest.mark.parametrize(
+    ("text", "match"),
+    [
+        (
+            'nme = "x"',
+            r"candidate\.toml: nme: got an unknown key, want one of name, seconds_per_frame, threads, unit, version",
+        ),
+        ('name = "my solver"', r'candidate\.toml: name: got "my solver", want .*pattern'),
+        ('name = ""', r"candidate\.toml: name: got"),
+        ("version = 2", r"candidate\.toml: version: got 2, want a valid string"),
+        ('unit = "furlong per day"', r'candidate\.toml: unit: got "furlong per day", want a unit of length'),
+        ('unit = "s"', r'candidate\.toml: unit: got "s", want a length with its unit'),
+        ("seconds_per_frame = 0", r"candidate\.toml: seconds_per_frame: got 0, want greater than 0"),
+        ('seconds_per_frame = "0.1"', r'candidate\.toml: seconds_per_frame: got "0\.1", want a valid number'),
+        ("threads = -1", r"candidate\.toml: threads: got -1, want greater than 0"),
+        ("name = mine", r"candidate\.toml: got .*, want a TOML file"),
+        ('unit = "m"', r'candidate\.toml: unit: got "m", want what --unit or the case says, a unit of 1 mm'),
+    ],
+)
+def test_what_a_candidate_says_wrongly(tmp_path: Path, text: str, match: str) -> None:
+    refuse(sequence(said(tmp_path, text)), match)

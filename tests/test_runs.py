@@ -98,3 +98,21 @@ def test_writing_again_starts_afresh(tmp_path) -> None:
     (folder / "surface" / "frame_0099.vtp").write_text("left over")
     write(folder)
     assert not (folder / "surface" / "frame_0099.vtp").exists()
+
+
+def test_a_run_of_lines_alone_keeps_its_rest_state(tmp_path) -> None:
+    writer = Writer(tmp_path / "run", IDENTITY, SURFACE, FIBRES, MESH)
+    for number in (0, 5):  # straight lines are elsewhere than the fibres from the first frame on
+        writer.add(Frame(number, None, FIBRES.points + number + 1))
+    writer.close(Outcome("converged", "done"))
+    run = runs.load(tmp_path / "run")
+    assert not run.has_surface
+    assert run.positions.shape == (2, len(SURFACE.points), 3)
+    assert np.isnan(run.positions).all()
+    assert np.array_equal(run.surface.points, SURFACE.points)
+    assert np.array_equal(run.fibres.points, FIBRES.points)
+    assert run.fibres.offsets.tolist() == [0, 3, 5]
+    assert np.array_equal(run.fibre_positions, np.stack([FIBRES.points + 1, FIBRES.points + 6]))
+    assert not (tmp_path / "run" / "surface").exists()
+    assert (tmp_path / "run" / "fibres.pvd").exists()
+    assert runs.load(write(tmp_path / "other")).has_surface

@@ -51,12 +51,13 @@ def main(arguments: list[str]) -> int:
 def _check_outputs(options: argparse.Namespace) -> None:
     """InputError where an output cannot be written, before anything is measured; makes nothing."""
     _check_folder("--out", out(options), written=options.verb is not verbs.list_all)
-    if options.json is None:
-        return
-    if options.json.is_dir():
-        raise InputError("--json", f'"{options.json}", a folder', "a file")
-    if not options.json.exists():
-        _check_folder("--json", options.json.parent, written=True)
+    written = ["json", "junit", "markdown", *(["baseline"] if getattr(options, "update", False) else [])]
+    for name in written:
+        path = getattr(options, name, None)
+        if path is not None and path.is_dir():
+            raise InputError(f"--{name}", f'"{path}", a folder', "a file")
+        if path is not None and not path.exists():
+            _check_folder(f"--{name}", path.parent, written=True)
 
 
 def _check_folder(place: str, folder: Path, *, written: bool) -> None:

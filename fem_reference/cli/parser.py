@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from fem_reference import __version__, field_verbs
-from fem_reference.cli import verbs
+from fem_reference.cli import check, export, verbs
 
 
 def parser() -> argparse.ArgumentParser:
@@ -35,6 +35,7 @@ def parser() -> argparse.ArgumentParser:
     )
     run = add("run", verbs.run, "solve a case and judge what it expects of the reference")
     run.add_argument("--solver", metavar="NAME", help="another solver than the case's own reference")
+    unit = "unit of length of the frames in DIR (default: that of its candidate.toml, else mm)"
     comparison = add("compare", verbs.compare, "measure candidates against the reference and write the page")
     comparison.add_argument(
         "--candidate",
@@ -42,22 +43,38 @@ def parser() -> argparse.ArgumentParser:
         metavar="NAME|DIR",
         help="a candidate of the case or a folder of frames; may be repeated",
     )
-    comparison.add_argument("--unit", default="mm", help="unit of length of the frames in DIR (default: mm)")
-    for judging in (run, comparison):
+    comparison.add_argument("--unit", help=unit)
+    checking = add("check", check.check, "judge a candidate by its own past and by the reference, for a pipeline")
+    check.add_options(checking, unit)
+    for judging in (run, comparison, checking):
         known = "how well the reference is known: solve it on coarser tetrahedra and with finer steps too"
         judging.add_argument("--error-bar", action="store_true", help=known)
-    for solving in (demo, run, comparison):
+    for solving in (demo, run, comparison, checking):
         ranks = "MPI processes of the reference (default: 2 where there are)"
         solving.add_argument("--ranks", type=int, metavar="N", help=ranks)
     page = add("page", verbs.page, "write a page over several cases", case=False)
-    page.add_argument(
-        "name", metavar="NAME", choices=sorted(field_verbs.PAGES), help=f"one of {', '.join(sorted(field_verbs.PAGES))}"
-    )
+    _add_page_options(page, unit)
+    speed = "time the solvers of Table 5.1 in CPU time of one thread, beside the machine's own speed"
+    timing = add("benchmark", verbs.time_solvers, speed, case=False)
+    timed = f"cases to time them on (default: {', '.join(verbs.TIMED_WITH_DATA)} where the data is, else {', '.join(verbs.TIMED)})"
+    timing.add_argument("cases", metavar="CASE", nargs="*", help=timed)
     catalogue = add("verify", verbs.verify, "measure problems whose answers are known and write the page", case=False)
     known = "an entry, a family or a shell pattern of them (default: all)"
     catalogue.add_argument("names", metavar="NAME", nargs="*", help=known)
     spoil = "measure this entry with its one thing wrong, named or not: it must fail; may be repeated"
     catalogue.add_argument("--spoil", action="append", default=[], metavar="NAME", help=spoil)
     add("list", verbs.list_all, "what there is: cases, solvers, metrics, stored runs", case=False)
+    exporting = add("export", export.export, "write all that a solver needs which is not ours, in open formats")
+    export.add_options(exporting)
     add("show", verbs.show, "what a case is made of; with --out also its meshes for ParaView")
     return whole
+
+
+def _add_page_options(page: argparse.ArgumentParser, unit: str) -> None:
+    names = sorted([*field_verbs.PAGES, verbs.TABLE])
+    page.add_argument("name", metavar="NAME", choices=names, help=f"one of {', '.join(names)}")
+    some = f"for {verbs.TABLE}: this case, not all of them; may be repeated"
+    page.add_argument("--case", action="append", default=[], metavar="CASE", help=some)
+    foreign = f"for {verbs.TABLE}: frames that your solver made of a case; may be repeated"
+    page.add_argument("--candidate", action="append", default=[], metavar="CASE=DIR", help=foreign)
+    page.add_argument("--unit", help=unit)

@@ -1,12 +1,15 @@
 """What each verb does; it prints what came of it and returns the exit status."""
 
 import argparse
+import os
 import re
 from pathlib import Path
 
 from fem_reference import (
+    benchmark,
     casefile,
     comparison,
+    families,
     field_verbs,
     files,
     judge,
@@ -22,12 +25,16 @@ from fem_reference.execution import Bench, complete
 from fem_reference.field.scene import FieldScene
 from fem_reference.field_execution import FieldBench
 from fem_reference.field_verbs import Told
-from fem_reference.overview import comparison_text, field_scene_facts, run_facts, run_text, scene_facts
+from fem_reference.overview import comparison_text, field_scene_facts, run_facts, run_text, scene_facts, standings_text
 from fem_reference.records import parse
-from fem_reference.scene import Candidate, Scene, SolverChoice
+from fem_reference.report.standings_page import facts as standings_facts
+from fem_reference.scene import DATA_SETTING, Candidate, Scene, SolverChoice
+from fem_reference.solvers import recorded
 from fem_reference.verification import verb as verification
 
 MAIN_JOB = "hip_flexion"
+TABLE = "table-5-1"
+TIMED, TIMED_WITH_DATA = ("hip_flexion", "box_squeeze"), ("gluteus_maximus", "box_squeeze_report")
 
 
 def demo(options: argparse.Namespace) -> int:
@@ -51,7 +58,7 @@ def compare(options: argparse.Namespace) -> int:
     return _judge(scene, options, [_candidate(scene, text, options.unit) for text in wanted])
 
 
-def _candidate(scene: Scene, text: str, unit: str) -> tuple[Candidate, str]:
+def _candidate(scene: Scene, text: str, unit: str | None) -> tuple[Candidate, str]:
     """The candidate of the scene with this name, else the recorded frames in this folder; and the place that chooses it."""
     names = [candidate.name for candidate in scene.candidate]
     if text in names:
@@ -60,8 +67,9 @@ def _candidate(scene: Scene, text: str, unit: str) -> tuple[Candidate, str]:
     if not path.exists():
         raise InputError("--candidate", f'"{text}"', f"a folder of frames, or one of {', '.join(names)}")
     folder = path.resolve()
-    name = re.sub(r"[^\w.-]+", "_", folder.stem if folder.is_file() else folder.name) or "candidate"
-    table = {"name": name, "solver": "recorded", "folder": str(folder), "unit": unit}
+    said = recorded.about(folder)
+    name = said.name or re.sub(r"[^\w.-]+", "_", folder.stem if folder.is_file() else folder.name) or "candidate"
+    table = {"name": name, "solver": "recorded", "folder": str(folder), "unit": unit or said.unit or "mm"}
     return parse(Candidate, table, "--candidate"), "--candidate"
 
 
@@ -105,7 +113,41 @@ def _told(told: Told, options: argparse.Namespace) -> int:
 
 def page(options: argparse.Namespace) -> int:
     """Write a page over several cases."""
+    if options.name == TABLE:
+        return _table(options)
+    if options.case or options.candidate:
+        raise InputError("page", f"--case or --candidate for {options.name}", f"them for {TABLE} only")
     return _told(field_verbs.page(options.name, out(options)), options)
+
+
+def _table(options: argparse.Namespace) -> int:
+    """The families of the report's table, measured."""
+    foreign = dict[str, list[Candidate]]()
+    for text in options.candidate:
+        case, equals, folder = text.partition("=")
+        if not equals:
+            raise InputError("--candidate", f'"{text}"', "CASE=DIR, a case and a folder of frames of it")
+        foreign.setdefault(case, []).append(_candidate(casefile.read_muscle(case), folder, options.unit)[0])
+    cases = options.case or families.SCENARIOS
+    if others := foreign.keys() - set(cases):
+        raise InputError("--candidate", f'"{min(others)}"', f"one of {', '.join(cases)}")
+    for case in options.case:
+        Bench(casefile.read_muscle(case), out(options)).setup()  # only what nobody asked for by name may be missing
+    table = families.stand(cases, out(options) / "runs", foreign)
+    path = report.write_standings(table, out(options), TABLE)
+    tell(standings_facts(table), f"{standings_text(table)}\npage: {path}", options)
+    return DONE if all(one.reference.status == "converged" for one in table.scenarios) else SOLVER_FAILED
+
+
+def time_solvers(options: argparse.Namespace) -> int:
+    """Time the solvers of Table 5.1."""
+    cases = options.cases or (TIMED_WITH_DATA if os.environ.get(DATA_SETTING) else TIMED)
+    benches = [Bench(casefile.read_muscle(case), out(options) / "runs") for case in cases]
+    for bench in benches:
+        bench.setup()  # what is missing shows before anything is timed
+    timings, machine = benchmark.measure(benches)
+    tell(benchmark.facts(timings, machine), benchmark.text(timings, machine), options)
+    return DONE
 
 
 def verify(options: argparse.Namespace) -> int:

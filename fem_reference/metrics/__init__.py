@@ -82,11 +82,17 @@ def of_itself(name: str) -> bool:
     return getattr(importlib.import_module(f"{__name__}.{name}"), "OF_ITSELF", False)
 
 
+def of_lines(name: str) -> bool:
+    """Whether the metric ``name`` is of the fibres alone, so that it needs no surface."""
+    return getattr(importlib.import_module(f"{__name__}.{name}"), "OF_LINES", False)
+
+
 def measure(run: Run, reference: Run, yardstick: Yardstick, wanted: Iterable[str] | None = None) -> tuple[Measure, ...]:
     """Every statistic of every metric (or of those ``wanted``) of ``run`` against ``reference``, frame by frame; both must have
-    the same frames.
+    the same frames. Of a run without a surface only what needs none.
     """
-    modules = (importlib.import_module(f"{__name__}.{name}") for name in (names() if wanted is None else wanted))
+    chosen = [name for name in (names() if wanted is None else wanted) if run.has_surface or of_lines(name)]
+    modules = (importlib.import_module(f"{__name__}.{name}") for name in chosen)
     return tuple(statistic for module in modules for statistic in module.measure(run, reference, yardstick))
 
 

@@ -1,7 +1,9 @@
 """How much longer or shorter each fibre of a run is than the same fibre of the reference, frame by frame.
 
 Two runs that both carry the yardstick's fibres inside themselves are measured on those; otherwise the surfaces of
-both go through the yardstick's extension, so that like is compared with like.
+both go through the yardstick's extension, so that like is compared with like. A run of lines alone (a line of action)
+puts its own points in the place of the fibres': its whole length is compared, so that it deviates at rest already where
+a straight line is shorter than the fibre. That is its error, and no change of length from its own rest makes up for it.
 """
 
 import numpy as np
@@ -13,6 +15,7 @@ from fem_reference.runs import Run
 UNITS = {"mean": "mm", "rms": "mm", "max": "mm", "mean_percent": "%", "rms_percent": "%", "max_percent": "%"}
 # Fibre points of a run this close [mm] to the yardstick's are the same points, after a file of single precision.
 _SAME = 1e-3
+OF_LINES = True
 
 
 @np.errstate(over="ignore", invalid="ignore")

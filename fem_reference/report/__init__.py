@@ -6,11 +6,12 @@ from pathlib import Path
 from fem_reference import files
 from fem_reference.comparison import Comparison
 from fem_reference.field.example import Example
-from fem_reference.report import field_page, page, verify_page
+from fem_reference.report import field_page, page, standings_page, verify_page
 from fem_reference.report.tables import as_csv, summary
 from fem_reference.report.verify_page import Verification
+from fem_reference.standings import Table
 
-__all__ = ["summary", "write", "write_examples", "write_verification"]
+__all__ = ["summary", "write", "write_examples", "write_standings", "write_verification"]
 
 
 def write(comparison: Comparison, folder: Path) -> Path:
@@ -42,6 +43,18 @@ def write_verification(verification: Verification, folder: Path, name: str) -> P
     texts = {
         f"{name}.json": json.dumps(verify_page.facts(verification), indent=1, allow_nan=False),
         f"{name}.html": verify_page.render(verification),
+    }
+    folder.mkdir(parents=True, exist_ok=True)
+    for file, text in texts.items():
+        files.write_text(folder / file, text)
+    return folder / f"{name}.html"
+
+
+def write_standings(table: Table, folder: Path, name: str) -> Path:
+    """Write the page ``name`` over families of solvers and its numbers as JSON into ``folder``; the path of the page."""
+    texts = {
+        f"{name}.json": json.dumps(standings_page.facts(table), indent=1, allow_nan=False),
+        f"{name}.html": standings_page.render(table),
     }
     folder.mkdir(parents=True, exist_ok=True)
     for file, text in texts.items():

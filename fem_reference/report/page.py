@@ -21,6 +21,7 @@ from fem_reference.report import gallery, pictures
 from fem_reference.report.curves import curves, label_of
 from fem_reference.report.tables import find, inversion, known, runs, seconds_per_frame
 from fem_reference.report.templates import template
+from fem_reference.report.viewer import view
 from fem_reference.report.words import listed, ratio, words
 from fem_reference.runs import Run
 from fem_reference.scene import Scene
@@ -69,6 +70,7 @@ def render(comparison: Comparison) -> str:
         least=least,
         greatest=greatest,
         figures=figures,
+        viewer=view(comparison),
         missing=missing,
         colours=_colours(),
         ticks=ticks,

@@ -3,19 +3,22 @@
 import logging
 import math
 import re
+import tomllib
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, field_validator
 
 from fem_reference import files
 from fem_reference.errors import InputError
 from fem_reference.mesh import Floats, Ints, Surface, check_finite
 from fem_reference.problem import Setup
-from fem_reference.records import Record
+from fem_reference.records import Record, parse
 from fem_reference.runs import Frame, Outcome, Sink
-from fem_reference.units import LengthUnit
+from fem_reference.units import LengthUnit, length_unit
 
 log = logging.getLogger(__name__)
 
@@ -32,6 +35,8 @@ SAME_POINT = 1e-4
 ON_FRAME = 1e-3
 
 _INDICES = (".pvd", ".xdmf")
+# What whoever computed a sequence may say of it, in a file beside the frames.
+ABOUT = "candidate.toml"
 
 
 class Settings(Record):
@@ -45,11 +50,52 @@ class Settings(Record):
     unit: LengthUnit
 
 
+class About(Record):
+    """What ``candidate.toml`` says: who computed the sequence, its unit of length, and the time [s] that solving one frame took on
+    so many threads.
+    """
+
+    name: str | None = Field(default=None, pattern=r"^[\w.-]+$")
+    version: str | None = None
+    unit: str | None = None
+    seconds_per_frame: float | None = Field(default=None, gt=0)
+    threads: int | None = Field(default=None, gt=0)
+
+    @field_validator("unit")
+    @classmethod
+    def _check_unit(cls, unit: str) -> str:
+        length_unit(unit)
+        return unit
+
+
+def about(path: Path) -> About:
+    """What is said of the sequence at ``path``, a folder or an index file; nothing where there is no ``candidate.toml``."""
+    file = _about_file(path)
+    if not file.is_file():
+        return About()
+    try:
+        table = tomllib.loads(file.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(file, str(error), "a TOML file") from error
+    return parse(About, table, str(file))
+
+
+def _about_file(path: Path) -> Path:
+    return (path if path.is_dir() else path.parent) / ABOUT
+
+
+def origin(settings: Settings) -> dict[str, Any]:
+    """Where a run comes from, as its candidate says."""
+    said = about(Path(settings.folder)).model_dump(exclude_none=True, include={"name", "version"})
+    return {"candidate": said} if said else {}
+
+
 def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
-    """Every frame wanted, once all of them are read and known to be of this surface.
+    """Every frame wanted, once all of them are read and known to be of this surface; the cost is what ``candidate.toml`` says.
 
     The times of an index are those of the frames by ``setup.interval`` [s], and frame numbers where that is None.
     """
+    said = _checked_about(settings)
     source = _source(Path(settings.folder))
     sequence = _sequence(source, settings.unit, setup.interval)
     missing = [str(number) for number in setup.frames if number not in sequence]
@@ -61,13 +107,24 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
     frames = []
     for number in setup.frames:
         surface = _surface(sequence[number], settings.unit)
-        frames.append(Frame(number, _positions(surface, setup.surface)))
+        positions = _positions(surface, setup.surface)
+        frames.append(Frame(number, positions))
         if number == setup.frames[0]:
-            _check_at_rest(surface.place, frames[0], setup.surface)
-        _check_size(surface.place, frames[-1].surface, setup.surface)
+            _check_at_rest(surface.place, number, positions, setup.surface)
+        _check_size(surface.place, positions, setup.surface)
     for frame in frames:
         sink(frame)
-    return Outcome("converged", f"read {len(frames)} frames from {source}")
+    cost = said.model_dump(exclude_none=True, include={"seconds_per_frame", "threads"})
+    return Outcome("converged", f"read {len(frames)} frames from {source}", {key: float(cost[key]) for key in cost})
+
+
+def _checked_about(settings: Settings) -> About:
+    """What is said of the sequence; InputError where its unit is another than that of ``settings``."""
+    said = about(Path(settings.folder))
+    if said.unit is not None and length_unit(said.unit) != settings.unit:
+        place = f"{_about_file(Path(settings.folder))}: unit"
+        raise InputError(place, f'"{said.unit}"', f"what --unit or the case says, a unit of {settings.unit:g} mm")
+    return said
 
 
 def _check_size(place: str, positions: Floats, rest: Surface) -> None:
@@ -189,11 +246,11 @@ def _weld(corners: Floats, triangles: Ints, count: int) -> tuple[Floats, float, 
     return points, float(gaps.max()), int(vertices[gaps.argmax()])
 
 
-def _check_at_rest(place: str, frame: Frame, rest: Surface) -> None:
+def _check_at_rest(place: str, number: int, positions: Floats, rest: Surface) -> None:
     """InputError where the first frame is grossly elsewhere than ``rest``, a warning where it is not quite there."""
-    away = float(np.sqrt(np.mean(np.sum((frame.surface - rest.points) ** 2, axis=1))))
+    away = float(np.sqrt(np.mean(np.sum((positions - rest.points) ** 2, axis=1))))
     limit = NEAR_REST * float(np.linalg.norm(np.ptp(rest.points, axis=0)))
-    got = f"a first frame ({frame.number}) that is {away:.3g} mm (rms) from the rest surface {rest.place}"
+    got = f"a first frame ({number}) that is {away:.3g} mm (rms) from the rest surface {rest.place}"
     if not away <= limit:
         raise InputError(place, got, f"at most {limit:.3g} mm; the usual reason is another unit or another mesh")
     if away > AT_REST:

@@ -89,12 +89,13 @@ def _with_held(problem: Problem, frame: Frame) -> Frame:
     bones have them, ``held_off_rms`` and ``held_off_max`` [mm]. Tets hold facets, which cover the attachments only roughly.
     As it is where no bone holds anything.
     """
-    if not problem.held:
+    surface = frame.surface
+    if not problem.held or surface is None:
         return frame
     off = np.concatenate(
         [
             np.linalg.norm(
-                frame.surface[held.vertices]
+                surface[held.vertices]
                 - apply(held.bone.pose(frame.number), problem.surface.points[held.vertices]),
                 axis=1,
             )
@@ -118,7 +119,7 @@ def _command(settings: Settings, job: Path) -> list[str]:
     worker = command("-m", "mpi4py", "-m", f"{__name__}.worker", str(job))
     beside = Path(sys.executable).with_name("mpiexec")
     mpiexec = str(beside) if beside.exists() else shutil.which("mpiexec")
-    ranks = settings.ranks or (min(2, os.cpu_count() or 1) if mpiexec else 1)
+    ranks = settings.ranks or (min(2, len(os.sched_getaffinity(0))) if mpiexec else 1)
     if ranks == 1:
         return worker
     if mpiexec is None:

@@ -1,0 +1,74 @@
+"""The verb ``check``: a candidate against its own past and against the reference, for the pipeline of whoever writes it.
+
+Where nothing can be said the exit status is 0: what the reference lacks is no fault of the change that is checked, and should
+not hold it up; the text, the Markdown and the JUnit file (as skipped) tell it.
+"""
+
+import argparse
+import time
+from pathlib import Path
+
+from fem_reference import files, refinement
+from fem_reference.cli.telling import DONE, SOLVER_FAILED, VERDICT_FAIL, tell
+from fem_reference.cli.verbs import _candidate, _checked_bench, _scene
+from fem_reference.errors import InputError
+from fem_reference.execution import Bench
+from fem_reference.regression import baseline, checking, told
+from fem_reference.regression.today import Today
+from fem_reference.runs import Run
+from fem_reference.scene import Candidate, Scene
+
+
+def add_options(parser: argparse.ArgumentParser, unit: str) -> None:
+    """The options that only this verb has, and ``--unit`` with its help."""
+    candidate = "a candidate of the case or a folder of frames"
+    parser.add_argument("--candidate", required=True, metavar="NAME|DIR", help=candidate)
+    parser.add_argument("--unit", help=unit)
+    past = "its measures as they were, JSON"
+    parser.add_argument("--baseline", type=Path, required=True, metavar="FILE", help=past)
+    anew = "write the baseline anew from today's measures; its tolerances and limits stay"
+    parser.add_argument("--update", action="store_true", help=anew)
+    parser.add_argument("--junit", type=Path, metavar="FILE", help="write the judgements as JUnit XML")
+    parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the worst of them for a pull request")
+
+
+def check(options: argparse.Namespace) -> int:
+    """Judge a candidate by its baseline, after having written that anew where it is asked for."""
+    begin = time.perf_counter()
+    scene = _scene(options)
+    if not isinstance(scene, Scene):
+        raise InputError("CASE", f'"{options.case}", a scalar case', "the case of a muscle")
+    chosen = _candidate(scene, options.candidate, options.unit)
+    bench = _checked_bench(scene, options, [chosen])
+    # What is wrong with the baseline shows before anything is solved.
+    (baseline.check if options.update else baseline.read)(options.baseline, scene, chosen[0].name)
+    candidate, reference = _runs(bench, chosen)
+    failed = [run for run in (reference, candidate) if run.outcome.status != "converged"]
+    if failed:
+        why = [f"{run.name}: {run.outcome.status}, {run.outcome.message}" for run in failed]
+        facts = {"case": scene.name, "candidate": candidate.name, "verdict": "failed", "notes": why, "judgements": []}
+        tell(facts, "\n".join([*why, "verdict: failed"]), options)
+        return SOLVER_FAILED
+    bars = refinement.obtain(bench, reference) if options.error_bar else refinement.stored(reference)
+    return _told(Today.of(scene, bench.setup(), candidate, reference, bars), options, begin)
+
+
+def _runs(bench: Bench, chosen: tuple[Candidate, str]) -> tuple[Run, Run]:
+    """The candidate, first as it may be bad input, and the reference."""
+    entry, place = chosen
+    candidate = bench.obtain(entry.name, entry, place)
+    return candidate, bench.obtain("reference", bench.scene.reference, "reference")
+
+
+def _told(today: Today, options: argparse.Namespace, begin: float) -> int:
+    """Judge, write what is wanted, and return the exit status."""
+    if options.update:
+        baseline.update(options.baseline, today)
+    result = checking.check(baseline.read(options.baseline, today.scene, today.candidate.name), today)
+    texts = {options.junit: told.junit(result, time.perf_counter() - begin), options.markdown: told.markdown(result)}
+    for path, text in texts.items():
+        if path is not None:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            files.write_text(path, text)
+    tell(told.facts(result), told.text(result), options)
+    return VERDICT_FAIL if result.word == "fail" else DONE

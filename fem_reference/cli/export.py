@@ -1,0 +1,31 @@
+"""The verb ``export``: a case for a solver that is not ours."""
+
+import argparse
+from pathlib import Path
+
+from fem_reference import casefile, exchange
+from fem_reference.cli.telling import DONE, lines, out, tell
+from fem_reference.errors import InputError
+from fem_reference.execution import Bench
+from fem_reference.scene import Scene
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """What the verb is told: where to, and in which formats."""
+    parser.add_argument(
+        "--to", type=Path, required=True, metavar="DIR", help="a folder that is not there yet, or empty"
+    )
+    forms = "open formats alone (default), or FEBio's own besides"
+    parser.add_argument("--format", choices=exchange.FORMATS, default="open", help=forms)
+
+
+def export(options: argparse.Namespace) -> int:
+    """Write a case for a solver that is not ours."""
+    scene = casefile.read(options.case, changes=dict(map(casefile.setting, options.set)))
+    if not isinstance(scene, Scene):
+        raise InputError(scene.place, "the scene of a scalar field", "the scene of a muscle")
+    bench = Bench(scene, out(options) / "runs")
+    written = exchange.export(scene, bench.problem, options.to, options.format)
+    facts = {"case": scene.name, "folder": str(options.to), "files": written}
+    tell(facts, "\n".join(lines(facts)), options)
+    return DONE

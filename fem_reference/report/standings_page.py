@@ -1,0 +1,129 @@
+"""The page ``table-5-1``: what the report rates with pluses and minuses, in numbers."""
+
+import io
+import math
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
+
+from fem_reference.report.curves import LOOK, PALETTE, REFERENCE, Curve, inline
+from fem_reference.report.tables import finite
+from fem_reference.report.templates import template
+from fem_reference.report.words import number
+from fem_reference.standings import Standing, Table
+
+# What is measured: metric, statistic, words above the column, unit.
+COLUMNS = (
+    ("volume", "deviation", "Volume", "%"),
+    ("fibre_length", "rms", "Fibre length, rms", "mm"),
+    ("fibre_length", "rms_percent", "Fibre length, rms", "%"),
+    ("surface_deviation", "rms", "Surface, rms", "mm"),
+    ("surface_deviation", "rms_percent", "Surface, rms", "% of travel"),
+    ("surface_deviation", "hausdorff", "Surface, Hausdorff", "mm"),
+    ("penetration", "deepest", "In bones, deepest", "mm"),
+)
+# Of them in the first table, which is over all scenes.
+OVER_ALL = (COLUMNS[0], COLUMNS[2], COLUMNS[4], COLUMNS[6])
+_MARKS = "osD^vPX*<>"
+
+
+def render(table: Table) -> str:
+    """The whole page as text."""
+    return template("standings_page.html").render(
+        table=table, columns=COLUMNS, over_all=OVER_ALL, per_second=per_second, drawing=_drawing(table)
+    )
+
+
+def per_second(seconds: float | None) -> float | None:
+    """Frames in a second, None where the time of one is not known."""
+    return 1 / seconds if seconds else None
+
+
+def facts(table: Table) -> dict[str, Any]:
+    """All of it as valid JSON: a number that is not finite is None."""
+    return {
+        "scenarios": [
+            {
+                "case": one.case,
+                "triangles": one.triangles,
+                "travel_mm": one.travel,
+                "reference": one.reference.status,
+                "message": one.reference.message,
+            }
+            for one in table.scenarios
+        ],
+        "missing": table.missing,
+        "report": [one.model_dump(mode="json", exclude={"candidate", "of_case"}) for one in table.families],
+        "standings": [_row(one) for one in table.standings],
+        "versions": table.versions,
+        "machine": table.machine,
+    }
+
+
+def _row(one: Standing) -> dict[str, Any]:
+    worst = {}
+    for metric, statistic, _, unit in COLUMNS:
+        found = one.worst(metric, statistic)
+        value = None if found is None else {"value": finite(found[0]), "frame": found[1], "unit": unit}
+        worst[f"{metric}.{statistic}"] = value
+    return {
+        **{name: getattr(one, name) for name in ("family", "name", "solver", "case", "seconds_per_frame")},
+        "status": one.outcome.status,
+        "message": one.outcome.message,
+        "worst": worst,
+    }
+
+
+def _drawing(table: Table) -> Curve:
+    """Deviation of the surface against the time of a frame, everybody on every scene."""
+    title = "Surface deviation (rms, worst frame) against the time of a frame"
+    with mpl.rc_context(LOOK):
+        figure = Figure(figsize=(9.6, 4.6), layout="constrained")
+        FigureCanvasSVG(figure)
+        axes = figure.add_subplot()
+        shown = [one for one in table.standings if _place(one) is not None]
+        colours = _colours(table)
+        for one in shown:
+            x, y = _place(one)  # type: ignore[misc]
+            look: dict[str, Any] = {"markerfacecolor": "white"} if one.of_reference else {}
+            mark = _MARKS[[scenario.case for scenario in table.scenarios].index(one.case) % len(_MARKS)]
+            axes.plot([x], [y], mark, color=colours[one.name], markersize=7, alpha=0.85, **look)
+        _label(axes, table, [name for name in colours if any(one.name == name for one in shown)])
+        text = io.StringIO()
+        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
+    return Curve(title, inline(text.getvalue(), "standings", title))
+
+
+def _colours(table: Table) -> dict[str, str]:
+    names = list(dict.fromkeys(one.name for one in table.standings if not one.of_reference))
+    more = [mpl.colors.to_hex(colour) for colour in mpl.colormaps["tab20b"].colors]  # type: ignore[attr-defined]
+    return {"reference": REFERENCE} | dict(zip(names, [*PALETTE, *more], strict=False))
+
+
+def _place(one: Standing) -> tuple[float, float] | None:
+    worst = one.worst("surface_deviation", "rms_percent")
+    if worst is None or one.seconds_per_frame is None or not (math.isfinite(worst[0]) and worst[0] > 0):
+        return None
+    return 1000 * one.seconds_per_frame, worst[0]
+
+
+def _label(axes: Axes, table: Table, names: list[str]) -> None:
+    """Axes in the words of the table; a legend of colours and one of marks."""
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
+        axis.set_minor_formatter(NullFormatter())
+    axes.set_xlabel("time for a frame, ms")
+    axes.set_ylabel("% of the greatest displacement")
+    colours = _colours(table)
+    hues = [axes.plot([], [], "o", color=colours[name], label=name)[0] for name in names]
+    cases = [one.case for one in table.scenarios]
+    marks = [axes.plot([], [], _MARKS[i % len(_MARKS)], color="#777777", label=case)[0] for i, case in enumerate(cases)]
+    first = axes.legend(handles=hues, loc="upper left", bbox_to_anchor=(1.01, 1.0))
+    axes.add_artist(first)
+    axes.legend(handles=marks, loc="lower left", bbox_to_anchor=(1.01, 0.0))

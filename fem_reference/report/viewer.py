@@ -1,0 +1,208 @@
+"""The 3D view of the page: every frame of every run, packed into the page with the library that draws it in a browser.
+
+What ``viewer.js`` unpacks is one JSON object. Arrays in it are little-endian, compressed (gzip) and in base64:
+
+    library    text of each file of three.js
+    frames     numbers (f,) of the frames drawn;  colours  stops of the colour bar;  top  its greatest distance [mm]
+    low, step  position = low + step * whole number from 0 to 65535 [mm]
+    triangles  whole numbers (m, 3), of 4 bytes, the same for every run
+    runs       name, worst (greatest distance to the reference [mm] and its frame's index), reached (f,), off (f,): how many
+               vertices are outside of the box, and positions: whole numbers (f, n, 3) of 2 bytes as differences from the
+               frame before, zigzag (0, -1, 1, -2, ... as 0, 1, 2, 3, ...), all low bytes before all high bytes
+    bones      name, triangles, positions (1, n, 3) in the same form with its own low and step, poses (f, 16) by rows
+    camera     middle (3,), half height of the picture [mm], directions (2, 3) towards the camera
+"""
+
+import base64
+import gzip
+import json
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.colors import to_hex
+from numpy.typing import NDArray
+
+from fem_reference.comparison import Comparison
+from fem_reference.geometry.thinning import thin
+from fem_reference.mesh import Floats
+from fem_reference.problem import Body
+from fem_reference.report import gallery, pictures
+from fem_reference.runs import Run
+
+THREE = Path(__file__).parent / "three"
+# How many bytes the positions of all frames may have before they are compressed: about as many as base64 needs for what is left.
+BUDGET = 10_000_000
+BONE_TRIANGLES = 8000
+_LEVELS = 65535
+
+
+@dataclass(frozen=True)
+class Viewer:
+    """What the template needs: the ``data`` for the script, the names of the ``candidates`` drawn, the frame numbers, one frame
+    in how many is drawn, the greatest error of a coordinate [mm], and the library's version and licence.
+    """
+
+    data: str
+    candidates: tuple[str, ...]
+    numbers: tuple[int, ...]
+    every: int
+    error: float
+    version: str
+    licence: str
+
+
+@dataclass(frozen=True, eq=False)
+class _Box:
+    """What coordinates are rounded in: from ``low`` (3,) [mm] in steps of ``step`` [mm]."""
+
+    low: Floats
+    step: float
+
+    @classmethod
+    def around(cls, low: Floats, high: Floats) -> "_Box":
+        return cls(low, max(float((high - low).max()) / _LEVELS, 1e-9))
+
+    def whole(self, points: Floats) -> NDArray[np.uint16]:
+        """The nearest whole numbers; 0 for what is not a number, the edge of the box for what is outside of it."""
+        with np.errstate(invalid="ignore", over="ignore"):
+            steps = np.clip(np.round((points - self.low) / self.step), 0, _LEVELS)
+        return np.nan_to_num(steps, nan=0.0).astype(np.uint16)
+
+    def told(self) -> dict[str, Any]:
+        return {"low": self.low.tolist(), "step": self.step}
+
+
+def view(comparison: Comparison, budget: int = BUDGET) -> Viewer:
+    """The 3D view of a comparison; where its positions would have more bytes than ``budget`` only of every k-th frame."""
+    reference = comparison.reference
+    shown = [reference, *(run for run in comparison.candidates if run.has_surface)]
+    every = _every(shown, budget)
+    numbers = reference.numbers[::every]
+    frames = {run.name: _frames(run, numbers) for run in shown}
+    box = _box(frames[reference.name], list(frames.values()))
+    version, licence = _library_facts()
+    data = {
+        "library": _library(),
+        "frames": numbers,
+        "colours": [to_hex(colour) for colour in mpl.colormaps[pictures.COLOURS](np.linspace(0, 1, 33))],
+        "triangles": _packed(reference.surface.triangles.astype("<u4").tobytes()),
+        "bones": [_bone(bone, numbers) for bone in comparison.setup.bones],
+        "camera": _camera(comparison, frames[reference.name]),
+        **box.told(),
+        **_runs(frames, reference.name, box),
+    }
+    names = tuple(run.name for run in shown[1:])
+    return Viewer(_json(data), names, numbers, every, box.step / 2, version, licence)
+
+
+def _every(shown: list[Run], budget: int) -> int:
+    """One frame in how many keeps the positions of all runs within ``budget`` bytes, as far as two frames are left."""
+    count, vertices = len(shown[0].numbers), len(shown[0].surface.points)
+    frame = len(shown) * vertices * 3 * 2
+    ways = range(1, max(count, 2))
+    return next((every for every in ways if -(-count // every) * frame <= budget), ways[-1])
+
+
+def _frames(run: Run, numbers: tuple[int, ...]) -> Floats:
+    """Positions (f, n, 3) of a run at frame ``numbers``, NaN all over where one is not wholly known."""
+    found = dict(zip(run.numbers, run.positions, strict=True))
+    lost = np.full_like(run.surface.points, np.nan)
+    chosen = (found.get(number, lost) for number in numbers)
+    return np.stack([points if np.isfinite(points).all() else lost for points in chosen])
+
+
+def _box(reference: Floats, runs: list[Floats]) -> _Box:
+    """Around all frames, but beyond the reference's by at most its own length on each side: a run may scatter."""
+    low, high = _bounds(reference)
+    reach = float(np.linalg.norm(high - low))
+    lows, highs = zip(*(_bounds(frames) for frames in runs if np.isfinite(frames).any()), strict=True)
+    return _Box.around(np.maximum(np.min(lows, axis=0), low - reach), np.minimum(np.max(highs, axis=0), high + reach))
+
+
+def _bounds(frames: Floats) -> tuple[Floats, Floats]:
+    return np.nanmin(frames, axis=(0, 1)), np.nanmax(frames, axis=(0, 1))
+
+
+def _runs(frames: dict[str, Floats], reference: str, box: _Box) -> dict[str, Any]:
+    """Every run, and the ``top`` of the colours: the greatest distance of a vertex inside the box to the reference's."""
+    rows, top = [], 0.0
+    for name, positions in frames.items():
+        inside = (positions >= box.low - box.step) & (positions <= box.low + (_LEVELS + 1) * box.step)
+        reached = np.isfinite(positions).all(axis=(1, 2))
+        with np.errstate(over="ignore"):
+            distances = np.linalg.norm(positions - frames[reference], axis=2)
+        known = np.where(np.isfinite(distances) & inside.all(axis=2), distances, 0.0).max(axis=1)
+        rows.append(
+            {
+                "name": name,
+                "worst": [float(known.max()), int(known.argmax())],
+                "reached": reached.tolist(),
+                "off": np.where(reached, (~inside).any(axis=2).sum(axis=1), 0).tolist(),
+                "positions": _positions(_held_on(positions), box),
+            }
+        )
+        top = max(top, float(known.max()))
+    return {"runs": rows, "top": top}
+
+
+def _held_on(frames: Floats) -> Floats:
+    """The frames with the last that was reached in the place of one that was not, which then costs no bytes."""
+    reached = np.isfinite(frames).all(axis=(1, 2))
+    last = np.maximum.accumulate(np.where(reached, np.arange(len(frames)), 0))
+    return np.asarray(frames[last])
+
+
+def _positions(frames: Floats, box: _Box) -> str:
+    """Positions (f, n, 3) in the form that this module's text tells."""
+    whole = box.whole(frames)
+    steps = np.diff(whole, axis=0, prepend=np.zeros_like(whole[:1])).view(np.int16)
+    zigzag = ((steps << 1) ^ (steps >> 15)).view(np.uint16)
+    return _packed((zigzag & 255).astype(np.uint8).tobytes() + (zigzag >> 8).astype(np.uint8).tobytes())
+
+
+def _bone(bone: Body, numbers: tuple[int, ...]) -> dict[str, Any]:
+    surface = thin(bone.surface, BONE_TRIANGLES)
+    box = _Box.around(surface.points.min(axis=0), surface.points.max(axis=0))
+    return {
+        "name": bone.name,
+        "triangles": _packed(surface.triangles.astype("<u4").tobytes()),
+        "positions": _positions(surface.points[None], box),
+        "poses": [bone.pose(number).ravel().tolist() for number in numbers],
+        **box.told(),
+    }
+
+
+def _camera(comparison: Comparison, frames: Floats) -> dict[str, Any]:
+    """Where the pictures are taken from, wide enough for the reference in all frames."""
+    low, high = _bounds(frames)
+    middle = (low + high) / 2
+    return {
+        "middle": middle.tolist(),
+        "half": 1.06 * float(np.nanmax(np.linalg.norm(frames - middle, axis=2))),
+        "directions": gallery.directions(comparison.setup.surface, comparison.setup.bones).tolist(),
+    }
+
+
+@cache
+def _library() -> dict[str, str]:
+    return {path.name: _packed(path.read_bytes()) for path in sorted(THREE.glob("*.js"))}
+
+
+def _library_facts() -> tuple[str, str]:
+    """Version and licence text of three.js as it lies beside this file."""
+    card = tomllib.loads((THREE / "card.toml").read_text(encoding="utf-8"))
+    return card["version"], (THREE / "LICENSE").read_text(encoding="utf-8")
+
+
+def _packed(values: bytes) -> str:
+    return base64.b64encode(gzip.compress(values, 9, mtime=0)).decode()
+
+
+def _json(data: dict[str, Any]) -> str:
+    """As text that may stand in a page's script: no name in it can end that."""
+    return json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")

@@ -1,0 +1,208 @@
+"""The families of Table 5.1 stand on scenes: who is measured, how fast, how far off, and what the page and the command say."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import small
+
+from fem_reference import benchmark, casefile, cli, families, overview, report, runs, standings
+from fem_reference.errors import InputError
+from fem_reference.execution import Bench
+from fem_reference.metrics import Measure
+from fem_reference.report import standings_page
+from fem_reference.runs import Frame, Outcome
+from fem_reference.scene import Candidate
+from fem_reference.solvers import fenicsx, pbd
+from fem_reference.standings import Family, Scenario, Standing, Table
+
+PBD = {"sub_iterations": 1, "solver_iterations": 1, "damping": 0.0, "stretch": 1.0, "volume": 1.0, "bending": 0.5}
+ROWS = (
+    Family(name="FEM", form="Volumetric model", speed="---", precision="+++", literature="[59]"),
+    Family(
+        name="PBD",
+        form="Surface model",
+        speed="++",
+        precision="?",
+        literature="[62]",
+        of_case=("pb*",),
+        candidate=(Candidate(name="still", solver="pbd", **PBD | {"stretch": 0.0, "volume": 0.0, "bending": 0.0}),),
+    ),
+)
+
+
+def shift(problem, _, sink) -> Outcome:
+    """In place of the reference: everything moves up, by the frame number [mm]."""
+    for number in problem.frames:
+        up = np.array([0, 0, float(number)])
+        sink(Frame(number, problem.surface.points + up, problem.fibres.points + up))
+    return Outcome("converged", "done", {"seconds_solve": 8.0})
+
+
+@pytest.fixture
+def case(tmp_path, monkeypatch):
+    """The small scene, its reference shifted, and a table of two families."""
+    monkeypatch.setattr(fenicsx, "require", lambda _: None)
+    monkeypatch.setattr(fenicsx, "solve", shift)
+    monkeypatch.setattr(families, "families", lambda: ROWS)
+    monkeypatch.setattr(benchmark, "families", lambda: ROWS)
+    return small.write(tmp_path / "bar")
+
+
+def page(case, *words: str) -> tuple[int, dict, str]:
+    out = case.parent / "out"
+    status = cli.main(["page", "table-5-1", "--case", str(case), *words, "--out", str(out), "--quiet"])
+    return status, json.loads((out / "table-5-1.json").read_text()), (out / "table-5-1.html").read_text()
+
+
+def test_the_rows_are_those_of_the_report() -> None:
+    # Table 5.1: algorithm, form, speed, precision.
+    assert [(row.name, row.form, row.speed, row.precision) for row in standings.families()] == [
+        ("Hill-type", "Single line", "+++", "---"),
+        ("Via-points", "Polyline", "++", "--"),
+        ("Wrap. obst.", "Complex curve", "+", "-"),
+        ("FEM", "Volumetric model", "---", "+++"),
+        ("MSS", "Volumetric model", "++", "-"),
+        ("ARAP", "Surface model", "++", "?"),
+        ("PBD", "Surface model", "++", "?"),
+    ]
+    assert standings.report_speeds()["gluteus_medius"] == 57.12  # Table 6.1
+
+
+def test_everybody_is_measured_against_the_reference(case) -> None:
+    status, facts, html = page(case)
+    assert status == cli.DONE
+    assert [(one["family"], one["name"]) for one in facts["standings"]] == [
+        ("FEM", "reference"),
+        ("PBD", "pbd"),
+        ("PBD", "still"),
+    ]
+    reference, _, still = facts["standings"]
+    # 8 s for the four frames after the first; nobody asked for its error bar.
+    assert reference["seconds_per_frame"] == 2.0
+    assert set(reference["worst"].values()) == {None}
+    # Nothing but what bones hold moves in a solver without constraints: in frame 20, where they are back at rest, the whole surface
+    # is 20 mm below the reference's, and so is that of the greatest displacement, 100 %.
+    assert still["worst"]["surface_deviation.rms"] == pytest.approx({"value": 20.0, "frame": 20, "unit": "mm"})
+    assert still["worst"]["surface_deviation.rms_percent"]["value"] == pytest.approx(100.0)
+    assert facts["scenarios"][0]["travel_mm"] == pytest.approx(20.0)
+    for word in ("Surface model", "still", "20", "<svg"):
+        assert word in html
+
+
+def test_a_foreign_solver_stands_in_the_same_table(case, tmp_path) -> None:
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    rest = small.body()
+    for number in (0, 5, 10, 15, 20):
+        runs.files.write_surface(
+            folder / f"frame_{number}.vtp", rest, rest.points + [0, 0, number + 0.25 * (number == 20)]
+        )
+    status, facts, html = page(case, "--candidate", f"{case}={folder}")
+    assert status == cli.DONE
+    mine = facts["standings"][-1]
+    assert (mine["family"], mine["name"], mine["solver"]) == ("Yours", "mine", "recorded")
+    assert mine["worst"]["surface_deviation.rms"]["value"] == pytest.approx(0.25, abs=1e-4)  # files of single precision
+    assert "Yours" in html
+
+
+def test_a_scene_that_is_not_there_is_left_out_and_told(case, capsys) -> None:
+    (case / "bar.vtp").unlink()
+    made = families.stand([str(case)], case.parent, {})
+    assert (made.scenarios, made.standings) == ((), ())
+    assert "bar.vtp" in made.missing["bar"]
+    assert "Left out" in standings_page.render(made)
+    assert "bar: left out" in overview.standings_text(made)
+    # One that was asked for by name is an error.
+    assert cli.main(["page", "table-5-1", "--case", str(case), "--quiet"]) == cli.BAD_INPUT
+    assert "bar.vtp" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "place"),
+    [
+        (["--candidate", "somewhere"], '--candidate: got "somewhere", want CASE=DIR'),
+        (["--candidate", "hip_flexion=."], '--candidate: got "hip_flexion", want one of'),
+    ],
+)
+def test_a_foreign_solver_of_no_scene_is_bad_input(case, words, place, capsys) -> None:
+    assert cli.main(["page", "table-5-1", "--case", str(case), *words, "--quiet"]) == cli.BAD_INPUT
+    assert place in capsys.readouterr().err
+
+
+def test_other_pages_have_no_candidates(capsys) -> None:
+    assert cli.main(["page", "octave-examples", "--case", "rod", "--quiet"]) == cli.BAD_INPUT
+    assert "page: got --case or --candidate for octave-examples" in capsys.readouterr().err
+
+
+def table(*found: Standing) -> Table:
+    scenarios = tuple(Scenario(f"case{i}", f"Case {i}", 100 * (i + 1), 50.0, Outcome("converged", "")) for i in (0, 1))
+    return Table(ROWS, scenarios, found, {}, {}, "this machine")
+
+
+def standing(case: str, *values: float, seconds: float | None = 0.01) -> Standing:
+    measures = (Measure("surface_deviation", "rms_percent", "%", np.array(values)),)
+    return Standing("PBD", "pbd", "pbd", case, Outcome("converged", ""), seconds, measures, tuple(range(len(values))))
+
+
+def test_what_is_worst_over_frames_and_scenes() -> None:
+    made = table(standing("case0", 1.0, -7.0, 3.0), standing("case1", 2.0, 2.5, seconds=0.5))
+    assert made.standings[0].worst("surface_deviation", "rms_percent") == (-7.0, 1)
+    assert made.standings[0].worst("volume", "deviation") is None
+    assert made.over("PBD", "pbd", "surface_deviation", "rms_percent") == (-7.0, "case0")
+    assert made.over("PBD", "nobody", "surface_deviation", "rms_percent") is None
+    assert made.speed("PBD", "pbd") == (made.scenarios[1], 0.5)  # that with more triangles
+    # A frame that was not reached is worse than any that was.
+    lost = table(standing("case0", 1.0, math.nan), standing("case1", 99.0))
+    value, case = lost.over("PBD", "pbd", "surface_deviation", "rms_percent")
+    assert math.isnan(value)
+    assert case == "case0"
+
+
+def test_what_is_not_a_number_stands_on_the_page_and_not_in_the_drawing() -> None:
+    lost = replace(standing("case0", math.nan), outcome=Outcome("diverged", "lost at <frame> 3"))
+    made = table(lost, standing("case1", 5.0, seconds=None))
+    html = standings_page.render(made)
+    assert "not a number" in html
+    assert "lost at &lt;frame&gt; 3" in html
+    json.dumps(standings_page.facts(made), allow_nan=False)
+
+
+def test_the_page_is_whole_or_not_there(tmp_path) -> None:
+    path = report.write_standings(table(standing("case0", 1.0)), tmp_path / "new", "table-5-1")
+    assert sorted(file.name for file in path.parent.iterdir()) == ["table-5-1.html", "table-5-1.json"]
+
+
+def test_the_benchmark_times_what_iterates(case, capsys, monkeypatch) -> None:
+    monkeypatch.setattr(benchmark, "REPEATS", 2)
+    target = case.parent / "speed.json"
+    assert cli.main(["benchmark", str(case), "--json", str(target), "--quiet"]) == cli.DONE
+    facts = json.loads(target.read_text())
+    assert [(one["name"], one["case"], one["limit"]) for one in facts["timings"]] == [
+        ("pbd", "bar", None),
+        ("still", "bar", None),
+    ]
+    assert all(len(one["seconds"]) == 2 for one in facts["timings"])
+    assert min(facts["machine"].values()) > 0
+    told = capsys.readouterr().out
+    assert "iterations a second of CPU time" in told
+
+
+def test_a_ratio_is_told_where_the_report_has_a_speed() -> None:
+    timing = benchmark.Timing("gluteus_maximus", "pbd", "pbd", 19752, (0.02, 0.01), 33.0)
+    assert (timing.per_second, timing.ratio) == pytest.approx((100.0, 100 / 33))
+    told = benchmark.text([timing], benchmark.Machine(10.0, 2.0))
+    assert "pbd 50 to 100, 3.03 times the report's program (33 a second)" in told
+
+
+def test_a_solver_that_fails_has_no_time(case, monkeypatch) -> None:
+    monkeypatch.setattr(pbd, "solve", lambda *_: Outcome("diverged", "lost"))
+    timings, _ = benchmark.measure([Bench(casefile.read_muscle(case), case.parent)])
+    assert timings == []
+
+
+def test_bad_input_is_not_an_empty_table(case) -> None:
+    with pytest.raises(InputError, match="nowhere"):
+        families.stand(["nowhere"], case.parent, {})

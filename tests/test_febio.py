@@ -1,0 +1,346 @@
+"""FEBio's file of a scene: well formed, every name in it there, its elements and curves those of the scene.
+
+FEBio is not here: its conventions (numbering, order of nodes, laws) are written down in these tests once more, from its manual.
+"""
+
+import json
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+import acting
+import meshio
+import numpy as np
+import pytest
+import shapes
+import small
+from scipy.spatial.transform import Rotation as Turn
+
+from fem_reference import casefile, exchange
+from fem_reference.effects import total_energy
+from fem_reference.errors import InputError
+from fem_reference.exchange import febio
+from fem_reference.mesh import tet_volumes, triangle_areas
+from fem_reference.motion import Rotation, Translation, apply
+from fem_reference.problem import Body, Problem
+from fem_reference.records import parse
+from fem_reference.scene import Scene
+
+FRAMES = (10, 15, 20, 25)
+TURNS = Rotation((1, 2, 2), (3.0, -4.0, 5.0), (10.0, 18.0, 40.0), (0.0, -0.7, 0.4))
+SLIDES = Translation((0, -3, 4), (10.0, 12.5, 30.0), (0.0, 2.0, 9.0))
+
+
+def effects(*names: str) -> tuple[Any, ...]:
+    changes = {"contact": {"bones": ["top"]}}
+    return tuple(
+        parse(acting.effects.find(name), acting.PARAMETERS[name] | changes.get(name, {}), "test") for name in names
+    )
+
+
+@pytest.fixture(scope="module")
+def bar() -> Problem:
+    """A bar held by a bone that slides and one that turns and pushes, beside one that rests; its fibres point anywhere."""
+    acts = effects("neo_hooke", "incompressible", "fibre_passive_febio", "contact")
+    plain = shapes.bar((2, 2, 3), (10, 10, 30), {"bottom": SLIDES, "top": TURNS}, acts, FRAMES)
+    ball = shapes.sphere(0, 5.0)
+    bones = {bone.name: replace(bone, surface=ball) for bone in plain.bones}
+    held = tuple(replace(held, bone=bones[held.bone.name]) for held in plain.held)
+    along = np.random.default_rng(3).normal(size=(len(plain.mesh.tets), 3))
+    directions = along / np.linalg.norm(along, axis=1)[:, None]
+    rests = Body("rests & <waits>", ball.moved_to(ball.points + [50, 0, 0]), None)
+    return replace(plain, bones=(*bones.values(), rests), held=held, directions=directions)
+
+
+@pytest.fixture(scope="module")
+def feb(bar: Problem, tmp_path_factory: pytest.TempPathFactory) -> Element:
+    folder = tmp_path_factory.mktemp("febio")
+    febio.write(bar, folder)
+    return ElementTree.parse(folder / "scene.feb").getroot()
+
+
+def numbers(element: Element) -> list[float]:
+    return [float(text) for text in (element.text or "").split(",")]
+
+
+def nodes(feb: Element) -> np.ndarray:
+    """Positions by number, from 1; the numbers are all there, in their order."""
+    found = list(feb.iterfind("Mesh/Nodes/node"))
+    assert [int(node.attrib["id"]) for node in found] == list(range(1, len(found) + 1))
+    return np.array([[np.nan] * 3, *map(numbers, found)])
+
+
+def cells(feb: Element, name: str, tag: str = "Elements") -> np.ndarray:
+    return np.array([numbers(cell) for cell in feb.find(f"Mesh/{tag}[@name='{name}']")], int)
+
+
+def test_the_sections_are_those_of_the_format(feb: Element) -> None:
+    assert feb.attrib == {"version": "4.0"}
+    sections = "Module Control Material Mesh MeshDomains MeshData Boundary Rigid Contact LoadData Output"
+    assert [section.tag for section in feb] == sections.split()
+
+
+def test_what_is_empty_is_written_short(bar: Problem, tmp_path: Path) -> None:
+    """FEBio takes ``<Module type="solid"></Module>`` for the beginning of a list (FEBioModuleSection.cpp)."""
+    febio.write(bar, tmp_path)
+    text = (tmp_path / "scene.feb").read_text()
+    assert '<Module type="solid" />' in text
+    assert "></" not in text
+
+
+def test_numbers_are_used_once_and_every_node_is_there(feb: Element) -> None:
+    elements = [int(cell.attrib["id"]) for cell in feb.iterfind("Mesh/Elements/elem")]
+    assert elements == list(range(1, len(elements) + 1))
+    count = len(nodes(feb)) - 1
+    for cell in feb.iterfind("Mesh/Elements/elem"):
+        wanted = {"tet10": 10, "tri3": 3}[
+            next(group for group in feb.iterfind("Mesh/Elements") if cell in group).attrib["type"]
+        ]
+        assert len(set(numbers(cell))) == wanted
+        assert all(1 <= number <= count for number in numbers(cell))
+    used = {int(number) for cell in feb.iterfind("Mesh/Elements/elem") for number in numbers(cell)}
+    assert used == set(range(1, count + 1))
+
+
+def test_every_name_that_is_used_is_there(feb: Element) -> None:
+    def named(path: str, key: str = "name") -> set[str]:
+        return {entry.attrib[key] for entry in feb.iterfind(path)}
+
+    def texts(path: str) -> set[str | None]:
+        return {entry.text for entry in feb.iterfind(path)}
+
+    materials, domains = named("Material/material"), named("MeshDomains/*")
+    rigid = {entry.attrib["name"] for entry in feb.iterfind("Material/material[@type='rigid body']")}
+    assert rigid == {"bone_bottom", "bone_top", "bone_rests & <waits>"}
+    assert domains == named("Mesh/Elements")
+    assert named("MeshDomains/*", "mat") <= materials
+    assert named("MeshData/ElementData", "elem_set") <= domains
+    assert named("Boundary/bc", "node_set") == named("Mesh/NodeSet")
+    assert texts(".//rb") <= rigid
+    assert named("Contact/contact", "surface_pair") == named("Mesh/SurfacePair")
+    assert texts("Mesh/SurfacePair/*") == named("Mesh/Surface")
+    curves = {entry.attrib["id"] for entry in feb.iterfind("LoadData/load_controller")}
+    assert {entry.attrib["lc"] for entry in feb.iterfind(".//*[@lc]")} == curves
+    assert named("Output/logfile/node_data", "node_set") <= named("Mesh/Nodes")
+    assert len(materials) == len({entry.attrib["id"] for entry in feb.iterfind("Material/material")})
+
+
+def shapes_of_febio(r: np.ndarray) -> np.ndarray:
+    """FEBio's ten shape functions at points (n, 3) of its reference tet, (n, 10)."""
+    a, (b, c, d) = 1 - r.sum(axis=1), r.T
+    corners = [x * (2 * x - 1) for x in (a, b, c, d)]
+    return np.stack([*corners, 4 * a * b, 4 * b * c, 4 * c * a, 4 * a * d, 4 * b * d, 4 * c * d], axis=1)
+
+
+def test_elements_are_straight_tets_of_positive_volume_in_febios_order(feb: Element, bar: Problem) -> None:
+    """In that order alone its shape functions carry its reference tet linearly to where the corners are (rounding at 30 mm)."""
+    at = nodes(feb)[cells(feb, "muscle")]
+    r = np.random.default_rng(1).dirichlet(np.ones(4), size=20)
+    linear = np.einsum("pk,ekx->epx", r, at[:, :4])
+    assert np.allclose(np.einsum("pk,ekx->epx", shapes_of_febio(r[:, 1:]), at), linear, rtol=0, atol=1e-12)
+    volumes = tet_volumes(at.reshape(-1, 3), 10 * np.arange(len(at))[:, None] + np.arange(4))
+    assert volumes.min() > 0
+    assert volumes.sum() == pytest.approx(3000, rel=1e-12)  # 10 x 10 x 30
+    assert len(at) == len(bar.mesh.tets)
+
+
+def test_held_nodes_are_all_of_an_end(feb: Element) -> None:
+    """5 x 5 nodes of the 2 x 2 cells in a face: corners, and middles of edges and diagonals."""
+    points = nodes(feb)
+    for name, height in (("bottom", 0.0), ("top", 30.0)):
+        held = [int(text) for text in feb.find(f"Mesh/NodeSet[@name='held_{name}']").text.split(",")]
+        assert set(held) == set(np.flatnonzero(np.isclose(points[: 1 + cells(feb, "muscle").max(), 2], height)))
+        assert len(held) == 25
+        assert feb.find(f"Boundary/bc[@node_set='held_{name}']/rb").text == f"bone_{name}"
+
+
+def test_a_node_goes_with_one_bone(bar: Problem) -> None:
+    """Attachments that share an edge: what the first has, the second has not."""
+    facets = bar.mesh.facets["bottom"]
+    split = replace(bar.mesh, facets={"bottom": facets[:4], "top": facets[4:]})
+    feb = febio.model(replace(bar, mesh=split))
+    one, other = (set(entry.text.split(",")) for entry in feb.iterfind("Mesh/NodeSet"))
+    assert not one & other
+    assert len(one | other) == 25
+
+
+def test_the_contact_surfaces(feb: Element) -> None:
+    """Of the sides 10 x 30 the third in the middle touches no held node; it faces outwards, as FEBio's surfaces must."""
+    points, free = nodes(feb), cells(feb, "muscle_free", "Surface")
+    assert triangle_areas(points, free[:, :3]).sum() == pytest.approx(4 * 10 * 10, rel=1e-12)
+    for middle, (a, b) in zip(free[:, 3:].T, ((0, 1), (1, 2), (2, 0)), strict=True):
+        assert np.allclose(points[middle], (points[free[:, a]] + points[free[:, b]]) / 2, rtol=0, atol=1e-12)
+    a, b, c = (points[free[:, k]] for k in range(3))
+    assert (np.einsum("ij,ij->i", np.cross(b - a, c - a), a - [5, 5, 15]) > 0).all()
+    (contact,) = feb.iterfind("Contact/contact")  # of the bone that the effect names
+    assert contact.find("penalty").text == "0.5"  # 500 kPa/mm
+    assert contact.find("auto_penalty").text == "0"
+    pair = feb.find("Mesh/SurfacePair")
+    assert [surface.text for surface in pair] == ["muscle_free", "bone_top_surface"]
+    ball = cells(feb, "bone_top_surface", "Surface")
+    a, b, c = (points[ball[:, k]] for k in range(3))
+    assert (np.einsum("ij,ij->i", np.cross(b - a, c - a), a) > 0).all()
+    assert np.array_equal(ball, cells(feb, "bone_top"))
+
+
+def test_a_bone_whose_triangles_face_inwards_is_turned(bar: Problem) -> None:
+    ball = bar.bones[0].surface
+    inwards = replace(bar.bones[0], surface=replace(ball, triangles=ball.triangles[:, ::-1]))
+    upright, turned = (febio.model(replace(bar, bones=(bone,), held=())) for bone in (bar.bones[0], inwards))
+    assert np.array_equal(cells(upright, "bone_bottom"), cells(turned, "bone_bottom"))
+
+
+def pose(feb: Element, name: str, time: float) -> np.ndarray:
+    """Where FEBio has a rigid body: turned about its centre of mass by a rotation vector, then displaced; each component a value
+    times its load curve.
+    """
+    parts = dict.fromkeys(("x", "y", "z", "Ru", "Rv", "Rw"), 0.0)
+    for entry in feb.iterfind("Rigid/rigid_bc"):
+        if entry.find("rb").text != name or entry.attrib["type"] == "rigid_fixed":
+            continue
+        value = entry.find("value")
+        curve = feb.find(f"LoadData/load_controller[@id='{value.attrib['lc']}']")
+        assert curve.find("interpolate").text == "LINEAR"
+        times, scales = zip(*map(numbers, curve.iterfind("points/pt")), strict=True)
+        assert entry.attrib["type"] == ("rigid_rotation" if entry.find("dof").text[0] == "R" else "rigid_displacement")
+        parts[entry.find("dof").text] = float(value.text) * np.interp(time, times, scales)
+    centre = np.array(numbers(feb.find(f"Material/material[@name='{name}']/center_of_mass")))
+    x, y, z, *vector = parts.values()
+    matrix = np.eye(4)
+    matrix[:3, :3] = Turn.from_rotvec(vector).as_matrix()
+    matrix[:3, 3] = centre + [x, y, z] - matrix[:3, :3] @ centre
+    return matrix
+
+
+def test_load_curves_are_the_poses(feb: Element, bar: Problem) -> None:
+    """At frames, between them and at keyframes beside them."""
+    for bone in bar.bones:
+        for frame in (*FRAMES, 11.3, 12.5, 18.0, 22.2):
+            assert np.allclose(pose(feb, f"bone_{bone.name}", frame - 10), bone.pose(frame), rtol=0, atol=1e-13)
+
+
+def test_every_freedom_of_a_bone_is_fixed_or_moved(feb: Element, bar: Problem) -> None:
+    for bone in bar.bones:
+        mine = [entry for entry in feb.iterfind("Rigid/rigid_bc") if entry.find("rb").text == f"bone_{bone.name}"]
+        fixed = [
+            one.tag.removesuffix("_dof")
+            for entry in mine
+            for one in entry
+            if one.tag.endswith("_dof") and one.text == "1"
+        ]
+        moved = [entry.find("dof").text for entry in mine if entry.find("dof") is not None]
+        freedoms = fixed + [f"R{name}" if len(name) == 1 else name for name in moved]
+        assert sorted(freedoms) == ["Ru", "Rv", "Rw", "Rx", "Ry", "Rz"]
+
+
+def test_febio_passes_every_frame_wanted(feb: Element) -> None:
+    must = feb.find("LoadData/load_controller[@id='1']")
+    assert [numbers(point)[0] for point in must.iterfind("points/pt")] == [0, 5, 10, 15]
+    assert must.find("interpolate").text == "STEP"
+    control = feb.find("Control")
+    assert float(control.find("time_steps").text) * float(control.find("step_size").text) == FRAMES[-1] - FRAMES[0]
+    assert control.find("time_stepper/dtmax").attrib["lc"] == "1"
+
+
+def test_fibres_are_the_first_axis_of_each_element(feb: Element, bar: Problem) -> None:
+    axes = list(feb.iterfind("MeshData/ElementData[@type='mat_axis'][@elem_set='muscle']/e"))
+    assert [int(entry.attrib["lid"]) for entry in axes] == list(range(1, len(bar.mesh.tets) + 1))
+    along, across = (np.array([numbers(entry.find(axis)) for entry in axes]) for axis in "ad")
+    assert np.array_equal(along, bar.directions)
+    assert np.allclose(np.einsum("ij,ij->i", along, across), 0, atol=1e-15)
+    assert np.allclose(np.linalg.norm(across, axis=1), 1, atol=1e-15)
+    assert feb.find("Material/material[@name='muscle']/fiber/vector").text == "1,0,0"
+
+
+@pytest.mark.parametrize("matrix", [("neo_hooke",), ("mooney_rivlin",), ("neo_hooke", "mooney_rivlin")])
+def test_the_law_is_the_same(matrix: tuple[str, ...]) -> None:
+    """FEBio's energy c1 (I1 - 3) + c2 (I2 - 3) + k/2 (J - 1)^2 with its constants, of the isochoric invariants of eigenvalues."""
+    acts = effects(*matrix, "incompressible_penalty")
+    constants = febio.constants(acts)
+    assert constants["pressure_model"] == 2
+    for state in map(acting.state, acting.deformations()):
+        squares = np.linalg.eigvalsh(np.array(state.C, float))
+        J = np.sqrt(squares.prod())
+        a, b, c = squares * J ** (-2 / 3)
+        energy = (
+            constants["c1"] * (a + b + c - 3)
+            + constants["c2"] * (a * b + b * c + c * a - 3)
+            + constants["k"] / 2 * (J - 1) ** 2
+        )
+        ours = total_energy([(effect, 1.0) for effect in acts], state)
+        assert energy == pytest.approx(ours, rel=1e-9)
+
+
+def test_constants_of_fibres_and_kind_of_element(feb: Element, bar: Problem) -> None:
+    muscle = feb.find("Material/material[@name='muscle']")
+    assert muscle.attrib["type"] == "trans iso Mooney-Rivlin"
+    found = {entry.tag: float(entry.text) for entry in muscle if entry.tag != "fiber"}
+    assert found == {"pressure_model": 2, "k": 10, "c1": 0.005, "c2": 0, "c3": 0.01, "c4": 12, "c5": 3, "lam_max": 1.3}
+    assert feb.find("MeshDomains/SolidDomain").attrib["type"] == "three-field-solid"
+    plain = febio.model(replace(bar, effects=effects("neo_hooke", "incompressible_penalty"), directions=None))
+    assert plain.find("Material/material[@name='muscle']").attrib["type"] == "Mooney-Rivlin"
+    assert plain.find("MeshDomains/SolidDomain").attrib["type"] == "elastic-solid"
+    assert plain.find("Contact") is None
+    assert plain.find("MeshData") is None
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return small.write(tmp_path_factory.mktemp("case") / "bar")
+
+
+@pytest.mark.parametrize(
+    ("changes", "match"),
+    [
+        (
+            {"effect[0]": {"name": "fibre_passive", **acting.PARAMETERS["fibre_passive"]}},
+            r'effect\[0\]: got "fibre_passive", want what FEBio',
+        ),
+        ({"effect[0]": {"name": "contact", "stiffness": "1 kPa/mm"}}, "effect: got no matrix: neither neo_hooke"),
+        ({"effect[1]": {"name": "contact", "stiffness": "1 kPa/mm"}}, "effect: got neither incompressible nor"),
+        (
+            {"attachment[1]": {"name": "insertion", "bone": "lid", "within": "2 mm", "stiffness": "1 MPa/mm"}},
+            r"attachment\[1\]\.stiffness: got 1 MPa/mm, want no springs",
+        ),
+    ],
+)
+def test_what_febio_has_not_is_refused_before_any_work(
+    folder: Path, tmp_path: Path, changes: dict[str, Any], match: str
+) -> None:
+    scene = casefile.read(folder, changes=changes)
+    assert isinstance(scene, Scene)
+    with pytest.raises(InputError, match=match):
+        exchange.export(scene, lambda: pytest.fail("built"), tmp_path / "bar", "febio")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_frames_come_back_from_febios_log(folder: Path, bar: Problem, tmp_path: Path) -> None:
+    """Its quadratic elements hold a quadratic motion exactly; so does every vertex of the surface, wherever in a tet it lies."""
+    scene = casefile.read(folder)
+    assert isinstance(scene, Scene)
+    inside = bar.surface.moved_to(5 + 0.9 * (bar.surface.points - 5))  # no vertex where a node is
+    exchange.export(scene, lambda: replace(bar, surface=inside, bones=bar.bones[:2]), tmp_path / "bar", "febio")
+    feb = ElementTree.parse(tmp_path / "bar" / "scene.feb").getroot()
+    positions = nodes(feb)[1 : 1 + cells(feb, "muscle").max()]
+
+    def moved(points: np.ndarray, time: float) -> np.ndarray:
+        bent = time / 1e4 * np.stack([points[:, 1] ** 2, points[:, 0] * points[:, 2], points[:, 2] ** 2], axis=1)
+        return apply(TURNS.pose(10 + time), points) + bent
+
+    log = ""
+    for step, time in enumerate((5, 10, 15), start=1):
+        rows = (",".join([str(i), *map(repr, row)]) for i, row in enumerate(moved(positions, time).tolist(), start=1))
+        log += f"*Step  = {step}\n*Time  = {time}\n*Data  = x;y;z\n" + "\n".join(rows) + "\n"
+    (tmp_path / "bar" / "nodes.txt").write_text(log)
+    (block,) = re.findall(r"```python\n(.*?)```", (tmp_path / "bar" / "FEBIO.md").read_text(), re.DOTALL)
+    subprocess.run([sys.executable, "-I", "-W", "error", "-c", block], cwd=tmp_path / "bar", check=True)
+    assert json.loads((tmp_path / "bar" / "scene.json").read_text())["frames"] == list(FRAMES)
+    for frame in FRAMES:
+        back = meshio.read(tmp_path / "bar" / "febio_frames" / f"frame_{frame:04d}.ply")
+        assert np.allclose(back.points, moved(inside.points, frame - 10), rtol=0, atol=1e-10)
+        assert np.array_equal(back.cells_dict["triangle"], inside.triangles)
