@@ -26,6 +26,10 @@ _INSIDE = {
     "a stiffness per area": "MPa/mm",
     "a damping per volume": "MPa*s/mm^2",
     "a viscosity": "MPa*s",
+    "a stiffness": "N/mm",
+    "a damping": "N*s/mm",
+    "a bending stiffness": "N*mm",
+    "a rate": "1/s",
 }
 # A number, then what may be a unit.
 _NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.ASCII)
@@ -80,6 +84,10 @@ _EXAMPLE = {
     "a stiffness per area": '"100 kPa/mm"',
     "a damping per volume": '"1 Pa s/mm^2"',
     "a viscosity": '"300 kPa s"',
+    "a stiffness": '"200 N/m"',
+    "a damping": '"0.1 N s/m"',
+    "a bending stiffness": '"0.3 N mm"',
+    "a rate": '"5 1/s"',
 }
 _EXAMPLE_OF_THREE = {
     "a length": '"146, 238, -431 mm"',
@@ -127,7 +135,10 @@ PositivePressure = Annotated[float, BeforeValidator(partial(positive, kind="a pr
 PressureVector = Annotated[tuple[float, float, float], BeforeValidator(partial(three, kind="a pressure"))]
 AreaStiffness = Annotated[float, BeforeValidator(partial(positive, kind="a stiffness per area"))]
 VolumeDamping = Annotated[float, BeforeValidator(partial(positive, kind="a damping per volume"))]
+Stiffness = Annotated[float, BeforeValidator(partial(positive, kind="a stiffness"))]
 Viscosity = Annotated[float, BeforeValidator(partial(positive, kind="a viscosity"))]
+BendingStiffness = Annotated[float, BeforeValidator(partial(positive, kind="a bending stiffness"))]
+Rate = Annotated[float, BeforeValidator(partial(positive, kind="a rate"))]
 Density = Annotated[float, BeforeValidator(partial(positive, kind="a density"))]
 AccelerationVector = Annotated[tuple[float, float, float], BeforeValidator(partial(three, kind="an acceleration"))]
 Time = Annotated[float, BeforeValidator(partial(positive, kind="a time"))]

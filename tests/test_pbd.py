@@ -4,10 +4,12 @@ import math
 
 import numpy as np
 import pytest
+import shapes
 
 from fem_reference.errors import InputError
-from fem_reference.mesh import Surface, check_closed, enclosed_volume
-from fem_reference.motion import Rotation, apply
+from fem_reference.geometry.rigid_bodies import Sphere
+from fem_reference.mesh import Polylines, Surface, check_closed, enclosed_volume
+from fem_reference.motion import Rotation, Translation, apply
 from fem_reference.problem import Body, Held, Setup
 from fem_reference.records import parse
 from fem_reference.solvers import pbd
@@ -22,6 +24,7 @@ USUAL = {
 }
 SETTINGS = pbd.Settings(**USUAL)
 TURN = Rotation((1, 2, 3), (5, -4, 7), (0.0, 1.0), (0.0, 2.0)).pose(1)
+CONTACT = {"gap": "0 mm", "stiffness": 1.0}
 SWING = Rotation((1, 0, 0), (0, 20, -10), (0.0, 50.0), (0.0, 0.5))
 
 
@@ -153,6 +156,92 @@ def test_volume_is_kept():
     assert abs(lost - 1) > 2 * abs(kept - 1)
 
 
+def ball_against(last, back=None):
+    """The spindle held at its ends, and a ball of 8 mm that gets 10 mm into its side by frame 40, and is gone by ``back``."""
+    setup = held_setup(None, None, last=last)
+    frames, ways = ((0.0, 40.0), (0.0, 12.0)) if back is None else ((0.0, 40.0, float(back)), (0.0, 12.0, 0.0))
+    ball = Body("ball", shapes.sphere(0, 8.0), Translation((-1, 0, 0), frames, ways), solid=Sphere((20, 0, 0), 8.0))
+    return Setup(setup.surface, (ball,), setup.held, setup.frames, None)
+
+
+def deepest(setup, frames):
+    """How deep a vertex that nothing holds gets below the surface of a bone, over all frames [mm]."""
+    loose = np.setdiff1d(np.arange(len(setup.surface.points)), pbd.held_by(setup))
+    return max(
+        -bone.shape.sample(apply(np.linalg.inv(bone.pose(number)), points[loose])).distance.min()
+        for number, points in frames.items()
+        for bone in setup.bones
+    )
+
+
+def test_bones_push_only_where_it_is_wanted():
+    setup = ball_against(40)
+    _, through = run(setup)
+    outcome, aside = run(setup, collision=CONTACT)
+    assert outcome.status == "converged"
+    assert deepest(setup, through) > 5
+    # The projections of a sweep end with collisions: what is left is rounding.
+    assert deepest(setup, aside) < 1e-9
+    volumes = [enclosed_volume(aside[number], setup.surface.triangles) for number in (0, 40)]
+    assert volumes[1] == pytest.approx(
+        volumes[0], rel=0.02
+    )  # the volume is projected before and not after the ball pushes
+
+
+def test_a_gap_is_kept():
+    setup = ball_against(40)
+    _, frames = run(setup, collision={"gap": "1.5 mm", "stiffness": 1.0})
+    assert deepest(setup, frames) == pytest.approx(-1.5, abs=1e-9)
+
+
+def test_a_bone_that_is_gone_leaves_the_rest_state():
+    setup = ball_against(300, back=80)
+    _, frames = run(setup, collision=CONTACT, damping=0.1)
+    moved = np.linalg.norm(frames[300] - setup.surface.points, axis=1).max()
+    assert np.linalg.norm(frames[40] - setup.surface.points, axis=1).max() > 10
+    assert moved < 0.1  # what damping has not yet taken after 660 steps
+
+
+def test_what_overlaps_at_rest_does_not_jump():
+    setup = ball_against(10)
+    ball = Body("ball", shapes.sphere(0, 8.0), None, solid=Sphere((15, 0, 0), 8.0))
+    setup = Setup(setup.surface, (ball,), setup.held, setup.frames, None)
+    assert deepest(setup, {0: setup.surface.points}) > 2
+    _, frames = run(setup, collision=CONTACT)
+    np.testing.assert_allclose(frames[10], setup.surface.points, atol=1e-12)
+
+
+def test_held_vertices_go_with_their_bone_whatever_pushes():
+    setup = ball_against(5)
+    everywhere = Body("ball", shapes.sphere(0, 100.0), None, solid=Sphere((0, 0, 0), 100.0))
+    _, frames = run(Setup(setup.surface, (everywhere,), setup.held, setup.frames, None), collision=CONTACT)
+    for held in setup.held:
+        np.testing.assert_array_equal(frames[5][held.vertices], setup.surface.points[held.vertices])
+
+
+def test_edges_along_fibres_are_told_from_those_across():
+    # Two fibres: one along z about the origin, of points 40 mm apart, one along x at y = 100. Nearest is the segment, not its ends.
+    fibres = Polylines(
+        np.array([[0.0, 0, -20], [0, 0, 20], [0, 0, 20], [-20, 100, 0], [20, 100, 0]]), np.array([0, 3, 5])
+    )
+    points = np.array([[1.0, 0, 0], [1, 0, 5], [1, 5, 0], [1, 4, 3], [1, 98, 0], [6, 98, 0]])
+    edges = np.array([[0, 1], [0, 2], [0, 3], [1, 0], [4, 5]])
+    np.testing.assert_allclose(pbd.along_fibres(points, edges, fibres), [1, 0, 0.6, 1, 1], atol=1e-15)
+
+
+def test_edges_along_fibres_are_softer():
+    # A bar with its fibre along z: by 40 % less stiff along it, by 40 % of cos 45 degrees less on the diagonals, not across.
+    given = shapes.bar((2, 2, 6), (10, 10, 30), {"bottom": None, "top": SWING}, (), (0, 5))
+    found = pbd._constraints(given, pbd.Settings(**USUAL, anisotropy=0.4))
+    ways = np.diff(given.surface.points[found.edges], axis=1)[:, 0]
+    cosine = np.abs(ways[:, 2]) / np.linalg.norm(ways, axis=1)
+    np.testing.assert_allclose(found.share, 1 - 0.4 * cosine, rtol=1e-14)
+    assert {0.6, 0.717, 1.0} == set(np.round(found.share, 3).tolist())
+    ends = [run(given, anisotropy=value)[1][5] for value in (None, 0.0, 0.4)]
+    np.testing.assert_array_equal(ends[0], ends[1])
+    assert np.abs(ends[2] - ends[0]).max() > 1e-3
+
+
 @pytest.mark.parametrize(
     ("key", "value"),
     [
@@ -212,6 +301,21 @@ def test_a_body_torn_apart_is_an_outcome():
 def test_settings_out_of_range(key, value):
     with pytest.raises(InputError, match=f"{key}: got {value}, want "):
         parse(pbd.Settings, USUAL | {key: value}, "candidate[0]")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"anisotropy": 1.5}, "anisotropy: got 1.5, want "),
+        ({"collision": {"gap": "0 mm"}}, "collision.stiffness: got nothing, want this key"),
+        ({"collision": {"gap": "-1 mm", "stiffness": 1.0}}, 'collision.gap: got "-1 mm", want '),
+        ({"collision": {"gap": 1.0, "stiffness": 1.0}}, "collision.gap: got 1.0, want a length with its unit"),
+        ({"collision": CONTACT | {"friction": 0.1}}, "collision.friction: got an unknown key"),
+    ],
+)
+def test_effects_out_of_range(change, message):
+    with pytest.raises(InputError, match=message):
+        parse(pbd.Settings, USUAL | change, "candidate[0]")
 
 
 @pytest.mark.parametrize("key", list(USUAL))

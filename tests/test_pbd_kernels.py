@@ -121,7 +121,7 @@ def test_points_that_coincide_have_no_gradient():
 
 def test_one_projection_restores_a_distance():
     points = np.array([[1.0, 2, 3], [4, -1, 5]])
-    kernels.project_distances(points, np.array([1.0, 0.25]), np.array([[0, 1]]), np.array([2.0]), 1.0)
+    kernels.project_distances(points, np.array([1.0, 0.25]), np.array([[0, 1]]), np.array([2.0]), np.ones(1))
     assert np.linalg.norm(points[1] - points[0]) == pytest.approx(2, rel=1e-15)
 
 
@@ -168,7 +168,9 @@ def projections(surface):
     """The three projections of a surface that changed its shape, each a function of points and inverse masses."""
     rest = Constraints.at_rest(surface.points, surface.triangles, [])
     return {
-        "distance": lambda points, masses: kernels.project_distances(points, masses, rest.edges, rest.lengths, 0.8),
+        "distance": lambda points, masses: kernels.project_distances(
+            points, masses, rest.edges, rest.lengths, 0.8 * rest.share
+        ),
         "volume": lambda points, masses: kernels.project_volume(points, masses, rest.triangles, rest.six_volumes, 0.8),
         "dihedral": lambda points, masses: kernels.project_dihedrals(points, masses, rest.hinges, rest.angles, 0.8),
     }

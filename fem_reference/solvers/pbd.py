@@ -1,4 +1,4 @@
-"""Position based dynamics of the muscle surface: the report's Algorithm 1 (section 5.5.3), without collision.
+"""Position based dynamics of the muscle surface: the report's Algorithm 1 (section 5.5.3).
 
 Frame number n is the state after iteration n. In an iteration the bones take their pose and stay; then every
 sub-iteration is a whole step of the algorithm. No force acts from outside, so the time step cancels: what is kept of a
@@ -7,17 +7,21 @@ the order of the vertices, as it does in the report: constraints are projected o
 """
 
 import time
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 
-from fem_reference.mesh import TET_FACES, Floats, Ints
+from fem_reference.geometry import distance
+from fem_reference.mesh import TET_FACES, Floats, Ints, Polylines, Surface
 from fem_reference.motion import apply
-from fem_reference.problem import Setup
+from fem_reference.problem import Problem, Setup
 from fem_reference.records import Record
 from fem_reference.runs import Frame, Outcome, Sink
+from fem_reference.solvers import collision_kernels
+from fem_reference.solvers.collision_kernels import Obstacle, push_out
 from fem_reference.solvers.pbd_kernels import (
     dihedrals,
     distances,
@@ -26,20 +30,35 @@ from fem_reference.solvers.pbd_kernels import (
     project_volume,
     volume,
 )
+from fem_reference.units import Length
 
 Stiffness = Annotated[float, Field(ge=0, le=1)]
+# Positions (n, 3) [mm], what is kept of their velocities (n, 3), and the frame number -> both after its iteration.
+Iterate = Callable[[Floats, Floats, int], tuple[Floats, Floats]]
 
 # A body spread this many times as wide as at rest, or as what the bones hold of it, is lost.
 _LOST = 10.0
 
 
+class Collision(Record):
+    """How bones keep out what they do not hold: ``gap`` [mm], how near vertices may come, or as near as they are at rest;
+    ``stiffness``, the share of the way out that one projection goes.
+    """
+
+    gap: Annotated[Length, Field(ge=0)]
+    stiffness: Stiffness
+
+
 class Settings(Record):
-    """How the algorithm is run; every key is required.
+    """How the algorithm is run; every key is required but those that turn an effect on.
 
     ``sub_iterations``: steps of the algorithm in each iteration, 3 in report 6.1. ``solver_iterations``: sweeps over
     all constraints in each step (line 15). ``damping``: share of every velocity that is lost in a step (line 8), 0 for
     none. ``stretch``, ``volume``, ``bending``: stiffness of edge lengths, enclosed volume and dihedral angles, the
     share of its error that one projection of a constraint takes away, from 0 (constraint off) to 1.
+
+    ``anisotropy`` a: edges have the stiffness ``stretch (1 - a |cos|)`` of their angle to the nearest fibre, both at rest;
+    1 in the report's program, when it has fibres. ``collision``: bones push (lines 12 to 14).
     """
 
     sub_iterations: Annotated[int, Field(gt=0)]
@@ -48,20 +67,23 @@ class Settings(Record):
     stretch: Stiffness
     volume: Stiffness
     bending: Stiffness
+    anisotropy: Stiffness | None = None
+    collision: Collision | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Constraints:
     """What the surface keeps of its rest state.
 
-    ``lengths`` (e,) [mm] of ``edges`` (e, 2); ``six_volumes`` [mm3], six times the volume inside ``triangles`` (m, 3);
-    ``angles`` (e,) [rad] of ``hinges`` (e, 4), the two triangles at each edge. ``inverse_masses`` (n,): 0 for a vertex
-    that a bone holds, 1 for every other.
+    ``lengths`` (e,) [mm] of ``edges`` (e, 2), of whose stiffness each has its ``share`` (e,); ``six_volumes`` [mm3], six
+    times the volume inside ``triangles`` (m, 3); ``angles`` (e,) [rad] of ``hinges`` (e, 4), the two triangles at each
+    edge. ``inverse_masses`` (n,): 0 for a vertex that a bone holds, 1 for every other.
     """
 
     inverse_masses: Floats
     edges: Ints
     lengths: Floats
+    share: Floats
     triangles: Ints
     six_volumes: float
     hinges: Ints
@@ -69,7 +91,7 @@ class Constraints:
 
     @classmethod
     def at_rest(cls, points: Floats, triangles: Ints, held: Ints) -> "Constraints":
-        """The constraints of a closed surface whose vertices ``held`` (k,) are held."""
+        """The constraints of a closed surface whose vertices ``held`` (k,) are held; all edges are as stiff."""
         points, triangles = np.array(points), np.array(triangles)  # the compiled functions know writable arrays only
         inverse_masses = np.ones(len(points))
         inverse_masses[held] = 0
@@ -79,6 +101,7 @@ class Constraints:
             inverse_masses=inverse_masses,
             edges=edges,
             lengths=distances(points, edges),
+            share=np.ones(len(edges)),
             triangles=triangles,
             six_volumes=volume(points, triangles)[0],
             hinges=hinges,
@@ -94,48 +117,107 @@ def hinges_of(triangles: Ints) -> Ints:
     return np.column_stack([edges[order][::2], opposite[order].reshape(-1, 2)])
 
 
+def along_fibres(points: Floats, edges: Ints, fibres: Polylines) -> Floats:
+    """``|cos|`` (e,) of the angle between each of ``edges`` (e, 2) and the fibre at the point nearest to its middle."""
+    starts = np.setdiff1d(np.arange(len(fibres.points) - 1), fibres.offsets[1:] - 1)
+    starts = starts[np.any(fibres.points[starts + 1] != fibres.points[starts], axis=1)]
+    lines = Surface(fibres.points, np.column_stack([starts, starts + 1, starts + 1]))
+    nearest = starts[distance.distances(points[edges].mean(axis=1), lines).triangle]
+    edge, fibre = points[edges[:, 1]] - points[edges[:, 0]], fibres.points[nearest + 1] - fibres.points[nearest]
+    lengths = np.linalg.norm(edge, axis=1) * np.linalg.norm(fibre, axis=1)
+    return np.asarray(np.minimum(np.abs(np.einsum("ed,ed->e", edge, fibre)) / lengths, 1))
+
+
 def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
     """Iterate from rest at the first of ``setup.frames`` to the last of them; each frame wanted goes into ``sink``."""
     seconds_compile = _compile(settings)
-    held = np.concatenate([np.zeros(0, np.int64), *(entry.vertices for entry in setup.held)])
-    constraints = Constraints.at_rest(setup.surface.points, setup.surface.triangles, held)
-    points, way = np.array(setup.surface.points), np.zeros(setup.surface.points.shape)
-    first, last = setup.frames[0], setup.frames[-1]
-    sink(Frame(first, points.copy()))
-    cost = {"seconds_solve": 0.0, "seconds_compile": seconds_compile, "iterations": 0, "threads": 1}
-    for iteration in range(first + 1, last + 1):
-        begin = time.perf_counter()
-        for entry in setup.held:
-            points[entry.vertices] = apply(entry.bone.pose(iteration), setup.surface.points[entry.vertices])
+    begin = time.perf_counter()
+    constraints = _constraints(setup, settings)
+    obstacles = [] if settings.collision is None else obstacles_of(setup, settings.collision.gap)
+    cost = {"seconds_compile": seconds_compile, "seconds_setup": time.perf_counter() - begin}
+
+    def iterate(points: Floats, way: Floats, frame: int) -> tuple[Floats, Floats]:
+        carry(points, setup, frame)
+        for one in obstacles:
+            one.move(frame)
         for _ in range(settings.sub_iterations):
-            points, way = advance(points, way, constraints, settings)
-        cost["seconds_solve"] += time.perf_counter() - begin
-        cost["iterations"] += 1
-        cost["seconds_per_iteration"] = cost["seconds_solve"] / cost["iterations"]
-        if trouble := _trouble(points, setup.surface.points, held):
-            advice = "a slower motion, more sub_iterations or a lower stiffness may help"
-            return Outcome("diverged", f"frame {iteration}: {trouble}; {advice}", cost)
-        if iteration in setup.frames:
-            sink(Frame(iteration, points.copy()))
-    return Outcome("converged", f"{last - first} iterations of {settings.sub_iterations} steps", cost)
+            points, way = advance(points, way, constraints, settings, obstacles)
+        return points, way
+
+    return follow(setup, iterate, sink, cost)
 
 
-def advance(points: Floats, way: Floats, constraints: Constraints, settings: Settings) -> tuple[Floats, Floats]:
+def _constraints(setup: Setup, settings: Settings) -> Constraints:
+    """Those of the surface at rest, with the stiffness that fibres leave to its edges."""
+    surface = setup.surface
+    found = Constraints.at_rest(surface.points, surface.triangles, held_by(setup))
+    if settings.anisotropy is None:
+        return found
+    assert isinstance(setup, Problem)  # what a scene is solved from; it has fibres
+    return replace(found, share=1 - settings.anisotropy * along_fibres(surface.points, found.edges, setup.fibres))
+
+
+def held_by(setup: Setup) -> Ints:
+    """The vertices (k,) that bones hold."""
+    return np.concatenate([np.zeros(0, np.int64), *(entry.vertices for entry in setup.held)])
+
+
+def obstacles_of(setup: Setup, gap: float) -> list[Obstacle]:
+    """All bones, as they push what none of them holds."""
+    loose = np.ones(len(setup.surface.points), bool)
+    loose[held_by(setup)] = False
+    return [Obstacle(bone, setup.surface.points, loose, gap) for bone in setup.bones]
+
+
+def carry(points: Floats, setup: Setup, frame: float) -> None:
+    """Put the vertices that bones hold where those are at ``frame``."""
+    for entry in setup.held:
+        points[entry.vertices] = apply(entry.bone.pose(frame), setup.surface.points[entry.vertices])
+
+
+def advance(
+    points: Floats, way: Floats, constraints: Constraints, settings: Settings, obstacles: Sequence[Obstacle] = ()
+) -> tuple[Floats, Floats]:
     """Positions (n, 3) [mm] and ``way`` = dt v (n, 3) [mm] after one step of Algorithm 1, lines 8 to 20."""
     moved = points + (1 - settings.damping) * way
     at = constraints
     for _ in range(settings.solver_iterations):
-        project_distances(moved, at.inverse_masses, at.edges, at.lengths, settings.stretch)
+        project_distances(moved, at.inverse_masses, at.edges, at.lengths, settings.stretch * at.share)
         project_volume(moved, at.inverse_masses, at.triangles, at.six_volumes, settings.volume)
         project_dihedrals(moved, at.inverse_masses, at.hinges, at.angles, settings.bending)
+        if settings.collision is not None:
+            push_out(moved, obstacles, settings.collision.stiffness)
     return moved, moved - points
+
+
+def follow(setup: Setup, iterate: Iterate, sink: Sink, cost: dict[str, float]) -> Outcome:
+    """Iterate from rest at the first of ``setup.frames`` to the last, into ``sink``; what that costs is added to ``cost``."""
+    rest, held, (first, *_, last) = setup.surface.points, held_by(setup), setup.frames
+    points, kept = np.array(rest), np.zeros(rest.shape)
+    sink(Frame(first, points.copy()))
+    cost |= {"seconds_solve": 0.0, "iterations": 0, "threads": 1}
+    for iteration in range(first + 1, last + 1):
+        begin = time.perf_counter()
+        points, kept = iterate(points, kept, iteration)
+        cost["seconds_solve"] += time.perf_counter() - begin
+        cost["iterations"] += 1
+        cost["seconds_per_iteration"] = cost["seconds_solve"] / cost["iterations"]
+        if trouble := _trouble(points, rest, held):
+            advice = "a slower motion, more steps or a lower stiffness may help"
+            return Outcome("diverged", f"frame {iteration}: {trouble}; {advice}", cost)
+        if iteration in setup.frames:
+            sink(Frame(iteration, points.copy()))
+    return Outcome("converged", f"{last - first} iterations", cost)
 
 
 def _compile(settings: Settings) -> float:
     """Run every compiled function once, on a tetrahedron; seconds."""
     begin = time.perf_counter()
     points = np.vstack([np.zeros(3), np.eye(3)])
-    advance(points, np.zeros((4, 3)), Constraints.at_rest(points, TET_FACES, np.zeros(0, np.int64)), settings)
+    rest = Constraints.at_rest(points, TET_FACES, np.zeros(0, np.int64))
+    advance(points, np.zeros((4, 3)), rest, settings)
+    if settings.collision is not None:
+        collision_kernels.compile_all()
     return time.perf_counter() - begin
 
 

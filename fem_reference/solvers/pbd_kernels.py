@@ -31,32 +31,38 @@ def compiled[F: Callable[..., Any]](function: F) -> F:
 
 
 @compiled
-def _at(points: Floats, i: int) -> Vector:
+def at(points: Floats, i: int) -> Vector:
+    """Point i."""
     return points[i, 0], points[i, 1], points[i, 2]
 
 
 @compiled
-def _minus(a: Vector, b: Vector) -> Vector:
+def minus(a: Vector, b: Vector) -> Vector:
+    """``a - b``."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @compiled
-def _times(factor: float, a: Vector) -> Vector:
+def times(factor: float, a: Vector) -> Vector:
+    """``factor a``."""
     return factor * a[0], factor * a[1], factor * a[2]
 
 
 @compiled
-def _dot(a: Vector, b: Vector) -> float:
+def dot(a: Vector, b: Vector) -> float:
+    """``a . b``."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @compiled
-def _cross(a: Vector, b: Vector) -> Vector:
+def cross(a: Vector, b: Vector) -> Vector:
+    """``a x b``."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @compiled
-def _move(points: Floats, i: int, factor: float, direction: Vector) -> None:
+def move(points: Floats, i: int, factor: float, direction: Vector) -> None:
+    """Move point i by ``factor`` times ``direction``, in place."""
     for axis in range(3):
         points[i, axis] += factor * direction[axis]
 
@@ -67,9 +73,9 @@ def distance(p1: Vector, p2: Vector) -> tuple[float, Vector]:
 
     The gradient is zero where the points coincide.
     """
-    apart = _minus(p1, p2)
-    length = math.sqrt(_dot(apart, apart))
-    return length, (_times(1 / length, apart) if length > 0 else _ZERO)
+    apart = minus(p1, p2)
+    length = math.sqrt(dot(apart, apart))
+    return length, (times(1 / length, apart) if length > 0 else _ZERO)
 
 
 @compiled
@@ -84,12 +90,12 @@ def volume(points: Floats, triangles: Ints) -> tuple[float, Floats]:
     value = 0.0
     for t in range(len(triangles)):
         i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        a, b, c = _minus(_at(points, i), centre), _minus(_at(points, j), centre), _minus(_at(points, k), centre)
-        opposite = _cross(b, c)
-        value += _dot(a, opposite)
-        _move(gradient, i, 1.0, opposite)
-        _move(gradient, j, 1.0, _cross(c, a))
-        _move(gradient, k, 1.0, _cross(a, b))
+        a, b, c = minus(at(points, i), centre), minus(at(points, j), centre), minus(at(points, k), centre)
+        opposite = cross(b, c)
+        value += dot(a, opposite)
+        move(gradient, i, 1.0, opposite)
+        move(gradient, j, 1.0, cross(c, a))
+        move(gradient, k, 1.0, cross(a, b))
     return value, gradient
 
 
@@ -101,23 +107,23 @@ def dihedral(p1: Vector, p2: Vector, p3: Vector, p4: Vector) -> tuple[float, Vec
     folded shut, no area. There arccos d loses half its digits too: it is taken as atan2(sine, d). Eq. 5.26 needs
     eq. 5.30 transposed, and ``n2 . (n2 x p2)`` in it is an outer product.
     """
-    e, a, b = _minus(p2, p1), _minus(p3, p1), _minus(p4, p1)
-    u1, u2 = _cross(e, a), _cross(e, b)
-    size1, size2 = math.sqrt(_dot(u1, u1)), math.sqrt(_dot(u2, u2))
+    e, a, b = minus(p2, p1), minus(p3, p1), minus(p4, p1)
+    u1, u2 = cross(e, a), cross(e, b)
+    size1, size2 = math.sqrt(dot(u1, u1)), math.sqrt(dot(u2, u2))
     if size1 == 0 or size2 == 0:
         return math.pi, _ZERO, _ZERO, _ZERO, _ZERO
-    n1, n2 = _times(1 / size1, u1), _times(1 / size2, u2)
-    d, normal = _dot(n1, n2), _cross(n1, n2)
-    sine = math.sqrt(_dot(normal, normal))
+    n1, n2 = times(1 / size1, u1), times(1 / size2, u2)
+    d, normal = dot(n1, n2), cross(n1, n2)
+    sine = math.sqrt(dot(normal, normal))
     angle = math.atan2(sine, d)
     if sine < FLAT:
         return angle, _ZERO, _ZERO, _ZERO, _ZERO
     slope = -1 / sine
-    to1 = _times(slope / size1, _minus(n2, _times(d, n1)))
-    to2 = _times(slope / size2, _minus(n1, _times(d, n2)))
-    g3, g4 = _cross(to1, e), _cross(to2, e)
-    g2 = _minus(_cross(a, to1), _cross(to2, b))
-    g1 = _minus(_minus(_ZERO, g2), (g3[0] + g4[0], g3[1] + g4[1], g3[2] + g4[2]))
+    to1 = times(slope / size1, minus(n2, times(d, n1)))
+    to2 = times(slope / size2, minus(n1, times(d, n2)))
+    g3, g4 = cross(to1, e), cross(to2, e)
+    g2 = minus(cross(a, to1), cross(to2, b))
+    g1 = minus(minus(_ZERO, g2), (g3[0] + g4[0], g3[1] + g4[1], g3[2] + g4[2]))
     return angle, g1, g2, g3, g4
 
 
@@ -126,7 +132,7 @@ def distances(points: Floats, edges: Ints) -> Floats:
     """Length [mm] of each of the ``edges`` (e, 2)."""
     found = np.empty(len(edges))
     for h in range(len(edges)):
-        found[h] = distance(_at(points, edges[h, 0]), _at(points, edges[h, 1]))[0]
+        found[h] = distance(at(points, edges[h, 0]), at(points, edges[h, 1]))[0]
     return found
 
 
@@ -136,21 +142,21 @@ def dihedrals(points: Floats, hinges: Ints) -> Floats:
     found = np.empty(len(hinges))
     for h in range(len(hinges)):
         i, j, k, m = hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3]
-        found[h] = dihedral(_at(points, i), _at(points, j), _at(points, k), _at(points, m))[0]
+        found[h] = dihedral(at(points, i), at(points, j), at(points, k), at(points, m))[0]
     return found
 
 
 @compiled
-def project_distances(points: Floats, inverse_masses: Floats, edges: Ints, rest: Floats, stiffness: float) -> None:
-    """Move the ends of each of the ``edges`` (e, 2) towards their distance ``rest`` (e,) [mm]."""
+def project_distances(points: Floats, inverse_masses: Floats, edges: Ints, rest: Floats, stiffness: Floats) -> None:
+    """Move the ends of each of the ``edges`` (e, 2) towards their distance ``rest`` (e,) [mm], by their ``stiffness`` (e,)."""
     for h in range(len(edges)):
         i, j = edges[h, 0], edges[h, 1]
         weight = inverse_masses[i] + inverse_masses[j]
         if weight > 0:
-            length, direction = distance(_at(points, i), _at(points, j))
-            step = -stiffness * (length - rest[h]) / weight
-            _move(points, i, step * inverse_masses[i], direction)
-            _move(points, j, -step * inverse_masses[j], direction)
+            length, direction = distance(at(points, i), at(points, j))
+            step = -stiffness[h] * (length - rest[h]) / weight
+            move(points, i, step * inverse_masses[i], direction)
+            move(points, j, -step * inverse_masses[j], direction)
 
 
 @compiled
@@ -159,12 +165,12 @@ def project_volume(points: Floats, inverse_masses: Floats, triangles: Ints, rest
     value, gradient = volume(points, triangles)
     weight = 0.0
     for i in range(len(points)):
-        slope = _at(gradient, i)
-        weight += inverse_masses[i] * _dot(slope, slope)
+        slope = at(gradient, i)
+        weight += inverse_masses[i] * dot(slope, slope)
     if weight > 0:
         step = -stiffness * (value - rest) / weight
         for i in range(len(points)):
-            _move(points, i, step * inverse_masses[i], _at(gradient, i))
+            move(points, i, step * inverse_masses[i], at(gradient, i))
 
 
 @compiled
@@ -172,12 +178,12 @@ def project_dihedrals(points: Floats, inverse_masses: Floats, hinges: Ints, rest
     """Move the vertices of each of the ``hinges`` (e, 4) towards their angle ``rest`` (e,) [rad]."""
     for h in range(len(hinges)):
         i, j, k, m = hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3]
-        angle, g1, g2, g3, g4 = dihedral(_at(points, i), _at(points, j), _at(points, k), _at(points, m))
+        angle, g1, g2, g3, g4 = dihedral(at(points, i), at(points, j), at(points, k), at(points, m))
         w1, w2, w3, w4 = inverse_masses[i], inverse_masses[j], inverse_masses[k], inverse_masses[m]
-        weight = w1 * _dot(g1, g1) + w2 * _dot(g2, g2) + w3 * _dot(g3, g3) + w4 * _dot(g4, g4)
+        weight = w1 * dot(g1, g1) + w2 * dot(g2, g2) + w3 * dot(g3, g3) + w4 * dot(g4, g4)
         if weight > 0:
             step = -stiffness * min(LARGEST_TURN, max(-LARGEST_TURN, angle - rest[h])) / weight
-            _move(points, i, step * w1, g1)
-            _move(points, j, step * w2, g2)
-            _move(points, k, step * w3, g3)
-            _move(points, m, step * w4, g4)
+            move(points, i, step * w1, g1)
+            move(points, j, step * w2, g2)
+            move(points, k, step * w3, g3)
+            move(points, m, step * w4, g4)

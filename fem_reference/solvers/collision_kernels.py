@@ -1,0 +1,177 @@
+"""Bones that keep vertices out of them, as constraints ``C = distance - allowed >= 0`` of vertices. Report section 6.1.1.
+
+A bone's distance is asked only for the vertices that it may have come near to: a distance grows and falls no faster than the
+way gone, so that a vertex which has gone less far, seen from the bone, than it was away is still outside. Vertices alone are
+asked, at the places they reach and not on their way there: a sharp edge gets between them, and what goes through a thin bone
+in one step comes out on its other side.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_reference.geometry.signed_distance import FAR, Grid
+from fem_reference.mesh import Floats, Ints
+from fem_reference.problem import Body
+from fem_reference.solvers.pbd_kernels import Vector, compiled
+
+# The gradient of a sampled distance is a unit vector but for a few percent.
+_SURE = 0.9
+
+Four = tuple[float, float, float, float]
+
+
+class Contacts(NamedTuple):
+    """Vertices (k,) that were asked, their value of the constraint (k,) [mm], and the unit vectors (k, 3) that raise it."""
+
+    vertices: Ints
+    value: Floats
+    away: Floats
+
+
+@compiled
+def _splines(t: float) -> tuple[Four, Four]:
+    """Values and slopes of the four cubic B-splines that reach into a cell, at ``t`` from 0 to 1 across it."""
+    s = 1 - t
+    values = (s * s * s / 6, (4 - 6 * t * t + 3 * t * t * t) / 6, (4 - 6 * s * s + 3 * s * s * s) / 6, t * t * t / 6)
+    slopes = (-s * s / 2, (3 * t * t - 4 * t) / 2, (4 * s - 3 * s * s) / 2, t * t / 2)
+    return values, slopes
+
+
+@compiled
+def _cell(place: float, count: int) -> tuple[int, float]:
+    """The cell that a ``place``, counted in cells, lies in, of those that ``count`` nodes have between them, and where in it."""
+    cell = min(int(place), count - 3)
+    return cell, place - cell
+
+
+@compiled
+def _spline(coefficients: Floats, x: float, y: float, z: float) -> tuple[float, Vector]:
+    """Value and gradient of the spline at a place inside its grid, counted in cells from its origin."""
+    i, within_x = _cell(x, coefficients.shape[0])
+    j, within_y = _cell(y, coefficients.shape[1])
+    k, within_z = _cell(z, coefficients.shape[2])
+    of_x, along_x = _splines(within_x)
+    of_y, along_y = _splines(within_y)
+    of_z, along_z = _splines(within_z)
+    value, slope_x, slope_y, slope_z = 0.0, 0.0, 0.0, 0.0
+    for a in range(4):
+        for b in range(4):
+            line, along_line = 0.0, 0.0
+            for c in range(4):
+                coefficient = coefficients[i + a - 1, j + b - 1, k + c - 1]
+                line += of_z[c] * coefficient
+                along_line += along_z[c] * coefficient
+            value += of_x[a] * of_y[b] * line
+            slope_x += along_x[a] * of_y[b] * line
+            slope_y += of_x[a] * along_y[b] * line
+            slope_z += of_x[a] * of_y[b] * along_line
+    return value, (slope_x, slope_y, slope_z)
+
+
+@compiled
+def sample(coefficients: Floats, origin: Floats, spacing: float, points: Floats) -> tuple[Floats, Floats]:
+    """Distance (n,) [mm] and gradient (n, 3) at ``points`` (n, 3), as the ``Grid`` of these coefficients says."""
+    distance, gradient = np.full(len(points), FAR), np.zeros_like(points)
+    last_x, last_y, last_z = coefficients.shape[0] - 2, coefficients.shape[1] - 2, coefficients.shape[2] - 2
+    for n in range(len(points)):
+        x = (points[n, 0] - origin[0]) / spacing
+        y = (points[n, 1] - origin[1]) / spacing
+        z = (points[n, 2] - origin[2]) / spacing
+        if not math.isfinite(x + y + z):
+            distance[n] = math.nan
+        elif 1 <= x <= last_x and 1 <= y <= last_y and 1 <= z <= last_z:
+            distance[n], slope = _spline(coefficients, x, y, z)
+            for axis in range(3):
+                gradient[n, axis] = slope[axis] / spacing
+    return distance, gradient
+
+
+@compiled
+def approached(points: Floats, pose: Floats, asked_at: Floats, clear: Floats) -> tuple[Ints, Floats]:
+    """Which of ``points`` (n, 3) have gone at least ``clear`` (n,) [mm] from ``asked_at`` (n, 3), seen from a bone at ``pose``.
+
+    Their numbers (k,) and where they are in the bone's rest frame (k, 3).
+    """
+    found, places = np.empty(len(points), np.int64), np.empty_like(points)
+    count = 0
+    for n in range(len(points)):
+        gone = 0.0
+        for axis in range(3):
+            place = 0.0
+            for other in range(3):
+                place += pose[other, axis] * (points[n, other] - pose[other, 3])
+            places[count, axis] = place
+            gone += (place - asked_at[n, axis]) ** 2
+        if gone >= clear[n] * clear[n]:
+            found[count] = n
+            count += 1
+    return found[:count].copy(), places[:count].copy()
+
+
+def compile_all() -> None:
+    """Run every compiled function of this module once."""
+    sample(np.zeros((4, 4, 4)), np.zeros(3), 1.0, np.ones((1, 3)))
+    approached(np.zeros((1, 3)), np.eye(4), np.zeros((1, 3)), np.zeros(1))
+
+
+class Obstacle:
+    """A bone, what it allows each vertex, and what is known of how near each has come.
+
+    A vertex is allowed to come within ``gap`` [mm] of the bone, and no nearer than at rest where it is nearer there: nothing
+    jumps at the first step. Vertices that are not ``free`` (n,) are never asked.
+    """
+
+    def __init__(self, bone: Body, rest: Floats, free: NDArray[np.bool_], gap: float) -> None:
+        self.bone, shape = bone, bone.shape
+        self.grid = shape if isinstance(shape, Grid) else None
+        self.coefficients = np.array(shape.coefficients) if isinstance(shape, Grid) else np.zeros((0, 0, 0))
+        self.asked_at, self.clear = np.array(rest), np.where(free, 0.0, np.inf)
+        distance, _ = self._sample(self.asked_at)
+        self.allowed = np.minimum(distance, gap)
+        self.pose = np.eye(4)
+
+    def move(self, frame: float) -> None:
+        """Put the bone where it is at ``frame``."""
+        self.pose = np.array(self.bone.pose(frame), np.float64)
+
+    def near(self, points: Floats) -> Contacts:
+        """The constraints of all vertices that may be violated, with ``points`` (n, 3) [mm]."""
+        vertices, places = approached(points, self.pose, self.asked_at, self.clear)
+        distance, gradient = self._sample(places)
+        allowed = self.allowed[vertices]
+        self.asked_at[vertices] = places
+        self.clear[vertices] = _SURE * np.maximum(self._known(distance) - allowed, 0)
+        length = np.linalg.norm(gradient, axis=1, keepdims=True)
+        away = np.divide(gradient, length, out=np.zeros_like(gradient), where=length > 0)
+        return Contacts(vertices, distance - allowed, away @ self.pose[:3, :3].T)
+
+    def watch(self, vertices: Ints) -> None:
+        """Ask for these the next time, wherever they are."""
+        self.clear[vertices] = 0
+
+    def _sample(self, places: Floats) -> tuple[Floats, Floats]:
+        if self.grid is not None:
+            return sample(self.coefficients, np.array(self.grid.origin), self.grid.spacing, places)
+        found = self.bone.shape.sample(places)
+        return found.distance, found.gradient
+
+    def _known(self, distance: Floats) -> Floats:
+        """Not more than what the distance is for sure: beyond the margin of a grid it is coarse."""
+        return distance if self.grid is None else np.minimum(distance, self.grid.margin)
+
+
+def push_out(points: Floats, obstacles: Sequence[Obstacle], stiffness: float) -> None:
+    """Move ``points`` (n, 3) [mm] out of all bones in place, each by the sum of the ways out of every bone that it is in.
+
+    ``stiffness`` is the share of each way that is gone. The masses cancel: a constraint has one vertex.
+    """
+    ways = np.zeros_like(points)
+    for one in obstacles:
+        near = one.near(points)
+        inside = near.value < 0
+        ways[near.vertices[inside]] -= stiffness * near.value[inside, None] * near.away[inside]
+    points += ways

@@ -1,0 +1,232 @@
+"""Extended position based dynamics of the muscle surface: constraints with compliances in physical units, in real time.
+
+Macklin, Mueller and Chentanez 2016, "XPBD: position-based simulation of compliant constrained dynamics",
+DOI 10.1145/2994258.2994272; report section 5.5.3 mentions it. The surface is a membrane with mass around an interior that
+resists change of volume. Position based dynamics, with the same constraints, gets stiffer with every sweep and every step;
+here a sweep too few is too soft, enough of them make an implicit Euler step, and what comes to rest depends on the time step
+only as far as directions change within one: all this vanishes where ``sqrt(k / m) dt`` of the stiffest edges is below 1.
+
+Frame number n is the state after iteration n, ``interval`` after the one before; meanwhile bones move steadily.
+"""
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from fem_reference.mesh import TET_FACES, Floats, Ints, Surface, enclosed_volume, triangle_areas
+from fem_reference.problem import Setup
+from fem_reference.records import Record
+from fem_reference.runs import Outcome, Sink
+from fem_reference.solvers import collision_kernels
+from fem_reference.solvers.collision_kernels import Obstacle
+from fem_reference.solvers.pbd import carry, follow, held_by, hinges_of, obstacles_of
+from fem_reference.solvers.pbd_kernels import dihedrals, distances, volume
+from fem_reference.solvers.xpbd_kernels import pull_dihedrals, pull_distances, pull_volume
+from fem_reference.units import (
+    AreaStiffness,
+    BendingStiffness,
+    Density,
+    Length,
+    PositivePressure,
+    Rate,
+    Stiffness,
+    Time,
+)
+
+
+class Collision(Record):
+    """How bones keep out what they do not hold: ``gap`` [mm], how near vertices may come, or as near as they are at rest;
+    ``stiffness`` [MPa/mm]: pressed by p, the surface gets p / stiffness nearer.
+    """
+
+    gap: Annotated[Length, Field(ge=0)]
+    stiffness: AreaStiffness
+
+
+class Settings(Record):
+    """How the method is run, and what the muscle is like; every key is required but those that turn an effect on.
+
+    ``interval`` [s]: from a frame number to the next. ``sub_steps``: time steps in it. ``sweeps``: over all constraints in each
+    time step. ``density`` [t/mm3]: of the enclosed body, whose mass the vertices share as they share its surface.
+
+    ``stretch`` [N/mm]: Young's modulus times thickness of the membrane. ``bending`` [N mm]: its stiffness as a plate. ``volume``
+    [MPa]: bulk modulus of what it encloses. ``damping`` [1/s]: rate at which velocities decay that nothing keeps up.
+    ``collision``: bones push.
+    """
+
+    interval: Time
+    sub_steps: Annotated[int, Field(gt=0)]
+    sweeps: Annotated[int, Field(gt=0)]
+    density: Density
+    stretch: Stiffness | None = None
+    bending: BendingStiffness | None = None
+    volume: PositivePressure | None = None
+    damping: Rate | None = None
+    collision: Collision | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Constraints:
+    """What a body keeps of its rest state, and how softly: any graph of edges, closed triangles and hinges, or none of a kind.
+
+    ``inverse_masses`` (n,) [1/t], 0 for what is held; ``edges`` (e, 2) of ``lengths`` (e,) [mm] and compliances ``edge_softness``
+    (e,) [mm/N]; ``triangles`` (m, 3) around ``six_volumes`` [mm3], ``volume_softness`` [mm5/N]; ``hinges`` (h, 4) of ``angles``
+    (h,) [rad] and ``hinge_softness`` (h,) [1/(N mm)].
+    """
+
+    inverse_masses: Floats
+    edges: Ints
+    lengths: Floats
+    edge_softness: Floats
+    triangles: Ints
+    six_volumes: float
+    volume_softness: float
+    hinges: Ints
+    angles: Floats
+    hinge_softness: Floats
+
+    @classmethod
+    def at_rest(cls, surface: Surface, held: Ints, settings: Settings) -> "Constraints":
+        """Those of a closed ``surface`` whose vertices ``held`` (k,) are held; none of a kind that has no stiffness.
+
+        In a net of equal triangles, edges of the stiffness ``stretch a / l^2`` of their length l and the area a of both their
+        triangles make a membrane of Young's modulus ``stretch`` and Poisson's ratio 1/3, and hinges of ``bending l^2 / a`` bend
+        as a plate of the stiffness ``bending`` (Seung and Nelson 1988, DOI 10.1103/PhysRevA.38.1005).
+        """
+        # The compiled functions know writable arrays only.
+        points, triangles = np.array(surface.points), np.array(surface.triangles)
+        hinges, six_volumes = hinges_of(triangles), volume(points, triangles)[0]
+        slender = distances(points, hinges) ** 2 / pair_areas(points, hinges)
+        stretched, bent, filled = (
+            slice(None if stiffness else 0) for stiffness in (settings.stretch, settings.bending, settings.volume)
+        )
+        return cls(
+            inverse_masses=inverse_masses(surface, held, settings.density),
+            edges=np.ascontiguousarray(hinges[stretched, :2]),
+            lengths=distances(points, hinges[stretched]),
+            edge_softness=slender[stretched] / (settings.stretch or math.inf),
+            triangles=triangles[filled],
+            six_volumes=six_volumes,
+            volume_softness=6 * six_volumes / (settings.volume or math.inf),
+            hinges=hinges[bent],
+            angles=dihedrals(points, hinges[bent]),
+            hinge_softness=1 / (slender[bent] * (settings.bending or math.inf)),
+        )
+
+
+@dataclass(frozen=True)
+class Step:
+    """A time step: ``seconds`` long, ``sweeps`` over all constraints, ``damping`` [1/s], ``acceleration`` [mm/s2] from outside."""
+
+    seconds: float
+    sweeps: int
+    damping: float
+    acceleration: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+def vertex_areas(surface: Surface) -> Floats:
+    """A third (n,) [mm2] of the triangles at each vertex."""
+    areas = triangle_areas(surface.points, surface.triangles)
+    return np.bincount(surface.triangles.ravel(), weights=np.repeat(areas / 3, 3), minlength=len(surface.points))
+
+
+def inverse_masses(surface: Surface, held: Ints, density: float) -> Floats:
+    """Inverse masses (n,) [1/t] of vertices that share the mass of the enclosed body as they share its surface; 0 where held."""
+    areas = vertex_areas(surface)
+    mass = density * enclosed_volume(surface.points, surface.triangles) * areas / areas.sum()
+    found = 1 / mass
+    found[held] = 0
+    return np.asarray(found)
+
+
+def pair_areas(points: Floats, hinges: Ints) -> Floats:
+    """Area (h,) [mm2] of both triangles of each of the ``hinges`` (h, 4)."""
+    return triangle_areas(points, hinges[:, [0, 1, 2]]) + triangle_areas(points, hinges[:, [0, 1, 3]])
+
+
+class Contact:
+    """An obstacle, how softly it pushes each vertex, (n,) [mm/N], and the multipliers (n,) of the present time step."""
+
+    def __init__(self, obstacle: Obstacle, softness: Floats) -> None:
+        self.obstacle, self.softness = obstacle, softness
+        self.multipliers = np.zeros(len(softness))
+
+    def begin(self) -> None:
+        """A time step begins: nothing pushes yet."""
+        self.multipliers[:] = 0
+
+    def push(self, points: Floats, inverse_masses: Floats, seconds: float) -> Floats:
+        """The ways (n, 3) [mm] of one projection: bones push and never pull, so that no multiplier is below 0."""
+        vertices, value, away = self.obstacle.near(points)
+        soft, before, mass = self.softness[vertices] / seconds**2, self.multipliers[vertices], inverse_masses[vertices]
+        after = np.maximum(before - (value + soft * before) / (mass + soft), 0)
+        self.multipliers[vertices] = after
+        self.obstacle.watch(vertices[after > 0])
+        ways = np.zeros_like(points)
+        ways[vertices] = ((after - before) * mass)[:, None] * away
+        return ways
+
+
+def advance(
+    points: Floats, velocities: Floats, constraints: Constraints, step: Step, contacts: Sequence[Contact] = ()
+) -> tuple[Floats, Floats]:
+    """Positions (n, 3) [mm] and velocities (n, 3) [mm/s] after one time step: their Algorithm 1."""
+    at, dt = constraints, step.seconds
+    loose = (at.inverse_masses > 0)[:, None]
+    velocities = math.exp(-step.damping * dt) * velocities + np.where(loose, dt * np.array(step.acceleration), 0.0)
+    moved = points + dt * velocities
+    of_edges, of_hinges, of_volume = np.zeros(len(at.edges)), np.zeros(len(at.hinges)), 0.0
+    edges, hinges, enclosed = at.edge_softness / dt**2, at.hinge_softness / dt**2, at.volume_softness / dt**2
+    for contact in contacts:
+        contact.begin()
+    for _ in range(step.sweeps):
+        pull_distances(moved, at.inverse_masses, at.edges, at.lengths, edges, of_edges)
+        of_volume = pull_volume(moved, at.inverse_masses, at.triangles, at.six_volumes, enclosed, of_volume)
+        pull_dihedrals(moved, at.inverse_masses, at.hinges, at.angles, hinges, of_hinges)
+        moved += sum((contact.push(moved, at.inverse_masses, dt) for contact in contacts), np.zeros_like(moved))
+    return moved, (moved - points) / dt
+
+
+def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
+    """Iterate from rest at the first of ``setup.frames`` to the last of them; each frame wanted goes into ``sink``."""
+    seconds_compile = _compile(settings)
+    begin = time.perf_counter()
+    constraints = Constraints.at_rest(setup.surface, held_by(setup), settings)
+    contacts = _contacts(setup, settings)
+    step = Step(settings.interval / settings.sub_steps, settings.sweeps, settings.damping or 0.0)
+    cost = {"seconds_compile": seconds_compile, "seconds_setup": time.perf_counter() - begin}
+
+    def iterate(points: Floats, velocities: Floats, frame: int) -> tuple[Floats, Floats]:
+        for number in range(1, settings.sub_steps + 1):
+            now = frame - 1 + number / settings.sub_steps
+            carry(points, setup, now)
+            for contact in contacts:
+                contact.obstacle.move(now)
+            points, velocities = advance(points, velocities, constraints, step, contacts)
+        return points, velocities
+
+    return follow(setup, iterate, sink, cost)
+
+
+def _contacts(setup: Setup, settings: Settings) -> list[Contact]:
+    """One of each bone, where bones push."""
+    if settings.collision is None:
+        return []
+    softness = 1 / (settings.collision.stiffness * vertex_areas(setup.surface))
+    return [Contact(obstacle, softness) for obstacle in obstacles_of(setup, settings.collision.gap)]
+
+
+def _compile(settings: Settings) -> float:
+    """Run every compiled function once, on a tetrahedron; seconds."""
+    begin = time.perf_counter()
+    tetrahedron = Surface(np.vstack([np.zeros(3), np.eye(3)]), TET_FACES)
+    rest = Constraints.at_rest(tetrahedron, np.zeros(0, np.int64), settings)
+    advance(np.array(tetrahedron.points), np.zeros((4, 3)), rest, Step(1.0, 1, 0.0))
+    if settings.collision is not None:
+        collision_kernels.compile_all()
+    return time.perf_counter() - begin
