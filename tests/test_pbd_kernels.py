@@ -1,13 +1,16 @@
 """Each constraint of position based dynamics alone: value, gradient, projection."""
 
 import math
+from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 
 from fem_reference.mesh import TET_FACES, Surface
 from fem_reference.motion import Rotation, apply
 from fem_reference.solvers import pbd_kernels as kernels
+from fem_reference.solvers.compiled_kernels import kept_code
 from fem_reference.solvers.pbd import Constraints, hinges_of
 
 TET = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
@@ -224,3 +227,8 @@ def test_rigid_motion_costs_nothing(name):
     after = turned.copy()
     projections(surface)[name](after, np.ones(len(after)))
     np.testing.assert_allclose(after, turned, atol=1e-12)
+
+
+def test_machine_code_is_kept_by_what_all_loops_are_and_numba_is_left_as_it_was() -> None:
+    assert Path(kernels.distance.stats.cache_path).parent == kept_code()
+    assert not numba.config.CACHE_DIR

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from fem_reference.geometry.signed_distance import FAR, Grid
 from fem_reference.mesh import Floats, Ints
 from fem_reference.problem import Body
-from fem_reference.solvers.pbd_kernels import Vector, compiled
+from fem_reference.solvers.compiled_kernels import compiled
+from fem_reference.solvers.pbd_kernels import Vector
 
 # The gradient of a sampled distance is a unit vector but for a few percent.
 _SURE = 0.9

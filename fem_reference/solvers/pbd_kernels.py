@@ -7,13 +7,11 @@ takes away, to first order. Arrays should be writable and C-contiguous: each oth
 """
 
 import math
-from collections.abc import Callable
-from typing import Any, cast
 
-import numba
 import numpy as np
 
 from fem_reference.mesh import Floats, Ints
+from fem_reference.solvers.compiled_kernels import compiled
 
 Vector = tuple[float, float, float]
 
@@ -23,11 +21,6 @@ FLAT = 1e-5
 # higher by t^2 / 2; where pairs are folded shut (t near pi) that grows from pair to pair until all is lost.
 LARGEST_TURN = 0.3
 _ZERO = (0.0, 0.0, 0.0)
-
-
-def compiled[F: Callable[..., Any]](function: F) -> F:
-    """The function as machine code, made at its first call and kept on disk; it runs on one thread."""
-    return cast(F, numba.njit(cache=True, error_model="numpy")(function))
 
 
 @compiled

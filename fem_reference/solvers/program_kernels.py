@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference.mesh import Floats, Ints
-from fem_reference.solvers.pbd_kernels import Vector, at, compiled, cross, dihedral, dot, minus, move, times
+from fem_reference.solvers.compiled_kernels import compiled
+from fem_reference.solvers.pbd_kernels import Vector, at, cross, dihedral, dot, minus, move, times
 
 Bools = NDArray[np.bool_]
 

@@ -10,7 +10,8 @@ their order and the solution does not.
 import math
 
 from fem_reference.mesh import Floats, Ints
-from fem_reference.solvers.pbd_kernels import LARGEST_TURN, at, compiled, dihedral, distance, dot, move, volume
+from fem_reference.solvers.compiled_kernels import compiled
+from fem_reference.solvers.pbd_kernels import LARGEST_TURN, at, dihedral, distance, dot, move, volume
 
 
 @compiled

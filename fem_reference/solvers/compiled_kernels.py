@@ -1,0 +1,34 @@
+"""How loops are compiled, and where the machine code is kept."""
+
+import hashlib
+import os
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, cast
+
+import numba
+
+
+def compiled[F: Callable[..., Any]](function: F) -> F:
+    """The function as machine code, made at its first call and kept on disk; it runs on one thread."""
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(kept_code())  # numba reads it here and never again for this function
+    try:
+        return cast(F, numba.njit(cache=True, error_model="numpy")(function))
+    finally:
+        numba.config.CACHE_DIR = before
+
+
+@cache
+def kept_code() -> Path:
+    """The folder where machine code of this version of the loops is kept; it may be deleted.
+
+    A compiled function holds those that it calls. numba looks only at a function's own file to tell whether it changed,
+    hence one folder for what all of them are together.
+    """
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.glob("*_kernels.py")):
+        digest.update(path.read_bytes())
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111 - Path.home() may raise
+    return Path(home) / "fem_reference" / "compiled" / digest.hexdigest()[:16]
