@@ -95,8 +95,7 @@ def _with_held(problem: Problem, frame: Frame) -> Frame:
     off = np.concatenate(
         [
             np.linalg.norm(
-                surface[held.vertices]
-                - apply(held.bone.pose(frame.number), problem.surface.points[held.vertices]),
+                surface[held.vertices] - apply(held.bone.pose(frame.number), problem.surface.points[held.vertices]),
                 axis=1,
             )
             for held in problem.held

@@ -1,0 +1,180 @@
+"""The shortest paths between two points around a sphere or a cylinder: straight, along the obstacle, straight.
+
+Where a path touches, it goes along a geodesic: a great circle of the sphere, a helix of the cylinder. Seen along the axis
+about which it turns, both are an arc of a circle between two tangents, so one closed form serves both (the obstacles of
+Garner and Pandy 2000, Comput. Methods Biomech. Biomed. Eng. 3(1), DOI 10.1080/10255840008915251; report 5.3).
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from fem_reference.mesh import Floats, Ints
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Paths:
+    """Of n paths, ``parts`` (n, 3) [mm]: lengths before, along and behind the obstacle, only the first where it is straight.
+
+    ``starts``, ``ends``, and ``touches``, where each meets the obstacle and where it leaves it: (n, 3) [mm]. Along it a path
+    turns by ``turns`` (n,) [rad] about the unit ``axes`` (n, 3) through ``middles`` (n, 3) and climbs along them evenly.
+    """
+
+    parts: Floats
+    starts: Floats
+    ends: Floats
+    touches: tuple[Floats, Floats]
+    middles: Floats
+    axes: Floats
+    turns: Floats
+
+    @property
+    def lengths(self) -> Floats:
+        """Length (n,) [mm] of each path."""
+        return np.asarray(self.parts.sum(axis=1))
+
+    def at(self, which: Ints, shares: Floats) -> Floats:
+        """The points (m, 3) of paths ``which`` (m,) after ``shares`` (m,) of their lengths, from 0 to 1."""
+        before, along, behind = self.parts[which].T
+        way = shares * (before + along + behind)
+        on = _clipped(way - before, along)
+        straight = _between(self.starts[which], self.touches[0][which], _clipped(way, before))
+        last = _between(self.touches[1][which], self.ends[which], _clipped(way - before - along, behind))
+        beyond, wraps = way > before + along, (along > 0) & (way > before)
+        return np.where(beyond[:, None], last, np.where(wraps[:, None], self._on_obstacle(which, on), straight))
+
+    def _on_obstacle(self, which: Ints, share: Floats) -> Floats:
+        """The points (m, 3) after ``share`` (m,) of the way along the obstacle."""
+        first, last, axes = self.touches[0][which], self.touches[1][which], self.axes[which]
+        arm, angle = first - self.middles[which], (share * self.turns[which])[:, None]
+        height = np.sum(arm * axes, axis=1)[:, None] * axes
+        climb = (share * np.sum((last - first) * axes, axis=1))[:, None] * axes
+        across = arm - height
+        turned = np.cos(angle) * across + np.sin(angle) * np.cross(axes, across)
+        return np.asarray(self.middles[which] + height + climb + turned)
+
+
+class Obstacle(Protocol):
+    """What paths go around."""
+
+    def depths(self, points: Floats) -> Floats:
+        """How deep inside the obstacle ``points`` (n, 3) [mm] are, (n,) [mm]; below 0 outside."""
+        ...
+
+    def around(self, starts: Floats, ends: Floats) -> Paths:
+        """The shortest paths from ``starts`` (n, 3) to ``ends`` (n, 3) [mm]; one inside counts as on the surface."""
+        ...
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """A ball of ``radius`` about ``centre`` [mm]."""
+
+    centre: Vector
+    radius: float
+
+    def depths(self, points: Floats) -> Floats:
+        """``radius - |x - centre|``."""
+        return np.asarray(self.radius - np.linalg.norm(points - self.centre, axis=1))
+
+    def around(self, starts: Floats, ends: Floats) -> Paths:
+        """Along the great circle through both points; where they are opposite each other, one of them."""
+        normals = np.cross(starts - self.centre, ends - self.centre)
+        return _around(starts, ends, np.asarray(self.centre), _units(normals, starts - self.centre), self.radius)
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """All within ``radius`` [mm] of the endless line through ``point`` [mm] along ``axis``, of any length."""
+
+    point: Vector
+    axis: Vector
+    radius: float
+
+    def depths(self, points: Floats) -> Floats:
+        """``radius`` less the distance from the axis."""
+        return np.asarray(self.radius - np.linalg.norm(_across(points - self.point, self._unit()), axis=1))
+
+    def around(self, starts: Floats, ends: Floats) -> Paths:
+        """Along a helix, the shorter way round."""
+        axis = self._unit()
+        one, other = (_across(points - self.point, axis) for points in (starts, ends))
+        senses = np.where(np.cross(one, other) @ axis < 0, -1.0, 1.0)
+        return _around(starts, ends, np.asarray(self.point), senses[:, None] * axis, self.radius)
+
+    def _unit(self) -> Floats:
+        return np.asarray(self.axis, float) / np.linalg.norm(self.axis)
+
+
+def straight(starts: Floats, ends: Floats) -> Paths:
+    """The straight lines from ``starts`` (n, 3) to ``ends`` (n, 3) [mm]."""
+    parts = np.zeros((len(starts), 3))
+    parts[:, 0] = np.linalg.norm(ends - starts, axis=1)
+    return Paths(parts, starts, ends, (ends, ends), starts, np.zeros_like(starts), np.zeros(len(starts)))
+
+
+def _around(starts: Floats, ends: Floats, middle: Floats, axes: Floats, radius: float) -> Paths:
+    """The paths that turn from starts to ends, by at most half a turn, about ``axes`` (n, 3) through ``middle`` (3,).
+
+    Seen along the axis, points at distances d1, d2 from it and an angle t apart are joined by tangents of lengths
+    sqrt(d^2 - r^2) and an arc of r (t - acos(r / d1) - acos(r / d2)), or straight where that angle is not above 0. The way
+    along the axis is shared out evenly over the length so seen: unrolled, the path is a straight line.
+    """
+    one, other = _across(starts - middle, axes), _across(ends - middle, axes)
+    sines, cosines = np.sum(np.cross(one, other) * axes, axis=1), np.sum(one * other, axis=1)
+    near, far = (np.maximum(np.linalg.norm(arm, axis=1), radius) for arm in (one, other))
+    first, last = np.arccos(radius / near), np.arccos(radius / far)
+    turns = np.arctan2(np.maximum(sines, 0.0), cosines) - first - last
+    wraps = turns > 0
+    flat = np.stack([np.sqrt(near**2 - radius**2), radius * turns, np.sqrt(far**2 - radius**2)], axis=1)
+    climbs = np.sum((ends - starts) * axes, axis=1)
+    rises = climbs[:, None] * flat / np.where(wraps, flat.sum(axis=1), 1.0)[:, None]
+    on = middle + radius * _turned(one, axes, first) + _along(starts - middle, axes) + rises[:, :1] * axes
+    off = middle + radius * _turned(other, axes, -last) + _along(ends - middle, axes) - rises[:, 2:] * axes
+    plain, picked = straight(starts, ends), wraps[:, None]
+    return Paths(
+        parts=np.where(picked, np.hypot(flat, rises), plain.parts),
+        starts=starts,
+        ends=ends,
+        touches=(np.where(picked, on, ends), np.where(picked, off, ends)),
+        middles=np.broadcast_to(middle, starts.shape),
+        axes=axes,
+        turns=np.where(wraps, turns, 0.0),
+    )
+
+
+def _turned(arms: Floats, axes: Floats, angles: Floats) -> Floats:
+    """Unit vectors along ``arms`` (n, 3), which are perpendicular to ``axes``, turned about them by ``angles`` (n,)."""
+    units = arms / np.linalg.norm(arms, axis=1)[:, None]
+    return np.asarray(np.cos(angles)[:, None] * units + np.sin(angles)[:, None] * np.cross(axes, units))
+
+
+def _along(vectors: Floats, axes: Floats) -> Floats:
+    """The part of ``vectors`` (n, 3) along the unit ``axes``, (3,) or (n, 3)."""
+    return np.asarray(np.sum(vectors * axes, axis=1)[:, None] * axes)
+
+
+def _across(vectors: Floats, axes: Floats) -> Floats:
+    """The part of ``vectors`` (n, 3) perpendicular to the unit ``axes``, (3,) or (n, 3)."""
+    return np.asarray(vectors - _along(vectors, axes))
+
+
+def _units(normals: Floats, arms: Floats) -> Floats:
+    """``normals`` (n, 3) of length 1; where one is round-off, any direction perpendicular to its arm."""
+    sizes = np.linalg.norm(normals, axis=1)[:, None]
+    squares = np.sum(arms**2, axis=1)[:, None]
+    spare = np.cross(arms, np.eye(3)[np.argmin(np.abs(arms), axis=1)])
+    chosen = np.where(sizes > 1e-9 * squares, normals, spare)
+    return np.asarray(chosen / np.linalg.norm(chosen, axis=1)[:, None])
+
+
+def _clipped(way: Floats, length: Floats) -> Floats:
+    """``way`` as a share of ``length``, from 0 to 1; 0 where there is no length."""
+    return np.clip(way / np.where(length > 0, length, 1.0), 0.0, 1.0)
+
+
+def _between(one: Floats, other: Floats, shares: Floats) -> Floats:
+    return np.asarray(one + shares[:, None] * (other - one))

@@ -1,0 +1,217 @@
+"""Lines of action: each fibre of the scene as one line between its bones, straight, through via-points or around an obstacle.
+
+Report 5.2 and 5.3. A line's ends are the fibre's, each fixed to the bone whose attachment is nearest at rest; between two fixed
+points it is as short as it can be. It has a length and no surface, and is judged on that length alone. A shortest path takes the
+shorter way round: where ends turn past what is opposite, it changes sides.
+"""
+
+import time
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Annotated, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from fem_reference import bones
+from fem_reference.errors import InputError
+from fem_reference.geometry.wrapping import Cylinder, Obstacle, Paths, Sphere, straight
+from fem_reference.mesh import Floats, Ints, Polylines
+from fem_reference.motion import apply
+from fem_reference.problem import Body, Problem
+from fem_reference.records import Record
+from fem_reference.runs import Frame, Outcome, Sink
+
+# An end this deep [mm] in an obstacle is on its surface, but for rounding.
+_TOUCHES = 1e-6
+
+
+class Via(Record):
+    """A point of every fibre that moves with a ``bone``: where it is at rest ``at`` this share of the fibre's length."""
+
+    at: Annotated[float, Field(gt=0, lt=1)]
+    bone: str
+
+
+class SphereOn(bones.Sphere):
+    """A sphere, told at rest, that moves with a ``bone``."""
+
+    bone: str
+
+
+class CylinderOn(bones.Rod):
+    """A cylinder that moves with a ``bone``; ``start`` and ``end``, told at rest, say where its axis is: it does not end there."""
+
+    bone: str
+
+
+class Settings(Record):
+    """What lines go through and around; without any key they are straight.
+
+    ``via``: points in the order in which a fibre passes them. ``sphere`` or ``cylinder``: an obstacle that every part of a
+    line goes around, from one fixed point to the next, where the straight way would cross it.
+    """
+
+    via: tuple[Via, ...] = ()
+    sphere: SphereOn | None = None
+    cylinder: CylinderOn | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.sphere is not None and self.cylinder is not None:
+            raise ValueError('at most one of "sphere", "cylinder"')
+        places = [via.at for via in self.via]
+        if places != sorted(set(places)):
+            raise ValueError("via-points in the order in which a fibre passes them")
+        return self
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """A line for each of k fibres, made of p parts between fixed points, counted line by line.
+
+    ``fixed`` (k, p + 1, 3) [mm] at rest, each on ``bones[on]``, on (k, p + 1). Point j of the fibres is on part ``part[j]`` after
+    the share ``share[j]`` of its length.
+    """
+
+    bones: tuple[Body, ...]
+    fixed: Floats
+    on: Ints
+    part: Ints
+    share: Floats
+
+    def at(self, number: int) -> Floats:
+        """Where the fixed points (k, p + 1, 3) [mm] are at frame ``number``."""
+        moved = np.array(self.fixed)
+        for i in np.unique(self.on):
+            moved[self.on == i] = apply(self.bones[i].pose(number), self.fixed[self.on == i])
+        return moved
+
+
+@dataclass(frozen=True)
+class Wrap:
+    """An ``obstacle``, told at rest, on a ``bone``; ``name`` is what messages call it."""
+
+    obstacle: Obstacle
+    bone: Body
+    name: str
+
+
+def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
+    """The lines at every frame wanted, up to one with a fixed point inside the obstacle; InputError where that is the first."""
+    lines, wrap = _lines(problem, settings), _wrap(problem, settings)
+    cost = {"seconds_solve": 0.0, "seconds_compile": 0.0, "iterations": 0, "threads": 1}
+    for number in problem.frames:
+        begin = time.perf_counter()
+        fixed = lines.at(number)
+        if wrap is not None and (trouble := _inside(wrap, fixed, number)):
+            if number == problem.frames[0]:
+                raise InputError(f"line_of_action: {wrap.name}", trouble, "an obstacle with all of them outside")
+            return Outcome("diverged", f"frame {number}: {trouble}; a smaller radius may help", cost)
+        frame = _frame(lines, wrap, fixed, number, problem.fibres)
+        cost["seconds_solve"] += time.perf_counter() - begin
+        cost["iterations"] += 1
+        cost["seconds_per_iteration"] = cost["seconds_solve"] / cost["iterations"]
+        sink(frame)
+    kind = f"straight, through {len(settings.via)} via-points" if settings.via else "straight"
+    around = "" if wrap is None else f" or around the {wrap.name} on {wrap.bone.name}"
+    return Outcome("converged", f"{len(problem.fibres)} lines, {kind}{around}; no surface", cost)
+
+
+def _frame(lines: Lines, wrap: Wrap | None, fixed: Floats, number: int, fibres: Polylines) -> Frame:
+    """The lines with as many points as the fibres have; ``lost_by_chords_max`` [mm], how much shorter than its path one is so."""
+    paths, pose = _paths(wrap, fixed, number)
+    points = apply(pose, paths.at(lines.part, lines.share))
+    lengths = paths.lengths.reshape(len(fixed), -1).sum(axis=1)
+    lost = float((lengths - fibres.lengths(points)).max())
+    return Frame(number, None, fibres=points, scalars={"lost_by_chords_max": lost})
+
+
+def _paths(wrap: Wrap | None, fixed: Floats, number: int) -> tuple[Paths, Floats]:
+    """The parts, and the 4 x 4 pose that takes them to where they are: an obstacle is asked where it rests."""
+    starts, ends = fixed[:, :-1].reshape(-1, 3), fixed[:, 1:].reshape(-1, 3)
+    if wrap is None:
+        return straight(starts, ends), np.eye(4)
+    pose = wrap.bone.pose(number)
+    back = np.linalg.inv(pose)
+    return wrap.obstacle.around(apply(back, starts), apply(back, ends)), pose
+
+
+def _inside(wrap: Wrap, fixed: Floats, number: int) -> str:
+    """Which line has the fixed point deepest inside the obstacle; empty where none is inside."""
+    resting = apply(np.linalg.inv(wrap.bone.pose(number)), fixed.reshape(-1, 3))
+    depths = wrap.obstacle.depths(resting).reshape(len(fixed), -1).max(axis=1)
+    line = int(np.argmax(depths))
+    return "" if depths[line] <= _TOUCHES else f"a fixed point of line {line} {depths[line]:.3g} mm inside"
+
+
+def _wrap(problem: Problem, settings: Settings) -> Wrap | None:
+    """The obstacle of the settings, None without one."""
+    if (ball := settings.sphere) is not None:
+        bone = problem.bones[_index(problem.bones, ball.bone, "sphere.bone")]
+        return Wrap(Sphere(ball.centre, ball.radius), bone, "sphere")
+    if (roll := settings.cylinder) is not None:
+        x, y, z = (float(entry) for entry in np.subtract(roll.end, roll.start))
+        bone = problem.bones[_index(problem.bones, roll.bone, "cylinder.bone")]
+        return Wrap(Cylinder(roll.start, (x, y, z), roll.radius), bone, "cylinder")
+    return None
+
+
+def _lines(problem: Problem, settings: Settings) -> Lines:
+    fibres, places = problem.fibres, [0.0, *(via.at for via in settings.via), 1.0]
+    vias = [_index(problem.bones, via.bone, f"via[{i}].bone") for i, via in enumerate(settings.via)]
+    parts, count = len(places) - 1, len(fibres)
+    sizes = np.diff(fibres.offsets)
+    if sizes.min() <= parts:
+        got = f"fibre {sizes.argmin()} of {sizes.min()} points"
+        raise InputError(
+            "line_of_action: via", got, f"fibres of at least {parts + 1} points for {parts - 1} via-points"
+        )
+    fixed = np.array([_along(fibres.points[low:high], places) for low, high in pairwise(fibres.offsets)])
+    ends = [_nearest(problem, fixed[:, end]) for end in (0, -1)]
+    on = np.column_stack([ends[0], *(np.full(count, via) for via in vias), ends[1]])
+    part, share = zip(*(_spread(int(size), places) for size in sizes), strict=True)
+    return Lines(
+        bones=problem.bones,
+        fixed=fixed,
+        on=on,
+        part=np.concatenate([found + i * parts for i, found in enumerate(part)]),
+        share=np.concatenate(share),
+    )
+
+
+def _along(points: Floats, places: list[float]) -> Floats:
+    """The points (k, 3) after ``places`` (k,) of the length of the polyline ``points`` (n, 3)."""
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    return np.column_stack([np.interp(np.array(places) * way[-1], way, points[:, axis]) for axis in range(3)])
+
+
+def _spread(count: int, places: list[float]) -> tuple[Ints, Floats]:
+    """Part and share of it (count,) for each point of a line: fixed points among them, the others evenly in between."""
+    at = np.rint(np.array(places) * (count - 1)).astype(np.int64)
+    steps = np.arange(len(at))
+    at = np.maximum.accumulate(at - steps) + steps  # at least one point further each
+    at = np.minimum(at, count - 1 - steps[::-1])
+    part = np.clip(np.searchsorted(at, np.arange(count), side="right") - 1, 0, len(at) - 2)
+    return part, (np.arange(count) - at[part]) / np.diff(at)[part]
+
+
+def _nearest(problem: Problem, points: Floats) -> Ints:
+    """The index of the bone (n,) whose attachment has the vertex nearest to each of ``points`` (n, 3)."""
+    if not problem.held:
+        raise InputError("line_of_action", "a muscle that no bone holds", "attachments that lines are fixed to")
+    away = np.array(
+        [
+            np.linalg.norm(points[:, None] - problem.surface.points[held.vertices], axis=2).min(axis=1)
+            for held in problem.held
+        ]
+    )
+    found = [_index(problem.bones, held.bone.name, "attachment") for held in problem.held]
+    return np.array(found)[np.argmin(away, axis=0)]
+
+
+def _index(bodies: tuple[Body, ...], name: str, key: str) -> int:
+    names = [body.name for body in bodies]
+    if name not in names:
+        raise InputError(f"line_of_action: {key}", f'"{name}"', f"one of {', '.join(names)}")
+    return names.index(name)

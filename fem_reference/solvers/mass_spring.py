@@ -1,0 +1,249 @@
+"""A mass-spring system: report section 5.5.1, eqs 5.3 to 5.7.
+
+A volumetric model, as Table 5.1 has it: the masses are the points of the tetrahedra, the springs their edges. (Janak's masses
+sample fibres and are joined to those near them; here the mesh says which are.) They carry the surface and the fibres along.
+Springs resist neither a change of volume nor a tetrahedron that turns inside out. Bones hold exactly, whatever the stiffness
+of an attachment. Where bones push, they push the masses of the surface: what is between those may be inside.
+"""
+
+import math
+import time
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BeforeValidator
+
+from fem_reference.geometry.embedding import Embedding, Locator
+from fem_reference.mesh import Floats, Ints, TetMesh, boundary, tet_volumes
+from fem_reference.motion import apply
+from fem_reference.problem import Problem
+from fem_reference.records import Record
+from fem_reference.runs import Frame, Outcome, Sink
+from fem_reference.solvers import collision_kernels
+from fem_reference.solvers.collision_kernels import Obstacle, push_out
+from fem_reference.solvers.pbd import Collision
+from fem_reference.solvers.spring_kernels import Course, Network, advance, forces
+from fem_reference.units import AccelerationVector, Density, Stiffness, Time, positive
+
+# Where no time step is asked for, it is this share of the greatest that is stable.
+SHARE_OF_STABLE = 0.9
+# A body spread this many times as wide as at rest, or as what the bones hold of it, is lost.
+_LOST = 10.0
+_REPORT = "eq. 5.5"
+
+
+def _damping(text: object) -> float | str:
+    """A damping coefficient [N s/mm], or the report's as it is."""
+    if text == _REPORT:
+        return _REPORT
+    try:
+        return positive(text, "a damping")
+    except ValueError as error:
+        raise ValueError(f'"{_REPORT}" or {error}') from error
+
+
+class Settings(Record):
+    """How stiff and heavy the muscle is, and how fast it is moved.
+
+    ``stiffness``: of every spring. ``density``: of the muscle, shared out evenly over the masses: equilibrium does
+    not depend on them, and a small one would make every time step small.
+    ``frame_time``: from a frame number to the next; the bones' motion has no other clock here, and the longer it lasts the nearer
+    the muscle is to equilibrium. ``damping``: the coefficient c, or ``"eq. 5.5"``, see ``report_damping``; without it none.
+    ``gravity``: an acceleration; without it none. ``collision``: bones push, at every step; without it not. ``time_step``: the
+    longest step wanted; without it one that is stable.
+    """
+
+    stiffness: Stiffness
+    density: Density
+    frame_time: Time
+    damping: Annotated[float | Literal["eq. 5.5"] | None, BeforeValidator(_damping)] = None
+    gravity: AccelerationVector | None = None
+    collision: Collision | None = None
+    time_step: Time | None = None
+
+
+def network_of(mesh: TetMesh, settings: Settings) -> Network:
+    """The masses and springs of a mesh."""
+    pairs = np.concatenate([mesh.tets[:, list(pair)] for pair in combinations(range(4), 2)])
+    springs = np.unique(np.sort(pairs, axis=1), axis=0)
+    mass = settings.density * float(tet_volumes(mesh.points, mesh.tets).sum()) / len(mesh.points)
+    return Network(
+        masses=np.full(len(mesh.points), mass),
+        springs=springs,
+        lengths=np.linalg.norm(mesh.points[springs[:, 1]] - mesh.points[springs[:, 0]], axis=1),
+        stiffness=settings.stiffness,
+        damping=_coefficient(settings, mass),
+        gravity=np.array(settings.gravity or (0.0, 0.0, 0.0)),
+    )
+
+
+def _coefficient(settings: Settings, mass: float) -> float:
+    """The damping coefficient c [N s/mm] of settings."""
+    if settings.damping is None:
+        return 0.0
+    return settings.damping if isinstance(settings.damping, float) else report_damping(mass, settings.stiffness)
+
+
+def report_damping(mass: float, stiffness: float) -> float:
+    """Eq. 5.5, c = 2 sqrt(2 m (2 + 4 / k_a)), as a coefficient [N s/mm] of a ``mass`` [tonne] and a ``stiffness`` [N/mm].
+
+    It adds a number to one over a stiffness and holds in one system of units only, which the report does not name. Read in SI
+    (kg, N/m, N s/m), as here, it is the critical damping 2 sqrt(m k) of a mass on a spring of k = 4 + 8 / k_a: of k_a itself
+    where that is 2 + sqrt(12) = 5.46 N/m, and of 4 N/m where k_a is large.
+    """
+    kilograms, newtons_per_metre = 1000 * mass, 1000 * stiffness
+    return 2 * math.sqrt(2 * kilograms * (2 + 4 / newtons_per_metre)) / 1000
+
+
+def stable_time_step(network: Network, held: Ints) -> float:
+    """The time step [s] below which eqs 5.6 and 5.7 are stable, whatever the shape.
+
+    A mode of the free masses is stable where ``4 m - 2 c dt - k dt^2 > 0`` (the Jury conditions), with k its stiffness. Of springs
+    that is at most ``2 n_i k`` of mass i with n_i springs, stretched or not, so each mass has a limit, and the least counts. For
+    c = 0 it is 2 / omega with omega^2 = 2 n k / m, which two masses on one spring reach.
+    """
+    springs = network.stiffness * np.bincount(network.springs.ravel(), minlength=len(network.masses))
+    c = network.damping
+    limits = (np.sqrt(c**2 + 8 * springs * network.masses) - c) / (2 * springs)
+    return float(np.delete(limits, held).min(initial=math.inf))
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A muscle as masses and springs: its ``network``, the masses that each attachment holds and all of them together, ``held``,
+    the bones as ``obstacles`` that push with ``stiffness``, and where the ``surface`` and the ``fibres`` are in the tetrahedra.
+    """
+
+    problem: Problem
+    network: Network
+    attached: tuple[Ints, ...]
+    held: Ints
+    obstacles: list[Obstacle]
+    stiffness: float
+    surface: Embedding
+    fibres: Embedding
+
+    @classmethod
+    def of(cls, problem: Problem, settings: Settings) -> "Model":
+        """The model of a problem."""
+        attached = tuple(np.unique(problem.mesh.facets[entry.attachment]) for entry in problem.held)
+        held = np.unique(np.concatenate([np.zeros(0, np.int64), *attached]))
+        locator, collision = Locator(problem.mesh), settings.collision
+        return cls(
+            problem=problem,
+            network=network_of(problem.mesh, settings),
+            attached=attached,
+            held=held,
+            obstacles=[] if collision is None else _obstacles(problem, held, collision.gap),
+            stiffness=0.0 if collision is None else collision.stiffness,
+            surface=locator.embed(problem.surface.points),
+            fibres=locator.embed(problem.fibres.points),
+        )
+
+    def move(self, points: Floats, previous: Floats, number: int, time_step: float, steps: int) -> None:
+        """Take ``points`` and those a step before, (n, 3) [mm], in place from the frame number before to ``number``."""
+        before, after = (self._carried(frame)[self.held] for frame in (number - 1, number))
+        if not self.obstacles:
+            advance(points, previous, self.network, Course(self.held, before, after), time_step, steps)
+            return
+        for share in np.arange(1, steps + 1) / steps:
+            there = (1 - share) * before + share * after
+            advance(points, previous, self.network, Course(self.held, there, there), time_step, 1)
+            for one in self.obstacles:
+                one.move(number - 1 + share)
+            push_out(points, self.obstacles, self.stiffness)
+
+    def _carried(self, number: int) -> Floats:
+        """The masses (n, 3) [mm] at rest, but those that bones hold where they are at frame ``number``."""
+        points = np.array(self.problem.mesh.points)
+        for entry, masses in zip(self.problem.held, self.attached, strict=True):
+            points[masses] = apply(entry.bone.pose(number), points[masses])
+        return points
+
+    def frame(self, points: Floats, number: int) -> Frame:
+        """What masses at ``points`` (n, 3) make of surface and fibres; vertices that bones hold are where the bones have them.
+
+        Scalars: ``unbalanced_max`` [N], the greatest force on a mass that none holds, and ``inverted_tets``, how many are inside
+        out.
+        """
+        given, mesh = self.problem, self.problem.mesh
+        moved = points - mesh.points
+        surface = given.surface.points + self.surface.interpolate(mesh, moved)
+        for entry in given.held:
+            surface[entry.vertices] = apply(entry.bone.pose(number), given.surface.points[entry.vertices])
+        free = np.delete(forces(points, self.network), self.held, axis=0)
+        scalars = {
+            "unbalanced_max": float(np.linalg.norm(free, axis=1).max(initial=0.0)),
+            "inverted_tets": float((tet_volumes(points, mesh.tets) <= 0).sum()),
+        }
+        return Frame(
+            number, surface, given.fibres.points + self.fibres.interpolate(mesh, moved), points.copy(), scalars
+        )
+
+
+def _obstacles(problem: Problem, held: Ints, gap: float) -> list[Obstacle]:
+    """All bones, as they push the masses of the surface that none of them holds."""
+    loose = np.zeros(len(problem.mesh.points), bool)
+    loose[boundary(problem.mesh.tets)[0]] = True
+    loose[held] = False
+    return [Obstacle(bone, problem.mesh.points, loose, gap) for bone in problem.bones]
+
+
+def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
+    """Step from rest at the first of ``problem.frames`` to the last of them; each frame wanted goes into ``sink``."""
+    seconds_compile, model = _compile(settings), Model.of(problem, settings)
+    limit = stable_time_step(model.network, model.held)
+    steps = max(1, math.ceil(settings.frame_time / (settings.time_step or SHARE_OF_STABLE * limit) - 1e-9))
+    time_step = settings.frame_time / steps
+    points, first, last = np.array(problem.mesh.points), problem.frames[0], problem.frames[-1]
+    previous = points.copy()
+    sink(model.frame(points, first))
+    cost = {"seconds_solve": 0.0, "seconds_compile": seconds_compile, "iterations": 0, "time_steps": 0, "threads": 1}
+    for number in range(first + 1, last + 1):
+        begin = time.perf_counter()
+        model.move(points, previous, number, time_step, steps)
+        cost["seconds_solve"] += time.perf_counter() - begin
+        cost["iterations"] += 1
+        cost["time_steps"] += steps
+        cost["seconds_per_iteration"] = cost["seconds_solve"] / cost["iterations"]
+        if trouble := _trouble(points, problem.mesh.points, model.held):
+            return Outcome("diverged", f"frame {number}: {trouble}; {_advice(time_step, limit)}", cost)
+        if number in problem.frames:
+            sink(model.frame(points, number))
+    return Outcome("converged", f"{last - first} frame numbers of {steps} steps of {time_step:.3g} s", cost)
+
+
+def _compile(settings: Settings) -> float:
+    """Run every compiled function once, on one spring; seconds."""
+    begin = time.perf_counter()
+    points, nothing = np.array([[0.0, 0, 0], [1, 0, 0]]), np.zeros((0, 3))
+    network = Network(np.ones(2), np.array([[0, 1]]), np.ones(1), 1.0, 0.0, np.zeros(3))
+    advance(points, points.copy(), network, Course(np.zeros(0, np.int64), nothing, nothing), 0.1, 1)
+    forces(points, network)
+    if settings.collision is not None:
+        collision_kernels.compile_all()
+    return time.perf_counter() - begin
+
+
+def _advice(time_step: float, limit: float) -> str:
+    if time_step > limit:
+        return f"the time step of {time_step:.3g} s is above the stable one of {limit:.3g} s"
+    return "a longer frame_time or more damping may help"
+
+
+def _trouble(points: Floats, rest: Floats, held: Ints) -> str:
+    """What is wrong with positions as a whole, empty if nothing is."""
+    lost = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if len(lost):
+        return f"the position of {len(lost)} points is not a number (point {lost[0]} for one)"
+    wide, at_rest, between = _spread(points), _spread(rest), _spread(points[held])
+    if wide > _LOST * max(at_rest, between):
+        return f"the muscle is spread over {wide:.3g} mm, at rest {at_rest:.3g} mm"
+    return ""
+
+
+def _spread(points: Floats) -> float:
+    """Diagonal of the box around points [mm], 0 without any."""
+    return float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0

@@ -1,0 +1,302 @@
+"""Lines of action against closed forms, and through the run store, the comparison and the page: a run without a surface."""
+
+import csv
+import json
+import math
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapes
+import small
+from numpy.testing import assert_allclose
+
+from fem_reference.cli import main
+from fem_reference.errors import InputError
+from fem_reference.mesh import Polylines
+from fem_reference.motion import Rotation, Translation, apply
+from fem_reference.problem import Body, Problem
+from fem_reference.records import parse
+from fem_reference.report import gallery
+from fem_reference.runs import Frame, Outcome
+from fem_reference.solvers import line_of_action
+
+SWING = Rotation((1, 0, 0), (5, 25, 15), (0.0, 10.0), (0.0, 1.2))
+
+
+def bar(motion=SWING, points: int = 41, bottom=None) -> Problem:
+    """The bar of the contract, 30 mm long, with one fibre of many points that is bent at rest, and one straight."""
+    given = shapes.bar((2, 2, 4), (10, 10, 30), {"bottom": bottom, "top": motion}, (), (0, 5, 10))
+    heights = np.linspace(0, 30, points)
+    bent = np.column_stack([np.full(points, 5.0), 5 + 4 * np.sin(math.pi * heights / 30), heights])
+    straight = np.column_stack([np.full(points, 4.0), np.full(points, 5.0), heights[::-1]])
+    return replace(given, fibres=Polylines(np.vstack([bent, straight]), np.array([0, points, 2 * points])))
+
+
+def solved(given: Problem, **settings: object) -> tuple[Outcome, list[Frame]]:
+    frames: list[Frame] = []
+    record = parse(line_of_action.Settings, settings, "candidate[0]")
+    return line_of_action.solve(given, record, frames.append), frames
+
+
+def lengths(given: Problem, frames: list[Frame]) -> np.ndarray:
+    return np.array([given.fibres.lengths(frame.fibres) for frame in frames])
+
+
+def test_a_straight_line_is_between_ends_that_go_with_their_bones() -> None:
+    given = bar()
+    outcome, frames = solved(given)
+    assert outcome.status == "converged"
+    assert outcome.message == "2 lines, straight; no surface"
+    assert [frame.number for frame in frames] == [0, 5, 10]
+    assert all(frame.surface is None and frame.tets is None for frame in frames)
+    for frame in frames:
+        # The first fibre ends on top, the second begins there.
+        tops = apply(SWING.pose(frame.number), np.array([[5.0, 5, 30], [4, 5, 30]]))
+        expected = [np.linspace([5, 5, 0], tops[0], 41), np.linspace(tops[1], [4, 5, 0], 41)]
+        assert_allclose(frame.fibres, np.vstack(expected), atol=1e-12)
+    # At rest a line is as long as the chord of its fibre.
+    assert_allclose(lengths(given, frames)[0], [30, 30], rtol=1e-13)
+    assert given.fibres.lengths()[0] > 31
+
+
+def test_via_points_go_with_their_bones() -> None:
+    given = bar(bottom=Translation((0, 1, 0), (0.0, 10.0), (0.0, 3.0)))
+    outcome, frames = solved(given, via=[{"at": 0.25, "bone": "bottom"}, {"at": 0.5, "bone": "top"}])
+    assert outcome.message == "2 lines, straight, through 2 via-points; no surface"
+    low, high = given.fibres.points[20], given.fibres.points[61]  # the middles of both fibres
+    for frame in frames:
+        up, down = SWING.pose(frame.number), given.held[0].bone.pose(frame.number)
+        assert_allclose(frame.fibres[20], apply(up, low[None])[0], atol=1e-10)
+        assert_allclose(frame.fibres[61], apply(up, high[None])[0], atol=1e-10)
+        # A quarter of the way along the straight fibre, which begins at the top, at z = 22.5.
+        quarter = apply(down, np.array([[4.0, 5, 22.5]]))
+        path = np.vstack(
+            [apply(up, np.array([[4.0, 5, 30]])), quarter, apply(up, high[None]), apply(down, [[4.0, 5, 0]])]
+        )
+        assert_allclose(given.fibres.lengths(frame.fibres)[1], np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+
+
+@pytest.mark.parametrize("radius", [4, 9])
+def test_around_a_sphere_it_is_as_long_as_the_closed_form(radius) -> None:
+    # Two ends 15 mm off the centre, opposite each other: tangents of sqrt(d^2 - r^2) and r (pi - 2 acos(r / d)).
+    given = bar(motion=None, points=2001)
+    outcome, frames = solved(given, sphere={"bone": "top", "centre": "5, 5, 15 mm", "radius": f"{radius} mm"})
+    assert outcome.message == "2 lines, straight or around the sphere on top; no surface"
+    exact = 2 * math.sqrt(225 - radius**2) + radius * (math.pi - 2 * math.acos(radius / 15))
+    found = lengths(given, frames)
+    # 2000 chords, each turning by less than 0.01: shorter by less than 0.01^2 / 24 = 4e-6.
+    assert_allclose(found[:, 0], exact, rtol=4e-6)
+    assert np.linalg.norm(frames[0].fibres - [5, 5, 15], axis=1).min() > radius - 1e-9
+    # Points fewer than that lose length, and the frame says how much.
+    coarse = bar(motion=None, points=11)
+    _, few = solved(coarse, sphere={"bone": "top", "centre": "5, 5, 15 mm", "radius": f"{radius} mm"})
+    assert_allclose(few[0].scalars["lost_by_chords_max"], exact - coarse.fibres.lengths(few[0].fibres)[0], rtol=1e-9)
+    assert 1e-3 < few[0].scalars["lost_by_chords_max"] < 0.5
+
+
+@pytest.mark.parametrize(
+    "obstacle",
+    [
+        {"sphere": {"bone": "bottom", "centre": "5, 8, 15 mm", "radius": "6 mm"}},
+        {"cylinder": {"bone": "bottom", "start": "0, 7, 12 mm", "end": "1, 7, 13 mm", "radius": "6 mm"}},
+        {"via": [{"at": 0.4, "bone": "bottom"}]},
+        {},
+    ],
+)
+def test_what_moves_as_a_whole_keeps_its_lengths(obstacle) -> None:
+    given = bar(SWING, bottom=SWING)
+    _, frames = solved(given, **obstacle)
+    for frame in frames[1:]:
+        assert_allclose(frame.fibres, apply(SWING.pose(frame.number), frames[0].fibres), atol=1e-10)
+    assert (frames[0].scalars["lost_by_chords_max"] > 1e-6) == ("sphere" in obstacle or "cylinder" in obstacle)
+
+
+def test_a_cylinder_is_wrapped_where_the_line_comes_to_it() -> None:
+    """A cylinder beside the lines, of which one is pulled over: straight before, longer than straight after."""
+    given = bar(Translation((0, 1, 0), (0.0, 10.0), (0.0, 20.0)))
+    roll = {"bone": "bottom", "start": "0, 14, 15 mm", "end": "10, 14, 15 mm", "radius": "5 mm"}
+    outcome, frames = solved(given, cylinder=roll)
+    assert outcome.message == "2 lines, straight or around the cylinder on bottom; no surface"
+    straight, wrapped = lengths(given, solved(given)[1]), lengths(given, frames)
+    assert_allclose(wrapped[0], straight[0], rtol=1e-13)
+    assert (wrapped[2] > straight[2] + 0.1).all()
+
+
+def test_points_are_shared_out_so_that_via_points_are_among_them() -> None:
+    # Four points of a fibre, two via-points close to its end: each part has a point at both of its ends.
+    given = bar(motion=None, points=4)
+    _, frames = solved(given, via=[{"at": 0.98, "bone": "top"}, {"at": 0.99, "bone": "top"}])
+    assert_allclose(frames[0].fibres[4:, 2], 30 * (1 - np.array([0, 0.98, 0.99, 1])), atol=1e-12)
+
+
+def test_cost() -> None:
+    outcome, _ = solved(bar())
+    assert outcome.cost["iterations"] == 3
+    assert (outcome.cost["threads"], outcome.cost["seconds_compile"]) == (1, 0)
+    assert 0 < outcome.cost["seconds_solve"] == pytest.approx(3 * outcome.cost["seconds_per_iteration"])
+
+
+def test_an_end_inside_an_obstacle_is_refused_at_rest_and_an_outcome_later() -> None:
+    inside = {"bone": "bottom", "centre": "5, 5, 28 mm", "radius": "4 mm"}
+    with pytest.raises(InputError, match=r"sphere: got a fixed point of line 0 2 mm inside, want an obstacle with all"):
+        solved(bar(), sphere=inside)
+    down = Translation((0, 0, -1), (0.0, 10.0), (0.0, 20.0))
+    outcome, frames = solved(bar(down), sphere=inside | {"centre": "5, 5, 12 mm"})
+    assert outcome.status == "diverged"
+    assert outcome.message == "frame 10: a fixed point of line 0 2 mm inside; a smaller radius may help"
+    assert [frame.number for frame in frames] == [0, 5]
+
+
+BALL = {"bone": "top", "centre": "5, 5, 15 mm", "radius": "4 mm"}
+ROLL = {"bone": "top", "start": "0, 0, 0 mm", "end": "0, 0, 1 mm", "radius": "4 mm"}
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"via": [{"at": 0.5, "bone": "skull"}]}, r'via\[0\]\.bone: got "skull", want one of bottom, top'),
+        ({"sphere": BALL | {"bone": "skull"}}, r'sphere\.bone: got "skull", want one of bottom, top'),
+        ({"cylinder": ROLL | {"bone": "skull"}}, r'cylinder\.bone: got "skull", want one of bottom, top'),
+        ({"sphere": BALL, "cylinder": ROLL}, 'at most one of "sphere", "cylinder"'),
+        (
+            {"via": [{"at": 0.5, "bone": "top"}, {"at": 0.5, "bone": "top"}]},
+            "in the order in which a fibre passes them",
+        ),
+        ({"via": [{"at": 1.0, "bone": "top"}]}, r"via\[0\]\.at: got 1\.0, want less than 1"),
+        ({"sphere": BALL | {"radius": "0 mm"}}, r'sphere\.radius: got "0 mm", want more than zero'),
+    ],
+)
+def test_settings_that_are_refused(settings, message) -> None:
+    with pytest.raises(InputError, match=message):
+        solved(bar(), **settings)
+
+
+def test_too_few_points_and_no_attachment_are_refused() -> None:
+    with pytest.raises(
+        InputError, match="via: got fibre 0 of 2 points, want fibres of at least 3 points for 1 via-points"
+    ):
+        solved(bar(points=2), via=[{"at": 0.5, "bone": "top"}])
+    with pytest.raises(InputError, match="a muscle that no bone holds, want attachments that lines are fixed to"):
+        solved(replace(bar(), held=()))
+
+
+CANDIDATES = """
+[[candidate]]
+name = "line"
+solver = "line_of_action"
+
+[[candidate]]
+name = "around"
+solver = "line_of_action"
+sphere = { bone = "floor", centre = "5, 5, 20 mm", radius = "3 mm" }
+
+[[candidate]]
+name = "springs"
+solver = "mass_spring"
+stiffness = "1 N/mm"
+density = "1060 kg/m3"
+frame_time = "10 ms"
+damping = "eq. 5.5"
+"""
+EXPECTED = """
+[[expect]]
+of = "candidates"
+metric = "{metric}"
+statistic = "max"
+frame = "any"
+truth = "0 mm"
+within = "{within} mm"
+kind = "property"
+because = "tested here"
+"""
+
+
+def scene(folder: Path) -> Path:
+    """The small scene with mass-spring as its reference, which takes no finite elements, and lines among the candidates."""
+    small.write(folder)
+    text = (folder / "case.toml").read_text()
+    head, rest = text.split("[[candidate]]")[0], text[text.index("[[expect]]") :]
+    reference = 'solver = "mass_spring"\nstiffness = "1 N/mm"\ndensity = "1060 kg/m3"\nframe_time = "20 ms"\n'
+    head = head.replace('solver = "fenicsx"\nfirst_step = 5\n', reference + 'damping = "0.01 N s/m"\n')
+    expected = EXPECTED.format(metric="surface_deviation", within=5) + EXPECTED.format(metric="fibre_length", within=9)
+    rest = rest.replace('within = "0.5 %"', 'within = "50 %"').replace("[spoil]", expected + "\n[spoil]")
+    (folder / "case.toml").write_text(head + CANDIDATES + rest)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def compared(tmp_path_factory) -> tuple[dict, Path]:
+    folder = tmp_path_factory.mktemp("lines")
+    told = folder / "told.json"
+    case = scene(folder / "bar")
+    with pytest.MonkeyPatch.context() as patch:  # pictures take seconds, and lines are in none
+        patch.setattr(gallery, "_command", lambda _job, _folder: [sys.executable, "-c", "raise SystemExit(3)"])
+        assert main(["compare", str(case), "--out", str(folder / "out"), "--json", str(told), "--quiet"]) == 0
+    return json.loads(told.read_text()), folder / "out"
+
+
+def test_lines_are_measured_and_judged_on_their_lengths_alone(compared) -> None:
+    told, _ = compared
+    metrics = {name: {row["metric"] for row in told["measures"] if row["candidate"] == name} for name in told["cost"]}
+    assert metrics["line"] == metrics["around"] == {"fibre_length"}
+    assert {"fibre_length", "surface_deviation", "volume", "penetration"} <= metrics["springs"]
+    judged = {(row["of"], row["metric"]): row["verdict"] for row in told["verdicts"]}
+    assert judged == {
+        ("reference", "volume"): "pass",
+        ("springs", "surface_deviation"): "pass",
+        ("springs", "fibre_length"): "pass",
+        ("line", "fibre_length"): "pass",
+        ("around", "fibre_length"): "pass",
+    }
+    assert {row["candidate"] for row in told["from_rest"] if row["metric"] == "volume"} == {"reference", "springs"}
+
+
+def test_a_line_is_shorter_than_its_fibre_at_rest_already(compared) -> None:
+    told, out = compared
+    rows = {
+        (row["candidate"], row["statistic"]): row["value"]
+        for row in told["measures"]
+        if row["frame"] == 0 and row["metric"] == "fibre_length" and row["value"] is not None
+    }
+    assert rows["springs", "max"] == pytest.approx(0, abs=1e-9)
+    assert -1 < rows["line", "mean"] < -0.01  # fibres of a bulging bar are bent
+    assert rows["around", "mean"] > rows["line", "mean"]
+    written = list(csv.DictReader((out / "bar" / "measures.csv").read_text().splitlines()))
+    assert {row["metric"] for row in written if row["candidate"] == "line"} == {"fibre_length"}
+    assert all(row["value"] for row in written)
+
+
+def test_the_page_shows_a_dash_and_says_that_there_is_no_surface(compared) -> None:
+    _, out = compared
+    text = (out / "bar" / "report.html").read_text(encoding="utf-8")
+    for name in ("line", "around"):
+        assert f"<b>{name}</b> has no surface to draw" in text
+        row = text.split(f"<th>{name}<small>line_of_action</small></th>")[1].split("</tr>")[0]
+        assert row.count("<td>\N{EN DASH}</td>") == 6  # of 8 columns of measures two are of fibres
+        assert " ms</td>" in row  # the time of a frame is known
+    assert "Dashes in a row: lines alone" in text
+    assert "Surface of springs: distance to the reference" in text
+    assert "Surface of line: distance to the reference" not in text
+    assert "has no frame whose coordinates" not in text
+
+
+def test_a_reference_of_lines_alone_is_refused(tmp_path, capsys) -> None:
+    case = scene(tmp_path / "bar")
+    text = (case / "case.toml").read_text()
+    head, tail = text[: text.index("[reference]")], text[text.index("[[candidate]]") :]
+    (case / "case.toml").write_text(head + '[reference]\nsolver = "line_of_action"\n' + tail)
+    assert main(["compare", str(case), "--candidate", "line", "--out", str(tmp_path / "out"), "--quiet"]) == 2
+    assert (
+        "reference: surface: got a run of lines alone, want a reference that moves the surface"
+        in capsys.readouterr().err
+    )
+
+
+def test_the_ends_are_held_by_the_bones_of_the_nearest_attachments() -> None:
+    given = bar()
+    spare = Body("spare", given.bones[0].surface, Translation((1, 0, 0), (0.0, 10.0), (0.0, 50.0)))
+    _, frames = solved(replace(given, bones=(spare, *given.bones)))
+    assert_allclose(frames[-1].fibres, solved(given)[1][-1].fibres, atol=1e-12)
