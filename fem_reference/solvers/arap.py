@@ -1,0 +1,272 @@
+"""As rigid as possible: the surface keeps the shape of every vertex's edges. Report section 5.5.2; Sorkine and Alexa 2007.
+
+Frame number n is the state after the bones took their pose of frame n: the vertices that a bone holds go with it exactly, and
+from the state before, the rotations of all cells (local step) and the positions of all other vertices (global step) take
+turns. Where the rows of held vertices are removed and weights are the same from both ends, both steps minimise eq. 5.10, each
+over its own unknowns, so that the energy never rises; negative weights do not change that, as the matrix is still the
+positive one of linear elements. What a bone holds by springs it holds exactly here, and bones push nothing aside.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import Field
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import splu
+
+from fem_reference.mesh import TET_FACES, Floats, Ints, Surface, enclosed_volume
+from fem_reference.problem import Setup
+from fem_reference.records import Record
+from fem_reference.runs import Frame, Outcome, Sink, Status
+from fem_reference.solvers import arap_kernels
+from fem_reference.solvers.pbd import carry, held_by
+from fem_reference.units import PositiveLength
+
+Symmetric = Literal["cotangent", "clamped cotangent", "kirchhoff"]
+Weights = Literal[Symmetric, "tutte"]
+Fixed = Literal["remove", "ols"]
+
+# A triangle whose height is this share of its longest side or less has no area.
+_NO_AREA = 1e-6
+_INVERTED = "the surface is turned inside out"
+
+
+class Settings(Record):
+    """How the alternation is run; every key is required.
+
+    ``weights`` of edges: "cotangent" (eq. 5.13), "clamped cotangent" (the same, the negative ones 0), "kirchhoff" (all 1),
+    "tutte" (those, each row divided by its diagonal). A cotangent weight is negative where the angles opposite its edge are
+    together more than pi. Kept, as libigl keeps them, such weights let a cell gain from a half turn, so that rest may not stay.
+    ``fixed``: the rows and columns of held vertices are left out ("remove"), or the columns alone, and all rows are met by
+    least squares ("ols", eq. 5.12). With removed rows tutte has the states of kirchhoff.
+    ``rotations``: fitted before "each" global step, or once in a frame ("first only"): its later iterations then change nothing.
+    ``volume_step``: after each global step the vertices that no bone holds are scaled about the mean of all by eq. 5.9.
+    A frame is done when no vertex moved by more than ``tolerance`` in an iteration, or after ``iterations`` of them.
+    """
+
+    weights: Weights
+    fixed: Fixed
+    rotations: Literal["each", "first only"]
+    volume_step: bool
+    iterations: Annotated[int, Field(gt=0)]
+    tolerance: PositiveLength
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """The edges around each vertex, as ``arap_kernels`` has them: ``rest`` (n, 3) [mm], ``starts`` (n + 1,), ``neighbours``
+    and ``weights`` (e,).
+    """
+
+    rest: Floats
+    starts: Ints
+    neighbours: Ints
+    weights: Floats
+
+    @classmethod
+    def of(cls, surface: Surface, weights: Weights) -> Self:
+        """The cells of a closed surface with ``weights`` named as in the settings."""
+        matrix = _edge_weights(surface, weights)
+        starts, neighbours = matrix.indptr.astype(np.int64), matrix.indices.astype(np.int64)
+        return cls(np.array(surface.points), starts, neighbours, matrix.data)  # compiled code wants writable arrays
+
+    def rotations(self, points: Floats) -> Floats:
+        """The local step: the rotation of each cell (n, 3, 3) that fits it best at ``points`` (n, 3)."""
+        return arap_kernels.fit_rotations(points, self.rest, self.starts, self.neighbours, self.weights)
+
+    def right_side(self, rotations: Floats) -> Floats:
+        """Eq. 5.11, (n, 3) [mm]."""
+        return arap_kernels.right_side(rotations, self.rest, self.starts, self.neighbours, self.weights)
+
+    def energy(self, points: Floats, rotations: Floats | None = None) -> float:
+        """Eq. 5.10 with squares [mm2], at given ``rotations`` or at those that fit ``points`` best."""
+        turned = self.rotations(points) if rotations is None else rotations
+        return arap_kernels.energy(points, turned, self.rest, self.starts, self.neighbours, self.weights)
+
+    def laplacian(self) -> Any:
+        """The sparse matrix L (n, n) of which ``L p' = b``: minus that of the report's Figure 5.5."""
+        count = len(self.rest)
+        matrix = sparse.csr_array((self.weights, self.neighbours, self.starts), shape=(count, count))
+        return sparse.diags_array(matrix.sum(axis=1)) - matrix
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """The global step for given ``held`` (k,) and ``free`` vertices, factorised once.
+
+    ``rows`` of the Laplacian are kept, its columns split into ``coupling`` (rows, k) and those of ``factor``; ``fold``, of
+    least squares, is the transpose that both sides are multiplied with. ``loose`` are free vertices that no weights tie to a
+    held one: where there are some, or nothing or everything is held, there is no ``factor`` and nothing else moves.
+    """
+
+    cells: Cells
+    held: Ints
+    free: Ints
+    rows: Ints
+    coupling: Any
+    fold: Any | None
+    factor: Any | None
+    loose: Ints
+
+    @classmethod
+    def of(cls, cells: Cells, held: Ints, fixed: Fixed) -> Self:
+        """The system with the rows of held vertices removed, or kept for least squares."""
+        everything, laplacian = np.arange(len(cells.rest)), cells.laplacian().tocsr()
+        free = np.setdiff1d(everything, held)
+        rows = free if fixed == "remove" else everything
+        matrix, coupling = laplacian[rows][:, free], laplacian[rows][:, held]
+        fold = None if fixed == "remove" else matrix.T.tocsr()
+        loose = _untied(laplacian, held)
+        solvable = 0 < len(free) < len(everything) and len(loose) == 0
+        factor = factorised(matrix if fold is None else fold @ matrix) if solvable else None
+        return cls(cells, held, free, rows, coupling, fold, factor, loose)
+
+    def place(self, points: Floats, rotations: Floats) -> Floats:
+        """The global step: positions (n, 3) [mm] that solve ``L p' = b`` with the held vertices where ``points`` has them."""
+        moved = points.copy()
+        if self.factor is not None:
+            right = self.cells.right_side(rotations)[self.rows] - self.coupling @ points[self.held]
+            moved[self.free] = self.factor.solve(right if self.fold is None else self.fold @ right)
+        return moved
+
+
+@dataclass(frozen=True, eq=False)
+class Relaxed:
+    """The state of a frame (n, 3) [mm], after how many iterations, whether they met the tolerance, and what went wrong."""
+
+    points: Floats
+    iterations: int
+    met: bool
+    trouble: str = ""
+
+
+def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
+    """Iterate through every frame number from the first of ``setup.frames``, at rest, to the last."""
+    cost = {"seconds_compile": compile_kernels()}
+    begin = time.perf_counter()
+    system = System.of(Cells.of(setup.surface, settings.weights), held_by(setup), settings.fixed)
+    cost["seconds_setup"] = time.perf_counter() - begin
+    triangles, volume = setup.surface.triangles, enclosed_volume(setup.surface.points, setup.surface.triangles)
+
+    def relax(points: Floats) -> Relaxed:
+        rotations = system.cells.rotations(points)
+        for count in range(1, settings.iterations + 1):
+            if count > 1 and settings.rotations == "each":
+                rotations = system.cells.rotations(points)
+            moved = system.place(points, rotations)
+            if settings.volume_step:
+                moved = scaled(moved, triangles, system.free, volume)
+            way, points = farthest(moved - points), moved
+            if way <= settings.tolerance:
+                return Relaxed(points, count, True)
+        return Relaxed(points, settings.iterations, False)
+
+    return march(setup, system, relax, sink, cost)
+
+
+def march(
+    setup: Setup, system: System, relax: Callable[[Floats], Relaxed], sink: Sink, cost: dict[str, float]
+) -> Outcome:
+    """Move the held vertices and ``relax`` the others, frame number by frame number; what it costs is added to ``cost``."""
+    points, (first, *_, last) = np.array(setup.surface.points), setup.frames
+    sink(Frame(first, points.copy(), scalars={"arap_energy_mm2": system.cells.energy(points)}))
+    cost |= {"seconds_solve": 0.0, "iterations": 0, "local_global_steps": 0, "frames_at_tolerance": 0, "threads": 1}
+    if len(system.loose):
+        why = f"vertex {system.loose[0]}: nothing but triangles without area or weight ties it to a held vertex"
+        return Outcome("diverged", f"{why}; kirchhoff weights feel no areas", cost)
+    for iteration in range(first + 1, last + 1):
+        begin = time.perf_counter()
+        carry(points, setup, iteration)
+        relaxed = relax(points)
+        points = relaxed.points
+        cost["seconds_solve"] += time.perf_counter() - begin
+        cost["iterations"] += 1
+        cost["local_global_steps"] += relaxed.iterations
+        cost["frames_at_tolerance"] += relaxed.met
+        cost["seconds_per_iteration"] = cost["seconds_solve"] / cost["iterations"]
+        if trouble := _trouble(points, setup.surface.triangles) or relaxed.trouble:
+            status: Status = "inverted" if trouble == _INVERTED else "diverged"
+            return Outcome(status, f"frame {iteration}: {trouble}; a slower motion may help", cost)
+        if iteration in setup.frames:
+            sink(Frame(iteration, points.copy(), scalars={"arap_energy_mm2": system.cells.energy(points)}))
+    met = f"{cost['frames_at_tolerance']:.0f} met the tolerance"
+    return Outcome("converged", f"{last - first} frames in {cost['local_global_steps']:.0f} iterations, {met}", cost)
+
+
+def _trouble(points: Floats, triangles: Ints) -> str:
+    """What is wrong with positions as a whole, empty if nothing is."""
+    lost = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if len(lost):
+        return f"the position of {len(lost)} vertices is not a number (vertex {lost[0]} for one)"
+    return _INVERTED if enclosed_volume(points, triangles) <= 0 else ""
+
+
+def scaled(points: Floats, triangles: Ints, free: Ints, volume: float) -> Floats:
+    """``points`` (n, 3) with the ``free`` ones scaled about the mean of all by the cube root of V0 / V, eq. 5.9.
+
+    V0 is ``volume`` [mm3]. It is reached where all are free: as those that a bone holds stay, some of it is missing.
+    """
+    centre = points.mean(axis=0)
+    factor = np.cbrt(volume / abs(enclosed_volume(points, triangles)))
+    found = points.copy()
+    found[free] = centre + factor * (points[free] - centre)
+    return found
+
+
+def farthest(ways: Floats) -> float:
+    """The greatest length of ``ways`` (n, 3)."""
+    return float(np.sqrt(np.max(np.einsum("ij,ij->i", ways, ways))))
+
+
+def factorised(matrix: Any) -> Any:
+    """The LU factors of a sparse matrix of symmetric structure whose diagonal needs no pivoting."""
+    options = {"SymmetricMode": True}
+    return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+
+
+def compile_kernels() -> float:
+    """Run every compiled function once, on a tetrahedron; seconds."""
+    begin = time.perf_counter()
+    cells = Cells.of(Surface(np.vstack([np.zeros(3), np.eye(3)]), TET_FACES), "kirchhoff")
+    cells.right_side(cells.rotations(cells.rest))
+    cells.energy(cells.rest)
+    return time.perf_counter() - begin
+
+
+def cotangents(points: Floats, triangles: Ints) -> Floats:
+    """Cotangent of the angle at each corner (m, 3), negative where it is obtuse; 0 in a triangle that has no area."""
+    sides = [points[triangles[:, (k + 2) % 3]] - points[triangles[:, (k + 1) % 3]] for k in range(3)]
+    doubled = np.linalg.norm(np.cross(sides[0], sides[1]), axis=1)
+    longest = np.max([np.einsum("ij,ij->i", side, side) for side in sides], axis=0)
+    products = np.stack([-np.einsum("ij,ij->i", sides[(k + 1) % 3], sides[(k + 2) % 3]) for k in range(3)], axis=1)
+    flat = doubled <= _NO_AREA * longest
+    return np.where(flat[:, None], 0.0, products / np.where(flat, 1.0, doubled)[:, None])
+
+
+def _edge_weights(surface: Surface, name: Weights) -> Any:
+    """The weight of each edge from either end, a sparse matrix (n, n)."""
+    triangles, count = surface.triangles, len(surface.points)
+    one, other = (
+        triangles[:, [1, 2, 0]].ravel(),
+        triangles[:, [2, 0, 1]].ravel(),
+    )  # the ends of the edge opposite a corner
+    ends = (np.concatenate([one, other]), np.concatenate([other, one]))
+    halves = np.tile(cotangents(surface.points, triangles).ravel() / 2, 2)
+    matrix = sparse.coo_array((halves, ends), shape=(count, count)).tocsr()
+    if name in ("kirchhoff", "tutte"):
+        matrix.data[:] = 1
+    if name == "clamped cotangent":
+        matrix.data = np.maximum(matrix.data, 0)
+    if name == "tutte":
+        matrix.data /= np.repeat(matrix.sum(axis=1), np.diff(matrix.indptr))
+    return matrix
+
+
+def _untied(laplacian: Any, held: Ints) -> Ints:
+    """The vertices that no chain of edges of a weight other than 0 leads to a held one; none where nothing is held."""
+    part = connected_components(laplacian != 0, directed=False)[1]
+    return np.flatnonzero(~np.isin(part, part[held])) if len(held) else np.zeros(0, np.int64)

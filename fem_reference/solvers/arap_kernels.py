@@ -1,0 +1,126 @@
+"""The local step, the right side and the energy of as-rigid-as-possible deformation, compiled. Report eq. 5.10 and 5.11.
+
+The cell of vertex i is its edges to its neighbours: ``neighbours[starts[i]:starts[i + 1]]`` with their ``weights``, which
+need not be the same from both ends. Where nothing else is said arrays are ``points`` and ``rest`` (n, 3) [mm], ``starts``
+(n + 1,), ``neighbours`` and ``weights`` (e,) and ``rotations`` (n, 3, 3), writable and C-contiguous.
+"""
+
+import math
+
+import numpy as np
+
+from fem_reference.mesh import Floats, Ints
+from fem_reference.solvers.compiled_kernels import compiled
+
+# Sweeps over a symmetric 4 x 4 matrix; it is diagonal to rounding after about five, as convergence is quadratic.
+_SWEEPS = 30
+_ROUNDING = 1e-17
+
+
+@compiled
+def _turn(matrix: Floats, vectors: Floats, p: int, q: int) -> None:
+    """Turn rows and columns p and q of the symmetric ``matrix`` (4, 4) so that [p, q] is 0; columns of ``vectors`` with them."""
+    slope = 0.5 * (matrix[q, q] - matrix[p, p]) / matrix[p, q]
+    tangent = math.copysign(1.0, slope) / (abs(slope) + math.sqrt(slope * slope + 1))
+    c = 1 / math.sqrt(tangent * tangent + 1)
+    s = tangent * c
+    for k in range(4):
+        matrix[k, p], matrix[k, q] = c * matrix[k, p] - s * matrix[k, q], s * matrix[k, p] + c * matrix[k, q]
+    for k in range(4):
+        matrix[p, k], matrix[q, k] = c * matrix[p, k] - s * matrix[q, k], s * matrix[p, k] + c * matrix[q, k]
+    for k in range(4):
+        vectors[k, p], vectors[k, q] = c * vectors[k, p] - s * vectors[k, q], s * vectors[k, p] + c * vectors[k, q]
+    matrix[p, q] = matrix[q, p] = 0.0
+
+
+@compiled
+def _diagonalise(matrix: Floats, vectors: Floats) -> None:
+    """Make the symmetric ``matrix`` (4, 4) diagonal by Jacobi's rotations; the columns of ``vectors`` become its eigenvectors."""
+    vectors[:] = 0.0
+    for k in range(4):
+        vectors[k, k] = 1.0
+    for _ in range(_SWEEPS):
+        turns = 0
+        for p in range(3):
+            for q in range(p + 1, 4):
+                if abs(matrix[p, q]) > _ROUNDING * (abs(matrix[p, p]) + abs(matrix[q, q])):
+                    _turn(matrix, vectors, p, q)
+                    turns += 1
+        if turns == 0:
+            break
+
+
+@compiled
+def _rotate(covariance: Floats, matrix: Floats, vectors: Floats, rotation: Floats) -> None:
+    """The ``rotation`` R (3, 3), det R = 1, for which sum_ab R_ab C_ba is greatest; ``matrix``, ``vectors`` (4, 4) are scratch.
+
+    It is the eigenvector of the greatest eigenvalue of a 4 x 4 matrix made of C, read as a quaternion (Horn 1987,
+    doi:10.1364/JOSAA.4.000629): what the report's singular values give, and a rotation where those give a reflection,
+    for cells that are flat or turned inside out.
+    """
+    C = covariance
+    matrix[0, 0] = C[0, 0] + C[1, 1] + C[2, 2]
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        matrix[0, a + 1] = matrix[a + 1, 0] = C[b, c] - C[c, b]
+        matrix[a + 1, a + 1] = C[a, a] - C[b, b] - C[c, c]
+        matrix[b + 1, c + 1] = matrix[c + 1, b + 1] = C[b, c] + C[c, b]
+    _diagonalise(matrix, vectors)
+    best = 0
+    for k in range(1, 4):
+        if matrix[k, k] > matrix[best, best]:
+            best = k
+    w, x, y, z = vectors[0, best], vectors[1, best], vectors[2, best], vectors[3, best]
+    rotation[0, 0], rotation[0, 1], rotation[0, 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
+    rotation[1, 0], rotation[1, 1], rotation[1, 2] = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
+    rotation[2, 0], rotation[2, 1], rotation[2, 2] = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
+
+
+@compiled
+def fit_rotations(points: Floats, rest: Floats, starts: Ints, neighbours: Ints, weights: Floats) -> Floats:
+    """The rotation of each cell that takes its edges at ``rest`` nearest to those of ``points``, (n, 3, 3).
+
+    The covariance is ``C = sum_j w_ij (p_i - p_j) (p'_i - p'_j)^T``: edges from the vertex itself, as in Sorkine and Alexa
+    2007; about the centroids of the report's text the fit would no longer minimise eq. 5.10.
+    """
+    rotations = np.empty((len(points), 3, 3))
+    covariance, matrix, vectors = np.empty((3, 3)), np.empty((4, 4)), np.empty((4, 4))
+    for i in range(len(points)):
+        covariance[:] = 0
+        for at in range(starts[i], starts[i + 1]):
+            j = neighbours[at]
+            for a in range(3):
+                edge = weights[at] * (rest[i, a] - rest[j, a])
+                for b in range(3):
+                    covariance[a, b] += edge * (points[i, b] - points[j, b])
+        _rotate(covariance, matrix, vectors, rotations[i])
+    return rotations
+
+
+@compiled
+def right_side(rotations: Floats, rest: Floats, starts: Ints, neighbours: Ints, weights: Floats) -> Floats:
+    """``b_i = sum_j w_ij / 2 (R_i + R_j) (p_i - p_j)`` (n, 3) [mm]. Eq. 5.11."""
+    found = np.zeros_like(rest)
+    for i in range(len(rest)):
+        for at in range(starts[i], starts[i + 1]):
+            j = neighbours[at]
+            for b in range(3):
+                edge = 0.5 * weights[at] * (rest[i, b] - rest[j, b])
+                for a in range(3):
+                    found[i, a] += edge * (rotations[i, a, b] + rotations[j, a, b])
+    return found
+
+
+@compiled
+def energy(points: Floats, rotations: Floats, rest: Floats, starts: Ints, neighbours: Ints, weights: Floats) -> float:
+    """``sum_i sum_j w_ij |(p'_i - p'_j) - R_i (p_i - p_j)|^2`` [mm2]: eq. 5.10 with the squares of its source."""
+    found = 0.0
+    for i in range(len(rest)):
+        for at in range(starts[i], starts[i + 1]):
+            j = neighbours[at]
+            for a in range(3):
+                off = points[i, a] - points[j, a]
+                for b in range(3):
+                    off -= rotations[i, a, b] * (rest[i, b] - rest[j, b])
+                found += weights[at] * off * off
+    return found

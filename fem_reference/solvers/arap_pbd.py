@@ -1,0 +1,134 @@
+"""As rigid as possible with position based dynamics: the two combinations that report 6.2 and 7.2 propose.
+
+*The volume as a constraint* of the ARAP energy, instead of scaling by turns: the positions of a global step solve
+``L p' = b + lambda grad V``, with the multiplier lambda for which the enclosed volume is that of rest and the gradient at the
+positions of the iteration before. Where the iteration comes to rest, the slope of the energy is a multiple of the volume's:
+no small change that keeps the volume changes the energy. *ARAP as initial guess*: sweeps of PBD's projections (edge lengths,
+volume, dihedral angles) start from the ARAP state of the frame; nothing is kept of a velocity. Where both are asked for, the
+projections come last. As in ``arap``, bones push nothing aside.
+"""
+
+import time
+from typing import Annotated, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from fem_reference.mesh import TET_FACES, Floats
+from fem_reference.problem import Setup
+from fem_reference.records import Record
+from fem_reference.runs import Outcome, Sink
+from fem_reference.solvers.arap import Cells, Relaxed, Symmetric, System, compile_kernels, farthest, march
+from fem_reference.solvers.pbd import Constraints, Stiffness, held_by
+from fem_reference.solvers.pbd_kernels import project_dihedrals, project_distances, project_volume, volume
+from fem_reference.units import PositiveLength
+
+# The volume counts as reached when it is off by this share, and as out of reach after this many steps of Newton's method.
+_REACHED, _STEPS = 1e-12, 20
+# Beyond this share the volume is not kept.
+_KEPT = 1e-6
+
+
+class Projections(Record):
+    """PBD's projections after ARAP: how many ``sweeps`` over all constraints, and their stiffnesses as in ``pbd``."""
+
+    sweeps: Annotated[int, Field(gt=0)]
+    stretch: Stiffness
+    volume: Stiffness
+    bending: Stiffness
+
+
+class Settings(Record):
+    """ARAP with the rows of held vertices removed and rotations fitted in each iteration, and what keeps its volume.
+
+    ``weights``, ``iterations`` and ``tolerance`` as in ``arap``; Tutte's are not offered, as with removed rows they have the
+    states of kirchhoff. ``volume_constraint``: whether the energy is minimised at the volume of rest. ``projections``: off
+    where the key is omitted.
+    """
+
+    weights: Symmetric
+    iterations: Annotated[int, Field(gt=0)]
+    tolerance: PositiveLength
+    volume_constraint: bool
+    projections: Projections | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if not self.volume_constraint and self.projections is None:
+            raise ValueError('volume_constraint = true or "projections" (without both it is the solver arap)')
+        return self
+
+
+def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
+    """Iterate through every frame number from the first of ``setup.frames``, at rest, to the last."""
+    cost = {"seconds_compile": compile_kernels() + _compile_projections()}
+    begin = time.perf_counter()
+    system = System.of(Cells.of(setup.surface, settings.weights), held_by(setup), "remove")
+    rest = Constraints.at_rest(setup.surface.points, setup.surface.triangles, system.held)
+    cost["seconds_setup"] = time.perf_counter() - begin
+
+    def relax(points: Floats) -> Relaxed:
+        found = minimise(system, points, settings, rest)
+        if settings.projections is None:
+            return found
+        return Relaxed(projected(found.points, rest, settings.projections), found.iterations, found.met, found.trouble)
+
+    return march(setup, system, relax, sink, cost)
+
+
+def minimise(system: System, points: Floats, settings: Settings, rest: Constraints) -> Relaxed:
+    """Local and global steps from ``points`` (n, 3) until the settings are met, at the volume of ``rest`` where they say so."""
+    count, met = 0, False
+    while count < settings.iterations and not met:
+        moved = system.place(points, system.cells.rotations(points))
+        if settings.volume_constraint:
+            moved = at_volume(system, moved, points, rest)
+        count, met, points = count + 1, farthest(moved - points) <= settings.tolerance, moved
+    return Relaxed(points, count, met, _lost_volume(points, rest, settings))
+
+
+def at_volume(system: System, minimum: Floats, before: Floats, rest: Constraints) -> Floats:
+    """``p + lambda L^-1 grad V`` with lambda such that the volume is that of ``rest``, found by Newton's method.
+
+    p is the ``minimum`` (n, 3) of the global step and the gradient that at the positions ``before`` it. The volume is a cubic
+    in lambda.
+    """
+    way = np.zeros_like(minimum)
+    if system.factor is None:
+        return minimum
+    way[system.free] = system.factor.solve(volume(before, rest.triangles)[1][system.free])
+    factor = 0.0
+    for _ in range(_STEPS):
+        value, gradient = volume(minimum + factor * way, rest.triangles)
+        off = value - rest.six_volumes
+        if abs(off) <= _REACHED * rest.six_volumes:
+            break
+        factor -= off / np.sum(gradient * way)
+    return minimum + factor * way
+
+
+def projected(points: Floats, rest: Constraints, projections: Projections) -> Floats:
+    """``points`` (n, 3) after the sweeps of PBD's projections."""
+    moved = points.copy()
+    for _ in range(projections.sweeps):
+        project_distances(moved, rest.inverse_masses, rest.edges, rest.lengths, projections.stretch * rest.share)
+        project_volume(moved, rest.inverse_masses, rest.triangles, rest.six_volumes, projections.volume)
+        project_dihedrals(moved, rest.inverse_masses, rest.hinges, rest.angles, projections.bending)
+    return moved
+
+
+def _lost_volume(points: Floats, rest: Constraints, settings: Settings) -> str:
+    """What is wrong with the volume of ``points``; empty if nothing is, or nobody asked."""
+    ratio = volume(points, rest.triangles)[0] / rest.six_volumes
+    if not settings.volume_constraint or abs(ratio - 1) <= _KEPT:
+        return ""
+    return f"no multiplier keeps the volume, it is {ratio:.6g} of that at rest"
+
+
+def _compile_projections() -> float:
+    """Run every compiled function of the projections once, on a tetrahedron; seconds."""
+    begin = time.perf_counter()
+    points, nothing = np.vstack([np.zeros(3), np.eye(3)]), np.zeros(0, np.int64)
+    rest = Constraints.at_rest(points, TET_FACES, nothing)
+    projected(points, rest, Projections(sweeps=1, stretch=1, volume=1, bending=1))
+    return time.perf_counter() - begin
