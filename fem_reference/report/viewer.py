@@ -84,7 +84,8 @@ def view(comparison: Comparison, budget: int = BUDGET) -> Viewer:
     every = _every(shown, budget)
     numbers = reference.numbers[::every]
     frames = {run.name: _frames(run, numbers) for run in shown}
-    box = _box(frames[reference.name], list(frames.values()))
+    own = np.concatenate([reference.surface.points[None], frames[reference.name]])  # even where it reached no frame
+    box = _box(own, list(frames.values()))
     version, licence = _library_facts()
     data = {
         "library": _library(),
@@ -92,7 +93,7 @@ def view(comparison: Comparison, budget: int = BUDGET) -> Viewer:
         "colours": [to_hex(colour) for colour in mpl.colormaps[pictures.COLOURS](np.linspace(0, 1, 33))],
         "triangles": _packed(reference.surface.triangles.astype("<u4").tobytes()),
         "bones": [_bone(bone, numbers) for bone in comparison.setup.bones],
-        "camera": _camera(comparison, frames[reference.name]),
+        "camera": _camera(comparison, own),
         **box.told(),
         **_runs(frames, reference.name, box),
     }
@@ -120,7 +121,7 @@ def _box(reference: Floats, runs: list[Floats]) -> _Box:
     """Around all frames, but beyond the reference's by at most its own length on each side: a run may scatter."""
     low, high = _bounds(reference)
     reach = float(np.linalg.norm(high - low))
-    lows, highs = zip(*(_bounds(frames) for frames in runs if np.isfinite(frames).any()), strict=True)
+    lows, highs = zip(*(_bounds(frames) for frames in [reference, *runs] if np.isfinite(frames).any()), strict=True)
     return _Box.around(np.maximum(np.min(lows, axis=0), low - reach), np.minimum(np.max(highs, axis=0), high + reach))
 
 
@@ -129,24 +130,24 @@ def _bounds(frames: Floats) -> tuple[Floats, Floats]:
 
 
 def _runs(frames: dict[str, Floats], reference: str, box: _Box) -> dict[str, Any]:
-    """Every run, and the ``top`` of the colours: the greatest distance of a vertex inside the box to the reference's."""
+    """Every run, and the ``top`` of the colours: the greatest distance to the reference in a frame that is wholly in the box."""
     rows, top = [], 0.0
     for name, positions in frames.items():
-        inside = (positions >= box.low - box.step) & (positions <= box.low + (_LEVELS + 1) * box.step)
+        inside = ((positions >= box.low - box.step) & (positions <= box.low + (_LEVELS + 1) * box.step)).all(axis=2)
         reached = np.isfinite(positions).all(axis=(1, 2))
         with np.errstate(over="ignore"):
             distances = np.linalg.norm(positions - frames[reference], axis=2)
-        known = np.where(np.isfinite(distances) & inside.all(axis=2), distances, 0.0).max(axis=1)
+        known = np.where(np.isfinite(distances) & inside, distances, 0.0).max(axis=1)
         rows.append(
             {
                 "name": name,
                 "worst": [float(known.max()), int(known.argmax())],
                 "reached": reached.tolist(),
-                "off": np.where(reached, (~inside).any(axis=2).sum(axis=1), 0).tolist(),
+                "off": np.where(reached, (~inside).sum(axis=1), 0).tolist(),
                 "positions": _positions(_held_on(positions), box),
             }
         )
-        top = max(top, float(known.max()))
+        top = max(top, float(known[inside.all(axis=1)].max(initial=0.0)))
     return {"runs": rows, "top": top}
 
 
@@ -178,7 +179,7 @@ def _bone(bone: Body, numbers: tuple[int, ...]) -> dict[str, Any]:
 
 
 def _camera(comparison: Comparison, frames: Floats) -> dict[str, Any]:
-    """Where the pictures are taken from, wide enough for the reference in all frames."""
+    """Where the pictures are taken from, wide enough for the reference in all ``frames`` (f, n, 3)."""
     low, high = _bounds(frames)
     middle = (low + high) / 2
     return {

@@ -1,0 +1,345 @@
+"""The 3D view: what is packed into the page is what the runs are, and a browser draws it without a network."""
+
+import base64
+import gzip
+import hashlib
+import json
+import re
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapes
+import test_report
+from browser import PROGRAM, Browser
+
+from fem_reference.problem import Body
+from fem_reference.report import page, viewer
+
+NAN = float("nan")
+comparison = test_report.comparison
+UP = "!document.getElementById('viewer').hidden"
+
+
+def unpacked(text: str, kind: str) -> np.ndarray:
+    return np.frombuffer(gzip.decompress(base64.b64decode(text)), kind).astype(np.int64)
+
+
+def positions(told: dict, box: dict, frames: int) -> np.ndarray:
+    """The positions (frames, n, 3) [mm] of a run, unpacked as the module's text says."""
+    low, high = unpacked(told["positions"], "u1").reshape(2, -1)
+    zigzag = low + 256 * high
+    steps = np.where(zigzag % 2, -(zigzag + 1) // 2, zigzag // 2).reshape(frames, -1, 3)
+    return box["low"] + box["step"] * (np.cumsum(steps, axis=0) % 65536)
+
+
+def test_the_library_is_as_it_was_published():
+    card = tomllib.loads((viewer.THREE / "card.toml").read_text())
+    files = {path.name: path.read_bytes() for path in viewer.THREE.iterdir() if path.name != "card.toml"}
+    assert {name: hashlib.sha256(text).hexdigest() for name, text in files.items()} == card["sha256"]
+    assert f'"{card["version"].split(".")[1]}"'.encode() in files["three.core.min.js"]
+    assert b"The MIT License" in files["LICENSE"]
+
+
+def test_what_is_packed_is_every_frame_of_every_run(comparison):
+    seen = viewer.view(comparison)
+    data = json.loads(seen.data)
+    assert (seen.candidates, seen.numbers, seen.every) == (("quick", "torn"), test_report.NUMBERS, 1)
+    assert data["frames"] == list(test_report.NUMBERS)
+    np.testing.assert_array_equal(
+        unpacked(data["triangles"], "<u4").reshape(-1, 3), comparison.reference.surface.triangles
+    )
+    for run, told in zip([comparison.reference, *comparison.candidates], data["runs"], strict=True):
+        known = np.isfinite(run.positions).all(axis=(1, 2))
+        assert told["reached"] == known.tolist()
+        assert told["off"] == [0] * 5
+        # Rounding is half a step, and of numbers of 60 mm 1e-14.
+        off = np.abs(positions(told, data, 5) - run.positions)[known].max()
+        assert off <= seen.error + 1e-12
+    # From -30 - 0 to 30 + 8 mm along x, in 65535 steps.
+    assert seen.error == pytest.approx(68 / 65535 / 2, rel=1e-9)
+
+
+def test_the_scale_ends_at_the_greatest_distance_and_each_run_names_its_worst_frame(comparison):
+    data = json.loads(viewer.view(comparison).data)
+    # quick is 1 mm a frame away; torn half of that, and its last frame is not a number.
+    assert data["top"] == pytest.approx(4.0, rel=1e-12)
+    assert [run["worst"] for run in data["runs"]] == [[0, 0], [pytest.approx(4), 4], [pytest.approx(1.5), 3]]
+
+
+def test_bones_have_a_pose_for_each_frame_and_few_triangles(comparison):
+    data = json.loads(viewer.view(comparison).data)
+    (bone,), body = data["bones"], comparison.setup.bones[0]
+    np.testing.assert_allclose(bone["poses"], [body.pose(number).ravel() for number in test_report.NUMBERS], atol=0)
+    points = positions(bone, bone, 1)[0]
+    assert np.abs(points - body.surface.points).max() <= bone["step"] / 2 + 1e-12
+    fine = Body("fine", shapes.sphere(5, 20.0), None)
+    assert len(fine.surface.triangles) > viewer.BONE_TRIANGLES
+    changed = replace(comparison, setup=replace(comparison.setup, bones=(fine,)))
+    (bone,) = json.loads(viewer.view(changed).data)["bones"]
+    assert 0 < len(unpacked(bone["triangles"], "<u4")) <= 3 * viewer.BONE_TRIANGLES
+
+
+def test_a_run_of_lines_alone_is_left_out(comparison):
+    lines = replace(comparison.candidates[0], has_surface=False)
+    seen = viewer.view(replace(comparison, candidates=(lines, comparison.candidates[1])))
+    assert seen.candidates == ("torn",)
+    assert [run["name"] for run in json.loads(seen.data)["runs"]] == ["reference", "torn"]
+
+
+def test_a_run_without_any_number_shows_nothing(comparison):
+    lost = replace(comparison.candidates[1], positions=np.full_like(comparison.reference.positions, np.inf))
+    data = json.loads(viewer.view(replace(comparison, candidates=(lost,))).data)
+    assert (data["runs"][1]["reached"], data["top"]) == ([False] * 5, 0.0)
+
+
+def test_a_reference_without_any_number_leaves_the_candidates(comparison):
+    lost = replace(comparison.reference, positions=np.full_like(comparison.reference.positions, NAN))
+    data = json.loads(viewer.view(replace(comparison, reference=lost)).data)
+    assert [run["reached"][0] for run in data["runs"]] == [False, True, True]
+    assert data["top"] == 0
+
+
+def test_vertices_that_scatter_are_counted_and_leave_the_others_their_digits(comparison):
+    moved = np.array(comparison.candidates[0].positions)
+    moved[3, 7] = [1e6, 0, 0]
+    moved[4, :2] = 1e300
+    seen = viewer.view(replace(comparison, candidates=(replace(comparison.candidates[0], positions=moved),)))
+    data = json.loads(seen.data)
+    assert data["runs"][1]["off"] == [0, 0, 0, 1, 2]
+    # The reference's box is 68 x 40 x 20, so that none is greater than three times its diagonal.
+    assert seen.error < 3 * np.hypot(68, np.hypot(40, 20)) / 65535 / 2
+    # 1e6 is drawn at the edge of the box and sets no scale, nor does what else is in such a frame: 2 mm off are those before.
+    assert data["top"] == pytest.approx(2.0, rel=1e-12)
+    assert data["runs"][1]["worst"] == [pytest.approx(4.0), 4]
+
+
+# A frame of three runs of 66 vertices, three coordinates of two bytes each.
+FRAME = 3 * 66 * 3 * 2
+
+
+@pytest.mark.parametrize(
+    ("budget", "every", "numbers"),
+    [(5 * FRAME, 1, test_report.NUMBERS), (3 * FRAME, 2, (0, 20, 40)), (1, 4, (0, 40))],
+)
+def test_beyond_its_budget_the_page_has_fewer_frames(comparison, budget, every, numbers):
+    seen = viewer.view(comparison, budget)
+    assert (seen.every, seen.numbers) == (every, numbers)
+    data = json.loads(seen.data)
+    assert {len(bone["poses"]) for bone in data["bones"]} == {len(numbers)}
+    at = [test_report.NUMBERS.index(number) for number in numbers]
+    off = np.abs(positions(data["runs"][0], data, len(at)) - comparison.reference.positions[at]).max()
+    assert off <= seen.error + 1e-12
+
+
+def test_a_muscle_of_the_report_fits_into_the_page_whatever_it_does(comparison):
+    # 10242 vertices over 31 frames and three candidates, in noise, which nothing compresses: base64 takes 4 bytes for 3.
+    ball, noise = shapes.sphere(5, 40.0), np.random.default_rng(6).normal(size=(31, 10242, 3))
+    numbers, runs = tuple(range(31)), [comparison.reference, *[comparison.candidates[0]] * 3]
+    given = [
+        replace(run, name=str(i), numbers=numbers, surface=ball, positions=ball.points + np.roll(noise, i, axis=0))
+        for i, run in enumerate(runs)
+    ]
+    changed = replace(comparison, setup=replace(comparison.setup, surface=ball), reference=given[0])
+    seen = viewer.view(replace(changed, candidates=tuple(given[1:])))
+    positions_alone = 4 * 31 * 10242 * 3 * 2
+    assert seen.every == 1
+    assert positions_alone < viewer.BUDGET
+    # Library, triangles and bones are what is left; 15 MB are the whole page's.
+    assert len(seen.data) < 4 / 3 * positions_alone + 1e6 < 4 / 3 * viewer.BUDGET + 1e6 < 15e6
+
+
+def test_fewer_frames_are_told(comparison, monkeypatch):
+    assert "is drawn here" not in page.render(comparison)
+    monkeypatch.setattr(page, "view", lambda it: viewer.view(it, 3 * FRAME))
+    assert "<b>one frame in 2 is drawn here</b>" in page.render(comparison)
+
+
+def test_no_name_ends_the_script(comparison):
+    quick = replace(comparison.candidates[0], name="</script><!--")
+    data = viewer.view(replace(comparison, candidates=(quick,))).data
+    assert "<" not in data
+    assert json.loads(data)["runs"][1]["name"] == quick.name
+
+
+# ---- In a browser
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    if PROGRAM is None:
+        pytest.skip("chromium is not installed: apt-get install chromium")
+    with Browser(tmp_path_factory.mktemp("profile")) as opened:
+        yield opened
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch):
+    """Without the curves, of which nothing here is."""
+    monkeypatch.setattr(page, "curves", lambda _: [])
+
+
+@pytest.fixture
+def opened(browser, comparison, tmp_path):
+    """The page of the small comparison, drawn."""
+    show(browser, comparison, tmp_path)
+    return browser
+
+
+def show(browser: Browser, comparison, folder: Path, fragment: str = "") -> None:
+    path = folder / "report.html"
+    path.write_text(page.render(comparison), encoding="utf-8")
+    browser.open(path, fragment)
+    browser.wait(f"document.getElementById('viewer') && {UP}")
+
+
+def labels(browser: Browser) -> dict[str, tuple[str, list[float]]]:
+    """What each pane shown tells, and the mean [mm] of the vertices that are drawn in it, by its name."""
+    found = browser.ask(
+        "[...document.querySelectorAll('.viewer-label:not([hidden])')]"
+        ".map((it) => [it.firstChild.textContent, it.lastChild.textContent, it.dataset.mean])"
+    )
+    return {name: (told, [float(value) for value in mean.split()]) for name, told, mean in found}
+
+
+def click(browser: Browser, name: str) -> None:
+    browser.ask(f"document.getElementById('viewer-{name}').click()")
+
+
+def test_it_loads_without_a_request_or_a_complaint(opened):
+    assert opened.complaints() == []
+    assert {address.split(":")[0] for address in opened.requests()} <= {"file", "data", "blob"}
+    assert len([address for address in opened.requests() if address.startswith("file:")]) == 1
+    # And one would be seen: the page's own policy refuses it.
+    opened.ask(
+        "new Promise((go) => { const it = new Image(); it.onerror = go; it.src = 'https://example.org/a.png'; })"
+    )
+    assert any("Content Security Policy" in told for told in opened.complaints())
+
+
+def body_of_reference(picture: np.ndarray) -> np.ndarray:
+    """Which pixels of the first of three panes, below its label, are of the muscle's red, where bones are hidden."""
+    pane = picture[50:, 5 : picture.shape[1] // 3 - 5]
+    return pane[:, :, 0] > pane[:, :, 2] + 40
+
+
+def test_the_slider_moves_the_mesh(opened, comparison):
+    seen = viewer.view(comparison)
+    error, half = seen.error, json.loads(seen.data)["camera"]["half"]
+    click(opened, "bones")
+    opened.ask("document.getElementById('viewer-slider').focus()")
+    middles = []
+    for key, i in (("Home", 0), ("ArrowRight", 1), ("End", 4), ("ArrowLeft", 3)):
+        opened.press(key)
+        picture = opened.picture("#viewer-stage")
+        middles.append(np.argwhere(body_of_reference(picture)).mean(axis=0))
+        assert opened.ask("document.getElementById('viewer-number').textContent") == str(test_report.NUMBERS[i])
+        for run in (comparison.reference, *comparison.candidates):
+            told, mean = labels(opened)[run.name]
+            if np.isfinite(run.positions[i]).all():
+                # Each coordinate is rounded by half a step at most, and held in 32 bits: 30 mm times 6e-8.
+                np.testing.assert_allclose(mean, run.positions[i].mean(axis=0), rtol=0, atol=error + 2e-6)
+            else:
+                assert (told, mean) == ("no frame", [])
+    # The picture moves with it: 2 mm a frame, across the camera's way. Its half height at the target is half / cos(9 degrees);
+    # the middle of the body is a few percents off that where it is not the middle of the picture.
+    pixels = np.linalg.norm(np.diff(middles, axis=0), axis=1)
+    pixels_per_mm = (picture.shape[0] / 2) / (half / np.cos(np.radians(9)))
+    np.testing.assert_allclose(pixels / pixels_per_mm, [2, 6, 2], rtol=0.05)
+    assert opened.complaints() == []
+
+
+def yellow(browser: Browser) -> float:
+    """Which share of the right half of the picture is yellow."""
+    picture = browser.picture("#viewer-stage")
+    right = picture[:, picture.shape[1] // 2 :]
+    return float(((right[:, :, 0] > right[:, :, 2] + 80) & (right[:, :, 1] > right[:, :, 2] + 80)).mean())
+
+
+def test_the_worst_vertex_is_told_and_has_the_colour_at_the_end_of_the_bar(opened):
+    told = {name: text for name, (text, _) in labels(opened).items()}
+    assert told == {"reference": "", "quick": "worst vertex 4 mm", "torn": "no frame"}
+    assert opened.ask("document.getElementById('viewer-full').textContent") == "4 mm"
+    opened.ask("document.querySelector('input[name=viewer-candidate][value=\"2\"]').click()")
+    # Viridis ends in yellow; all vertices are 4 mm away. Half axes 30 and 20 in a window of half height 1.06 x 34 or so.
+    assert yellow(opened) > 0.1
+    opened.ask("document.getElementById('viewer-slider').focus()")
+    opened.press("Home")
+    assert yellow(opened) == 0
+    click(opened, "worst")
+    assert yellow(opened) > 0.1
+    click(opened, "coloured")
+    assert yellow(opened) == 0
+
+
+def grey(picture: np.ndarray) -> int:
+    """How many pixels have neither colour nor are they white."""
+    return int(((np.ptp(picture, axis=2) < 12) & (picture.max(axis=2) < 220)).sum())
+
+
+def test_panes_are_those_chosen_and_the_reference_can_lie_over_them(opened):
+    assert list(labels(opened)) == ["reference", "quick", "torn"]
+    click(opened, "laid")
+    assert list(labels(opened)) == ["quick", "torn"]
+    opened.ask("document.querySelectorAll('input[name=viewer-candidate]').forEach((box) => box.click())")
+    assert list(labels(opened)) == ["reference"]
+    opened.ask("document.querySelector('input[name=viewer-candidate]').click()")
+    assert list(labels(opened)) == ["quick"]
+    click(opened, "bones")
+    click(opened, "side")
+    # The candidate is above the reference by 4 of its 20 mm, and never grey; the reference shows below it, and is.
+    assert grey(opened.picture("#viewer-stage")[60:]) > 1000
+    click(opened, "laid")
+    assert list(labels(opened)) == ["reference", "quick"]
+    assert grey(opened.picture("#viewer-stage")[60:, :, :]) < 1000
+    assert opened.complaints() == []
+
+
+def test_bones_move_and_can_be_hidden_and_one_camera_turns_with_the_keys(browser, comparison, tmp_path):
+    still = replace(comparison.reference, positions=np.repeat(comparison.reference.positions[:1], 5, axis=0))
+    show(browser, replace(test_report.alone(comparison), reference=still), tmp_path, "#frame=10")
+    assert browser.ask("document.getElementById('viewer-number').textContent") == "10"
+    one = browser.picture("#viewer-stage")
+    browser.ask("location.hash = '#frame=40'")
+    browser.wait("document.getElementById('viewer-number').textContent === '40'")
+    other = browser.picture("#viewer-stage")
+    click(browser, "bones")
+    without = browser.picture("#viewer-stage")
+    browser.ask("document.getElementById('viewer-canvas').focus()")
+    browser.press("ArrowUp")
+    turned = browser.picture("#viewer-stage")
+    click(browser, "front")
+    for before, after in ((one, other), (other, without), (without, turned)):
+        assert (np.abs(before - after).max(axis=2) > 8).sum() > 300
+    # The focus ring apart, the view is what it was.
+    np.testing.assert_allclose(browser.picture("#viewer-stage")[9:-9, 9:-9], without[9:-9, 9:-9], atol=2)
+    assert browser.complaints() == []
+
+
+def test_it_plays(opened):
+    click(opened, "play")
+    opened.wait("document.getElementById('viewer-number').textContent === '20'", seconds=10)
+    assert opened.ask("document.getElementById('viewer-play').textContent") == "Pause"
+    click(opened, "play")
+    assert opened.ask("document.getElementById('viewer-play').textContent") == "Play"
+
+
+def test_without_webgl_it_points_at_the_pictures(browser, comparison, tmp_path):
+    code = "HTMLCanvasElement.prototype.getContext = () => null;"
+    script = browser.call("Page.addScriptToEvaluateOnNewDocument", source=code)["identifier"]
+    try:
+        (tmp_path / "report.html").write_text(page.render(comparison), encoding="utf-8")
+        browser.open(tmp_path / "report.html")
+        browser.wait("document.getElementById('viewer-sorry')?.textContent.startsWith('No 3D view')")
+    finally:
+        browser.call("Page.removeScriptToEvaluateOnNewDocument", identifier=script)
+    assert "the pictures below show the same" in browser.ask("document.getElementById('viewer-sorry').textContent")
+    assert not browser.ask(UP)
+
+
+def test_without_javascript_the_page_says_what_it_needs(comparison):
+    text = re.sub(r"<script.*?</script>", "", page.render(comparison), flags=re.DOTALL)
+    assert re.search(r'<p [^>]*id="viewer-sorry">This view needs JavaScript and WebGL 2; the pictures', text)
+    assert '<div class="viewer" id="viewer" hidden>' in text
