@@ -9,8 +9,8 @@ import time
 from pathlib import Path
 
 from fem_reference import files, refinement
+from fem_reference.cli.choosing import candidate, checked_bench, scene_of
 from fem_reference.cli.telling import DONE, SOLVER_FAILED, VERDICT_FAIL, tell
-from fem_reference.cli.verbs import _candidate, _checked_bench, _scene
 from fem_reference.errors import InputError
 from fem_reference.execution import Bench
 from fem_reference.regression import baseline, checking, told
@@ -21,8 +21,8 @@ from fem_reference.scene import Candidate, Scene
 
 def add_options(parser: argparse.ArgumentParser, unit: str) -> None:
     """The options that only this verb has, and ``--unit`` with its help."""
-    candidate = "a candidate of the case or a folder of frames"
-    parser.add_argument("--candidate", required=True, metavar="NAME|DIR", help=candidate)
+    either = "a candidate of the case or a folder of frames"
+    parser.add_argument("--candidate", required=True, metavar="NAME|DIR", help=either)
     parser.add_argument("--unit", help=unit)
     past = "its measures as they were, JSON"
     parser.add_argument("--baseline", type=Path, required=True, metavar="FILE", help=past)
@@ -35,29 +35,29 @@ def add_options(parser: argparse.ArgumentParser, unit: str) -> None:
 def check(options: argparse.Namespace) -> int:
     """Judge a candidate by its baseline, after having written that anew where it is asked for."""
     begin = time.perf_counter()
-    scene = _scene(options)
+    scene = scene_of(options)
     if not isinstance(scene, Scene):
         raise InputError("CASE", f'"{options.case}", a scalar case', "the case of a muscle")
-    chosen = _candidate(scene, options.candidate, options.unit)
-    bench = _checked_bench(scene, options, [chosen])
+    chosen = candidate(scene, options.candidate, options.unit)
+    bench = checked_bench(scene, options, [chosen])
     # What is wrong with the baseline shows before anything is solved.
     (baseline.check if options.update else baseline.read)(options.baseline, scene, chosen[0].name)
-    candidate, reference = _runs(bench, chosen)
-    failed = [run for run in (reference, candidate) if run.outcome.status != "converged"]
+    run, reference = _runs(bench, chosen)
+    failed = [one for one in (reference, run) if one.outcome.status != "converged"]
     if failed:
-        why = [f"{run.name}: {run.outcome.status}, {run.outcome.message}" for run in failed]
-        facts = {"case": scene.name, "candidate": candidate.name, "verdict": "failed", "notes": why, "judgements": []}
+        why = [f"{one.name}: {one.outcome.status}, {one.outcome.message}" for one in failed]
+        facts = {"case": scene.name, "candidate": run.name, "verdict": "failed", "notes": why, "judgements": []}
         tell(facts, "\n".join([*why, "verdict: failed"]), options)
         return SOLVER_FAILED
     bars = refinement.obtain(bench, reference) if options.error_bar else refinement.stored(reference)
-    return _told(Today.of(scene, bench.setup(), candidate, reference, bars), options, begin)
+    return _told(Today.of(scene, bench.setup(), run, reference, bars), options, begin)
 
 
 def _runs(bench: Bench, chosen: tuple[Candidate, str]) -> tuple[Run, Run]:
     """The candidate, first as it may be bad input, and the reference."""
     entry, place = chosen
-    candidate = bench.obtain(entry.name, entry, place)
-    return candidate, bench.obtain("reference", bench.scene.reference, "reference")
+    run = bench.obtain(entry.name, entry, place)
+    return run, bench.obtain("reference", bench.scene.reference, "reference")
 
 
 def _told(today: Today, options: argparse.Namespace, begin: float) -> int:

@@ -2,7 +2,6 @@
 
 import argparse
 import os
-import re
 from pathlib import Path
 
 from fem_reference import (
@@ -12,13 +11,13 @@ from fem_reference import (
     families,
     field_verbs,
     files,
-    judge,
     metrics,
     refinement,
     report,
     runs,
     solvers,
 )
+from fem_reference.cli.choosing import candidate, checked_bench, own_candidates, scene_of
 from fem_reference.cli.telling import DONE, SOLVER_FAILED, VERDICT_FAIL, lines, out, tell
 from fem_reference.errors import InputError
 from fem_reference.execution import Bench, complete
@@ -26,10 +25,8 @@ from fem_reference.field.scene import FieldScene
 from fem_reference.field_execution import FieldBench
 from fem_reference.field_verbs import Told
 from fem_reference.overview import comparison_text, field_scene_facts, run_facts, run_text, scene_facts, standings_text
-from fem_reference.records import parse
 from fem_reference.report.standings_page import facts as standings_facts
 from fem_reference.scene import DATA_SETTING, Candidate, Scene, SolverChoice
-from fem_reference.solvers import recorded
 from fem_reference.verification import verb as verification
 
 MAIN_JOB = "hip_flexion"
@@ -40,42 +37,22 @@ TIMED, TIMED_WITH_DATA = ("hip_flexion", "box_squeeze"), ("gluteus_maximus", "bo
 def demo(options: argparse.Namespace) -> int:
     """The main job."""
     scene = casefile.read_muscle(MAIN_JOB)
-    return _judge(scene, options, _own_candidates(scene))
-
-
-def _own_candidates(scene: Scene) -> list[tuple[Candidate, str]]:
-    """The candidates of the scene, each with its place."""
-    return [(candidate, f"candidate[{i}]") for i, candidate in enumerate(scene.candidate)]
+    return _judge(scene, options, own_candidates(scene))
 
 
 def compare(options: argparse.Namespace) -> int:
     """Measure candidates against the reference."""
-    scene = _scene(options)
+    scene = scene_of(options)
     if isinstance(scene, FieldScene):
         _refuse_error_bar(options)
         return _told(field_verbs.compare(scene, options.candidate, out(options)), options)
     wanted = options.candidate or [candidate.name for candidate in scene.candidate]
-    return _judge(scene, options, [_candidate(scene, text, options.unit) for text in wanted])
-
-
-def _candidate(scene: Scene, text: str, unit: str | None) -> tuple[Candidate, str]:
-    """The candidate of the scene with this name, else the recorded frames in this folder; and the place that chooses it."""
-    names = [candidate.name for candidate in scene.candidate]
-    if text in names:
-        return scene.candidate[names.index(text)], f"candidate[{names.index(text)}]"
-    path = Path(text)
-    if not path.exists():
-        raise InputError("--candidate", f'"{text}"', f"a folder of frames, or one of {', '.join(names)}")
-    folder = path.resolve()
-    said = recorded.about(folder)
-    name = said.name or re.sub(r"[^\w.-]+", "_", folder.stem if folder.is_file() else folder.name) or "candidate"
-    table = {"name": name, "solver": "recorded", "folder": str(folder), "unit": unit or said.unit or "mm"}
-    return parse(Candidate, table, "--candidate"), "--candidate"
+    return _judge(scene, options, [candidate(scene, text, options.unit) for text in wanted])
 
 
 def run(options: argparse.Namespace) -> int:
     """Solve a case, and judge what it expects of the reference."""
-    scene = _scene(options)
+    scene = scene_of(options)
     if isinstance(scene, FieldScene):
         _refuse_error_bar(options)
         return _told(field_verbs.run(scene, options.solver, out(options)), options)
@@ -96,11 +73,6 @@ def _refuse_error_bar(options: argparse.Namespace) -> None:
 def _choice(scene: Scene, solver: str) -> SolverChoice:
     """How the scene chooses ``solver``: its settings as a candidate, else no settings."""
     return next((entry for entry in scene.candidate if entry.solver == solver), SolverChoice(solver=solver))
-
-
-def _scene(options: argparse.Namespace) -> Scene | FieldScene:
-    """The scene of the case, with what ``--set`` changes of it."""
-    return casefile.read(options.case, changes=dict(map(casefile.setting, options.set)))
 
 
 def _told(told: Told, options: argparse.Namespace) -> int:
@@ -127,7 +99,7 @@ def _table(options: argparse.Namespace) -> int:
         case, equals, folder = text.partition("=")
         if not equals:
             raise InputError("--candidate", f'"{text}"', "CASE=DIR, a case and a folder of frames of it")
-        foreign.setdefault(case, []).append(_candidate(casefile.read_muscle(case), folder, options.unit)[0])
+        foreign.setdefault(case, []).append(candidate(casefile.read_muscle(case), folder, options.unit)[0])
     cases = options.case or families.SCENARIOS
     if others := foreign.keys() - set(cases):
         raise InputError("--candidate", f'"{min(others)}"', f"one of {', '.join(cases)}")
@@ -167,7 +139,7 @@ def _judge(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candida
             raise InputError(
                 "--candidate", f'"{name}" twice', 'folders and candidates of different names, none of them "reference"'
             )
-    bench = _checked_bench(scene, options, chosen)
+    bench = checked_bench(scene, options, chosen)
     read = {entry.name: bench.read(entry.name, entry, place) for entry, place in chosen if entry.solver == "recorded"}
     reference = bench.obtain("reference", scene.reference, "reference")
     solved = {
@@ -182,15 +154,6 @@ def _judge(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candida
     if any(run.outcome.status != "converged" for run in (reference, *candidates)):
         return SOLVER_FAILED
     return VERDICT_FAIL if result.word == "fail" else DONE
-
-
-def _checked_bench(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> Bench:
-    """The bench of a scene whose expectations, reference and ``chosen`` candidates can all be read."""
-    judge.check(scene)
-    bench = Bench(scene, out(options) / "runs", options.ranks)
-    for choice, place in [(scene.reference, "reference"), *chosen]:
-        bench.settings(choice, place)
-    return bench
 
 
 def list_all(options: argparse.Namespace) -> int:
@@ -214,12 +177,12 @@ def _stored(folder: Path) -> str:
 
 def show(options: argparse.Namespace) -> int:
     """Say what a case is made of."""
-    scene = _scene(options)
+    scene = scene_of(options)
     if isinstance(scene, FieldScene):
         facts = field_scene_facts(scene, FieldBench(scene, out(options)).problem)
         tell(facts, "\n".join(lines(facts)), options)
         return DONE
-    bench = _checked_bench(scene, options, _own_candidates(scene))
+    bench = checked_bench(scene, options, own_candidates(scene))
     facts = scene_facts(scene, bench.setup())
     if options.out is not None:
         built, folder = bench.problem(), options.out / scene.name

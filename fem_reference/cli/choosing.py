@@ -1,0 +1,48 @@
+"""What a command line chooses: a scene, candidates of it, and the bench that they are solved on."""
+
+import argparse
+import re
+from pathlib import Path
+
+from fem_reference import casefile, judge
+from fem_reference.cli.telling import out
+from fem_reference.errors import InputError
+from fem_reference.execution import Bench
+from fem_reference.field.scene import FieldScene
+from fem_reference.records import parse
+from fem_reference.scene import Candidate, Scene
+from fem_reference.solvers import recorded
+
+
+def scene_of(options: argparse.Namespace) -> Scene | FieldScene:
+    """The scene of the case, with what ``--set`` changes of it."""
+    return casefile.read(options.case, changes=dict(map(casefile.setting, options.set)))
+
+
+def own_candidates(scene: Scene) -> list[tuple[Candidate, str]]:
+    """The candidates of the scene, each with its place."""
+    return [(candidate, f"candidate[{i}]") for i, candidate in enumerate(scene.candidate)]
+
+
+def candidate(scene: Scene, text: str, unit: str | None) -> tuple[Candidate, str]:
+    """The candidate of the scene with this name, else the recorded frames in this folder; and the place that chooses it."""
+    names = [candidate.name for candidate in scene.candidate]
+    if text in names:
+        return scene.candidate[names.index(text)], f"candidate[{names.index(text)}]"
+    path = Path(text)
+    if not path.exists():
+        raise InputError("--candidate", f'"{text}"', f"a folder of frames, or one of {', '.join(names)}")
+    folder = path.resolve()
+    said = recorded.about(folder)
+    name = said.name or re.sub(r"[^\w.-]+", "_", folder.stem if folder.is_file() else folder.name) or "candidate"
+    table = {"name": name, "solver": "recorded", "folder": str(folder), "unit": unit or said.unit or "mm"}
+    return parse(Candidate, table, "--candidate"), "--candidate"
+
+
+def checked_bench(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> Bench:
+    """The bench of a scene whose expectations, reference and ``chosen`` candidates can all be read."""
+    judge.check(scene)
+    bench = Bench(scene, out(options) / "runs", options.ranks)
+    for choice, place in [(scene.reference, "reference"), *chosen]:
+        bench.settings(choice, place)
+    return bench
