@@ -145,7 +145,8 @@ def _sentence(comparison: Comparison) -> str:
     told = [verdict.word for verdict in comparison.verdicts]
     judged = f"{told.count('pass')} of {len(told)} expectations met"
     unjudged = [name for name in names if all(verdict.expectation.of != name for verdict in comparison.verdicts)]
-    judged += f"; none concerns {listed(unjudged)}: measured, not judged." if unjudged else "."
+    those = "a candidate" if len(unjudged) == len(names) else listed(unjudged)
+    judged += f"; none concerns {those}: measured, not judged." if unjudged else "."
     solver = comparison.reference.solver
     if not names:
         return f"The reference computed by {solver}, {over}, without a candidate: {judged}"

@@ -1,6 +1,9 @@
-"""What the report's own program does otherwise than its text, compiled: folds are opened only, and bones are voxels.
+"""What the report's own program does, compiled, in the order in which it adds up: folds are opened only, bones are voxels.
 
-All of it was read in the program's source. Arrays should be writable and C-contiguous: each other kind is compiled for anew.
+All of it was read in the program's source. Next to chaos the last digit counts: each sum here has the order that gcc 12 gives
+it with the flags in the program's CMakeLists.txt (-Ofast, which leaves the order to the compiler; no vectors wider than SSE2),
+as read in the machine code. Do not simplify them. Arrays should be writable and C-contiguous: each other kind is compiled for
+anew.
 """
 
 import math
@@ -10,7 +13,7 @@ from numpy.typing import NDArray
 
 from fem_reference.mesh import Floats, Ints
 from fem_reference.solvers.compiled_kernels import compiled
-from fem_reference.solvers.pbd_kernels import Vector, at, cross, dihedral, dot, minus, move, times
+from fem_reference.solvers.pbd_kernels import Vector, at, cross, dot, minus, move, times
 
 Bools = NDArray[np.bool_]
 
@@ -25,6 +28,112 @@ DIAGONAL = math.sqrt(3) + 1e-3
 
 
 @compiled
+def plus(a: Vector, b: Vector) -> Vector:
+    """``a + b``."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@compiled
+def add_square(total: float, a: Vector, b: Vector) -> float:
+    """``total + a . b``, the last component first."""
+    return (total + a[2] * b[2]) + (a[0] * b[0] + a[1] * b[1])
+
+
+@compiled
+def project_edges(points: Floats, edges: Ints, rest: Floats, stiffness: Floats) -> None:
+    """Move both ends of each of the ``edges`` (e, 2) towards their distance ``rest`` (e,) [mm], by their ``stiffness`` (e,)."""
+    for h in range(len(edges)):
+        i, j = edges[h, 0], edges[h, 1]
+        apart = minus(at(points, i), at(points, j))
+        share = times((1 - rest[h] / math.sqrt(dot(apart, apart))) * stiffness[h], apart)
+        move(points, i, -0.5, share)
+        move(points, j, 0.5, share)
+
+
+@compiled
+def six_volumes(points: Floats, triangles: Ints) -> tuple[float, Floats]:
+    """Six times the volume inside closed ``triangles`` (m, 3) [mm3], about the origin, and its gradient (n, 3) [mm2]."""
+    gradient, value = np.zeros_like(points), 0.0
+    for t in range(len(triangles)):
+        i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        a, b, c = at(points, i), at(points, j), at(points, k)
+        opposite = cross(a, b)
+        value = add_square(value, opposite, c)
+        move(gradient, k, 1.0, opposite)
+        move(gradient, j, 1.0, cross(c, a))
+        move(gradient, i, 1.0, cross(b, c))
+    return value, gradient
+
+
+@compiled
+def project_volume(points: Floats, triangles: Ints, rest: float) -> None:
+    """Move every point along the gradient of six volumes, towards ``rest`` [mm3], by a sixth of what is missing."""
+    value, gradient = six_volumes(points, triangles)
+    weight = 0.0
+    for i in range(len(points)):
+        weight = add_square(weight, at(gradient, i), at(gradient, i))
+    step = (value * (1 / 6) - rest * (1 / 6)) / weight
+    for i in range(len(points)):
+        move(points, i, -step, at(gradient, i))
+
+
+@compiled
+def normals_of(points: Floats, triangles: Ints) -> Floats:
+    """The unit normal of each of ``triangles`` (m, 3); zero where there is none."""
+    found = np.empty((len(triangles), 3))
+    for t in range(len(triangles)):
+        a, b, c = at(points, triangles[t, 0]), at(points, triangles[t, 1]), at(points, triangles[t, 2])
+        found[t, 0], found[t, 1], found[t, 2] = _unit_normal(minus(b, a), minus(c, a))
+    return found
+
+
+@compiled
+def angles_of(normals: Floats, pairs: Ints) -> Floats:
+    """Angle [rad] of the triangles in each of ``pairs`` (e, 2) about their edge: pi where they are flat, or nearly."""
+    found = np.empty(len(pairs))
+    for h in range(len(pairs)):
+        cosine = dot(at(normals, pairs[h, 0]), at(normals, pairs[h, 1]))
+        found[h] = math.pi - math.acos(max(-1.0, min(1.0, cosine)))
+    return found
+
+
+@compiled
+def _turn(point: Vector, other: Vector, own: Vector, cosine: float) -> Vector:
+    """``point x other + cosine own x point``: how the cosine of two unit normals grows with the size of one's triangle."""
+    return plus(cross(point, other), times(cosine, cross(own, point)))
+
+
+@compiled
+def _gradients(e: Vector, a: Vector, b: Vector) -> tuple[float, Vector, Vector, Vector, Vector]:
+    """Cosine of the normals of triangles (0, e, a) and (0, e, b), and minus its gradients at 0, e, a and b but that at e is
+    plus it. Mueller 2007, appendix A.
+
+    The compiler takes the sizes of the normals once more in another order, and those for the last component at e.
+    """
+    u1, u2 = cross(e, a), cross(e, b)
+    r1 = 1 / math.sqrt((u1[2] * u1[2] + u1[0] * u1[0]) + u1[1] * u1[1])
+    r2 = 1 / math.sqrt((u2[2] * u2[2] + u2[0] * u2[0]) + u2[1] * u2[1])
+    s1 = 1 / math.sqrt((u1[2] * u1[2] + u1[1] * u1[1]) + u1[0] * u1[0])
+    s2 = 1 / math.sqrt((u2[2] * u2[2] + u2[1] * u2[1]) + u2[0] * u2[0])
+    n1, n2 = times(r1, u1), times(r2, u2)
+    d = dot(n1, n2)
+    q3, q4 = times(r1, _turn(e, n2, n1, d)), times(r2, _turn(e, n1, n2, d))
+    x, y, _ = plus(times(r1, _turn(a, n2, n1, d)), times(r2, _turn(b, n1, n2, d)))
+    z = s1 * _turn(a, n2, times(s1, u1), d)[2] + s2 * _turn(b, n1, times(s2, u2), d)[2]
+    q1 = (x - q3[0]) - q4[0], (y - q3[1]) - q4[1], z - (q3[2] + q4[2])
+    return d, q1, (x, y, z), q3, q4
+
+
+@compiled
+def _squares(q1: Vector, q2: Vector, q3: Vector, q4: Vector) -> float:
+    """The sum of the squares of four vectors."""
+    third = (q3[2] * q3[2] + q4[2] * q4[2]) + (q3[0] * q3[0] + q3[1] * q3[1])
+    fourth = (q4[0] * q4[0] + q4[1] * q4[1]) + (q2[0] * q2[0] + q2[1] * q2[1])
+    first = (q1[0] * q1[0] + q1[1] * q1[1]) + (q1[2] * q1[2] + q2[2] * q2[2])
+    return (third + fourth) + first
+
+
+@compiled
 def project_folds(points: Floats, hinges: Ints, rest: Floats, factor: float) -> None:
     """Open each of the ``hinges`` (h, 4) that is folded more sharply than its angle ``rest`` (h,) [rad], by Mueller 2007.
 
@@ -32,17 +141,17 @@ def project_folds(points: Floats, hinges: Ints, rest: Floats, factor: float) -> 
     """
     for h in range(len(hinges)):
         i, j, k, m = hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3]
-        angle, g1, g2, g3, g4 = dihedral(at(points, i), at(points, j), at(points, k), at(points, m))
-        if angle >= rest[h] or abs(math.cos(angle)) > FLAT_COSINE:
+        p = at(points, i)
+        d, q1, q2, q3, q4 = _gradients(minus(at(points, j), p), minus(at(points, k), p), minus(at(points, m), p))
+        if abs(d) > FLAT_COSINE:
             continue
-        sine = math.sin(angle)
-        weight = sine * sine * (dot(g1, g1) + dot(g2, g2) + dot(g3, g3) + dot(g4, g4))
-        ratio = factor * sine * (rest[h] - angle) / max(SMALLEST_WEIGHT, weight)
+        error = math.sqrt(1 - d * d) * (rest[h] - math.acos(d))
+        ratio = factor * error / max(SMALLEST_WEIGHT, _squares(q1, q2, q3, q4))
         if SMALLEST_RATIO <= ratio <= GREATEST_RATIO:
-            move(points, i, ratio * sine, g1)
-            move(points, j, ratio * sine, g2)
-            move(points, k, ratio * sine, g3)
-            move(points, m, ratio * sine, g4)
+            move(points, i, ratio, q1)
+            move(points, j, -ratio, q2)
+            move(points, k, ratio, q3)
+            move(points, m, ratio, q4)
 
 
 @compiled
@@ -127,21 +236,18 @@ def are_inside(inside: Bools, places: Floats) -> Bools:
 
 
 @compiled
-def march_out(inside: Bools, starts: Floats, goals: Floats) -> Floats:
-    """Where those come to be that go from ``starts`` outside to ``goals`` inside; all (n, 3) in voxels.
+def march_out(inside: Bools, goals: Floats, ways: Floats) -> tuple[Floats, Bools]:
+    """Where those come to be that are inside at ``goals`` (n, 3), and who has come back too far (n,); all in voxels.
 
-    They go straight back, by steps of 1, until they are outside; who is not when it has come farther back than its start
-    is put there.
+    They go straight back along their ``ways`` (n, 3), by steps of 1, until they are outside; too far is farther than a way.
     """
-    reached = np.empty_like(goals)
+    reached, too_far = goals.copy(), np.empty(len(goals), np.bool_)
     for i in range(len(goals)):
-        place, start = at(goals, i), at(starts, i)
-        way = minus(start, place)
-        length = math.sqrt(dot(way, way))
+        length = math.sqrt(dot(at(ways, i), at(ways, i)))
+        step = times(1 / length, at(ways, i))
         taken = 0
-        while taken < length + 1 and _is_inside(inside, place):
-            place = (place[0] + way[0] / length, place[1] + way[1] / length, place[2] + way[2] / length)
+        while taken < length + 1 and _is_inside(inside, at(reached, i)):
+            move(reached, i, 1.0, step)
             taken += 1
-        for axis in range(3):
-            reached[i, axis] = start[axis] if taken > length + 1 else place[axis]
-    return reached
+        too_far[i] = taken > length + 1
+    return reached, too_far

@@ -1,0 +1,29 @@
+"""What the README lists is what there is, in both directions."""
+
+import argparse
+import re
+from pathlib import Path
+
+from fem_reference import metrics, solvers
+from fem_reference.cli.parser import parser
+
+README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
+
+
+def listed(heading: str) -> list[str]:
+    """The names at the beginning of rows of the first table whose head begins with ``heading``."""
+    table = README[README.index(f"| {heading} |") :].split("\n\n")[0]
+    return re.findall(r"^\| `(\w+)", table, re.MULTILINE)
+
+
+def test_the_solvers() -> None:
+    assert sorted(listed("solver")) == solvers.names("solve")
+
+
+def test_the_metrics() -> None:
+    assert sorted(listed("metric")) == metrics.names()
+
+
+def test_the_verbs() -> None:
+    (verbs,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
+    assert sorted(set(listed("verb"))) == sorted(verbs.choices)
