@@ -38,7 +38,9 @@ FOREIGN = "Yours"
 def stand(cases: Iterable[str], store: Path, foreign: dict[str, list[Candidate]]) -> Table:
     """The table over ``cases``, with runs in ``store``; ``foreign``: by case, what somebody else's solvers made of it."""
     rows, scenarios, standings, missing = families(), list[Scenario](), list[Standing](), dict[str, str]()
-    for case in cases:
+    wanted = list(cases)
+    for i, case in enumerate(wanted):
+        log.info("scene %d of %d: %s", i + 1, len(wanted), case)
         bench = Bench(casefile.read_muscle(case), store)
         try:
             bench.setup()
@@ -74,11 +76,11 @@ def _on(bench: Bench, rows: Iterable[Family], foreign: list[Candidate]) -> tuple
     assert reference.fibres is not None  # a reference has an interior
     yardstick = Yardstick.of(reference, reference.fibres, bench.setup().bones, bench.setup().free)
     found = [_standing(scene, REFERENCE, reference, _known(bars))]
-    for row in rows:
-        for candidate, place in chosen(scene, row):
-            run = complete(bench.obtain(candidate.name, candidate, place), numbers)
-            log.info("%s: measuring %s", scene.name, candidate.name)
-            found.append(_standing(scene, row.name, run, measure(run, reference, yardstick, METRICS)))
+    meeting = [(row.name, *entry) for row in rows for entry in chosen(scene, row)]
+    for i, (family, candidate, place) in enumerate(meeting):
+        log.info("%s: %s, solver %d of %d", scene.name, candidate.name, i + 1, len(meeting))
+        run = complete(bench.obtain(candidate.name, candidate, place), numbers)
+        found.append(_standing(scene, family, run, measure(run, reference, yardstick, METRICS)))
     for name, run in read.items():
         measured = measure(complete(run, numbers), reference, yardstick, METRICS)
         found.append(_standing(scene, FOREIGN, replace(run, name=name, numbers=numbers), measured))

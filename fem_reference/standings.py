@@ -94,6 +94,16 @@ class Scenario:
     reference: Outcome
 
 
+@dataclass(frozen=True)
+class Overall:
+    """A solver's worst frames over ``count`` scenarios: the ``median`` of their magnitudes, the ``worst`` of them and its ``case``."""
+
+    median: float
+    worst: float
+    case: str
+    count: int
+
+
 @dataclass(frozen=True, eq=False)
 class Table:
     """What was measured: ``standings`` of all on every of the ``scenarios``; ``missing``, by case, why it was left out."""
@@ -113,14 +123,17 @@ class Table:
         """Who stands for a family, in order."""
         return list(dict.fromkeys(one.name for one in self.standings if one.family == family))
 
-    def over(self, family: str, name: str, metric: str, statistic: str) -> tuple[float, str] | None:
-        """The worst value of ``name`` over all scenarios, and the case; None where it was measured on none."""
+    def over(self, family: str, name: str, metric: str, statistic: str) -> "Overall | None":
+        """The worst frames of ``name`` over all scenarios; None where it was measured on none."""
         found = [
             (value[0], one.case)
             for one in self.standings
             if (one.family, one.name) == (family, name) and (value := one.worst(metric, statistic)) is not None
         ]
-        return max(found, key=lambda entry: np.inf if np.isnan(entry[0]) else abs(entry[0])) if found else None
+        if not found:
+            return None
+        worst, case = max(found, key=lambda entry: np.inf if np.isnan(entry[0]) else abs(entry[0]))
+        return Overall(float(np.median([abs(value) for value, _ in found])), worst, case, len(found))
 
     def speed(self, family: str, name: str) -> tuple[Scenario, float] | None:
         """The scenario of the most triangles on which the time for a frame [s] of ``name`` is known, and that time."""

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+collect_ignore = ["foreign_solver.py"]  # a program: it runs where it is imported
+
 
 def pytest_configure() -> None:
     """Each of the processes that share the tests keeps to a core of its own, and so do the solvers that it starts."""

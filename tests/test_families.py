@@ -16,7 +16,7 @@ from fem_reference.report import standings_page
 from fem_reference.runs import Frame, Outcome
 from fem_reference.scene import Candidate
 from fem_reference.solvers import fenicsx, pbd
-from fem_reference.standings import Family, Scenario, Standing, Table
+from fem_reference.standings import Family, Overall, Scenario, Standing, Table
 
 PBD = {"sub_iterations": 1, "solver_iterations": 1, "damping": 0.0, "stretch": 1.0, "volume": 1.0, "bending": 0.5}
 ROWS = (
@@ -151,14 +151,16 @@ def test_what_is_worst_over_frames_and_scenes() -> None:
     made = table(standing("case0", 1.0, -7.0, 3.0), standing("case1", 2.0, 2.5, seconds=0.5))
     assert made.standings[0].worst("surface_deviation", "rms_percent") == (-7.0, 1)
     assert made.standings[0].worst("volume", "deviation") is None
-    assert made.over("PBD", "pbd", "surface_deviation", "rms_percent") == (-7.0, "case0")
+    overall = made.over("PBD", "pbd", "surface_deviation", "rms_percent")
+    assert overall == Overall(median=(7.0 + 2.5) / 2, worst=-7.0, case="case0", count=2)
     assert made.over("PBD", "nobody", "surface_deviation", "rms_percent") is None
     assert made.speed("PBD", "pbd") == (made.scenarios[1], 0.5)  # that with more triangles
     # A frame that was not reached is worse than any that was.
     lost = table(standing("case0", 1.0, math.nan), standing("case1", 99.0))
-    value, case = lost.over("PBD", "pbd", "surface_deviation", "rms_percent")
-    assert math.isnan(value)
-    assert case == "case0"
+    overall = lost.over("PBD", "pbd", "surface_deviation", "rms_percent")
+    assert math.isnan(overall.median)
+    assert math.isnan(overall.worst)
+    assert overall.case == "case0"
 
 
 def test_what_is_not_a_number_stands_on_the_page_and_not_in_the_drawing() -> None:

@@ -2,6 +2,7 @@
 
 import io
 import math
+from itertools import cycle
 from typing import Any
 
 import matplotlib as mpl
@@ -14,7 +15,7 @@ from fem_reference.report.curves import LOOK, PALETTE, REFERENCE, Curve, inline
 from fem_reference.report.tables import finite
 from fem_reference.report.templates import template
 from fem_reference.report.words import number
-from fem_reference.standings import Standing, Table
+from fem_reference.standings import Standing, Table, report_speeds
 
 # What is measured: metric, statistic, words above the column, unit.
 COLUMNS = (
@@ -29,12 +30,19 @@ COLUMNS = (
 # Of them in the first table, which is over all scenes.
 OVER_ALL = (COLUMNS[0], COLUMNS[2], COLUMNS[4], COLUMNS[6])
 _MARKS = "osD^vPX*<>"
+# Beyond the palette of curves: of Tol's muted colours those that are none of its own.
+_MORE = ("#882255", "#999933", "#332288", "#777777")
 
 
 def render(table: Table) -> str:
     """The whole page as text."""
     return template("standings_page.html").render(
-        table=table, columns=COLUMNS, over_all=OVER_ALL, per_second=per_second, drawing=_drawing(table)
+        table=table,
+        columns=COLUMNS,
+        over_all=OVER_ALL,
+        per_second=per_second,
+        report_speeds=report_speeds(),
+        drawing=_drawing(table),
     )
 
 
@@ -99,9 +107,9 @@ def _drawing(table: Table) -> Curve:
 
 
 def _colours(table: Table) -> dict[str, str]:
-    names = list(dict.fromkeys(one.name for one in table.standings if not one.of_reference))
-    more = [mpl.colors.to_hex(colour) for colour in mpl.colormaps["tab20b"].colors]  # type: ignore[attr-defined]
-    return {"reference": REFERENCE} | dict(zip(names, [*PALETTE, *more], strict=False))
+    """A colour for everybody who is drawn."""
+    names = dict.fromkeys(one.name for one in table.standings if not one.of_reference and _place(one) is not None)
+    return {"reference": REFERENCE} | dict(zip(names, cycle([*PALETTE, *_MORE]), strict=False))
 
 
 def _place(one: Standing) -> tuple[float, float] | None:

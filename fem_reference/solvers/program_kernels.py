@@ -34,7 +34,7 @@ def plus(a: Vector, b: Vector) -> Vector:
 
 
 @compiled
-def add_square(total: float, a: Vector, b: Vector) -> float:
+def add_dot(total: float, a: Vector, b: Vector) -> float:
     """``total + a . b``, the last component first."""
     return (total + a[2] * b[2]) + (a[0] * b[0] + a[1] * b[1])
 
@@ -58,7 +58,7 @@ def six_volumes(points: Floats, triangles: Ints) -> tuple[float, Floats]:
         i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         a, b, c = at(points, i), at(points, j), at(points, k)
         opposite = cross(a, b)
-        value = add_square(value, opposite, c)
+        value = add_dot(value, opposite, c)
         move(gradient, k, 1.0, opposite)
         move(gradient, j, 1.0, cross(c, a))
         move(gradient, i, 1.0, cross(b, c))
@@ -71,10 +71,11 @@ def project_volume(points: Floats, triangles: Ints, rest: float) -> None:
     value, gradient = six_volumes(points, triangles)
     weight = 0.0
     for i in range(len(points)):
-        weight = add_square(weight, at(gradient, i), at(gradient, i))
-    step = (value * (1 / 6) - rest * (1 / 6)) / weight
-    for i in range(len(points)):
-        move(points, i, -step, at(gradient, i))
+        weight = add_dot(weight, at(gradient, i), at(gradient, i))
+    if weight > 0:
+        step = (value * (1 / 6) - rest * (1 / 6)) / weight
+        for i in range(len(points)):
+            move(points, i, -step, at(gradient, i))
 
 
 @compiled
@@ -105,10 +106,10 @@ def _turn(point: Vector, other: Vector, own: Vector, cosine: float) -> Vector:
 
 @compiled
 def _gradients(e: Vector, a: Vector, b: Vector) -> tuple[float, Vector, Vector, Vector, Vector]:
-    """Cosine of the normals of triangles (0, e, a) and (0, e, b), and minus its gradients at 0, e, a and b but that at e is
-    plus it. Mueller 2007, appendix A.
+    """Cosine of the normals of triangles (0, e, a) and (0, e, b), and the q of Mueller 2007, appendix A, that belong to 0, e, a
+    and b: minus its gradients [1/mm], at e plus.
 
-    The compiler takes the sizes of the normals once more in another order, and those for the last component at e.
+    For the last component at e the compiler takes sizes of the normals that it adds up in another order.
     """
     u1, u2 = cross(e, a), cross(e, b)
     r1 = 1 / math.sqrt((u1[2] * u1[2] + u1[0] * u1[0]) + u1[1] * u1[1])
@@ -137,7 +138,7 @@ def _squares(q1: Vector, q2: Vector, q3: Vector, q4: Vector) -> float:
 def project_folds(points: Floats, hinges: Ints, rest: Floats, factor: float) -> None:
     """Open each of the ``hinges`` (h, 4) that is folded more sharply than its angle ``rest`` (h,) [rad], by Mueller 2007.
 
-    With q the gradients of minus the cosine, the points go by ``ratio q``; what asks for too small or too great a ratio stays.
+    With q minus the gradients of the cosine, the points go by ``ratio q``; what asks for too small or too great a ratio stays.
     """
     for h in range(len(hinges)):
         i, j, k, m = hinges[h, 0], hinges[h, 1], hinges[h, 2], hinges[h, 3]
