@@ -96,7 +96,7 @@ class Scenario:
 
 @dataclass(frozen=True)
 class Overall:
-    """A solver's worst frames over ``count`` scenarios: the ``median`` of their magnitudes, the ``worst`` of them and its ``case``."""
+    """A solver's worst frames over ``count`` scenarios: the ``median`` of magnitudes, the ``worst`` and its ``case``."""
 
     median: float
     worst: float
