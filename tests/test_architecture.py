@@ -66,7 +66,9 @@ DOORS = {
     "pytetwild": ["geometry/tetrahedra.py"],
     "igl": ["geometry/"],
     "skfem": ["geometry/fibres.py", "solvers/scikit_fem/"],
-    "numba": [f"solvers/{name}_kernels.py" for name in ("compiled", "pbd", "program", "collision", "xpbd", "arap", "spring")],
+    "numba": [
+        f"solvers/{name}_kernels.py" for name in ("compiled", "pbd", "program", "collision", "xpbd", "arap", "spring")
+    ],
     "pyvista": ["report/pictures.py"],
     "vtk": ["files.py", "report/pictures.py"],
     "vtkmodules": ["files.py", "report/pictures.py"],
