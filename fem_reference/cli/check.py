@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 from fem_reference import files, refinement
-from fem_reference.cli.choosing import candidate, checked_bench, scene_of
+from fem_reference.cli.choosing import checked_bench, choose, scene_of
 from fem_reference.cli.telling import DONE, SOLVER_FAILED, VERDICT_FAIL, tell
 from fem_reference.errors import InputError
 from fem_reference.execution import Bench
@@ -38,7 +38,7 @@ def check(options: argparse.Namespace) -> int:
     scene = scene_of(options)
     if not isinstance(scene, Scene):
         raise InputError("CASE", f'"{options.case}", a scalar case', "the case of a muscle")
-    chosen = candidate(scene, options.candidate, options.unit)
+    chosen = choose(scene, options.candidate, options.unit)
     bench = checked_bench(scene, options, [chosen])
     # What is wrong with the baseline shows before anything is solved.
     (baseline.check if options.update else baseline.read)(options.baseline, scene, chosen[0].name)

@@ -24,7 +24,7 @@ def own_candidates(scene: Scene) -> list[tuple[Candidate, str]]:
     return [(candidate, f"candidate[{i}]") for i, candidate in enumerate(scene.candidate)]
 
 
-def candidate(scene: Scene, text: str, unit: str | None) -> tuple[Candidate, str]:
+def choose(scene: Scene, text: str, unit: str | None) -> tuple[Candidate, str]:
     """The candidate of the scene with this name, else the recorded frames in this folder; and the place that chooses it."""
     names = [candidate.name for candidate in scene.candidate]
     if text in names:

@@ -17,7 +17,7 @@ from fem_reference import (
     runs,
     solvers,
 )
-from fem_reference.cli.choosing import candidate, checked_bench, own_candidates, scene_of
+from fem_reference.cli.choosing import checked_bench, choose, own_candidates, scene_of
 from fem_reference.cli.telling import DONE, SOLVER_FAILED, VERDICT_FAIL, lines, out, tell
 from fem_reference.errors import InputError
 from fem_reference.execution import Bench, complete
@@ -47,7 +47,7 @@ def compare(options: argparse.Namespace) -> int:
         _refuse_error_bar(options)
         return _told(field_verbs.compare(scene, options.candidate, out(options)), options)
     wanted = options.candidate or [candidate.name for candidate in scene.candidate]
-    return _judge(scene, options, [candidate(scene, text, options.unit) for text in wanted])
+    return _judge(scene, options, [choose(scene, text, options.unit) for text in wanted])
 
 
 def run(options: argparse.Namespace) -> int:
@@ -99,7 +99,7 @@ def _table(options: argparse.Namespace) -> int:
         case, equals, folder = text.partition("=")
         if not equals:
             raise InputError("--candidate", f'"{text}"', "CASE=DIR, a case and a folder of frames of it")
-        foreign.setdefault(case, []).append(candidate(casefile.read_muscle(case), folder, options.unit)[0])
+        foreign.setdefault(case, []).append(choose(casefile.read_muscle(case), folder, options.unit)[0])
     cases = options.case or families.SCENARIOS
     if others := foreign.keys() - set(cases):
         raise InputError("--candidate", f'"{min(others)}"', f"one of {', '.join(cases)}")
