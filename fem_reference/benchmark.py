@@ -1,6 +1,7 @@
-"""How fast solvers are, in CPU time of one thread, beside the speed of the machine and that of the report's own program.
+"""How fast solvers are, in processor time, beside the speed of the machine and that of the report's own program.
 
-Processor time is what these machines, shared by many, can tell; and a ratio within one run is what compares with another.
+Processor time, of all threads together, is what a machine shared by many can tell; and a ratio within one run is what compares
+with another.
 """
 
 import logging
@@ -13,11 +14,13 @@ from typing import Any
 import numpy as np
 
 from fem_reference import solvers
+from fem_reference.errors import InputError
 from fem_reference.execution import Bench
 from fem_reference.families import chosen
 from fem_reference.records import Record
+from fem_reference.report.tables import finite
 from fem_reference.runs import Frame
-from fem_reference.scene import Candidate
+from fem_reference.scene import Candidate, Scene
 from fem_reference.standings import families, report_speeds
 
 log = logging.getLogger(__name__)
@@ -41,14 +44,14 @@ class Timing:
     limit: float | None
 
     @property
-    def per_second(self) -> float:
-        """Iterations in a second of CPU time, in the fastest repeat."""
-        return 1 / min(self.seconds)
+    def per_second(self) -> float | None:
+        """Iterations in a second of CPU time, in the fastest repeat; None where one failed."""
+        return 1 / min(self.seconds) if np.isfinite(self.seconds).all() else None
 
     @property
     def ratio(self) -> float | None:
         """How many times as fast as the report's program."""
-        return None if self.limit is None else self.per_second / self.limit
+        return None if self.limit is None or self.per_second is None else self.per_second / self.limit
 
 
 @dataclass(frozen=True)
@@ -61,8 +64,16 @@ class Machine:
     multiplied: float
 
 
+def check(scene: Scene) -> None:
+    """InputError unless a scene is long enough to be timed."""
+    if scene.frames.last - scene.frames.first <= WARM_UP:
+        raise InputError(f"{scene.place}: frames.last", scene.frames.last, f"more than {WARM_UP} frame numbers")
+
+
 def measure(benches: Iterable[Bench]) -> tuple[list[Timing], Machine]:
-    """Every candidate of Table 5.1 on every scene of ``benches``, each repeat with a look at the machine."""
+    """Every candidate of Table 5.1 that iterates on every scene of ``benches``, each repeat with a look at the machine; one that
+    fails has times that are not numbers.
+    """
     machines, timings = [_machine()], list[Timing]()
     for bench in benches:
         tasks = {candidate.name: (candidate, _task(bench, candidate, place)) for candidate, place in _candidates(bench)}
@@ -72,18 +83,18 @@ def measure(benches: Iterable[Bench]) -> tuple[list[Timing], Machine]:
                 log.info("%s: %s, repeat %d of %d", bench.scene.name, name, repeat + 1, REPEATS)
                 seconds[name].append(_per_iteration(task, bench))
             machines.append(_machine())
-        triangles, limit = len(bench.setup().surface.triangles), report_speeds().get(bench.scene.name)
+        triangles, report = len(bench.setup().surface.triangles), report_speeds().get(bench.scene.name)
+        limit = None if report is None else report.per_second
         for name, (candidate, _) in tasks.items():
-            if np.isfinite(seconds[name]).all():
-                spent = tuple(seconds[name])
-                timings.append(Timing(bench.scene.name, name, candidate.solver, triangles, spent, limit))
+            spent = tuple(seconds[name])
+            timings.append(Timing(bench.scene.name, name, candidate.solver, triangles, spent, limit))
     return timings, Machine(*(max(getattr(one, key) for one in machines) for key in ("copied", "multiplied")))
 
 
 def _candidates(bench: Bench) -> list[tuple[Candidate, str]]:
-    """Who iterates frame by frame: what was recorded does not, and a line of action needs no iteration."""
+    """Who iterates from frame number to frame number: what was recorded does not, nor do lines of action."""
     found = [entry for row in families() for entry in chosen(bench.scene, row)]
-    return [(candidate, place) for candidate, place in found if candidate.solver != "recorded"]
+    return [entry for entry in found if entry[0].solver not in ("recorded", "line_of_action")]
 
 
 def _task(bench: Bench, candidate: Candidate, place: str) -> Callable[[int], str]:
@@ -104,7 +115,7 @@ def _solve(bench: Bench, solver: str, settings: Record, iterations: int) -> str:
 
 
 def _per_iteration(task: Callable[[int], str], bench: Bench) -> float:
-    """CPU time [s] for an iteration; not a number where the solver failed."""
+    """CPU time [s] for an iteration; not a number where the solver failed, or took too little to be told."""
     frames = bench.scene.frames
     count = min(ITERATIONS, frames.last - frames.first)
     if task(WARM_UP) != "converged":  # compiled functions are loaded, which is not counted
@@ -115,7 +126,8 @@ def _per_iteration(task: Callable[[int], str], bench: Bench) -> float:
         if task(iterations) != "converged":
             return float("nan")
         spent.append(time.process_time() - begin)
-    return (spent[1] - spent[0]) / (count - WARM_UP)
+    longer = spent[1] - spent[0]
+    return longer / (count - WARM_UP) if longer > 0 else float("nan")
 
 
 def _machine() -> Machine:
@@ -141,7 +153,8 @@ def facts(timings: list[Timing], machine: Machine) -> dict[str, Any]:
     return {
         "machine": {"copied_GB_per_s": machine.copied, "multiplied_GFLOP_per_s": machine.multiplied},
         "timings": [
-            vars(one) | {"seconds": list(one.seconds), "per_second": one.per_second, "ratio": one.ratio}
+            vars(one)
+            | {"seconds": [finite(each) for each in one.seconds], "per_second": one.per_second, "ratio": one.ratio}
             for one in timings
         ],
     }
@@ -150,11 +163,11 @@ def facts(timings: list[Timing], machine: Machine) -> dict[str, Any]:
 def text(timings: list[Timing], machine: Machine) -> str:
     """The same for people."""
     lines = [
-        f"machine, one thread: copies {machine.copied:.1f} GB/s, multiplies matrices at {machine.multiplied:.2f} GFLOP/s",
+        f"machine: copies {machine.copied:.1f} GB/s, multiplies matrices at {machine.multiplied:.2f} GFLOP/s",
         "iterations a second of CPU time, the fastest of the repeats:",
     ]
     for one in timings:
-        beside = "" if one.limit is None else f", {one.ratio:.2f} times the report's program ({one.limit:g} a second)"
-        slowest = f"{1 / max(one.seconds):.4g} to {one.per_second:.4g}"
-        lines.append(f"  {one.case}, {one.triangles} triangles: {one.name} {slowest}{beside}")
+        beside = "" if one.ratio is None else f", {one.ratio:.2f} times the report's program ({one.limit:g} a second)"
+        told = "failed" if one.per_second is None else f"{1 / max(one.seconds):.4g} to {one.per_second:.4g}"
+        lines.append(f"  {one.case}, {one.triangles} triangles: {one.name} {told}{beside}")
     return "\n".join(lines)

@@ -8,6 +8,7 @@ from fem_reference.mesh import Floats
 from fem_reference.metrics import Measure, Yardstick, at_rest, measure
 from fem_reference.metrics.fibre_length import extension_error
 from fem_reference.problem import Setup
+from fem_reference.records import join
 from fem_reference.runs import Run
 from fem_reference.scene import Expectation, Scene
 from fem_reference.study import ErrorBars, Of
@@ -53,6 +54,7 @@ def compare(
     deviations = {run.name: measure(run, reference, yardstick) for run in candidates}
     changes = {run.name: measure(run, at_rest(run), yardstick) for run in (reference, *candidates)}
     measured = {"reference": changes["reference"]} | deviations
+    _check_expected(scene, measured)
     verdicts = tuple(
         verdict(
             expectation.model_copy(update={"of": name}),
@@ -66,6 +68,14 @@ def compare(
     )
     error = extension_error(reference, yardstick)
     return Comparison(scene, setup, reference, candidates, yardstick, deviations, changes, error, verdicts, error_bars)
+
+
+def _check_expected(scene: Scene, measured: dict[str, tuple[Measure, ...]]) -> None:
+    """InputError where a scene expects of a run by its name what is not measured of it, as it has no surface."""
+    for i, one in enumerate(scene.expect):
+        if one.of in measured and not _is_measured(one, measured[one.of]):
+            got = f"{one.metric}.{one.statistic} of {one.of}, which has no surface"
+            raise InputError(join(scene.place, f"expect[{i}]"), got, "a measure of lines")
 
 
 def _is_measured(expectation: Expectation, measures: tuple[Measure, ...]) -> bool:

@@ -1,14 +1,11 @@
 """Every family of Table 5.1 on every scenario: solved where that was not done before, timed, and measured against the reference."""
 
 import logging
-import os
-import platform
 from collections.abc import Iterable
-from dataclasses import replace
 from fnmatch import fnmatch
 from pathlib import Path
 
-from fem_reference import casefile, refinement
+from fem_reference import refinement
 from fem_reference.errors import InputError
 from fem_reference.execution import Bench, complete, versions
 from fem_reference.metrics import Measure, Yardstick, measure
@@ -35,26 +32,31 @@ REFERENCE = "FEM"
 FOREIGN = "Yours"
 
 
-def stand(cases: Iterable[str], store: Path, foreign: dict[str, list[Candidate]]) -> Table:
-    """The table over ``cases``, with runs in ``store``; ``foreign``: by case, what somebody else's solvers made of it."""
+def stand(scenes: Iterable[Scene], store: Path, foreign: dict[str, list[Candidate]]) -> Table:
+    """The table over ``scenes``, with runs in ``store``; ``foreign``: by case, what somebody else's solvers made of it, which is
+    read before anything is solved.
+    """
     rows, scenarios, standings, missing = families(), list[Scenario](), list[Standing](), dict[str, str]()
-    wanted = list(cases)
-    for i, case in enumerate(wanted):
-        log.info("scene %d of %d: %s", i + 1, len(wanted), case)
-        bench = Bench(casefile.read_muscle(case), store)
+    benches = [Bench(scene, store) for scene in scenes]
+    read = {
+        bench.scene.name: [bench.read(entry.name, entry, "--candidate") for entry in foreign.get(bench.scene.name, [])]
+        for bench in benches
+    }
+    for i, bench in enumerate(benches):
+        log.info("scene %d of %d: %s", i + 1, len(benches), bench.scene.name)
         try:
             bench.setup()
         except InputError as error:
             log.info("%s is left out: %s", bench.scene.name, error)
             missing[bench.scene.name] = str(error)
             continue
-        scenario, found = _on(bench, rows, foreign.get(case, []))
+        scenario, found = _on(bench, rows, read[bench.scene.name])
         scenarios.append(scenario)
         standings += found
     if foreign:
         rows = (*rows, Family(name=FOREIGN, form="", speed="", precision="", literature=""))
-    machine = f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores"
-    return Table(rows, tuple(scenarios), tuple(standings), missing, versions(), machine)
+    machines = tuple(dict.fromkeys(one.machine for one in standings if one.family != FOREIGN))
+    return Table(rows, tuple(scenarios), tuple(standings), missing, versions(), machines)
 
 
 def chosen(scene: Scene, row: Family) -> list[tuple[Candidate, str]]:
@@ -67,10 +69,9 @@ def chosen(scene: Scene, row: Family) -> list[tuple[Candidate, str]]:
     return own + [(candidate, f"{row.name} of Table 5.1") for candidate in row.candidate]
 
 
-def _on(bench: Bench, rows: Iterable[Family], foreign: list[Candidate]) -> tuple[Scenario, list[Standing]]:
-    """How everybody stands on the scene of a bench; what cannot be read shows before anything is solved."""
+def _on(bench: Bench, rows: Iterable[Family], foreign: list[Run]) -> tuple[Scenario, list[Standing]]:
+    """How everybody stands on the scene of a bench."""
     scene, numbers = bench.scene, bench.scene.frames.numbers
-    read = {entry.name: bench.read(entry.name, entry, "--candidate") for entry in foreign}
     reference = complete(bench.obtain("reference", scene.reference, "reference"), numbers)
     bars = refinement.stored(reference)
     assert reference.fibres is not None  # a reference has an interior
@@ -81,9 +82,7 @@ def _on(bench: Bench, rows: Iterable[Family], foreign: list[Candidate]) -> tuple
         log.info("%s: %s, solver %d of %d", scene.name, candidate.name, i + 1, len(meeting))
         run = complete(bench.obtain(candidate.name, candidate, place), numbers)
         found.append(_standing(scene, family, run, measure(run, reference, yardstick, METRICS)))
-    for name, run in read.items():
-        measured = measure(complete(run, numbers), reference, yardstick, METRICS)
-        found.append(_standing(scene, FOREIGN, replace(run, name=name, numbers=numbers), measured))
+    found += [_standing(scene, FOREIGN, run, measure(run, reference, yardstick, METRICS)) for run in foreign]
     triangles = len(reference.surface.triangles)
     return Scenario(scene.name, scene.title, triangles, yardstick.travel, reference.outcome), found
 
@@ -99,12 +98,13 @@ def _standing(scene: Scene, family: str, run: Run, measures: tuple[Measure, ...]
         _seconds_per_frame(run),
         measures,
         run.numbers,
+        str(run.origin["machine"]),
         of_reference,
     )
 
 
 def _seconds_per_frame(run: Run) -> float | None:
-    """Time [s] for a frame: an iteration of a solver that makes one for every frame number, a frame wanted of another."""
+    """Time [s] for a frame number of a solver that makes one for each, so says ``candidate.toml``; else for a frame wanted."""
     cost = run.outcome.cost
     if "seconds_per_iteration" in cost:
         return cost["seconds_per_iteration"]

@@ -48,9 +48,9 @@ def families() -> tuple[Family, ...]:
     return _file().family
 
 
-def report_speeds() -> dict[str, float]:
+def report_speeds() -> dict[str, ReportSpeed]:
     """By case, how many iterations a second the report's program makes."""
-    return {one.case: one.per_second for one in _file().report_speed}
+    return {one.case: one for one in _file().report_speed}
 
 
 def _file() -> _File:
@@ -71,6 +71,7 @@ class Standing:
     seconds_per_frame: float | None
     measures: tuple[Measure, ...]
     numbers: tuple[int, ...]
+    machine: str
     of_reference: bool = False
 
     def worst(self, metric: str, statistic: str) -> tuple[float, int] | None:
@@ -106,14 +107,16 @@ class Overall:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """What was measured: ``standings`` of all on every of the ``scenarios``; ``missing``, by case, why it was left out."""
+    """What was measured: ``standings`` of all on every of the ``scenarios``; ``missing``, by case, why it was left out; the
+    ``machines`` that runs were made on.
+    """
 
     families: tuple[Family, ...]
     scenarios: tuple[Scenario, ...]
     standings: tuple[Standing, ...]
     missing: dict[str, str]
     versions: dict[str, str]
-    machine: str
+    machines: tuple[str, ...]
 
     def of(self, family: str, case: str) -> list[Standing]:
         """The standings of a family on a case."""

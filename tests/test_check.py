@@ -134,7 +134,13 @@ def test_a_solver_that_fails_is_status_three_and_writes_no_baseline(work, monkey
         shutil.rmtree(stored)
     work.baseline = work.root / "pbd.json"
     told = work.root / "told.json"
-    assert work.check("--update", "--json", str(told), candidate="pbd") == cli.SOLVER_FAILED
+    junit, markdown = work.root / "check.xml", work.root / "check.md"
+    markdown.write_text("what the last check said")
+    told_too = ("--junit", str(junit), "--markdown", str(markdown))
+    assert work.check("--update", "--json", str(told), *told_too, candidate="pbd") == cli.SOLVER_FAILED
+    suite = ElementTree.parse(junit).getroot()
+    assert (suite.get("errors"), suite.find(".//error").get("message")[-14:]) == ("1", "no equilibrium")
+    assert markdown.read_text().startswith("### failed: pbd on bar")
     assert "diverged, no equilibrium\nverdict: failed" in capsys.readouterr().out
     assert json.loads(told.read_text())["verdict"] == "failed"
     assert not work.baseline.exists()

@@ -9,7 +9,6 @@ import pytest
 import small
 
 from fem_reference import benchmark, casefile, cli, families, overview, report, runs, standings
-from fem_reference.errors import InputError
 from fem_reference.execution import Bench
 from fem_reference.metrics import Measure
 from fem_reference.report import standings_page
@@ -68,7 +67,7 @@ def test_the_rows_are_those_of_the_report() -> None:
         ("ARAP", "Surface model", "++", "?"),
         ("PBD", "Surface model", "++", "?"),
     ]
-    assert standings.report_speeds()["gluteus_medius"] == 57.12  # Table 6.1
+    assert standings.report_speeds()["gluteus_medius"].per_second == 57.12  # Table 6.1
 
 
 def test_everybody_is_measured_against_the_reference(case) -> None:
@@ -100,17 +99,20 @@ def test_a_foreign_solver_stands_in_the_same_table(case, tmp_path) -> None:
         runs.files.write_surface(
             folder / f"frame_{number}.vtp", rest, rest.points + [0, 0, number + 0.25 * (number == 20)]
         )
+    (folder / "candidate.toml").write_text("seconds_per_frame = 0.5\nthreads = 3\n")
     status, facts, html = page(case, "--candidate", f"{case}={folder}")
     assert status == cli.DONE
     mine = facts["standings"][-1]
     assert (mine["family"], mine["name"], mine["solver"]) == ("Yours", "mine", "recorded")
+    assert mine["seconds_per_frame"] == 0.5
+    assert "3 threads" in html
     assert mine["worst"]["surface_deviation.rms"]["value"] == pytest.approx(0.25, abs=1e-4)  # files of single precision
     assert "Yours" in html
 
 
 def test_a_scene_that_is_not_there_is_left_out_and_told(case, capsys) -> None:
     (case / "bar.vtp").unlink()
-    made = families.stand([str(case)], case.parent, {})
+    made = families.stand([casefile.read_muscle(case)], case.parent, {})
     assert (made.scenarios, made.standings) == ((), ())
     assert "bar.vtp" in made.missing["bar"]
     assert "Left out" in standings_page.render(made)
@@ -124,27 +126,37 @@ def test_a_scene_that_is_not_there_is_left_out_and_told(case, capsys) -> None:
     ("words", "place"),
     [
         (["--candidate", "somewhere"], '--candidate: got "somewhere", want CASE=DIR'),
-        (["--candidate", "hip_flexion=."], '--candidate: got "hip_flexion", want one of'),
+        (["--candidate", "hip_flexion=."], '--candidate: got "hip_flexion", want one of bar'),
+        (["--candidate", "CASE="], '--candidate: got "", want a folder of frames'),
+        (["--candidate", "CASE=pbd"], '--candidate: got "pbd", want a folder of frames'),
+        (["--candidate", "CASE=TWICE", "--candidate", "CASE=TWICE"], '--candidate: got "twice" twice, want'),
+        (["--candidate", "CASE=reference"], '--candidate: got "reference" twice, want'),
     ],
 )
-def test_a_foreign_solver_of_no_scene_is_bad_input(case, words, place, capsys) -> None:
+def test_a_foreign_solver_that_cannot_stand_is_bad_input(case, words, place, capsys, monkeypatch) -> None:
+    monkeypatch.chdir(case.parent)
+    for name in ("twice", "reference"):
+        (case.parent / name).mkdir()
+    words = [word.replace("CASE", str(case)).replace("TWICE", "twice") for word in words]
     assert cli.main(["page", "table-5-1", "--case", str(case), *words, "--quiet"]) == cli.BAD_INPUT
     assert place in capsys.readouterr().err
 
 
 def test_other_pages_have_no_candidates(capsys) -> None:
     assert cli.main(["page", "octave-examples", "--case", "rod", "--quiet"]) == cli.BAD_INPUT
-    assert "page: got --case or --candidate for octave-examples" in capsys.readouterr().err
+    assert "page: got --case, --candidate or --unit for octave-examples" in capsys.readouterr().err
 
 
 def table(*found: Standing) -> Table:
     scenarios = tuple(Scenario(f"case{i}", f"Case {i}", 100 * (i + 1), 50.0, Outcome("converged", "")) for i in (0, 1))
-    return Table(ROWS, scenarios, found, {}, {}, "this machine")
+    return Table(ROWS, scenarios, found, {}, {}, ("this machine",))
 
 
 def standing(case: str, *values: float, seconds: float | None = 0.01) -> Standing:
     measures = (Measure("surface_deviation", "rms_percent", "%", np.array(values)),)
-    return Standing("PBD", "pbd", "pbd", case, Outcome("converged", ""), seconds, measures, tuple(range(len(values))))
+    return Standing(
+        "PBD", "pbd", "pbd", case, Outcome("converged", ""), seconds, measures, tuple(range(len(values))), ""
+    )
 
 
 def test_what_is_worst_over_frames_and_scenes() -> None:
@@ -201,10 +213,26 @@ def test_a_ratio_is_told_where_the_report_has_a_speed() -> None:
 
 def test_a_solver_that_fails_has_no_time(case, monkeypatch) -> None:
     monkeypatch.setattr(pbd, "solve", lambda *_: Outcome("diverged", "lost"))
-    timings, _ = benchmark.measure([Bench(casefile.read_muscle(case), case.parent)])
-    assert timings == []
+    timings, machine = benchmark.measure([Bench(casefile.read_muscle(case), case.parent)])
+    assert [one.per_second for one in timings] == [None, None]
+    assert "pbd failed" in benchmark.text(timings, machine)
+    json.dumps(benchmark.facts(timings, machine), allow_nan=False)
+    assert cli.main(["benchmark", str(case), "--quiet"]) == cli.SOLVER_FAILED
 
 
-def test_bad_input_is_not_an_empty_table(case) -> None:
-    with pytest.raises(InputError, match="nowhere"):
-        families.stand(["nowhere"], case.parent, {})
+def test_lines_do_not_iterate_and_a_short_scene_cannot_be_timed(case, capsys) -> None:
+    path = case / "case.toml"
+    line = '[[candidate]]\nname = "pb_line"\nsolver = "line_of_action"\n\n'
+    path.write_text(path.read_text().replace("[[expect]]", f"{line}[[expect]]"))
+    assert [entry.name for entry, _ in benchmark._candidates(Bench(casefile.read_muscle(case), case.parent))] == [
+        "pbd",
+        "still",
+    ]
+    path.write_text(path.read_text().replace("last = 20\nevery = 5", "last = 2\nevery = 1"))
+    assert cli.main(["benchmark", str(case), "--quiet"]) == cli.BAD_INPUT
+    assert "frames.last: got 2, want more than 2 frame numbers" in capsys.readouterr().err
+
+
+def test_bad_input_is_not_an_empty_table(capsys) -> None:
+    assert cli.main(["page", "table-5-1", "--case", "nowhere", "--quiet"]) == cli.BAD_INPUT
+    assert "nowhere" in capsys.readouterr().err

@@ -27,3 +27,7 @@ def test_the_metrics() -> None:
 def test_the_verbs() -> None:
     (verbs,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
     assert sorted(set(listed("verb"))) == sorted(verbs.choices)
+
+
+def test_nothing_is_left_to_fill_in() -> None:
+    assert "@@" not in README

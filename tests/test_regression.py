@@ -26,7 +26,8 @@ REST = shapes.sphere(2, 30.0).moved_to(np.round(shapes.sphere(2, 30.0).points, 2
 FIBRE = Polylines(np.array([[0.0, 0, -15], [0, 0, 15]]), np.array([0, 2]))
 NUMBERS = (0, 10, 20)
 SETUP = Setup(REST, (), (), NUMBERS, None)
-SCENE = SimpleNamespace(name="ball", key="0123456789abcdef0123", place="case.toml")
+FRAMES = SimpleNamespace(numbers=NUMBERS)
+SCENE = SimpleNamespace(name="ball", key="0123456789abcdef0123", place="case.toml", frames=FRAMES)
 BAR = 0.5
 
 
@@ -317,8 +318,14 @@ def test_a_file_that_is_damaged_or_somebody_elses_is_neither_read_nor_written_ov
     assert path.read_text() == text
 
 
+def test_other_frames_are_told(path) -> None:
+    path.write_text(path.read_text().replace("[0, 10, 20]", "[0, 10, 30]"))
+    with pytest.raises(InputError, match="frames: got 3 others, want the frame numbers of the scene"):
+        baseline.read(path, SCENE, "mine")
+
+
 def test_another_scene_wants_an_update(path, tmp_path) -> None:
-    other = SimpleNamespace(name="ball", key="another", place="case.toml")
+    other = SimpleNamespace(name="ball", key="another", place="case.toml", frames=FRAMES)
     with pytest.raises(InputError, match=r"scene: got 0123456789abcdef\.\.\., while case.toml is another"):
         baseline.read(path, other, "mine")
     baseline.check(path, other, "mine")

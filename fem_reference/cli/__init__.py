@@ -51,6 +51,8 @@ def main(arguments: list[str]) -> int:
 def _check_outputs(options: argparse.Namespace) -> None:
     """InputError where an output cannot be written, before anything is measured; makes nothing."""
     _check_folder("--out", out(options), written=options.verb is not verbs.list_all)
+    if getattr(options, "to", None) is not None:
+        _check_folder("--to", options.to.absolute().parent, written=True)
     written = ["json", "junit", "markdown", *(["baseline"] if getattr(options, "update", False) else [])]
     for name in written:
         path = getattr(options, name, None)

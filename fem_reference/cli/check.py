@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 from fem_reference import files, refinement
-from fem_reference.cli.choosing import checked_bench, choose, scene_of
+from fem_reference.cli.choosing import check_names, checked_bench, choose, scene_of
 from fem_reference.cli.telling import DONE, SOLVER_FAILED, VERDICT_FAIL, tell
 from fem_reference.errors import InputError
 from fem_reference.execution import Bench
@@ -39,6 +39,7 @@ def check(options: argparse.Namespace) -> int:
     if not isinstance(scene, Scene):
         raise InputError("CASE", f'"{options.case}", a scalar case', "the case of a muscle")
     chosen = choose(scene, options.candidate, options.unit)
+    check_names([chosen[0].name])
     bench = checked_bench(scene, options, [chosen])
     # What is wrong with the baseline shows before anything is solved.
     (baseline.check if options.update else baseline.read)(options.baseline, scene, chosen[0].name)
@@ -47,6 +48,8 @@ def check(options: argparse.Namespace) -> int:
     if failed:
         why = [f"{one.name}: {one.outcome.status}, {one.outcome.message}" for one in failed]
         facts = {"case": scene.name, "candidate": run.name, "verdict": "failed", "notes": why, "judgements": []}
+        lost = told.lost(scene.name, run.name, why)
+        _write({options.junit: lost.junit, options.markdown: lost.markdown})
         tell(facts, "\n".join([*why, "verdict: failed"]), options)
         return SOLVER_FAILED
     bars = refinement.obtain(bench, reference) if options.error_bar else refinement.stored(reference)
@@ -65,10 +68,14 @@ def _told(today: Today, options: argparse.Namespace, begin: float) -> int:
     if options.update:
         baseline.update(options.baseline, today)
     result = checking.check(baseline.read(options.baseline, today.scene, today.candidate.name), today)
-    texts = {options.junit: told.junit(result, time.perf_counter() - begin), options.markdown: told.markdown(result)}
+    _write({options.junit: told.junit(result, time.perf_counter() - begin), options.markdown: told.markdown(result)})
+    tell(told.facts(result), told.text(result), options)
+    return VERDICT_FAIL if result.word == "fail" else DONE
+
+
+def _write(texts: dict[Path | None, str]) -> None:
+    """Write each text that is wanted."""
     for path, text in texts.items():
         if path is not None:
             path.parent.mkdir(parents=True, exist_ok=True)
             files.write_text(path, text)
-    tell(told.facts(result), told.text(result), options)
-    return VERDICT_FAIL if result.word == "fail" else DONE

@@ -28,15 +28,34 @@ def choose(scene: Scene, text: str, unit: str | None) -> tuple[Candidate, str]:
     """The candidate of the scene with this name, else the recorded frames in this folder; and the place that chooses it."""
     names = [candidate.name for candidate in scene.candidate]
     if text in names:
+        if Path(text).is_dir():
+            raise InputError(
+                "--candidate", f'"{text}", a candidate of the case and a folder', f"another name, or ./{text}"
+            )
         return scene.candidate[names.index(text)], f"candidate[{names.index(text)}]"
-    path = Path(text)
-    if not path.exists():
+    if not text or not Path(text).exists():
         raise InputError("--candidate", f'"{text}"', f"a folder of frames, or one of {', '.join(names)}")
+    return recorded_in(text, unit), "--candidate"
+
+
+def recorded_in(text: str, unit: str | None) -> Candidate:
+    """The recorded frames in the folder or file ``text``, with what their ``candidate.toml`` says."""
+    path = Path(text)
+    if not text or not path.exists():
+        raise InputError("--candidate", f'"{text}"', "a folder of frames")
     folder = path.resolve()
     said = recorded.about(folder)
     name = said.name or re.sub(r"[^\w.-]+", "_", folder.stem if folder.is_file() else folder.name) or "candidate"
     table = {"name": name, "solver": "recorded", "folder": str(folder), "unit": unit or said.unit or "mm"}
-    return parse(Candidate, table, "--candidate"), "--candidate"
+    return parse(Candidate, table, "--candidate")
+
+
+def check_names(names: list[str]) -> None:
+    """InputError where two candidates have one name, or one has that of the reference."""
+    for name in names:
+        if [*names, "reference"].count(name) > 1:
+            want = 'folders and candidates of different names, none of them "reference"'
+            raise InputError("--candidate", f'"{name}" twice', want)
 
 
 def checked_bench(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> Bench:

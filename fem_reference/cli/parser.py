@@ -54,7 +54,7 @@ def parser() -> argparse.ArgumentParser:
         solving.add_argument("--ranks", type=int, metavar="N", help=ranks)
     page = add("page", verbs.page, "write a page over several cases", case=False)
     _add_page_options(page, unit)
-    speed = "time the solvers of Table 5.1 in CPU time of one thread, beside the machine's own speed"
+    speed = "time the solvers of Table 5.1 in processor time, beside the machine's own speed"
     timing = add("benchmark", verbs.time_solvers, speed, case=False)
     timed = f"cases to time them on (default: {', '.join(verbs.TIMED_WITH_DATA)} where the data is, else {', '.join(verbs.TIMED)})"
     timing.add_argument("cases", metavar="CASE", nargs="*", help=timed)

@@ -17,7 +17,7 @@ from fem_reference import (
     runs,
     solvers,
 )
-from fem_reference.cli.choosing import checked_bench, choose, own_candidates, scene_of
+from fem_reference.cli.choosing import check_names, checked_bench, choose, own_candidates, recorded_in, scene_of
 from fem_reference.cli.telling import DONE, SOLVER_FAILED, VERDICT_FAIL, lines, out, tell
 from fem_reference.errors import InputError
 from fem_reference.execution import Bench, complete
@@ -87,28 +87,36 @@ def page(options: argparse.Namespace) -> int:
     """Write a page over several cases."""
     if options.name == TABLE:
         return _table(options)
-    if options.case or options.candidate:
-        raise InputError("page", f"--case or --candidate for {options.name}", f"them for {TABLE} only")
+    if options.case or options.candidate or options.unit:
+        raise InputError("page", f"--case, --candidate or --unit for {options.name}", f"them for {TABLE} only")
     return _told(field_verbs.page(options.name, out(options)), options)
 
 
 def _table(options: argparse.Namespace) -> int:
     """The families of the report's table, measured."""
-    foreign = dict[str, list[Candidate]]()
+    scenes = {scene.name: scene for scene in map(casefile.read_muscle, options.case or families.SCENARIOS)}
+    foreign = _foreign(options, list(scenes))
+    for name in scenes if options.case else foreign:
+        Bench(scenes[name], out(options)).setup()  # only what nobody asked for by name may be missing
+    table = families.stand(scenes.values(), out(options) / "runs", foreign)
+    path = report.write_standings(table, out(options), TABLE)
+    tell(standings_facts(table), f"{standings_text(table)}\npage: {path}", options)
+    return DONE if all(one.reference.status == "converged" for one in table.scenarios) else SOLVER_FAILED
+
+
+def _foreign(options: argparse.Namespace, cases: list[str]) -> dict[str, list[Candidate]]:
+    """By the name of a case, what somebody else's solvers made of it."""
+    found = dict[str, list[Candidate]]()
     for text in options.candidate:
         case, equals, folder = text.partition("=")
         if not equals:
             raise InputError("--candidate", f'"{text}"', "CASE=DIR, a case and a folder of frames of it")
-        foreign.setdefault(case, []).append(choose(casefile.read_muscle(case), folder, options.unit)[0])
-    cases = options.case or families.SCENARIOS
-    if others := foreign.keys() - set(cases):
-        raise InputError("--candidate", f'"{min(others)}"', f"one of {', '.join(cases)}")
-    for case in options.case:
-        Bench(casefile.read_muscle(case), out(options)).setup()  # only what nobody asked for by name may be missing
-    table = families.stand(cases, out(options) / "runs", foreign)
-    path = report.write_standings(table, out(options), TABLE)
-    tell(standings_facts(table), f"{standings_text(table)}\npage: {path}", options)
-    return DONE if all(one.reference.status == "converged" for one in table.scenarios) else SOLVER_FAILED
+        name = casefile.read_muscle(case).name
+        if name not in cases:
+            raise InputError("--candidate", f'"{case}"', f"one of {', '.join(cases)}")
+        found.setdefault(name, []).append(recorded_in(folder, options.unit))
+        check_names([candidate.name for candidate in found[name]])
+    return found
 
 
 def time_solvers(options: argparse.Namespace) -> int:
@@ -116,10 +124,11 @@ def time_solvers(options: argparse.Namespace) -> int:
     cases = options.cases or (TIMED_WITH_DATA if os.environ.get(DATA_SETTING) else TIMED)
     benches = [Bench(casefile.read_muscle(case), out(options) / "runs") for case in cases]
     for bench in benches:
+        benchmark.check(bench.scene)
         bench.setup()  # what is missing shows before anything is timed
     timings, machine = benchmark.measure(benches)
     tell(benchmark.facts(timings, machine), benchmark.text(timings, machine), options)
-    return DONE
+    return DONE if all(one.per_second is not None for one in timings) else SOLVER_FAILED
 
 
 def verify(options: argparse.Namespace) -> int:
@@ -133,12 +142,7 @@ def verify(options: argparse.Namespace) -> int:
 
 def _judge(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
     """Reference and candidates -> page, JSON and exit status. What is bad in the input shows before anything is solved."""
-    names = ["reference", *(entry.name for entry, _ in chosen)]
-    for name in names:
-        if names.count(name) > 1:
-            raise InputError(
-                "--candidate", f'"{name}" twice', 'folders and candidates of different names, none of them "reference"'
-            )
+    check_names([entry.name for entry, _ in chosen])
     bench = checked_bench(scene, options, chosen)
     read = {entry.name: bench.read(entry.name, entry, place) for entry, place in chosen if entry.solver == "recorded"}
     reference = bench.obtain("reference", scene.reference, "reference")

@@ -32,6 +32,7 @@ def export(scene: Scene, build: Callable[[], Problem], folder: Path, form: Forma
 
     ``"febio"`` adds FEBio's own file to the open ones. InputError where the folder is not free, or FEBio has not the same.
     """
+    folder = folder.resolve()
     check(folder)
     if form == "febio":
         febio.check(scene)

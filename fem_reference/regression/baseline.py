@@ -94,6 +94,8 @@ def read(path: Path, scene: Scene, candidate: str) -> Baseline:
         got = f"{baseline.scene[:16]}..., while {scene.place} is {scene.key[:16]}..."
         want = "the key of this scene (it was changed since; --update takes today's measures)"
         raise InputError(f"{path}: scene", got, want)
+    if baseline.frames != scene.frames.numbers:
+        raise InputError(f"{path}: frames", f"{len(baseline.frames)} others", "the frame numbers of the scene")
     return baseline
 
 

@@ -1,6 +1,7 @@
 """A check in words: as text, as JSON, as Markdown for a pull request, and as JUnit XML for what shows the tests of a pipeline."""
 
 import math
+from dataclasses import dataclass
 from typing import Any
 from xml.etree import ElementTree
 
@@ -87,6 +88,27 @@ def junit(check: Check, seconds: float) -> str:
         ElementTree.SubElement(suite, "system-out").text = "\n".join(check.notes)
     ElementTree.indent(root, " ")
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+
+
+@dataclass(frozen=True)
+class Lost:
+    """What ``junit`` and ``markdown`` say where nothing could be judged."""
+
+    junit: str
+    markdown: str
+
+
+def lost(case: str, candidate: str, why: list[str]) -> Lost:
+    """A suite with one error, and a headline, with ``why`` nothing could be judged: what an earlier check left would mislead."""
+    name, reasons = f"{case}.{candidate}", "\n".join(why)
+    counts = {"tests": "1", "failures": "0", "errors": "1", "skipped": "0"}
+    root = ElementTree.Element("testsuites", counts)
+    suite = ElementTree.SubElement(root, "testsuite", {"name": name} | counts)
+    element = ElementTree.SubElement(suite, "testcase", {"classname": name, "name": "solvers", "time": "0"})
+    ElementTree.SubElement(element, "error", {"message": why[0]}).text = reasons
+    ElementTree.indent(root, " ")
+    lines = [f"### failed: {_escaped(candidate)} on {_escaped(case)}", "", *(f"- {reason}" for reason in why)]
+    return Lost(ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n", "\n".join(lines) + "\n")
 
 
 def _of(check: Check, word: str) -> list[Judgement]:

@@ -68,7 +68,7 @@ def facts(table: Table) -> dict[str, Any]:
         "report": [one.model_dump(mode="json", exclude={"candidate", "of_case"}) for one in table.families],
         "standings": [_row(one) for one in table.standings],
         "versions": table.versions,
-        "machine": table.machine,
+        "machines": list(table.machines),
     }
 
 
@@ -99,8 +99,8 @@ def _drawing(table: Table) -> Curve:
             x, y = _place(one)  # type: ignore[misc]
             look: dict[str, Any] = {"markerfacecolor": "white"} if one.of_reference else {}
             mark = _MARKS[[scenario.case for scenario in table.scenarios].index(one.case) % len(_MARKS)]
-            axes.plot([x], [y], mark, color=colours[one.name], markersize=7, alpha=0.85, **look)
-        _label(axes, table, [name for name in colours if any(one.name == name for one in shown)])
+            axes.plot([x], [y], mark, color=colours[_label_of(one)], markersize=7, alpha=0.85, **look)
+        _label(axes, table, [name for name in colours if any(_label_of(one) == name for one in shown)])
         text = io.StringIO()
         figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
     return Curve(title, inline(text.getvalue(), "standings", title))
@@ -108,8 +108,14 @@ def _drawing(table: Table) -> Curve:
 
 def _colours(table: Table) -> dict[str, str]:
     """A colour for everybody who is drawn."""
-    names = dict.fromkeys(one.name for one in table.standings if not one.of_reference and _place(one) is not None)
+    names = dict.fromkeys(_label_of(one) for one in table.standings if not one.of_reference and _place(one) is not None)
     return {"reference": REFERENCE} | dict(zip(names, cycle([*PALETTE, *_MORE]), strict=False))
+
+
+def _label_of(one: Standing) -> str:
+    """What tells a solver from all others: somebody else's may have the name of one of ours."""
+    ours = one.of_reference or one.solver != "recorded"
+    return one.name if ours else f"{one.name} ({one.family.lower()})"
 
 
 def _place(one: Standing) -> tuple[float, float] | None:

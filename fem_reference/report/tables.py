@@ -90,7 +90,8 @@ def seconds_per_frame(run: Run) -> float | None:
     seconds = cost.get("seconds_solve", cost.get("seconds"))
     solved = reached(run) - 1
     if run.solver == "recorded":
-        return cost.get("seconds_per_frame")
+        each = cost.get("seconds_per_frame")  # for a frame number
+        return None if each is None else each * (run.numbers[-1] - run.numbers[0]) / max(len(run.numbers) - 1, 1)
     if seconds is None or solved < 1:
         return None
     return seconds / solved
