@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapes
 from test_arap import JUMP, SWING, TURN, held_setup, muscle, started, system_of
 
 from fem_reference.errors import InputError
@@ -15,7 +16,7 @@ from fem_reference.solvers import arap, arap_pbd
 from fem_reference.solvers.pbd import Constraints
 from fem_reference.solvers.pbd_kernels import distances, volume
 
-CONSTRAINT = {"weights": "clamped cotangent", "iterations": 5, "tolerance": "1e-6 mm", "volume_constraint": True}
+CONSTRAINT = {"weights": "clamped cotangent", "iterations": 5, "volume_constraint": True}
 SWEEPS = {"sweeps": 3, "stretch": 1.0, "volume": 1.0, "bending": 0.9}
 GUESS = CONSTRAINT | {"volume_constraint": False, "projections": SWEEPS}
 EXACT = {"iterations": 3000, "tolerance": "1e-12 mm"}
@@ -121,7 +122,7 @@ def test_independent_of_where_the_world_is(usual):
 def test_projections_start_from_the_state_of_arap():
     setup, states = held_setup(None, JUMP), []
     usual = {"weights": "kirchhoff", "fixed": "remove", "rotations": "each", "volume_step": False}
-    record = parse(arap.Settings, usual | {"iterations": 5, "tolerance": "1e-6 mm"}, "candidate[0]")
+    record = parse(arap.Settings, usual | {"iterations": 5}, "candidate[0]")
     arap.solve(setup, record, lambda frame: states.append(frame.surface))
     _, nothing = run(setup, GUESS, weights="kirchhoff", projections=SWEEPS | {"stretch": 0, "volume": 0, "bending": 0})
     np.testing.assert_array_equal(nothing[1], states[1])
@@ -182,6 +183,49 @@ def test_a_volume_out_of_reach_is_an_outcome():
     assert outcome.status == "diverged"
     assert outcome.message.startswith("frame 1: no multiplier keeps the volume, it is 1.")
     assert list(frames) == [0]
+
+
+def pressed(way):
+    """A bar of 30 mm whose upper end goes down by ``way`` [mm] in one frame."""
+    down = Translation((0, 0, -1), (0.0, 1.0), (0.0, way))
+    return shapes.bar((2, 2, 4), (10, 10, 30), {"bottom": None, "top": down}, (), (0, 1))
+
+
+def test_a_volume_at_another_root_is_an_outcome():
+    outcome, frames = run(pressed(45.0), iterations=3)
+    assert outcome.status == "diverged"
+    assert outcome.message.startswith("frame 1: the nearest positions of the volume at rest are ")
+    assert list(frames) == [0]
+
+
+@pytest.mark.parametrize("way", [20.0, 30.0, 37.5])
+def test_the_root_nearest_to_the_minimum_is_taken(way):
+    # Where the volume crosses that of rest first, on a fine grid of multipliers either way.
+    given = pressed(way)
+    system, rest = system_of(given, "clamped cotangent"), constraints_of(given)
+    before = started(given)
+    minimum = system.place(before, system.cells.rotations(before))
+    found = arap_pbd.at_volume(system, minimum, before, rest)
+    assert volume(found, rest.triangles)[0] == pytest.approx(rest.six_volumes, rel=1e-11)
+    shares = np.linspace(-1, 1, 4002)[1:-1] * (1 - 1e-9)  # no share is 0 or 1
+    off = [volume(minimum + share * (found - minimum), rest.triangles)[0] - rest.six_volumes for share in shares]
+    assert len(set(np.sign(off))) == 1
+
+
+@pytest.mark.parametrize("lost", [np.nan, np.inf])
+def test_no_number_has_no_root(lost):
+    setup = held_setup(None, SWING)
+    points = np.array(setup.surface.points)
+    points[5, 0] = lost
+    assert arap_pbd._least_root(points, setup.surface.points * 0.1, constraints_of(setup)) is None
+
+
+def test_a_tolerance_that_is_not_met_is_told():
+    setup = held_setup(None, SWING, last=10)
+    outcome, frames = run(setup, tolerance="1e-6 mm")
+    assert outcome.status == "out of steps"
+    assert outcome.message.startswith("10 frames in 50 iterations, 10 did not meet the tolerance; ")
+    assert list(frames) == list(range(11))
 
 
 def test_without_both_it_is_another_solver():

@@ -32,6 +32,7 @@ ORDER = [
     "exchange",
     "deformable",
     "stepping",
+    "soundness",
     "solvers",
     "metrics",
     "study",

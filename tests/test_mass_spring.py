@@ -326,6 +326,73 @@ def test_a_muscle_spread_too_wide_is_an_outcome() -> None:
     assert "the muscle is spread over " in outcome.message
 
 
+def pressed(way: float) -> Problem:
+    """A soft bar of two cells, 30 mm long, whose upper end goes down by ``way`` [mm] faster than the middle follows."""
+    down = Translation((0, 0, -1), (0.0, 1.0), (0.0, way))
+    return shapes.bar((1, 1, 2), (10, 10, 30), {"bottom": None, "top": down}, (), (0, 1))
+
+
+FAST = {"stiffness": "0.001 N/mm", "frame_time": "0.01 ms"}
+
+
+def test_a_muscle_turned_inside_out_is_an_outcome() -> None:
+    outcome, frames = solved(pressed(40.0), **FAST)
+    assert outcome.status == "inverted"
+    assert outcome.message.startswith("frame 1: the surface is turned inside out; ")
+    assert [frame.number for frame in frames] == [0]
+
+
+def test_single_tetrahedra_inside_out_are_told() -> None:
+    # The upper end is below the middle and above the lower end: all six tetrahedra of the upper cell are inside out.
+    outcome, frames = solved(pressed(20.0), **FAST)
+    assert outcome.status == "converged"
+    assert outcome.message.endswith("; 6 of 12 tetrahedra are inside out at the last frame")
+    assert frames[-1].scalars["inverted_tets"] == 6
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"time_step": "1e-12 s"}, "2e+10 steps in a frame number, at most 100000; a longer time_step may help"),
+        ({"damping": "1e9 N s/m"}, "a stiffness of 1 N/mm and a damping of 1e+06 N s/mm want "),
+        ({"stiffness": "1e9 N/mm"}, "a stiffness of 1e+09 N/mm and a damping of 2e-05 N s/mm want "),
+    ],
+)
+def test_too_many_steps_are_not_begun(change, message) -> None:
+    outcome, frames = solved(bar(BEND), **change)
+    assert outcome.status == "out of steps"
+    assert outcome.message.startswith(message)
+    assert [frame.number for frame in frames] == [0]
+    assert outcome.cost["time_steps"] == 0
+
+
+def test_steps_in_parts_are_the_steps_at_once() -> None:
+    # 450 steps are asked for 200 at a time; ends go as evenly, but for rounding of 30 mm.
+    given = bar(BEND)
+    model = mass_spring.Model.of(given, parse(mass_spring.Settings, USUAL, "candidate[0]"))
+    rest = np.array(given.mesh.points)
+    points, previous, at_once, before = (rest.copy() for _ in range(4))
+    model.move(points, previous, 1, 2e-6, 450)
+    ends = [model._carried(number)[model.held] for number in (0, 1)]
+    advance(at_once, before, model.network, Course(model.held, *ends), 2e-6, 450)
+    assert np.abs(points - rest).max() > 0.1
+    assert_allclose(points, at_once, rtol=0, atol=1e-11)
+    assert_allclose(previous, before, rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("damping", [1e-3, 1.0, 1e6, 1e200])
+def test_the_stable_time_step_at_great_damping(damping) -> None:
+    # Where c is great, 4 m - 2 c dt = 0: the next term of the root is smaller by 2 k m / c^2, a share of 1.2e-6 of c = 1e-3.
+    found = mass_spring.stable_time_step(network([0, 1], [10], 2, damping), FREE.held)
+    assert_allclose(found, 2 * MASS / damping, rtol=max(1e-12, 3 * STIFFNESS * MASS / damping / damping))
+
+
+def test_another_clock_than_the_scenes_is_told() -> None:
+    outcome, _ = solved(replace(bar(BEND), interval=0.5))
+    assert outcome.message.endswith("; from a frame number to the next it takes 0.02 s, the scene 0.5 s")
+    assert "the scene" not in solved(replace(bar(BEND), interval=0.02))[0].message
+
+
 @pytest.mark.parametrize("key", ["stiffness", "density", "frame_time"])
 def test_physics_has_no_defaults(key) -> None:
     with pytest.raises(InputError, match=f"{key}: got nothing, want this key"):

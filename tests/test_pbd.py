@@ -8,9 +8,10 @@ import shapes
 
 from fem_reference.errors import InputError
 from fem_reference.geometry.rigid_bodies import Sphere
+from fem_reference.geometry.signed_distance import build
 from fem_reference.mesh import Polylines, Surface, check_closed, enclosed_volume
 from fem_reference.motion import Rotation, Translation, apply
-from fem_reference.problem import Body, Held, Setup
+from fem_reference.problem import Body, Held, Problem, Setup
 from fem_reference.records import parse
 from fem_reference.solvers import pbd
 
@@ -229,6 +230,38 @@ def test_edges_along_fibres_are_told_from_those_across():
     np.testing.assert_allclose(pbd.along_fibres(points, edges, fibres), [1, 0, 0.6, 1, 1], atol=1e-15)
 
 
+def kinked():
+    """The spindle with its ends held, the upper one moved by ``SWING``, and a fibre that zigzags in it with 21 kinks."""
+    z = np.linspace(-25, 25, 23)
+    fibre = np.column_stack([6 * (-1.0) ** np.arange(23), np.zeros(23), z])
+    given = shapes.bar((1, 1, 1), (10, 10, 30), {"bottom": None, "top": None}, (), (0, 50))
+    setup = held_setup(None, SWING, last=50)
+    return Problem(**vars(given) | vars(setup) | {"fibres": Polylines(fibre, np.array([0, 23]))})
+
+
+def test_a_turned_scene_has_the_same_fibres_at_its_edges():
+    # Beyond a kink both its segments are as near: rounding would choose between them.
+    given = kinked()
+    edges = pbd.hinges_of(given.surface.triangles)[:, :2]
+    here = pbd.along_fibres(given.surface.points, edges, given.fibres)
+    for angle in np.linspace(0.1, 3, 20):
+        pose = Rotation((1, 2, 3), (50, -40, 70), (0.0, 1.0), (0.0, angle)).pose(1)
+        fibres = Polylines(apply(pose, given.fibres.points), given.fibres.offsets)
+        there = pbd.along_fibres(apply(pose, given.surface.points), edges, fibres)
+        np.testing.assert_allclose(there, here, rtol=0, atol=1e-12)
+
+
+def test_with_fibres_independent_of_where_the_world_is():
+    # As without them: roundings of 1e-14 in the place of the whole grow over 150 steps.
+    here = kinked()
+    x, y, z = TURN[:3, :3] @ SWING.axis
+    moved = Rotation((x, y, z), tuple(apply(TURN, np.array([SWING.centre]))[0]), SWING.frames, SWING.angles)
+    fibres = Polylines(apply(TURN, here.fibres.points), here.fibres.offsets)
+    there = Problem(**vars(here) | vars(held_setup(None, moved, last=50, pose=TURN)) | {"fibres": fibres})
+    states = [run(given, anisotropy=1.0)[1][50] for given in (here, there)]
+    np.testing.assert_allclose(states[1], apply(TURN, states[0]), atol=60e-6)
+
+
 def test_edges_along_fibres_are_softer():
     # A bar with its fibre along z: by 40 % less stiff along it, by 40 % of cos 45 degrees less on the diagonals, not across.
     given = shapes.bar((2, 2, 6), (10, 10, 30), {"bottom": None, "top": SWING}, (), (0, 5))
@@ -282,8 +315,43 @@ def test_a_body_torn_apart_is_an_outcome():
     leap = Rotation((1, 0, 0), (0, 1e5, 0), (0.0, 3.0, 4.0), (0.0, 0.0, 1.0))
     outcome, frames = run(held_setup(leap, leap))
     assert outcome.status == "diverged"
-    assert outcome.message.startswith("frame 4: the surface is spread over ")
+    assert outcome.message.startswith("frame 4: the muscle is spread over ")
     assert list(frames) == [0, 1, 2, 3]
+
+
+def test_a_body_turned_inside_out_is_an_outcome():
+    # One bone holds the lower half and one the upper, which goes by a whole length of 60 mm through the lower one.
+    setup = held_setup(None, Translation((0, 0, -1), (0.0, 3.0), (0.0, 60.0)))
+    upper = setup.surface.points[:, 2] > 0
+    held = tuple(
+        Held(bone.name, bone, np.flatnonzero(mask)) for bone, mask in zip(setup.bones, (~upper, upper), strict=True)
+    )
+    outcome, frames = run(Setup(setup.surface, setup.bones, held, setup.frames, None))
+    assert outcome.status == "inverted"
+    assert outcome.message.startswith("frame 3: the surface is turned inside out; ")
+    assert list(frames) == [0, 1, 2]
+
+
+def pressed(pose, spacing):
+    """Where a ball of triangles, its distance on a grid along the axes, has pushed the spindle after 16 iterations."""
+    setup = held_setup(None, None, last=16, pose=pose)
+    surface = shapes.sphere(2, 8.0)
+    surface = surface.moved_to(apply(pose, surface.points + [20, 0, 0]))
+    x, y, z = -pose[:3, 0]
+    ball = Body("ball", surface, Translation((x, y, z), (0.0, 40.0), (0.0, 12.0)))
+    vars(ball)["shape"] = build(surface, spacing, 6.0)  # as if it had been read from the kept distances
+    _, frames = run(Setup(setup.surface, (ball,), setup.held, setup.frames, None), collision=CONTACT)
+    return apply(np.linalg.inv(pose), frames[16])
+
+
+def test_a_turned_grid_is_felt_by_less_than_a_tenth_of_its_spacing():
+    # Two iterations after the first touch: what slides on the ball later doubles the difference every few iterations. The distance
+    # is interpolated across the edges of the ball, so that half the spacing has at most half the error.
+    coarse, fine = (
+        np.linalg.norm(pressed(TURN, spacing) - pressed(np.eye(4), spacing), axis=1).max() for spacing in (1.0, 0.5)
+    )
+    assert 1e-4 < fine < coarse / 2
+    assert coarse < 0.1
 
 
 @pytest.mark.parametrize(

@@ -331,7 +331,8 @@ def test_positions_that_are_no_number_are_an_outcome():
 
 
 @pytest.mark.parametrize(
-    ("key", "value"), [("sub_iterations", 0), ("damping", 1.1), ("bending", -0.1), ("voxels", 0), ("anisotropy", -1.0)]
+    ("key", "value"),
+    [("sub_iterations", 0), ("damping", 1.1), ("bending", -0.1), ("voxels", 0), ("voxels", 257), ("anisotropy", -1.0)],
 )
 def test_settings_out_of_range(key, value):
     with pytest.raises(InputError, match=f"{key}: got {value}, want "):

@@ -20,12 +20,12 @@ BEND = Rotation((1, 0, 0), (5, 5, 0), (0.0, 10.0), (0.0, 0.3))
 PBD = {"sub_iterations": 3, "solver_iterations": 2, "damping": 0.1, "stretch": 1.0, "volume": 1.0, "bending": 0.5}
 SPRINGS = {"stiffness": "1 N/mm", "density": "1060 kg/m3", "frame_time": "20 ms", "damping": "eq. 5.5"}
 SETTINGS = {"fenicsx": {"ranks": 1}, "pbd": PBD, "recorded": {"unit": "mm"}}
-ARAP = {"weights": "clamped cotangent", "iterations": 3, "tolerance": "1e-6 mm"}
+ARAP = {"weights": "clamped cotangent", "iterations": 3}
 SETTINGS |= {"arap": ARAP | {"fixed": "remove", "rotations": "each", "volume_step": False}}
 SETTINGS |= {"arap_pbd": ARAP | {"volume_constraint": True}}
 SETTINGS |= {"line_of_action": {}, "mass_spring": SPRINGS}
 SETTINGS |= {"pbd_program": {"sub_iterations": 3, "damping": 0.01, "bending": 0.9, "voxels": 64, "anisotropy": 1.0}}
-SETTINGS["xpbd"] = {"interval": "20 ms", "sub_steps": 2, "sweeps": 2, "density": "1060 kg/m3", "stretch": "0.4 N/mm"}
+SETTINGS["xpbd"] = {"frame_time": "20 ms", "sub_steps": 2, "sweeps": 2, "density": "1060 kg/m3", "stretch": "0.4 N/mm"}
 
 
 def problem(motion: Rotation | None = BEND, other: Rotation | None = None) -> Problem:

@@ -1,6 +1,7 @@
 """Extended position based dynamics: static states that physics gives in closed form, whatever the time step and the sweeps."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from fem_reference.solvers.collision_kernels import Obstacle
 from fem_reference.solvers.xpbd import Constraints, Step
 
 USUAL = {
-    "interval": "10 ms",
+    "frame_time": "10 ms",
     "sub_steps": 2,
     "sweeps": 3,
     "density": "1060 kg/m3",
@@ -327,7 +328,7 @@ def test_bones_push():
 @pytest.mark.parametrize(
     ("key", "value"),
     [
-        ("interval", "20 ms"),
+        ("frame_time", "20 ms"),
         ("sub_steps", 3),
         ("sweeps", 1),
         ("density", "2000 kg/m3"),
@@ -346,6 +347,14 @@ def test_every_setting_is_felt(key, value):
     assert np.abs(changed - usual).max() > 1e-3
 
 
+def test_another_clock_than_the_scenes_is_told():
+    setup = muscle(None, last=2)
+    told = [run(replace(setup, interval=interval))[0].message for interval in (None, 0.01, 0.05)]
+    assert told == ["2 iterations"] * 2 + [
+        "2 iterations; from a frame number to the next it takes 0.01 s, the scene 0.05 s"
+    ]
+
+
 def test_positions_that_are_no_number_are_an_outcome():
     outcome, frames = run(muscle(Rotation((1, 0, 0), (0, 0, 0), (0.0, 2.0, 3.0), (0.0, 0.01, math.nan))))
     assert outcome.status == "diverged"
@@ -356,8 +365,8 @@ def test_positions_that_are_no_number_are_an_outcome():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"interval": 0.01}, "interval: got 0.01, want a time with its unit"),
-        ({"interval": "0 s"}, 'interval: got "0 s", want more than zero'),
+        ({"frame_time": 0.01}, "frame_time: got 0.01, want a time with its unit"),
+        ({"frame_time": "0 s"}, 'frame_time: got "0 s", want more than zero'),
         ({"sub_steps": 0}, "sub_steps: got 0, want "),
         ({"sweeps": 0}, "sweeps: got 0, want "),
         ({"stretch": "0.4 MPa"}, 'stretch: got "0.4 MPa", want a stiffness with its unit'),
@@ -373,7 +382,7 @@ def test_settings_out_of_range(change, message):
         parse(xpbd.Settings, USUAL | change, "candidate[0]")
 
 
-@pytest.mark.parametrize("key", ["interval", "sub_steps", "sweeps", "density"])
+@pytest.mark.parametrize("key", ["frame_time", "sub_steps", "sweeps", "density"])
 def test_settings_that_are_required(key):
     with pytest.raises(InputError, match=f"{key}: got nothing, want this key"):
         parse(xpbd.Settings, {name: value for name, value in USUAL.items() if name != key}, "candidate[0]")

@@ -21,9 +21,10 @@ from scipy.sparse.linalg import splu
 from fem_reference.mesh import TET_FACES, Floats, Ints, Surface, enclosed_volume
 from fem_reference.problem import Setup
 from fem_reference.records import Record
-from fem_reference.runs import Frame, Outcome, Sink, Status
+from fem_reference.runs import Frame, Outcome, Sink
 from fem_reference.solvers import arap_kernels
 from fem_reference.solvers.pbd import carry, held_by
+from fem_reference.soundness import Trouble, trouble
 from fem_reference.units import PositiveLength
 
 Symmetric = Literal["cotangent", "clamped cotangent", "kirchhoff"]
@@ -32,11 +33,10 @@ Fixed = Literal["remove", "ols"]
 
 # A triangle whose height is this share of its longest side or less has no area.
 _NO_AREA = 1e-6
-_INVERTED = "the surface is turned inside out"
 
 
 class Settings(Record):
-    """How the alternation is run; every key is required.
+    """How the alternation is run; every key but ``tolerance`` is required.
 
     ``weights`` of edges: "cotangent" (eq. 5.13), "clamped cotangent" (the same, the negative ones 0), "kirchhoff" (all 1),
     "tutte" (those, each row divided by its diagonal). A cotangent weight is negative where the angles opposite its edge are
@@ -45,7 +45,8 @@ class Settings(Record):
     least squares ("ols", eq. 5.12). With removed rows tutte has the states of kirchhoff.
     ``rotations``: fitted before "each" global step, or once in a frame ("first only"): its later iterations then change nothing.
     ``volume_step``: after each global step the vertices that no bone holds are scaled about the mean of all by eq. 5.9.
-    A frame is done when no vertex moved by more than ``tolerance`` in an iteration, or after ``iterations`` of them.
+    ``iterations``: in each frame; their number is the method. With a ``tolerance`` [mm] a frame is done as soon as no vertex moved
+    by more in an iteration, and the run is out of steps where a frame is not done after so many.
     """
 
     weights: Weights
@@ -53,7 +54,7 @@ class Settings(Record):
     rotations: Literal["each", "first only"]
     volume_step: bool
     iterations: Annotated[int, Field(gt=0)]
-    tolerance: PositiveLength
+    tolerance: PositiveLength | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,12 +137,14 @@ class System:
 
 @dataclass(frozen=True, eq=False)
 class Relaxed:
-    """The state of a frame (n, 3) [mm], after how many iterations, whether they met the tolerance, and what went wrong."""
+    """The state of a frame (n, 3) [mm], after how many iterations, whether they met the tolerance, where there is one, and what
+    went wrong with it, if anything did.
+    """
 
     points: Floats
     iterations: int
     met: bool
-    trouble: str = ""
+    trouble: Trouble | None = None
 
 
 def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
@@ -161,9 +164,9 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
             if settings.volume_step:
                 moved = scaled(moved, triangles, system.free, volume)
             way, points = farthest(moved - points), moved
-            if way <= settings.tolerance:
+            if settings.tolerance is not None and way <= settings.tolerance:
                 return Relaxed(points, count, True)
-        return Relaxed(points, settings.iterations, False)
+        return Relaxed(points, settings.iterations, settings.tolerance is None)
 
     return march(setup, system, relax, sink, cost)
 
@@ -174,7 +177,7 @@ def march(
     """Move the held vertices and ``relax`` the others, frame number by frame number; what it costs is added to ``cost``."""
     points, (first, *_, last) = np.array(setup.surface.points), setup.frames
     sink(Frame(first, points.copy(), scalars={"arap_energy_mm2": system.cells.energy(points)}))
-    cost |= {"seconds_solve": 0.0, "iterations": 0, "local_global_steps": 0, "frames_at_tolerance": 0, "threads": 1}
+    cost |= {"seconds_solve": 0.0, "iterations": 0, "local_global_steps": 0, "frames_off_tolerance": 0, "threads": 1}
     if len(system.loose):
         why = f"vertex {system.loose[0]}: nothing but triangles without area or weight ties it to a held vertex"
         return Outcome("diverged", f"{why}; kirchhoff weights feel no areas", cost)
@@ -186,32 +189,27 @@ def march(
         cost["seconds_solve"] += time.perf_counter() - begin
         cost["iterations"] += 1
         cost["local_global_steps"] += relaxed.iterations
-        cost["frames_at_tolerance"] += relaxed.met
+        cost["frames_off_tolerance"] += not relaxed.met
         cost["seconds_per_iteration"] = cost["seconds_solve"] / cost["iterations"]
-        if trouble := _trouble(points, setup.surface.triangles) or relaxed.trouble:
-            status: Status = "inverted" if trouble == _INVERTED else "diverged"
-            return Outcome(status, f"frame {iteration}: {trouble}; a slower motion may help", cost)
+        if found := trouble(points, setup.surface, system.held) or relaxed.trouble:
+            return Outcome(found.status, f"frame {iteration}: {found.sentence}; a slower motion may help", cost)
         if iteration in setup.frames:
             sink(Frame(iteration, points.copy(), scalars={"arap_energy_mm2": system.cells.energy(points)}))
-    met = f"{cost['frames_at_tolerance']:.0f} met the tolerance"
-    return Outcome("converged", f"{last - first} frames in {cost['local_global_steps']:.0f} iterations, {met}", cost)
-
-
-def _trouble(points: Floats, triangles: Ints) -> str:
-    """What is wrong with positions as a whole, empty if nothing is."""
-    lost = np.flatnonzero(~np.isfinite(points).all(axis=1))
-    if len(lost):
-        return f"the position of {len(lost)} vertices is not a number (vertex {lost[0]} for one)"
-    return _INVERTED if enclosed_volume(points, triangles) <= 0 else ""
+    done, missed = f"{last - first} frames in {cost['local_global_steps']:.0f} iterations", cost["frames_off_tolerance"]
+    if missed:
+        advice = "more iterations may help; without a tolerance their number is the method"
+        return Outcome("out of steps", f"{done}, {missed:.0f} did not meet the tolerance; {advice}", cost)
+    return Outcome("converged", done, cost)
 
 
 def scaled(points: Floats, triangles: Ints, free: Ints, volume: float) -> Floats:
     """``points`` (n, 3) with the ``free`` ones scaled about the mean of all by the cube root of V0 / V, eq. 5.9.
 
-    V0 is ``volume`` [mm3]. It is reached where all are free: as those that a bone holds stay, some of it is missing.
+    V0 is ``volume`` [mm3]. It is reached where all are free: as those that a bone holds stay, some of it is missing. What encloses
+    nothing stays as it is.
     """
-    centre = points.mean(axis=0)
-    factor = np.cbrt(volume / abs(enclosed_volume(points, triangles)))
+    centre, inside = points.mean(axis=0), abs(enclosed_volume(points, triangles))
+    factor = np.cbrt(volume / inside) if inside > 0 else 1.0
     found = points.copy()
     found[free] = centre + factor * (points[free] - centre)
     return found

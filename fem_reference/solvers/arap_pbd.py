@@ -21,10 +21,13 @@ from fem_reference.runs import Outcome, Sink
 from fem_reference.solvers.arap import Cells, Relaxed, Symmetric, System, compile_kernels, farthest, march
 from fem_reference.solvers.pbd import Constraints, Stiffness, held_by
 from fem_reference.solvers.pbd_kernels import project_dihedrals, project_distances, project_volume, volume
+from fem_reference.soundness import Trouble
 from fem_reference.units import PositiveLength
 
 # The volume counts as reached when it is off by this share, and as out of reach after this many steps of Newton's method.
 _REACHED, _STEPS = 1e-12, 20
+# A root whose imaginary part is this share of it or less is a real one, rounded.
+_REAL = 1e-8
 # Beyond this share the volume is not kept.
 _KEPT = 1e-6
 
@@ -48,7 +51,7 @@ class Settings(Record):
 
     weights: Symmetric
     iterations: Annotated[int, Field(gt=0)]
-    tolerance: PositiveLength
+    tolerance: PositiveLength | None = None
     volume_constraint: bool
     projections: Projections | None = None
 
@@ -77,27 +80,37 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
 
 
 def minimise(system: System, points: Floats, settings: Settings, rest: Constraints) -> Relaxed:
-    """Local and global steps from ``points`` (n, 3) until the settings are met, at the volume of ``rest`` where they say so."""
-    count, met = 0, False
+    """Local and global steps from ``points`` (n, 3) until the settings are met, at the volume of ``rest`` where they say so.
+
+    The volume is lost where it is farther from the minimum of a global step than the edge of a cube of that volume: it is kept by
+    a fold then, at another root of the cubic.
+    """
+    count, met, tolerance = 0, False, settings.tolerance
     while count < settings.iterations and not met:
-        moved = system.place(points, system.cells.rotations(points))
+        moved = minimum = system.place(points, system.cells.rotations(points))
         if settings.volume_constraint:
-            moved = at_volume(system, moved, points, rest)
-        count, met, points = count + 1, farthest(moved - points) <= settings.tolerance, moved
-    return Relaxed(points, count, met, _lost_volume(points, rest, settings))
+            moved = at_volume(system, minimum, points, rest)
+        count, met, points = count + 1, tolerance is not None and farthest(moved - points) <= tolerance, moved
+        if (far := farthest(moved - minimum)) > np.cbrt(rest.six_volumes / 6):
+            why = f"the nearest positions of the volume at rest are {far:.3g} mm away"
+            return Relaxed(points, count, False, Trouble("diverged", why))
+    return Relaxed(points, count, met or tolerance is None, _lost_volume(points, rest, settings))
 
 
 def at_volume(system: System, minimum: Floats, before: Floats, rest: Constraints) -> Floats:
-    """``p + lambda L^-1 grad V`` with lambda such that the volume is that of ``rest``, found by Newton's method.
+    """``p + lambda L^-1 grad V`` with lambda such that the volume is that of ``rest``, and the least such lambda.
 
-    p is the ``minimum`` (n, 3) of the global step and the gradient that at the positions ``before`` it. The volume is a cubic
-    in lambda.
+    p is the ``minimum`` (n, 3) of the global step and the gradient that at the positions ``before`` it. The volume is a cubic in
+    lambda; of its roots the one nearest to the minimum counts, and Newton's method takes rounding from it. Without one the minimum
+    stays as it is.
     """
     way = np.zeros_like(minimum)
     if system.factor is None:
         return minimum
     way[system.free] = system.factor.solve(volume(before, rest.triangles)[1][system.free])
-    factor = 0.0
+    factor = _least_root(minimum, way, rest)
+    if factor is None:
+        return minimum
     for _ in range(_STEPS):
         value, gradient = volume(minimum + factor * way, rest.triangles)
         off = value - rest.six_volumes
@@ -105,6 +118,24 @@ def at_volume(system: System, minimum: Floats, before: Floats, rest: Constraints
             break
         factor -= off / np.sum(gradient * way)
     return minimum + factor * way
+
+
+def _least_root(points: Floats, way: Floats, rest: Constraints) -> float | None:
+    """The lambda nearest to 0 at which ``points + lambda way`` (n, 3) have the volume of ``rest``, None where there is none.
+
+    Six times the volume is a cubic form: its coefficients are values and slopes at ``points`` and at ``way``. The greatest
+    ``1 / lambda`` is asked for, which a cubic term that is next to nothing does not spoil.
+    """
+    (value, slope), (cubic, slope_of_way) = volume(points, rest.triangles), volume(way, rest.triangles)
+    off = value - rest.six_volumes
+    if abs(off) <= _REACHED * rest.six_volumes:
+        return 0.0
+    coefficients = np.array([off, np.sum(slope * way), np.sum(slope_of_way * points), cubic], np.float64)
+    if not np.isfinite(coefficients).all():
+        return None
+    roots = np.roots(coefficients)
+    real = roots.real[(np.abs(roots.imag) <= _REAL * np.abs(roots)) & (roots != 0)]
+    return float(1 / max(real, key=abs)) if len(real) else None
 
 
 def projected(points: Floats, rest: Constraints, projections: Projections) -> Floats:
@@ -117,12 +148,12 @@ def projected(points: Floats, rest: Constraints, projections: Projections) -> Fl
     return moved
 
 
-def _lost_volume(points: Floats, rest: Constraints, settings: Settings) -> str:
-    """What is wrong with the volume of ``points``; empty if nothing is, or nobody asked."""
+def _lost_volume(points: Floats, rest: Constraints, settings: Settings) -> Trouble | None:
+    """What is wrong with the volume of ``points``; None if nothing is, or nobody asked."""
     ratio = volume(points, rest.triangles)[0] / rest.six_volumes
     if not settings.volume_constraint or abs(ratio - 1) <= _KEPT:
-        return ""
-    return f"no multiplier keeps the volume, it is {ratio:.6g} of that at rest"
+        return None
+    return Trouble("diverged", f"no multiplier keeps the volume, it is {ratio:.6g} of that at rest")
 
 
 def _compile_projections() -> float:

@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+import tempfile
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -11,13 +12,28 @@ import numba
 
 
 def compiled[F: Callable[..., Any]](function: F) -> F:
-    """The function as machine code, made at its first call and kept on disk; it runs on one thread."""
+    """The function as machine code, made at its first call and kept on disk, where that can be written; it runs on one thread."""
+    if not can_keep(kept_code()):
+        return cast(F, numba.njit(error_model="numpy")(function))
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(kept_code())  # numba reads it here and never again for this function
     try:
         return cast(F, numba.njit(cache=True, error_model="numpy")(function))
     finally:
         numba.config.CACHE_DIR = before
+
+
+@cache
+def can_keep(folder: Path) -> bool:
+    """Whether files can be written in a folder, which is made; a user without a home has none."""
+    if not folder.is_absolute():
+        return False
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
 
 
 @cache

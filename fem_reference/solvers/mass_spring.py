@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import BeforeValidator
 
 from fem_reference.geometry.embedding import Embedding, Locator
-from fem_reference.mesh import Floats, Ints, TetMesh, boundary, tet_volumes
+from fem_reference.mesh import Floats, Ints, Surface, TetMesh, boundary, tet_volumes
 from fem_reference.motion import apply
 from fem_reference.problem import Problem
 from fem_reference.records import Record
@@ -25,12 +25,16 @@ from fem_reference.solvers import collision_kernels
 from fem_reference.solvers.collision_kernels import Obstacle, push_out
 from fem_reference.solvers.pbd import Collision
 from fem_reference.solvers.spring_kernels import Course, Network, advance, forces
+from fem_reference.solvers.xpbd import other_clock
+from fem_reference.soundness import trouble
 from fem_reference.units import AccelerationVector, Density, Stiffness, Time, positive
 
 # Where no time step is asked for, it is this share of the greatest that is stable.
 SHARE_OF_STABLE = 0.9
-# A body spread this many times as wide as at rest, or as what the bones hold of it, is lost.
-_LOST = 10.0
+# More steps than this in a frame number are not begun: on 3,000 tetrahedra they take two seconds, and runs have hundreds of them.
+_MOST_STEPS = 100_000
+# Compiled code is asked for so many steps at once: only in between can the user interrupt.
+_AT_ONCE = 200
 _REPORT = "eq. 5.5"
 
 
@@ -49,8 +53,9 @@ class Settings(Record):
 
     ``stiffness``: of every spring. ``density``: of the muscle, shared out evenly over the masses: equilibrium does
     not depend on them, and a small one would make every time step small.
-    ``frame_time``: from a frame number to the next; the bones' motion has no other clock here, and the longer it lasts the nearer
-    the muscle is to equilibrium. ``damping``: the coefficient c, or ``"eq. 5.5"``, see ``report_damping``; without it none.
+    ``frame_time``: the solver's own time from a frame number to the next, and the longer it is the nearer the muscle is to
+    equilibrium; the scene's interval is the clock of what the reference and recorded sequences do in time. ``damping``: the
+    coefficient c, or ``"eq. 5.5"``, see ``report_damping``; without it none.
     ``gravity``: an acceleration; without it none. ``collision``: bones push, at every step; without it not. ``time_step``: the
     longest step wanted; without it one that is stable.
     """
@@ -101,12 +106,13 @@ def stable_time_step(network: Network, held: Ints) -> float:
     """The time step [s] below which eqs 5.6 and 5.7 are stable, whatever the shape.
 
     A mode of the free masses is stable where ``4 m - 2 c dt - k dt^2 > 0`` (the Jury conditions), with k its stiffness. Of springs
-    that is at most ``2 n_i k`` of mass i with n_i springs, stretched or not, so each mass has a limit, and the least counts. For
-    c = 0 it is 2 / omega with omega^2 = 2 n k / m, which two masses on one spring reach.
+    that is at most ``2 n_i k`` of mass i with n_i springs, stretched or not, so each mass has a limit, and the least counts. The
+    positive root is ``4 m / (c + sqrt(c^2 + 4 k m))``, which takes no difference of great numbers. For c = 0 it is 2 / omega
+    with omega^2 = 2 n k / m, which two masses on one spring reach.
     """
     springs = network.stiffness * np.bincount(network.springs.ravel(), minlength=len(network.masses))
     c = network.damping
-    limits = (np.sqrt(c**2 + 8 * springs * network.masses) - c) / (2 * springs)
+    limits = 4 * network.masses / (c + np.hypot(c, np.sqrt(8 * springs * network.masses)))
     return float(np.delete(limits, held).min(initial=math.inf))
 
 
@@ -146,7 +152,10 @@ class Model:
         """Take ``points`` and those a step before, (n, 3) [mm], in place from the frame number before to ``number``."""
         before, after = (self._carried(frame)[self.held] for frame in (number - 1, number))
         if not self.obstacles:
-            advance(points, previous, self.network, Course(self.held, before, after), time_step, steps)
+            for done in range(0, steps, _AT_ONCE):
+                upto = min(done + _AT_ONCE, steps)
+                start, end = ((1 - step / steps) * before + step / steps * after for step in (done, upto))
+                advance(points, previous, self.network, Course(self.held, start, end), time_step, upto - done)
             return
         for share in np.arange(1, steps + 1) / steps:
             there = (1 - share) * before + share * after
@@ -195,12 +204,15 @@ def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
     """Step from rest at the first of ``problem.frames`` to the last of them; each frame wanted goes into ``sink``."""
     seconds_compile, model = _compile(settings), Model.of(problem, settings)
     limit = stable_time_step(model.network, model.held)
-    steps = max(1, math.ceil(settings.frame_time / (settings.time_step or SHARE_OF_STABLE * limit) - 1e-9))
-    time_step = settings.frame_time / steps
+    wanted = settings.frame_time / (settings.time_step or SHARE_OF_STABLE * limit)
     points, first, last = np.array(problem.mesh.points), problem.frames[0], problem.frames[-1]
-    previous = points.copy()
+    rest, previous = Surface(problem.mesh.points, boundary(problem.mesh.tets)[0]), points.copy()
     sink(model.frame(points, first))
     cost = {"seconds_solve": 0.0, "seconds_compile": seconds_compile, "iterations": 0, "time_steps": 0, "threads": 1}
+    if wanted > _MOST_STEPS:
+        return Outcome("out of steps", _too_many(wanted, settings, model.network), cost)
+    steps = max(1, math.ceil(wanted - 1e-9))
+    time_step = settings.frame_time / steps
     for number in range(first + 1, last + 1):
         begin = time.perf_counter()
         model.move(points, previous, number, time_step, steps)
@@ -208,11 +220,27 @@ def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
         cost["iterations"] += 1
         cost["time_steps"] += steps
         cost["seconds_per_iteration"] = cost["seconds_solve"] / cost["iterations"]
-        if trouble := _trouble(points, problem.mesh.points, model.held):
-            return Outcome("diverged", f"frame {number}: {trouble}; {_advice(time_step, limit)}", cost)
+        if found := trouble(points, rest, model.held):
+            return Outcome(found.status, f"frame {number}: {found.sentence}; {_advice(time_step, limit)}", cost)
         if number in problem.frames:
             sink(model.frame(points, number))
-    return Outcome("converged", f"{last - first} frame numbers of {steps} steps of {time_step:.3g} s", cost)
+    told = _inverted(points, problem.mesh.tets) + other_clock(problem, settings.frame_time)
+    return Outcome("converged", f"{last - first} frame numbers of {steps} steps of {time_step:.3g} s{told}", cost)
+
+
+def _too_many(steps: float, settings: Settings, network: Network) -> str:
+    """Why nothing was begun: what makes so many ``steps`` of a frame number."""
+    if settings.time_step is not None:
+        return f"{steps:.3g} steps in a frame number, at most {_MOST_STEPS}; a longer time_step may help"
+    what = f"a stiffness of {network.stiffness:.3g} N/mm and a damping of {network.damping:.3g} N s/mm"
+    helps = "a lower stiffness, less damping, a greater density or a shorter frame_time may help"
+    return f"{what} want {steps:.3g} steps in a frame number, at most {_MOST_STEPS}; {helps}"
+
+
+def _inverted(points: Floats, tets: Ints) -> str:
+    """How many tetrahedra are inside out in the end, empty if none is."""
+    count = int((tet_volumes(points, tets) <= 0).sum())
+    return f"; {count} of {len(tets)} tetrahedra are inside out at the last frame" if count else ""
 
 
 def _compile(settings: Settings) -> float:
@@ -231,19 +259,3 @@ def _advice(time_step: float, limit: float) -> str:
     if time_step > limit:
         return f"the time step of {time_step:.3g} s is above the stable one of {limit:.3g} s"
     return "a longer frame_time or more damping may help"
-
-
-def _trouble(points: Floats, rest: Floats, held: Ints) -> str:
-    """What is wrong with positions as a whole, empty if nothing is."""
-    lost = np.flatnonzero(~np.isfinite(points).all(axis=1))
-    if len(lost):
-        return f"the position of {len(lost)} points is not a number (point {lost[0]} for one)"
-    wide, at_rest, between = _spread(points), _spread(rest), _spread(points[held])
-    if wide > _LOST * max(at_rest, between):
-        return f"the muscle is spread over {wide:.3g} mm, at rest {at_rest:.3g} mm"
-    return ""
-
-
-def _spread(points: Floats) -> float:
-    """Diagonal of the box around points [mm], 0 without any."""
-    return float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0

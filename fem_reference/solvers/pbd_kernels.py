@@ -153,6 +153,30 @@ def project_distances(points: Floats, inverse_masses: Floats, edges: Ints, rest:
 
 
 @compiled
+def to_segment(p: Vector, start: Vector, end: Vector) -> float:
+    """Distance of a point [mm] from the segment between ``start`` and ``end``, which are apart."""
+    way, off = minus(end, start), minus(p, start)
+    share = min(1.0, max(0.0, dot(off, way) / max(dot(way, way), 1e-300)))
+    return distance(off, times(share, way))[0]
+
+
+@compiled
+def nearest_segments(points: Floats, starts: Floats, ends: Floats, within: float) -> Ints:
+    """The segment (n,) nearest to each of ``points`` (n, 3), the first of those ``within`` [mm] of the least distance.
+
+    Segments go from ``starts`` (k, 3) to ``ends`` (k, 3) [mm].
+    """
+    found, distances = np.zeros(len(points), np.int64), np.empty(len(starts))
+    for n in range(len(points)):
+        for s in range(len(starts)):
+            distances[s] = to_segment(at(points, n), at(starts, s), at(ends, s))
+        least = distances.min()
+        while distances[found[n]] > least + within:
+            found[n] += 1
+    return found
+
+
+@compiled
 def project_volume(points: Floats, inverse_masses: Floats, triangles: Ints, rest: float, stiffness: float) -> None:
     """Move every point along the volume's gradient, towards six times a volume of ``rest`` [mm3]."""
     value, gradient = volume(points, triangles)

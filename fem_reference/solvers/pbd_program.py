@@ -15,7 +15,9 @@ The program (github.com/cervenkam/muscle-deformation-PBD) departs from the repor
   force it cancels
 - collisions: of vertices with voxels (text: section 6.1.1 has triangles), in the bone's frame at rest. What a flood from one
   corner does not reach is inside. Who was inside before goes by the bone's last motion, step after step, even once the bone
-  rests; who comes inside is taken back by steps of a voxel; of two bones the later one wins
+  rests; who comes inside is taken back by steps of a voxel; of two bones the later one wins. Voxels lie along
+  the axes at rest, and one voxel decides where a vertex goes: with the whole scene turned, vertices of the case hip_flexion end
+  up to 57 mm elsewhere (4.5 mm on average; without voxels 1e-8 mm)
 
 Frame number n is the state after iteration n.
 
@@ -45,7 +47,7 @@ from fem_reference.problem import Body, Problem, Setup
 from fem_reference.records import Record
 from fem_reference.runs import Outcome, Sink
 from fem_reference.solvers.pbd import Constraints, along_fibres, carry, follow, held_by
-from fem_reference.solvers.pbd_kernels import distances
+from fem_reference.solvers.pbd_kernels import distances, nearest_segments
 from fem_reference.solvers.program_kernels import (
     angles_of,
     are_inside,
@@ -77,7 +79,7 @@ class Settings(Record):
     sub_iterations: Annotated[int, Field(gt=0)]
     damping: Annotated[float, Field(ge=0, le=1)]
     bending: Annotated[float, Field(ge=0, le=1)]
-    voxels: Annotated[int, Field(gt=0, le=512)] | None = None
+    voxels: Annotated[int, Field(gt=0, le=256)] | None = None
     anisotropy: Annotated[float, Field(ge=0)] | None = None
 
 
@@ -179,7 +181,7 @@ def constraints_of(setup: Setup, settings: Settings) -> Constraints:
 
 def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
     """Iterate from rest at the first of ``setup.frames`` to the last of them; each frame wanted goes into ``sink``."""
-    seconds_compile = _compile()
+    seconds_compile = _compile(settings)
     begin = time.perf_counter()
     constraints, held = constraints_of(setup, settings), held_by(setup)
     count, first = settings.voxels, setup.frames[0]
@@ -216,7 +218,7 @@ def collided(starts: Floats, goals: Floats, bones: Sequence[Bone]) -> Floats:
     return reached
 
 
-def _compile() -> float:
+def _compile(settings: Settings) -> float:
     """Run every compiled function once, on a tetrahedron; seconds."""
     begin = time.perf_counter()
     points = np.vstack([np.zeros(3), np.eye(3)])
@@ -226,4 +228,6 @@ def _compile() -> float:
     inside = Voxels.of(surface, 2).inside
     march_out(inside, points, points)
     are_inside(inside, points)
+    if settings.anisotropy is not None:
+        nearest_segments(points, points, points, 0.0)
     return time.perf_counter() - begin

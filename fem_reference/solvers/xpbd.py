@@ -4,15 +4,17 @@ Macklin, Mueller and Chentanez 2016, "XPBD: position-based simulation of complia
 DOI 10.1145/2994258.2994272; report section 5.5.3 mentions it. The surface is a membrane with mass around an interior that
 resists change of volume. Position based dynamics, with the same constraints, gets stiffer with every sweep and every step;
 here a sweep too few is too soft, enough of them make an implicit Euler step, and what comes to rest depends on the time step
-only as far as directions change within one: all this vanishes where ``sqrt(k / m) dt`` of the stiffest edges is below 1.
+only as far as directions change within one. All this holds where the sweeps resolve a step: ``sqrt(k / m) dt`` of the stiffest
+edges below about 1, or more sweeps. Where it is 3, as in the settings of the table of families (1.1 for half of the edges, one
+sweep), twice the sub-steps move the case hip_flexion by up to 1.6 mm, 0.7 mm on average, where it has moved by 53 mm.
 
-Frame number n is the state after iteration n, ``interval`` after the one before; meanwhile bones move steadily.
+Frame number n is the state after iteration n, ``frame_time`` after the one before; meanwhile bones move steadily.
 """
 
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -51,15 +53,16 @@ class Collision(Record):
 class Settings(Record):
     """How the method is run, and what the muscle is like; every key is required but those that turn an effect on.
 
-    ``interval`` [s]: from a frame number to the next. ``sub_steps``: time steps in it. ``sweeps``: over all constraints in each
-    time step. ``density`` [t/mm3]: of the enclosed body, whose mass the vertices share as they share its surface.
+    ``frame_time`` [s]: the solver's own time from a frame number to the next; the scene's interval is the clock of what the
+    reference and recorded sequences do in time. ``sub_steps``: time steps in it. ``sweeps``: over all constraints in each time
+    step. ``density`` [t/mm3]: of the enclosed body, whose mass the vertices share as they share its surface.
 
     ``stretch`` [N/mm]: Young's modulus times thickness of the membrane. ``bending`` [N mm]: its stiffness as a plate. ``volume``
     [MPa]: bulk modulus of what it encloses. ``damping`` [1/s]: rate at which velocities decay that nothing keeps up.
     ``collision``: bones push.
     """
 
-    interval: Time
+    frame_time: Time
     sub_steps: Annotated[int, Field(gt=0)]
     sweeps: Annotated[int, Field(gt=0)]
     density: Density
@@ -198,7 +201,7 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
     begin = time.perf_counter()
     constraints = Constraints.at_rest(setup.surface, held_by(setup), settings)
     contacts = _contacts(setup, settings)
-    step = Step(settings.interval / settings.sub_steps, settings.sweeps, settings.damping or 0.0)
+    step = Step(settings.frame_time / settings.sub_steps, settings.sweeps, settings.damping or 0.0)
     cost = {"seconds_compile": seconds_compile, "seconds_setup": time.perf_counter() - begin}
 
     def iterate(points: Floats, velocities: Floats, frame: int) -> tuple[Floats, Floats]:
@@ -210,7 +213,15 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
             points, velocities = advance(points, velocities, constraints, step, contacts)
         return points, velocities
 
-    return follow(setup, iterate, sink, cost)
+    outcome = follow(setup, iterate, sink, cost)
+    return replace(outcome, message=outcome.message + other_clock(setup, settings.frame_time))
+
+
+def other_clock(setup: Setup, frame_time: float) -> str:
+    """What is to be said where the scene has an interval [s] other than a solver's ``frame_time`` [s]; empty where it has not."""
+    if setup.interval is None or math.isclose(setup.interval, frame_time):
+        return ""
+    return f"; from a frame number to the next it takes {frame_time:g} s, the scene {setup.interval:g} s"
 
 
 def _contacts(setup: Setup, settings: Settings) -> list[Contact]:
