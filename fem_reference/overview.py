@@ -22,6 +22,17 @@ from fem_reference.scene import Scene
 from fem_reference.standings import Table
 from fem_reference.study import ErrorBar
 
+# The statistics that are printed of a comparison; the page, JSON and CSV have them all.
+TOLD = (
+    ("volume", "deviation"),
+    ("fibre_length", "max"),
+    ("surface_deviation", "rms"),
+    ("surface_deviation", "p95"),
+    ("surface_deviation", "max"),
+    ("surface_deviation", "hausdorff"),
+    ("penetration", "deepest"),
+)
+
 
 def scene_facts(scene: Scene, setup: Setup) -> dict[str, Any]:
     """Everything that a person asks of a case before solving it, as words and numbers by name."""
@@ -181,13 +192,27 @@ def comparison_text(result: Comparison, page: Path) -> str:
         + ("" if verdict.error_bar is None else f", known to {verdict.error_bar:.2g}")
         for verdict in result.verdicts
     ]
-    worst = [
-        f"{name}: {measure.metric} {measure.statistic} up to {measure.values[measure.worst]:.4g} {measure.unit}"
-        f" at frame {result.reference.numbers[measure.worst]}"
-        for name, measures in result.deviations.items()
-        for measure in measures
-    ]
-    return "\n".join([*runs, *_known(result), *worst, *judged, f"verdict: {result.word}", f"page: {page}"])
+    asked = {verdict.expectation.of for verdict in result.verdicts}
+    unjudged = result.candidates and asked <= {"reference"}
+    verdict = f"verdict: {result.word}" + (
+        ", of the reference; candidates are measured, not judged" if unjudged else ""
+    )
+    return "\n".join([*runs, *_known(result), *_worst(result), *judged, verdict, f"page: {page}"])
+
+
+def _worst(result: Comparison) -> list[str]:
+    """A line a candidate: how far it is off where it is worst, in the statistics of the page's first table."""
+    lines = []
+    for name, measures in result.deviations.items():
+        found = {(measure.metric, measure.statistic): measure for measure in measures}
+        told = [
+            f"{' '.join(key).replace('_', ' ')} {measure.values[measure.worst]:.4g} {measure.unit}"
+            f" (frame {result.reference.numbers[measure.worst]})"
+            for key in TOLD
+            if (measure := found.get(key)) is not None
+        ]
+        lines.append(f"{name} at its worst: {', '.join(told)}")
+    return lines
 
 
 def _known(result: Comparison) -> list[str]:

@@ -130,7 +130,7 @@ def test_a_scene_that_is_not_there_is_left_out_and_told(case, capsys) -> None:
         (["--candidate", "CASE="], '--candidate: got "", want a folder of frames'),
         (["--candidate", "CASE=pbd"], '--candidate: got "pbd", want a folder of frames'),
         (["--candidate", "CASE=TWICE", "--candidate", "CASE=TWICE"], '--candidate: got "twice" twice, want'),
-        (["--candidate", "CASE=reference"], '--candidate: got "reference" twice, want'),
+        (["--candidate", "CASE=reference"], '--candidate: got "reference", want another name'),
     ],
 )
 def test_a_foreign_solver_that_cannot_stand_is_bad_input(case, words, place, capsys, monkeypatch) -> None:

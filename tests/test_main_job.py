@@ -233,10 +233,10 @@ def test_unknown_candidate(job, capsys) -> None:
 
 
 def test_names_of_candidates_are_used_once(job, tmp_path, capsys) -> None:
-    for name in ("pbd", "reference"):
+    for name, got in (("pbd", '"pbd" twice'), ("reference", '"reference", want another name')):
         folder = job.frames(tmp_path / name)
         assert job.call("compare", str(job.case), "--candidate", "pbd", "--candidate", str(folder))[0] == cli.BAD_INPUT
-        assert f'--candidate: got "{name}" twice' in capsys.readouterr().err
+        assert f"--candidate: got {got}" in capsys.readouterr().err
 
 
 def test_another_solver_can_run_the_case(job) -> None:

@@ -53,9 +53,10 @@ def recorded_in(text: str, unit: str | None) -> Candidate:
 def check_names(names: list[str]) -> None:
     """InputError where two candidates have one name, or one has that of the reference."""
     for name in names:
-        if [*names, "reference"].count(name) > 1:
-            want = 'folders and candidates of different names, none of them "reference"'
-            raise InputError("--candidate", f'"{name}" twice', want)
+        if name == "reference":
+            raise InputError("--candidate", '"reference"', "another name: this is what candidates are measured against")
+        if names.count(name) > 1:
+            raise InputError("--candidate", f'"{name}" twice', "folders and candidates of different names")
 
 
 def checked_bench(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> Bench:

@@ -144,6 +144,10 @@ def _sentence(comparison: Comparison) -> str:
     over = f"over {len(numbers)} frames ({numbers[0]} to {numbers[-1]})"
     told = [verdict.word for verdict in comparison.verdicts]
     judged = f"{told.count('pass')} of {len(told)} expectations met"
+    if names and all(verdict.expectation.of == "reference" for verdict in comparison.verdicts):
+        solver = comparison.reference.solver
+        what = f"{listed(names)} compared with the reference computed by {solver}, {over}"
+        return f"{what}. The verdict is on the reference ({judged}): what candidates do is measured, not judged."
     unjudged = [name for name in names if all(verdict.expectation.of != name for verdict in comparison.verdicts)]
     those = "a candidate" if len(unjudged) == len(names) else listed(unjudged)
     judged += f"; none concerns {those}: measured, not judged." if unjudged else "."

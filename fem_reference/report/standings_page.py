@@ -9,7 +9,7 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from fem_reference.report.curves import LOOK, PALETTE, REFERENCE, Curve, inline
 from fem_reference.report.tables import finite
@@ -100,7 +100,7 @@ def _drawing(table: Table) -> Curve:
             look: dict[str, Any] = {"markerfacecolor": "white"} if one.of_reference else {}
             mark = _MARKS[[scenario.case for scenario in table.scenarios].index(one.case) % len(_MARKS)]
             axes.plot([x], [y], mark, color=colours[_label_of(one)], markersize=7, alpha=0.85, **look)
-        _label(axes, table, [name for name in colours if any(_label_of(one) == name for one in shown)])
+        _label(figure, axes, table, [name for name in colours if any(_label_of(one) == name for one in shown)])
         text = io.StringIO()
         figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
     return Curve(title, inline(text.getvalue(), "standings", title))
@@ -125,11 +125,12 @@ def _place(one: Standing) -> tuple[float, float] | None:
     return 1000 * one.seconds_per_frame, worst[0]
 
 
-def _label(axes: Axes, table: Table, names: list[str]) -> None:
+def _label(figure: Figure, axes: Axes, table: Table, names: list[str]) -> None:
     """Axes in the words of the table; a legend of colours and one of marks."""
     axes.set_xscale("log")
     axes.set_yscale("log")
     for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
         axis.set_minor_formatter(NullFormatter())
     axes.set_xlabel("time for a frame, ms")
@@ -138,6 +139,4 @@ def _label(axes: Axes, table: Table, names: list[str]) -> None:
     hues = [axes.plot([], [], "o", color=colours[name], label=name)[0] for name in names]
     cases = [one.case for one in table.scenarios]
     marks = [axes.plot([], [], _MARKS[i % len(_MARKS)], color="#777777", label=case)[0] for i, case in enumerate(cases)]
-    first = axes.legend(handles=hues, loc="upper left", bbox_to_anchor=(1.01, 1.0))
-    axes.add_artist(first)
-    axes.legend(handles=marks, loc="lower left", bbox_to_anchor=(1.01, 0.0))
+    figure.legend(handles=[*hues, *marks], loc="outside right upper")
