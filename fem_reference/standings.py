@@ -97,12 +97,15 @@ class Scenario:
 
 @dataclass(frozen=True)
 class Overall:
-    """A solver's worst frames over ``count`` scenarios: the ``median`` of magnitudes, the ``worst`` and its ``case``."""
+    """A solver's worst frames over scenarios: the ``median`` of magnitudes over the ``count`` where every frame has a number, the
+    ``worst`` of these and its ``case``, and the cases on which it was ``lost``.
+    """
 
     median: float
     worst: float
     case: str
     count: int
+    lost: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,10 +136,12 @@ class Table:
             for one in self.standings
             if (one.family, one.name) == (family, name) and (value := one.worst(metric, statistic)) is not None
         ]
-        if not found:
-            return None
-        worst, case = max(found, key=lambda entry: np.inf if np.isnan(entry[0]) else abs(entry[0]))
-        return Overall(float(np.median([abs(value) for value, _ in found])), worst, case, len(found))
+        told = [(value, case) for value, case in found if not np.isnan(value)]
+        lost = tuple(case for value, case in found if np.isnan(value))
+        if not told:
+            return Overall(np.nan, np.nan, "", 0, lost) if lost else None
+        worst, case = max(told, key=lambda entry: abs(entry[0]))
+        return Overall(float(np.median([abs(value) for value, _ in told])), worst, case, len(told), lost)
 
     def speed(self, family: str, name: str) -> tuple[Scenario, float] | None:
         """The scenario of the most triangles on which the time for a frame [s] of ``name`` is known, and that time."""

@@ -167,12 +167,13 @@ def test_what_is_worst_over_frames_and_scenes() -> None:
     assert overall == Overall(median=(7.0 + 2.5) / 2, worst=-7.0, case="case0", count=2)
     assert made.over("PBD", "nobody", "surface_deviation", "rms_percent") is None
     assert made.speed("PBD", "pbd") == (made.scenarios[1], 0.5)  # that with more triangles
-    # A frame that was not reached is worse than any that was.
+    # A scene that was not come through is told, and does not hide behind the others, nor they behind it.
     lost = table(standing("case0", 1.0, math.nan), standing("case1", 99.0))
     overall = lost.over("PBD", "pbd", "surface_deviation", "rms_percent")
-    assert math.isnan(overall.median)
-    assert math.isnan(overall.worst)
-    assert overall.case == "case0"
+    assert overall == Overall(99.0, 99.0, "case1", 1, ("case0",))
+    assert "failed on case0" in standings_page.render(lost)
+    nowhere = table(standing("case0", math.nan)).over("PBD", "pbd", "surface_deviation", "rms_percent")
+    assert (nowhere.count, nowhere.lost) == (0, ("case0",))
 
 
 def test_what_is_not_a_number_stands_on_the_page_and_not_in_the_drawing() -> None:
