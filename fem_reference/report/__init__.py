@@ -25,9 +25,7 @@ def write(comparison: Comparison, folder: Path) -> Path:
         "measures.csv": as_csv(numbers["measures"]),
         "report.html": page.render(comparison),
     }
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, text in texts.items():
-        files.write_text(folder / name, text)
+    _write(texts, folder)
     return folder / "report.html"
 
 
@@ -44,9 +42,7 @@ def write_verification(verification: Verification, folder: Path, name: str) -> P
         f"{name}.json": json.dumps(verify_page.facts(verification), indent=1, allow_nan=False),
         f"{name}.html": verify_page.render(verification),
     }
-    folder.mkdir(parents=True, exist_ok=True)
-    for file, text in texts.items():
-        files.write_text(folder / file, text)
+    _write(texts, folder)
     return folder / f"{name}.html"
 
 
@@ -56,7 +52,12 @@ def write_standings(table: Table, folder: Path, name: str) -> Path:
         f"{name}.json": json.dumps(standings_page.facts(table), indent=1, allow_nan=False),
         f"{name}.html": standings_page.render(table),
     }
-    folder.mkdir(parents=True, exist_ok=True)
-    for file, text in texts.items():
-        files.write_text(folder / file, text)
+    _write(texts, folder)
     return folder / f"{name}.html"
+
+
+def _write(texts: dict[str, str], folder: Path) -> None:
+    """Write each text into ``folder`` under its name."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in texts.items():
+        files.write_text(folder / name, text)
