@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from fem_reference.errors import InputError
 from fem_reference.judge import Verdict, Word, overall, verdict
 from fem_reference.mesh import Floats
-from fem_reference.metrics import Measure, Yardstick, at_rest, measure
+from fem_reference.metrics import Measure, Yardstick, at_rest, find, measure
 from fem_reference.metrics.fibre_length import extension_error
 from fem_reference.problem import Setup
 from fem_reference.records import join
@@ -80,8 +80,7 @@ def _check_expected(scene: Scene, measured: dict[str, tuple[Measure, ...]]) -> N
 
 def _is_measured(expectation: Expectation, measures: tuple[Measure, ...]) -> bool:
     """Whether what is expected is among ``measures``: of a run without a surface much is not."""
-    wanted = (expectation.metric, expectation.statistic)
-    return any((measure.metric, measure.statistic) == wanted for measure in measures)
+    return find(measures, expectation.metric, expectation.statistic) is not None
 
 
 def _bars(error_bars: ErrorBars | None, expectation: Expectation) -> Floats | None:

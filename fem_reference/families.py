@@ -9,6 +9,7 @@ from fem_reference import refinement
 from fem_reference.errors import InputError
 from fem_reference.execution import Bench, complete, versions
 from fem_reference.metrics import Measure, Yardstick, measure
+from fem_reference.report.tables import seconds_per_frame
 from fem_reference.runs import Run
 from fem_reference.scene import Candidate, Scene
 from fem_reference.standings import Family, Scenario, Standing, Table, families
@@ -88,10 +89,9 @@ def _on(bench: Bench, rows: Iterable[Family], foreign: list[Run]) -> tuple[Scena
 
 
 def _standing(scene: Scene, family: str, run: Run, measures: tuple[Measure, ...]) -> Standing:
-    of_reference = family == REFERENCE
     return Standing(
         family,
-        "reference" if of_reference else run.name,
+        run.name,
         run.solver,
         scene.name,
         run.outcome,
@@ -99,19 +99,16 @@ def _standing(scene: Scene, family: str, run: Run, measures: tuple[Measure, ...]
         measures,
         run.numbers,
         str(run.origin["machine"]),
-        of_reference,
+        of_reference=family == REFERENCE,
     )
 
 
 def _seconds_per_frame(run: Run) -> float | None:
     """Time [s] for a frame number of a solver that makes one for each, so says ``candidate.toml``; else for a frame wanted."""
-    cost = run.outcome.cost
-    if "seconds_per_iteration" in cost:
-        return cost["seconds_per_iteration"]
-    if "seconds_per_frame" in cost:
-        return cost["seconds_per_frame"]
-    solved = len(run.numbers) - 1
-    return cost["seconds_solve"] / solved if "seconds_solve" in cost and solved else None
+    for key in ("seconds_per_iteration", "seconds_per_frame"):
+        if key in run.outcome.cost:
+            return run.outcome.cost[key]
+    return seconds_per_frame(run)
 
 
 def _known(bars: ErrorBars | None) -> tuple[Measure, ...]:

@@ -14,6 +14,7 @@ from fem_reference.field.scene import FieldScene
 from fem_reference.geometry.sectors import held_area, held_shares
 from fem_reference.judge import overall
 from fem_reference.mesh import Surface, enclosed_volume
+from fem_reference.metrics import find
 from fem_reference.motion import RigidMotion, Translation
 from fem_reference.problem import Body, Held, Setup
 from fem_reference.report.words import exact
@@ -204,12 +205,11 @@ def _worst(result: Comparison) -> list[str]:
     """A line a candidate: how far it is off where it is worst, in the statistics of the page's first table."""
     lines = []
     for name, measures in result.deviations.items():
-        found = {(measure.metric, measure.statistic): measure for measure in measures}
         told = [
             f"{' '.join(key).replace('_', ' ')} {measure.values[measure.worst]:.4g} {measure.unit}"
             f" (frame {result.reference.numbers[measure.worst]})"
             for key in TOLD
-            if (measure := found.get(key)) is not None
+            if (measure := find(measures, *key)) is not None
         ]
         lines.append(f"{name} at its worst: {', '.join(told)}")
     return lines

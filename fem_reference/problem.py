@@ -107,11 +107,16 @@ class Setup:
     interval: float | None
 
     @cached_property
+    def held_vertices(self) -> Ints:
+        """The vertices (k,) of the surface that bones hold, attachment by attachment."""
+        return np.concatenate([np.zeros(0, np.int64), *(entry.vertices for entry in self.held)])
+
+    @cached_property
     def free(self) -> NDArray[np.bool_]:
         """Which vertices (n,) of the surface bones may push on: those that none holds, nor any of their neighbours."""
         triangles = self.surface.triangles
         held = np.zeros(len(self.surface.points), bool)
-        held[np.concatenate([np.zeros(0, np.int64), *(entry.vertices for entry in self.held)])] = True
+        held[self.held_vertices] = True
         free = ~held
         free[triangles[held[triangles].any(axis=1)]] = False
         return free

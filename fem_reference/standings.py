@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from pydantic import Field
 
-from fem_reference.metrics import Measure
+from fem_reference.metrics import Measure, find
 from fem_reference.records import Record, parse
 from fem_reference.runs import Outcome
 from fem_reference.scene import Candidate
@@ -76,10 +76,8 @@ class Standing:
 
     def worst(self, metric: str, statistic: str) -> tuple[float, int] | None:
         """The value of the greatest magnitude over the frames, not-a-number where one frame is, and its frame; None without."""
-        for measure in self.measures:
-            if (measure.metric, measure.statistic) == (metric, statistic):
-                return float(measure.values[measure.worst]), self.numbers[measure.worst]
-        return None
+        found = find(self.measures, metric, statistic)
+        return None if found is None else (float(found.values[found.worst]), self.numbers[found.worst])
 
 
 @dataclass(frozen=True, eq=False)

@@ -167,7 +167,7 @@ def ball_against(last, back=None):
 
 def deepest(setup, frames):
     """How deep a vertex that nothing holds gets below the surface of a bone, over all frames [mm]."""
-    loose = np.setdiff1d(np.arange(len(setup.surface.points)), pbd.held_by(setup))
+    loose = np.setdiff1d(np.arange(len(setup.surface.points)), setup.held_vertices)
     return max(
         -bone.shape.sample(apply(np.linalg.inv(bone.pose(number)), points[loose])).distance.min()
         for number, points in frames.items()

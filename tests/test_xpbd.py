@@ -303,7 +303,7 @@ def test_the_state_in_the_end_knows_neither_steps_nor_sweeps():
     # Measured: apart by 0.002 mm where the muscle moved by 3 mm; 1 % is allowed.
     soft = {"volume": "100 kPa", "collision": None, "damping": "60 1/s", "density": "100000 kg/m3"}
     setup = muscle(Translation((0, 0, 1), (0.0, 20.0), (0.0, 3.0)), last=60)
-    loose = np.setdiff1d(np.arange(len(setup.surface.points)), pbd.held_by(setup))
+    loose = np.setdiff1d(np.arange(len(setup.surface.points)), setup.held_vertices)
     ends = [
         run(setup, sub_steps=steps, sweeps=sweeps, **soft)[1][60][loose] for steps, sweeps in ((4, 8), (8, 8), (4, 16))
     ]
@@ -316,7 +316,7 @@ def test_the_state_in_the_end_knows_neither_steps_nor_sweeps():
 def test_bones_push():
     ball = Body("ball", icosahedron(), Translation((-1, 0, 0), (0.0, 20.0), (0.0, 12.0)), solid=Sphere((20, 0, 0), 8.0))
     setup = muscle(None, last=20, ball=ball)
-    loose = np.setdiff1d(np.arange(len(setup.surface.points)), pbd.held_by(setup))
+    loose = np.setdiff1d(np.arange(len(setup.surface.points)), setup.held_vertices)
     depths = []
     for collision in (USUAL["collision"], None):
         _, frames = run(setup, collision=collision)

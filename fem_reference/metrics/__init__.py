@@ -96,6 +96,11 @@ def measure(run: Run, reference: Run, yardstick: Yardstick, wanted: Iterable[str
     return tuple(statistic for module in modules for statistic in module.measure(run, reference, yardstick))
 
 
+def find(measures: Iterable[Measure], metric: str, statistic: str) -> Measure | None:
+    """The measure of that name, None where it was not taken."""
+    return next((found for found in measures if (found.metric, found.statistic) == (metric, statistic)), None)
+
+
 def at_rest(run: Run) -> Run:
     """The rest state of ``run``, fibres too, repeated over its frames: against it, a run tells its change from rest."""
     frames = len(run.numbers)

@@ -15,8 +15,8 @@ from matplotlib.ticker import MaxNLocator
 
 from fem_reference.comparison import Comparison
 from fem_reference.mesh import Floats
-from fem_reference.metrics import Measure
-from fem_reference.report.tables import find, inversion, runs
+from fem_reference.metrics import Measure, find
+from fem_reference.report.tables import inversion, runs
 from fem_reference.report.words import words
 from fem_reference.study import Of
 

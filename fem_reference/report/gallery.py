@@ -15,9 +15,9 @@ from fem_reference.children import command, environment
 from fem_reference.comparison import Comparison
 from fem_reference.errors import MissingSoftware
 from fem_reference.mesh import Floats, Surface
+from fem_reference.metrics import find
 from fem_reference.problem import Body, Setup
 from fem_reference.report import pictures
-from fem_reference.report.tables import find
 from fem_reference.runs import Run
 
 log = logging.getLogger(__name__)

@@ -16,10 +16,10 @@ from matplotlib.colors import to_hex
 from fem_reference import casefile
 from fem_reference.comparison import Comparison
 from fem_reference.errors import InputError, MissingSoftware
-from fem_reference.metrics import Measure
+from fem_reference.metrics import Measure, find
 from fem_reference.report import gallery, pictures
 from fem_reference.report.curves import curves, label_of
-from fem_reference.report.tables import find, inversion, known, runs, seconds_per_frame
+from fem_reference.report.tables import inversion, known, runs, seconds_per_frame
 from fem_reference.report.templates import template
 from fem_reference.report.viewer import view
 from fem_reference.report.words import listed, ratio, words

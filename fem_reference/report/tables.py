@@ -64,11 +64,6 @@ def finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def find(measures: Iterable[Measure], metric: str, statistic: str) -> Measure | None:
-    """The measure of that name, None where it was not taken."""
-    return next((found for found in measures if (found.metric, found.statistic) == (metric, statistic)), None)
-
-
 def known(comparison: Comparison) -> tuple[ErrorBar, ...]:
     """The error bars of the reference, none where nobody asked."""
     return () if comparison.error_bars is None else comparison.error_bars.bars

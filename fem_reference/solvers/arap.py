@@ -23,7 +23,7 @@ from fem_reference.problem import Setup
 from fem_reference.records import Record
 from fem_reference.runs import Frame, Outcome, Sink
 from fem_reference.solvers import arap_kernels
-from fem_reference.solvers.pbd import carry, held_by
+from fem_reference.solvers.pbd import carry
 from fem_reference.soundness import Trouble, trouble
 from fem_reference.units import PositiveLength
 
@@ -151,7 +151,7 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
     """Iterate through every frame number from the first of ``setup.frames``, at rest, to the last."""
     cost = {"seconds_compile": compile_kernels()}
     begin = time.perf_counter()
-    system = System.of(Cells.of(setup.surface, settings.weights), held_by(setup), settings.fixed)
+    system = System.of(Cells.of(setup.surface, settings.weights), setup.held_vertices, settings.fixed)
     cost["seconds_setup"] = time.perf_counter() - begin
     triangles, volume = setup.surface.triangles, enclosed_volume(setup.surface.points, setup.surface.triangles)
 

@@ -19,7 +19,7 @@ from fem_reference.problem import Setup
 from fem_reference.records import Record
 from fem_reference.runs import Outcome, Sink
 from fem_reference.solvers.arap import Cells, Relaxed, Symmetric, System, compile_kernels, farthest, march
-from fem_reference.solvers.pbd import Constraints, Stiffness, held_by
+from fem_reference.solvers.pbd import Constraints, Stiffness
 from fem_reference.solvers.pbd_kernels import project_dihedrals, project_distances, project_volume, volume
 from fem_reference.soundness import Trouble
 from fem_reference.units import PositiveLength
@@ -66,7 +66,7 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
     """Iterate through every frame number from the first of ``setup.frames``, at rest, to the last."""
     cost = {"seconds_compile": compile_kernels() + _compile_projections()}
     begin = time.perf_counter()
-    system = System.of(Cells.of(setup.surface, settings.weights), held_by(setup), "remove")
+    system = System.of(Cells.of(setup.surface, settings.weights), setup.held_vertices, "remove")
     rest = Constraints.at_rest(setup.surface.points, setup.surface.triangles, system.held)
     cost["seconds_setup"] = time.perf_counter() - begin
 

@@ -156,22 +156,17 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
 def _constraints(setup: Setup, settings: Settings) -> Constraints:
     """Those of the surface at rest, with the stiffness that fibres leave to its edges."""
     surface = setup.surface
-    found = Constraints.at_rest(surface.points, surface.triangles, held_by(setup))
+    found = Constraints.at_rest(surface.points, surface.triangles, setup.held_vertices)
     if settings.anisotropy is None:
         return found
     assert isinstance(setup, Problem)  # what a scene is solved from; it has fibres
     return replace(found, share=1 - settings.anisotropy * along_fibres(surface.points, found.edges, setup.fibres))
 
 
-def held_by(setup: Setup) -> Ints:
-    """The vertices (k,) that bones hold."""
-    return np.concatenate([np.zeros(0, np.int64), *(entry.vertices for entry in setup.held)])
-
-
 def obstacles_of(setup: Setup, gap: float) -> list[Obstacle]:
     """All bones, as they push what none of them holds."""
     loose = np.ones(len(setup.surface.points), bool)
-    loose[held_by(setup)] = False
+    loose[setup.held_vertices] = False
     return [Obstacle(bone, setup.surface.points, loose, gap) for bone in setup.bones]
 
 
@@ -198,7 +193,7 @@ def advance(
 
 def follow(setup: Setup, iterate: Iterate, sink: Sink, cost: dict[str, float]) -> Outcome:
     """Iterate from rest at the first of ``setup.frames`` to the last, into ``sink``; what that costs is added to ``cost``."""
-    points, held, (first, *_, last) = np.array(setup.surface.points), held_by(setup), setup.frames
+    points, held, (first, *_, last) = np.array(setup.surface.points), setup.held_vertices, setup.frames
     kept = np.zeros(points.shape)
     sink(Frame(first, points.copy()))
     cost |= {"seconds_solve": 0.0, "iterations": 0, "threads": 1}

@@ -46,7 +46,7 @@ from fem_reference.motion import apply
 from fem_reference.problem import Body, Problem, Setup
 from fem_reference.records import Record
 from fem_reference.runs import Outcome, Sink
-from fem_reference.solvers.pbd import Constraints, along_fibres, carry, follow, held_by
+from fem_reference.solvers.pbd import Constraints, along_fibres, carry, follow
 from fem_reference.solvers.pbd_kernels import distances, nearest_segments
 from fem_reference.solvers.program_kernels import (
     angles_of,
@@ -183,7 +183,7 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
     """Iterate from rest at the first of ``setup.frames`` to the last of them; each frame wanted goes into ``sink``."""
     seconds_compile = _compile(settings)
     begin = time.perf_counter()
-    constraints, held = constraints_of(setup, settings), held_by(setup)
+    constraints, held = constraints_of(setup, settings), setup.held_vertices
     count, first = settings.voxels, setup.frames[0]
     bones = [] if count is None else [Bone(body, count, first) for body in setup.bones]
     cost = {"seconds_compile": seconds_compile, "seconds_setup": time.perf_counter() - begin}

@@ -26,7 +26,7 @@ from fem_reference.records import Record
 from fem_reference.runs import Outcome, Sink
 from fem_reference.solvers import collision_kernels
 from fem_reference.solvers.collision_kernels import Obstacle
-from fem_reference.solvers.pbd import carry, follow, held_by, hinges_of, obstacles_of
+from fem_reference.solvers.pbd import carry, follow, hinges_of, obstacles_of
 from fem_reference.solvers.pbd_kernels import dihedrals, distances, volume
 from fem_reference.solvers.xpbd_kernels import pull_dihedrals, pull_distances, pull_volume
 from fem_reference.units import (
@@ -199,7 +199,7 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
     """Iterate from rest at the first of ``setup.frames`` to the last of them; each frame wanted goes into ``sink``."""
     seconds_compile = _compile(settings)
     begin = time.perf_counter()
-    constraints = Constraints.at_rest(setup.surface, held_by(setup), settings)
+    constraints = Constraints.at_rest(setup.surface, setup.held_vertices, settings)
     contacts = _contacts(setup, settings)
     step = Step(settings.frame_time / settings.sub_steps, settings.sweeps, settings.damping or 0.0)
     cost = {"seconds_compile": seconds_compile, "seconds_setup": time.perf_counter() - begin}
