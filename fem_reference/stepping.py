@@ -34,21 +34,31 @@ class Step:
     at: float = 0.0
 
 
+@dataclass(frozen=True)
+class Steps:
+    """The ``first`` load step, and between which sizes they may be, in frame numbers."""
+
+    first: float
+    smallest: float
+    largest: float | None = None
+
+
 def march(
     attempt: Callable[[float], Attempt],
     frames: tuple[float, ...],
-    first_step: float,
-    smallest_step: float,
-    largest_step: float | None = None,
+    steps: Steps,
+    recall: Callable[[float], bool] = lambda _: False,
 ) -> Iterator[Step]:
     """Go from ``frames[0]`` (where the body rests) through every frame; ``attempt`` solves at a load, from the last state that
-    converged, and must leave that state untouched where it fails. No step is above ``largest_step``. Ends after the first frame
-    that cannot be reached.
+    converged, and must leave that state untouched where it fails. A frame whose state ``recall`` can take up from before needs no
+    step. Ends after the first frame that cannot be reached.
     """
-    largest = math.inf if largest_step is None else largest_step
-    at, step = float(frames[0]), min(first_step, largest)
+    largest = math.inf if steps.largest is None else steps.largest
+    at, step = float(frames[0]), min(steps.first, largest)
     for frame in frames[1:]:
-        steps = iterations = cutbacks = 0
+        taken = iterations = cutbacks = 0
+        if recall(frame):
+            at = frame
         while at < frame:
             left = frame - at
             count = max(1, round(left / step + 0.3), math.ceil(left / largest - 1e-9))
@@ -58,11 +68,11 @@ def march(
             if result.failure is not None:
                 cutbacks += 1
                 step = size / 2
-                if step < smallest_step:
-                    yield Step(frame, steps, iterations, cutbacks, result.failure, result.sentence, at)
+                if step < steps.smallest:
+                    yield Step(frame, taken, iterations, cutbacks, result.failure, result.sentence, at)
                     return
                 continue
             at = frame if size == left else at + size
-            steps += 1
+            taken += 1
             step = step * GROWTH if result.iterations <= EASY else size
-        yield Step(frame, steps, iterations, cutbacks, at=at)
+        yield Step(frame, taken, iterations, cutbacks, at=at)

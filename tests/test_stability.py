@@ -122,7 +122,7 @@ def test_it_is_told_where_a_run_is_unstable(session) -> None:
     solved = session.solve(body, BodySettings(element="Q2/Q1", first_step=100.0))
     told = "in 2 of them the equilibrium is unstable, first at frame 2 (negative modes: up to 2)"
     assert solved.outcome.message == f"all 4 frames reached; {told}"
-    assert solved.outcome.cost["factorisations"] == solved.outcome.cost["newton_iterations"]
+    assert solved.outcome.cost["factorisations"] >= len(solved.states)
     assert solved.outcome.cost["seconds_stability"] > 0
 
 

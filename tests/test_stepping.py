@@ -2,11 +2,11 @@
 
 from itertools import pairwise
 
-from fem_reference.stepping import Attempt, march
+from fem_reference.stepping import Attempt, Steps, march
 
 
 def marched(attempt, frames=(0, 10, 20), first_step=10.0, smallest_step=0.5):
-    return list(march(attempt, frames, first_step, smallest_step))
+    return list(march(attempt, frames, Steps(first_step, smallest_step)))
 
 
 def test_easy_steps_hit_every_frame_at_once() -> None:
@@ -19,7 +19,7 @@ def test_easy_steps_hit_every_frame_at_once() -> None:
 
 def test_no_step_is_above_the_largest() -> None:
     tried = [0.0]
-    list(march(lambda at: tried.append(at) or Attempt(None, 2), (0, 10, 11), 1.0, 0.5, 3.0))
+    list(march(lambda at: tried.append(at) or Attempt(None, 2), (0, 10, 11), Steps(1.0, 0.5, 3.0)))
     assert max(later - earlier for earlier, later in pairwise(tried)) <= 3
     assert tried[-2:] == [10, 11]
 
@@ -58,3 +58,14 @@ def test_gives_up_below_the_smallest_step_and_says_where() -> None:
     assert (reached[1].status, reached[1].sentence) == ("inverted", "det F")
     assert reached[1].at == 10
     assert len(reached) == 2
+
+
+def test_what_was_solved_before_needs_no_step() -> None:
+    tried = []
+    reached = marched_back(lambda at: tried.append(at) or Attempt(None, 3), known={20, 30})
+    assert tried == [10, 40]
+    assert [(entry.frame, entry.steps) for entry in reached] == [(10, 1), (20, 0), (30, 0), (40, 1)]
+
+
+def marched_back(attempt, known):
+    return list(march(attempt, (0, 10, 20, 30, 40), Steps(10.0, 0.5), lambda frame: frame in known))

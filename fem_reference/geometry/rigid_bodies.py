@@ -5,8 +5,9 @@ nearest part of the surface, curvatures the second derivatives. On ridges, where
 is taken; a curvature that would be infinite (on a sharp edge, at a centre, on an axis) is zero.
 """
 
+import math
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,15 +28,34 @@ class Sampled(NamedTuple):
 
 
 class Obstacle(Protocol):
-    """A rigid body that knows how far away it is."""
+    """A rigid body that knows how far away it is: up to ``reach`` [mm]; a distance changes by at most ``steepest`` times how far
+    one goes.
+    """
+
+    @property
+    def reach(self) -> float:
+        """A point that is farther away [mm] is known to be at least so far away."""
+        ...
+
+    @property
+    def steepest(self) -> float:
+        """A bound of the length of the gradient."""
+        ...
 
     def sample(self, points: Floats) -> Sampled:
         """Distance and its two derivatives at ``points`` (n, 3) [mm] of the body's rest frame; NaN for NaN."""
         ...
 
 
+class Exact:
+    """What bodies of closed form have in common: their distance is known everywhere, and is one."""
+
+    reach: ClassVar[float] = math.inf
+    steepest: ClassVar[float] = 1.0
+
+
 @dataclass(frozen=True)
-class HalfSpace:
+class HalfSpace(Exact):
     """All that lies behind the plane through ``point`` [mm] across ``normal``, of any length, which points out of it."""
 
     point: Vector
@@ -52,7 +72,7 @@ class HalfSpace:
 
 
 @dataclass(frozen=True)
-class Sphere:
+class Sphere(Exact):
     """A ball of ``radius`` [mm] about ``centre`` [mm]."""
 
     centre: Vector
@@ -68,7 +88,7 @@ class Sphere:
 
 
 @dataclass(frozen=True)
-class Capsule:
+class Capsule(Exact):
     """All that is within ``radius`` of the segment from ``start`` to ``end`` [mm]."""
 
     start: Vector
@@ -90,7 +110,7 @@ class Capsule:
 
 
 @dataclass(frozen=True)
-class Box:
+class Box(Exact):
     """A box about ``centre`` with edges along the axes, of outer ``size`` [mm], edges and corners of radius ``rounding`` [mm]."""
 
     centre: Vector
@@ -114,7 +134,7 @@ class Box:
 
 
 @dataclass(frozen=True)
-class Cylinder:
+class Cylinder(Exact):
     """A cylinder of ``radius`` [mm] about the segment from ``start`` to ``end`` [mm], with flat ends and sharp rims."""
 
     start: Vector

@@ -6,7 +6,8 @@ Between the nodes stand tricubic B-splines, so that gradient and curvature are c
 import logging
 import math
 import tempfile
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from pathlib import Path
 
 import igl
@@ -56,6 +57,17 @@ class Grid:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "coefficients", read_only(self.coefficients, np.float64))
+
+    @property
+    def reach(self) -> float:
+        """Where the grid ends, and beyond, the surface is at least so far away [mm]."""
+        return self.margin
+
+    @cached_property
+    def steepest(self) -> float:
+        """A bound of the length of the gradient: a spline is along each axis no steeper than its coefficients."""
+        steps = [np.abs(np.diff(self.coefficients, axis=axis)).max() for axis in range(3)]
+        return float(np.linalg.norm(steps)) / self.spacing
 
     def sample(self, points: Floats) -> Sampled:
         """Distance, gradient and curvature at ``points`` (n, 3) [mm]; outside the grid ``FAR`` and zeros, NaN for NaN."""
@@ -167,7 +179,7 @@ def _write(path: Path, grid: Grid) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=path.parent, prefix=".") as folder:
         part = Path(folder) / path.name
-        np.savez(part, allow_pickle=False, **vars(grid))
+        np.savez(part, allow_pickle=False, **{entry.name: getattr(grid, entry.name) for entry in fields(grid)})
         part.replace(path)
 
 

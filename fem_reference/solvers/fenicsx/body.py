@@ -3,27 +3,30 @@
 Every method is collective: all ranks call it and, where it returns a value, get the same one.
 """
 
+from functools import cached_property
 from typing import Any
 
 import basix.ufl
 import numpy as np
 import ufl
-from dolfinx import fem, la, mesh
-from dolfinx.fem.petsc import NonlinearProblem
+from dolfinx import fem, mesh
 from mpi4py import MPI
+from petsc4py import PETSc
 
 from fem_reference.continuum import ELEMENTS, Continuum
 from fem_reference.mesh import Floats, Ints
-from fem_reference.solvers.fenicsx import compiling, forms, meshes, pushed_points
+from fem_reference.solvers.fenicsx import compiling, forms, linear, meshes, pushed_points
 from fem_reference.solvers.fenicsx.clock import Clock
-from fem_reference.solvers.fenicsx.contact import Pushes, Watched
+from fem_reference.solvers.fenicsx.contact import Pushes
 from fem_reference.solvers.fenicsx.determinants import Determinants
 from fem_reference.solvers.fenicsx.holds import Hold
+from fem_reference.solvers.fenicsx.known import Known, State
+from fem_reference.solvers.fenicsx.newton import Newton
 from fem_reference.solvers.fenicsx.settings import BodySettings
+from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.stability import Stability, has_energy
+from fem_reference.solvers.fenicsx.system import System
 from fem_reference.stepping import Attempt
-
-_NOT_A_NUMBER = -4  # how PETSc's SNES ends there; the name of the constant depends on its version
 
 
 class Body:
@@ -45,19 +48,23 @@ class Body:
         self.clock = Clock(body, form.before, form.rate)
         self.volume_form, self.energy_form = compiling.form(form.volume), compiling.form(form.energy)
         self.rest_volume = self.integral(self.volume_form)
-        self.internal = compiling.form(form.residual)
         self.held = [Hold(self.unknowns, entry, form.regions[entry.on]) for entry in body.prescribed]
         self.determinants = Determinants(self.mesh, self.cells, form.determinant, form.rule[0], body.mesh.kind)
-        springs = sum((hold.springs(form.measure(hold.entry.on)) for hold in self.held), 0)
-        slope = ufl.derivative(springs, self.unknowns) if springs else 0
+        self.spent = Spent()
+        self.system = System(form, self.unknowns, settings.element, self.held, self.spent)
         symmetric = has_energy(body)
-        self.newton = self._newton(form.residual + springs, form.tangent + slope, settings, symmetric)
-        self.stability = Stability(self.newton, self.unknowns) if symmetric else None
-        self.contact = self._contact(body, form) if body.contact else None
+        self.system.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)  # type: ignore[arg-type]  # as its stubs have it
+        self.linear = linear.make(self.system.matrix, symmetric, settings, self.spent)
+        self.newton = Newton(self.system, self.linear, self.determinants, settings, self.spent)
+        self.stability = Stability(self.system, self.linear, self.unknowns) if symmetric else None
+        self.contact = self.system.contact = self._contact(body, form) if body.contact else None
+        self.system.balance_units()
+        self.known = Known(self.comm)
+        self.recalled: State | None = None
         self.nodes = meshes.Nodes(body.mesh, self.cells, ufl.split(self.unknowns)[0])
 
-    def _contact(self, body: Continuum, form: forms.Form) -> Watched:
-        """What obstructions do, added to Newton's method."""
+    def _contact(self, body: Continuum, form: forms.Form) -> Pushes:
+        """What obstructions do."""
         law, space, parents = body.contact, self.displacement_space, np.ravel(self.displacement_dofs)
         assert law is not None  # asked for only where it is there
         if isinstance(law.on, str):
@@ -65,38 +72,7 @@ class Body:
             points = pushed_points.on_facets(space, parents, body.mesh, facets, form.degree)
         else:
             points = pushed_points.on_skin(space, parents, law.on, self.local)
-        pushes = Pushes(law, body.obstructions, points, self.unknowns, body.frames[0])
-        return Watched(self.newton, pushes, self._conditions)
-
-    @property
-    def _conditions(self) -> list[Any]:
-        return [condition for hold in self.held for condition in hold.conditions]
-
-    def _newton(self, equations: Any, tangent: Any, settings: BodySettings, symmetric: bool) -> NonlinearProblem:
-        """Newton's method, each step whole and by a sparse factorisation (MUMPS): LDL^T of a symmetric tangent, else LU.
-
-        A line search would weigh out-of-balance forces [N] against volumes [mm3]: it stalls where bodies bend or are soft.
-        """
-        options = {
-            "snes_type": "newtonls",
-            "snes_linesearch_type": "basic",
-            "snes_atol": settings.residual,
-            "snes_rtol": 0.0,
-            "snes_stol": 0.0,
-            "snes_max_it": settings.newton_iterations,
-            "ksp_type": "preonly",
-            "pc_type": "cholesky" if symmetric else "lu",  # with MUMPS the former is LDL^T
-            "pc_factor_mat_solver_type": "mumps",
-        }
-        return NonlinearProblem(
-            equations,
-            self.unknowns,
-            J=tangent,
-            bcs=self._conditions,
-            petsc_options=options,
-            jit_options=compiling.OPTIONS,
-            petsc_options_prefix="fem_reference_",
-        )
+        return Pushes(law, body.obstructions, points, self.unknowns, body.frames[0])
 
     @property
     def size(self) -> int:
@@ -109,39 +85,62 @@ class Body:
         """
         before = np.array(self.unknowns.x.array)
         self.clock.start(frame, before)
-        reason, iterations = self._solve(frame)
+        self._set(frame)
+        self.recalled = None
+        failure, iterations = self.newton.solve(frame)
         smallest = self.determinants.smallest()
-        through = self.contact.pushes.tunnelled(self.comm) if self.contact and reason > 0 else None
-        if reason > 0 and smallest.value > 0 and through is None:
+        through = self.contact.tunnelled(self.comm) if self.contact and failure is None else None
+        if failure is None and smallest.value > 0 and through is None:
             self.clock.settle(frame)
             if self.contact:
-                self.contact.pushes.settle()
+                self.contact.settle()
             return Attempt(None, iterations)
         self.unknowns.x.array[:] = before
         if self.contact:
-            self.contact.pushes.go_back()
+            self.contact.go_back()
         if through is not None:
             return Attempt("diverged", iterations, f"Newton's method converged, but {through}")
-        if reason > 0:
-            return Attempt("inverted", iterations, f"Newton's method converged, but det F fell to {smallest}")
-        how = "went where a law has no value" if reason == _NOT_A_NUMBER else "did not converge"
-        return Attempt("diverged", iterations, f"Newton's method {how} in {iterations} iterations")
+        how = failure or f"converged, but det F fell to {smallest}"
+        return Attempt("diverged" if smallest.value > 0 else "inverted", iterations, f"Newton's method {how}")
 
-    def _solve(self, frame: float) -> tuple[int, int]:
-        """Newton's method with what acts and is prescribed at ``frame``: how it ended (above 0: converged) and its iterations."""
+    def recall(self, frame: float) -> bool:
+        """Take up the state that was solved before under what acts at ``frame``, if there is one; its residual proves it."""
+        if self.clock.matters:
+            return False
+        before = np.array(self.unknowns.x.array)
+        self._set(frame)
+        self.recalled = self.known.find(self._acting(frame))
+        if self.recalled is None:
+            return False
+        self.unknowns.x.array[:] = self.recalled.unknowns
+        self.unknowns.x.array[:] -= self.system.missing()  # rounding of a motion that comes back
+        if self.contact:
+            self.contact.update(frame)
+        proved = self.system.residual() <= self.newton.residual
+        if not proved:
+            self.unknowns.x.array[:] = before
+        if self.contact:
+            self.contact.settle() if proved else self.contact.go_back()
+        return proved
+
+    def _acting(self, frame: float) -> Floats:
+        """All numbers that determine the state at ``frame``, beside the body itself."""
+        amounts = [effect.amount(frame) for effect in self.effects]
+        poses = [entry.pose(frame).ravel() for entry in self.contact.obstructions] if self.contact else []
+        allowed = [self.contact.law.allowance(frame)] if self.contact else []
+        held = [component.values.x.array for hold in self.held for component in hold.components]
+        return np.concatenate([amounts, allowed, *poses, *held])
+
+    def _set(self, frame: float) -> None:
+        """What acts and is prescribed at ``frame``."""
         for effect, amount in zip(self.effects, self.amounts, strict=True):
             amount.value = effect.amount(frame)
         for hold in self.held:
             hold.move_to(frame)
-        if self.contact:
-            self.contact.go_to(frame)
-        self.newton.solve()
-        snes = self.newton.solver
-        return int(snes.getConvergedReason()), int(snes.getIterationNumber())
 
     def scalars(self) -> dict[str, float]:
         """The smallest det F at quadrature points and vertices, V/V0, and the energy [N mm]."""
-        contact = self.contact.pushes.scalars(self.comm) if self.contact else {}
+        contact = self.contact.scalars(self.comm) if self.contact else {}
         return contact | {
             "min_det_F_quadrature": self.determinants.smallest("quadrature point").value,
             "min_det_F_vertices": self.determinants.smallest("vertex").value,
@@ -149,15 +148,22 @@ class Body:
             "energy": self.integral(self.energy_form),
         }
 
-    def negative_modes(self) -> float | None:
-        """In how many directions the energy falls, with drag or viscosity those in which it does so by more than a factor e over
-        all frames, were it held still from now on: the viscous stress of this step is left out. None where the tangent is not
-        symmetric.
+    def examine(self, frame: float) -> float | None:
+        """In how many directions the energy falls from the present state, that of a ``frame`` which was reached; the state is kept
+        for when what acts is the same again. None where the tangent is not symmetric.
+
+        With drag or viscosity these are the directions in which the energy does so by more than a factor e over all frames, were
+        the body held still from now on: the viscous stress of this step is left out.
         """
-        if self.stability is None:
-            return None
-        with self.clock.slow(np.array(self.unknowns.x.array)):
-            return self.stability.negative_modes()
+        if self.recalled is not None:
+            return self.recalled.negative_modes
+        modes = None
+        if self.stability is not None:
+            with self.clock.slow(np.array(self.unknowns.x.array)):
+                modes = self.stability.negative_modes()
+        if not self.clock.matters:
+            self.known.add(State(self._acting(frame), np.array(self.unknowns.x.array), modes))
+        return modes
 
     def integral(self, form: Any) -> float:
         """A compiled form, summed over the ranks."""
@@ -165,16 +171,22 @@ class Body:
 
     def forces(self) -> tuple[dict[str, Floats], dict[str, Floats]]:
         """By name of what is prescribed, the force (3,) [N] that holds it there and its moment (3,) [N mm] about the origin."""
-        vector = fem.assemble_vector(self.internal)
-        vector.scatter_reverse(la.InsertMode.add)
-        now = np.array(self.unknowns.x.array)
-        if self.contact:
-            vector.array[:] += self.contact.everywhere(self.contact.pushes.tractions())
-        held = {hold.entry.name: hold.force(vector.array, now) for hold in self.held}
-        held |= self.contact.pushes.forces() if self.contact else {}
+        balance, now = self.system.reactions(), np.array(self.unknowns.x.array)
+        shared = self._shared
+        held = {hold.entry.name: hold.force(balance, now, shared) for hold in self.held}
+        held |= self.contact.forces() if self.contact else {}
         forces = {name: self.comm.allreduce(force, MPI.SUM) for name, (force, _) in held.items()}
         moments = {name: self.comm.allreduce(moment, MPI.SUM) for name, (_, moment) in held.items()}
         return forces, moments
+
+    @cached_property
+    def _shared(self) -> Ints:
+        """By how many regions each unknown (n,) is prescribed."""
+        count = np.zeros(len(self.unknowns.x.array), np.int64)
+        for hold in self.held:
+            for component in hold.components:
+                count[component.dofs[0]] += 1
+        return count
 
     def node_positions(self) -> Floats:
         """Where the nodes of the body's mesh are now (n, 3) [mm]."""

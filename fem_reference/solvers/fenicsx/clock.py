@@ -17,6 +17,11 @@ class Clock:
         self.before, self.rate, self.interval, self.at = before, rate, body.interval, body.frames[0]
         self.whole = body.frames[-1] - body.frames[0]
 
+    @property
+    def matters(self) -> bool:
+        """Whether anything feels how fast time passes."""
+        return self.before is not None
+
     def start(self, frame: float, unknowns: Floats) -> None:
         """A load step from the last settled frame, with its ``unknowns``, to ``frame``."""
         if self.before is not None:

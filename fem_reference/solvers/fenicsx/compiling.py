@@ -1,7 +1,17 @@
-"""How FEniCSx compiles what it solves: patiently where another process compiles the same, and past what one left half-done."""
+"""How what is solved is compiled: patiently where another process compiles the same, past what one left half-done, and for this
+machine.
+"""
 
+import hashlib
+import os
+import platform
 import signal
+import subprocess
+import sysconfig
+import tempfile
 import time
+from ctypes import CDLL
+from functools import cache
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -9,7 +19,35 @@ from typing import Any
 from dolfinx import fem, jit
 
 PATIENCE = 300  # [s] that a process waits for another's compilation
-OPTIONS = {"timeout": PATIENCE}
+
+
+@cache
+def machine() -> str:
+    """What kind of processor this is, as a hash: what is compiled for one need not run on another."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        known = next(line for line in lines if line.startswith(("flags", "Features")))
+    except (OSError, StopIteration):
+        known = platform.processor()
+    return hashlib.sha256(f"{platform.machine()} {known}".encode()).hexdigest()[:12]
+
+
+# All instructions of this machine, and sums in any order. Never -ffast-math itself: it takes for granted that nothing is NaN, by
+# which a state without a value is told, and makes the whole process round denormal numbers to zero.
+FLAGS = [
+    "-O3",
+    "-march=native",
+    "-fno-math-errno",
+    "-fno-trapping-math",
+    "-fno-signed-zeros",
+    "-fassociative-math",
+    "-freciprocal-math",
+]
+# FFCx keeps what it compiled by what it is and by these words, the machine among them.
+OPTIONS: dict[str, Any] = {
+    "timeout": PATIENCE,
+    "cffi_extra_compile_args": [*FLAGS, f"-DFEM_REFERENCE_MACHINE={machine()}"],
+}
 
 
 def form(expression: Any, entity_maps: Any = None) -> Any:
@@ -20,6 +58,28 @@ def form(expression: Any, entity_maps: Any = None) -> Any:
 def expression(value: Any, points: Any) -> Any:
     """A compiled expression at reference ``points`` (q, 3)."""
     return fem.Expression(value, points, jit_options=OPTIONS)
+
+
+def library(source: Path, sizes: dict[str, int]) -> CDLL:
+    """The functions of a C file, compiled with ``sizes`` and kept beside what FFCx compiles."""
+    words = [*FLAGS, *(f"-D{name}={value}" for name, value in sizes.items())]
+    compiler = (os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc").split()
+    key = hashlib.sha256("\n".join([source.read_text(encoding="utf-8"), *compiler, *words, machine()]).encode())
+    folder = Path(jit.get_options()["cache_dir"])
+    kept = folder / f"fem_reference_{source.stem}_{key.hexdigest()[:16]}.so"
+    if not kept.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder) as new:
+            made = Path(new) / kept.name
+            _compile([*compiler, *words, "-std=gnu11", "-shared", "-fPIC", str(source), "-o", str(made)])
+            made.replace(kept)  # whole or not at all, also where several processes compile it
+    return CDLL(str(kept))
+
+
+def _compile(command: list[str]) -> None:
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise RuntimeError(f"{command[0]} cannot compile {command[-3]}: {done.stderr.strip()}")
 
 
 def prepare() -> None:

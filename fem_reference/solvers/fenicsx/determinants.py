@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 from dolfinx import mesh
+from mpi4py import MPI
+from numpy.typing import NDArray
 
 from fem_reference.continuum import Kind, reference_nodes
 from fem_reference.mesh import Floats, Ints
@@ -42,11 +44,25 @@ class Determinants:
         everywhere: list[Smallest] = [found for rank in self.mesh.comm.allgather(mine) for found in rank]
         return min(everywhere, key=lambda found: (not np.isnan(found.value), found.value))
 
+    def values_now(self) -> Floats:
+        """Det F at all points of this rank's cells (p,)."""
+        return np.concatenate([self._at(where).ravel() for where in self.points])
+
+    def everywhere(self, good: NDArray[np.bool_]) -> bool:
+        """Whether what is asked of this rank's points (p,) is so on all ranks."""
+        return bool(self.mesh.comm.allreduce(bool(good.all()), MPI.LAND))
+
+    def _at(self, where: str) -> Floats:
+        """By cell of this rank and point of a kind."""
+        if len(self.cells) == 0:
+            return np.zeros((0, len(self.points[where])))
+        values = self.values[where].eval(self.mesh, np.arange(len(self.cells), dtype=np.int32))
+        return np.asarray(values).reshape(len(self.cells), -1)
+
     def _mine(self, where: str) -> Smallest:
         if len(self.cells) == 0:  # a rank without cells
             return Smallest(float("inf"), where, -1, (0.0, 0.0, 0.0))
-        values = self.values[where].eval(self.mesh, np.arange(len(self.cells), dtype=np.int32))
-        values = values.reshape(len(self.cells), -1)
+        values = self._at(where)
         cell, point = np.unravel_index(np.argmin(np.where(np.isnan(values), -np.inf, values)), values.shape)
         at = self.places[where].eval(self.mesh, np.array([cell], np.int32))
         x, y, z = at.reshape(-1, 3)[point]

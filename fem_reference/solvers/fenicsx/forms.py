@@ -1,17 +1,19 @@
 """The weak form of a body, summed from its effects; symbols stand for their parameters, so that a compiled form serves many."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import basix.ufl
 import numpy as np
 import ufl
 from dolfinx import fem, mesh
+from ufl.algorithms import expand_derivatives
+from ufl.constantvalue import Zero
 
 from fem_reference.continuum import Continuum
 from fem_reference.effects import Effect, Energy, Load, State, total_energy
 from fem_reference.mesh import Floats, Ints
-from fem_reference.solvers.fenicsx import meshes, quadrature
+from fem_reference.solvers.fenicsx import compiling, meshes, quadrature
 from fem_reference.solvers.fenicsx.settings import BodySettings
 
 Rule = tuple[Floats, Floats]
@@ -33,10 +35,13 @@ class UflFunctions:
 
 
 class Form:
-    """``energy`` that is stored and ``volume`` as integrals, ``residual`` as what vanishes in equilibrium, det F as
-    ``determinant``; to be set: ``amounts`` by effect, ``rate`` [1/s] of the load step and the unknowns ``before`` it (None where
-    time does not matter); ``rule``: points (q, 3) and weights (q,) of the quadrature, of ``degree``; ``regions``: by name, this
-    rank's facets.
+    """What acts in a body. Of the energy, all its first derivatives at the quadrature points, ``first``, and these with the upper
+    triangle of the second ones, ``second``: compiled expressions of what ``cells.c`` names, with ``kinds`` variables a component
+    of the displacement. ``loads`` on the surface, a residual, 0 where there are none.
+
+    ``energy`` that is stored and ``volume`` as integrals, det F as ``determinant``; to be set: ``amounts`` by effect, ``rate``
+    [1/s] of the load step and the unknowns ``before`` it (None where time does not matter); ``rule``: points (q, 3) and weights
+    (q,) of the quadrature, of ``degree``; ``regions``: by name, this rank's facets.
     """
 
     def __init__(
@@ -52,19 +57,23 @@ class Form:
         acting = list(zip(effects, self.amounts, strict=True))
         timed = any("interval" in effect.needs for effect in effects)
         self.before, self.rate = fem.Function(unknowns.function_space) if timed else None, fem.Constant(msh, 0.0)
-        state = _state(unknowns, self._fibre(body, cells), self.before, self.rate)
+        state, variables = _state(unknowns, self._fibre(body, cells), self.before, self.rate)
         self.determinant = state.J
         stored = [(effect, amount) for effect, amount in acting if not isinstance(effect, Energy) or effect.stored]
         self.volume, self.energy = state.J * self.dx, total_energy(stored, state) * self.dx
-        test = ufl.TestFunction(unknowns.function_space)
-        step = ufl.TrialFunction(unknowns.function_space)
-        self.residual = ufl.derivative(total_energy(acting, state) * self.dx, unknowns, test)
+        self.kinds, first, second = _derivatives(total_energy(acting, state), variables)
+        self.first = compiling.expression(ufl.as_vector(first), self.rule[0])
+        self.second = compiling.expression(ufl.as_vector(first + second), self.rule[0])
+        self.loads = self._loads(acting, state, unknowns)
+
+    def _loads(self, acting: list[tuple[Effect, Any]], state: State, unknowns: fem.Function) -> Any:
+        test, loads = ufl.TestFunction(unknowns.function_space), 0
         for effect, amount in acting:
             if isinstance(effect, Load):
-                traction = effect.traction(replace(state, amount=amount), list(ufl.FacetNormal(msh)))
+                traction = effect.traction(replace(state, amount=amount), list(ufl.FacetNormal(self.mesh)))
                 work = sum(a * b for a, b in zip(traction, ufl.split(test)[0], strict=True))
-                self.residual -= work * self.measure(effect.on)
-        self.tangent = ufl.derivative(self.residual, unknowns, step)
+                loads -= work * self.measure(effect.on)
+        return loads
 
     def measure(self, region: str) -> Any:
         """The measure of the facets of ``region``."""
@@ -99,25 +108,59 @@ def _measures(msh: mesh.Mesh, regions: dict[str, Ints], rule: Rule, degree: int)
     )
 
 
-def _state(unknowns: fem.Function, fibre: list[Any] | None, before: fem.Function | None, rate: fem.Constant) -> State:
-    displacement, *others = ufl.split(unknowns)
+@dataclass(frozen=True)
+class _Variables:
+    """What the energy at a point is differentiated by: ``F`` and ``displacement``, and the ``pressure`` where there is one."""
+
+    F: Any
+    displacement: Any
+    pressure: Any
+
+
+def _state(
+    unknowns: fem.Function, fibre: list[Any] | None, before: fem.Function | None, rate: fem.Constant
+) -> tuple[State, _Variables]:
+    displacement, *others = (ufl.variable(part) for part in ufl.split(unknowns))
+    F = ufl.variable(ufl.Identity(3) + ufl.grad(ufl.split(unknowns)[0]))
     passed = ufl.as_vector((0.0, 0.0, 0.0)) if before is None else ufl.split(before)[0]
-    return State(
-        F=_gradient(displacement),
+    F_before = F if before is None else ufl.Identity(3) + ufl.grad(passed)
+    state = State(
+        F=_rows(F),
         displacement=[displacement[i] for i in range(3)],
         pressure=others[0] if others else None,
         fibre=fibre,
         before=[passed[i] for i in range(3)],
-        F_before=_gradient(displacement if before is None else passed),
+        F_before=_rows(F_before),
         rate=rate,
         functions=UflFunctions(),
     )
+    return state, _Variables(F, displacement, others[0] if others else None)
 
 
-def _gradient(displacement: Any) -> list[list[Any]]:
-    """The deformation gradient (3, 3)."""
-    F = ufl.Identity(3) + ufl.grad(displacement)
+def _rows(F: Any) -> list[list[Any]]:
     return [[F[i, k] for k in range(3)] for i in range(3)]
+
+
+def _derivatives(energy: Any, by: _Variables) -> tuple[int, list[Any], list[Any]]:
+    """How many variables a component of the displacement has, the first derivatives of ``energy`` by all of them and the pressure,
+    and the upper triangle of the second ones: in the order of ``cells.c``.
+    """
+    placed = not _vanishes(ufl.diff(energy, by.displacement))
+    variables: list[tuple[Any, tuple[int, ...]]] = [
+        (by.F, (i, k)) if k < 3 else (by.displacement, (i,)) for i in range(3) for k in range(3 + placed)
+    ]
+    variables += [(by.pressure, ())] if by.pressure is not None else []
+    first = [_part(ufl.diff(energy, symbol), where) for symbol, where in variables]
+    second = [_part(ufl.diff(slope, symbol), where) for i, slope in enumerate(first) for symbol, where in variables[i:]]
+    return 3 + placed, first, second
+
+
+def _part(derivative: Any, where: tuple[int, ...]) -> Any:
+    return derivative[where] if where else derivative
+
+
+def _vanishes(derivative: Any) -> bool:
+    return isinstance(expand_derivatives(derivative), Zero)
 
 
 def _symbolic(effect: Effect, msh: mesh.Mesh) -> Effect:

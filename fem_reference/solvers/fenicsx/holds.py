@@ -20,7 +20,6 @@ class _Component:
         self.dofs = fem.locate_dofs_topological((whole, space), 2, facets)
         self.values = fem.Function(space)
         self.rest: Floats = space.tabulate_dof_coordinates()[self.dofs[1]]
-        self.condition = fem.dirichletbc(self.values, self.dofs, whole)
         owned = whole.dofmap.index_map.size_local * whole.dofmap.index_map_bs
         self.own = self.dofs[0] < owned
 
@@ -35,11 +34,18 @@ class Hold:
         self.components = [self.all[component] for component in entry.components]
 
     @property
-    def conditions(self) -> list[Any]:
-        """The conditions of what is prescribed exactly."""
+    def exact(self) -> Ints:
+        """The unknowns (n,) that are prescribed exactly: none by springs."""
         if self.entry.stiffness is not None:
-            return []
-        return [component.condition for component in self.components]
+            return np.zeros(0, np.int64)
+        return np.concatenate([component.dofs[0] for component in self.components]).astype(np.int64)
+
+    @property
+    def targets(self) -> Floats:
+        """What (n,) the unknowns ``exact`` shall be."""
+        if self.entry.stiffness is not None:
+            return np.zeros(0)
+        return np.concatenate([component.values.x.array[component.dofs[1]] for component in self.components])
 
     def springs(self, measure: Any) -> Any:
         """The weak form of springs that pull towards what is prescribed, 0 where it is exact; ``measure`` is of the region."""
@@ -58,12 +64,14 @@ class Hold:
         for entry in self.components:
             entry.values.x.array[entry.dofs[1]] = self.entry.course(entry.rest, frame)[:, entry.component]
 
-    def force(self, residual: Floats, now: Floats) -> tuple[Floats, Floats]:
+    def force(self, residual: Floats, now: Floats, shared: Ints) -> tuple[Floats, Floats]:
         """The force (3,) [N] and its moment (3,) [N mm] about the origin that this rank's part of the region takes, from the
-        out-of-balance ``residual`` of what acts in the body and the unknowns ``now``.
+        out-of-balance ``residual`` of what acts in the body and the unknowns ``now``. Of an unknown that several regions prescribe
+        each takes an equal part: ``shared`` (n,) says how many do.
         """
         places = np.stack([entry.rest[:, i] + now[entry.dofs[0]] for i, entry in enumerate(self.all)], axis=1)
         forces = np.zeros_like(places)
         for entry in self.components:
-            forces[entry.own, entry.component] = residual[entry.dofs[0][entry.own]]
+            own = entry.dofs[0][entry.own]
+            forces[entry.own, entry.component] = residual[own] / shared[own]
         return forces.sum(axis=0), np.cross(places, forces).sum(axis=0)

@@ -1,11 +1,13 @@
 """The material points that rigid bodies push on: where they are in the cells, and how displacement reaches them."""
 
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any
 
 import basix
 import numpy as np
 from dolfinx import fem
+from scipy.sparse import csr_array
 
 from fem_reference.continuum import Cells
 from fem_reference.geometry.skins import Skin
@@ -26,11 +28,16 @@ class PushedPoints:
 
     def positions(self, unknowns: Floats) -> Floats:
         """Where the points are now (n, 3) [mm]."""
-        return np.asarray(self.rest + np.einsum("nk,nki->ni", self.basis, unknowns[self.dofs]))
+        nodes, carried = self._carried
+        return np.asarray(self.rest + carried @ unknowns[nodes])
 
-    def take(self, chosen: Ints) -> "PushedPoints":
-        """Some of the points."""
-        return PushedPoints(*(getattr(self, entry.name)[chosen] for entry in fields(self)))
+    @cached_property
+    def _carried(self) -> tuple[Ints, csr_array]:
+        """The unknowns (m, 3) of the nodes, and how much (n, m) of each a point has."""
+        _, first, which = np.unique(self.dofs[:, :, 0], return_index=True, return_inverse=True)
+        points = np.repeat(np.arange(len(self.basis)), self.basis.shape[1])
+        entries = (self.basis.ravel(), (points, which.ravel()))
+        return self.dofs.reshape(-1, 3)[first], csr_array(entries, shape=(len(self.basis), len(first)))
 
 
 def on_facets(space: fem.FunctionSpace, parents: Ints, mesh: Cells, facets: Ints, degree: int) -> PushedPoints:

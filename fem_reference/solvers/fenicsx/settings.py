@@ -1,5 +1,7 @@
 """How the reference is solved."""
 
+from typing import Literal
+
 from pydantic import Field
 
 from fem_reference.records import Record
@@ -14,6 +16,10 @@ class BodySettings(Record):
     ``newton_iterations`` or a cell inverts.
     ``residual`` [N, mm3] ends Newton's iteration: the norm of out-of-balance nodal forces and of the volume equation.
     ``quadrature_degree``: of the polynomials that are integrated exactly on a straight cell, by default what the element needs.
+    ``linear_solver``: how the linear systems of Newton's method are solved: ``"direct"``, each exactly, by a factorisation of its
+    own; ``"lagged"``, as exactly as it is worth it, by FGMRES with a factorisation that serves until a new one is cheaper; by
+    default as the size asks. ``precision``: of factorisations, by default double of direct ones and single of lagged ones. Both
+    change the time and not the answer.
     ``time_limit``: when to give up, by default never.
     """
 
@@ -24,6 +30,8 @@ class BodySettings(Record):
     newton_iterations: int = Field(default=14, gt=0)
     residual: float = Field(default=1e-8, gt=0)
     quadrature_degree: int | None = Field(default=None, gt=0)
+    linear_solver: Literal["direct", "lagged"] | None = None
+    precision: Literal["single", "double"] | None = None
     time_limit: Time | None = None
 
 

@@ -11,17 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.solvers.fenicsx.dolfinx_door import PETSc
+from fem_reference.solvers.fenicsx import dolfinx_door  # noqa: F401 - first
 from fem_reference.solvers.fenicsx.jobs import Job
 from fem_reference.solvers.fenicsx.processes import MARK
 
 from fem_reference.solvers.fenicsx import compiling  # isort: skip - after the door
 from fem_reference.solvers.fenicsx.body import Body  # isort: skip
-from fem_reference.stepping import Attempt, Step, march  # isort: skip
-
-_ASSEMBLY = ("SNESFunctionEval", "SNESJacobianEval")
-_NUMERIC = ("MatLUFactorNum", "MatCholFctrNum")  # of the two kinds of factorisation
-_FACTORISATION = ("MatLUFactorSym", "MatCholFctrSym", *_NUMERIC)
+from fem_reference.stepping import Attempt, Step, Steps, march  # isort: skip
 
 
 class Worker:
@@ -31,8 +27,6 @@ class Worker:
         """``folder``: where the frames are written."""
         begin = time.perf_counter()
         self.job, self.folder, self.settings = job, folder, job.settings
-        PETSc.Log.begin()
-        self.before = _spent()
         self.body = Body(job.body, job.settings)
         self.set_up = time.perf_counter() - begin
         self.solving = self.checking = 0.0
@@ -43,7 +37,8 @@ class Worker:
         """March through the frames and report how it ended."""
         frames, settings = self.job.body.frames, self.settings
         self.report_frame(Step(frames[0], 0, 0, 0))
-        for reached in march(self.attempt, frames, settings.first_step, settings.smallest_step, settings.largest_step):
+        steps = Steps(settings.first_step, settings.smallest_step, settings.largest_step)
+        for reached in march(self.attempt, frames, steps, self.body.recall):
             for name, count in (
                 ("newton_iterations", reached.iterations),
                 ("load_steps", reached.steps),
@@ -64,11 +59,12 @@ class Worker:
         self.solving += time.perf_counter() - begin
         return result
 
-    def negative_modes(self) -> dict[str, float]:
-        """In how many directions the energy falls from the present state, where that can be told; it is no part of solving."""
-        begin, then = time.perf_counter(), _spent()
-        modes = self.body.negative_modes()
-        self.before = {name: self.before[name] + now - then[name] for name, now in _spent().items()}
+    def negative_modes(self, frame: float) -> dict[str, float]:
+        """In how many directions the energy falls from the state of a frame that was reached, where that can be known; the time
+        for it is no part of solving.
+        """
+        begin = time.perf_counter()
+        modes = self.body.examine(frame)
         self.checking += time.perf_counter() - begin
         return {} if modes is None else {"negative_modes": modes}
 
@@ -94,7 +90,7 @@ class Worker:
     def deepest(self) -> str:
         """Where contact is deepest, if there is any."""
         contact = self.body.contact
-        return f", and contact is deepest, {contact.pushes.deepest(self.body.comm)}" if contact else ""
+        return f", and contact is deepest, {contact.deepest(self.body.comm)}" if contact else ""
 
     def report_frame(self, reached: Step) -> None:
         """Write the frame's positions and forces beside the job and tell of it."""
@@ -105,7 +101,7 @@ class Worker:
         arrays |= {f"moment {name}": moment for name, moment in moments.items()}
         counts = {"newton_iterations": float(reached.iterations), "cut_backs": float(reached.cutbacks)}
         path = self.folder / f"frame_{reached.frame}.npz"
-        scalars = self.body.scalars() | counts | self.negative_modes()
+        scalars = self.body.scalars() | counts | self.negative_modes(reached.frame)
         if scalars.get("negative_modes", 0) > 0 and reached.frame >= self.job.body.first:
             self.unstable[reached.frame] = scalars["negative_modes"]
         if self.body.comm.rank == 0:
@@ -120,30 +116,20 @@ class Worker:
 
     def cost(self) -> dict[str, float]:
         """Seconds by phase as the first rank sees them, counts, and memory over all ranks."""
-        seconds = {name: now - self.before[name] for name, now in _spent().items()}
+        spent = self.body.spent
         memory = self.body.comm.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
         return {
             "seconds_set_up": self.set_up,
             "seconds_solve": self.solving,
-            "seconds_assembly": sum(seconds[name] for name in _ASSEMBLY),
-            "seconds_factorisation": sum(seconds[name] for name in _FACTORISATION),
-            "seconds_back_substitution": seconds["MatSolve"],
+            **{f"seconds_{name}": spent.seconds[name] for name in ("assembly", "contact", "factorisation", "krylov")},
             "seconds_stability": self.checking,
-            "factorisations": seconds["count"],
+            **{name: float(spent.counts[name]) for name in ("factorisations", "krylov_iterations", "halved_steps")},
             **{name: float(count) for name, count in self.counts.items()},
             "unknowns": float(self.body.size),
             "peak_memory_mb": memory / 1024,
             "ranks": float(self.body.comm.size),
             "threads": 1.0,
         }
-
-
-def _spent() -> dict[str, float]:
-    """Seconds by PETSc's events so far, and under ``count`` the number of factorisations."""
-    names = (*_ASSEMBLY, "MatSolve", *_FACTORISATION)
-    events = {name: PETSc.Log.Event(name).getPerfInfo() for name in names}
-    count = {"count": float(sum(events[name]["count"] for name in _NUMERIC))}
-    return {name: float(event["time"]) for name, event in events.items()} | count
 
 
 def main(argument: str) -> None:

@@ -15,7 +15,7 @@ from fem_reference.mesh import Floats, Ints
 from fem_reference.records import Record
 from fem_reference.runs import Outcome
 from fem_reference.solvers.scikit_fem.equations import Equations
-from fem_reference.stepping import Attempt, Step, march
+from fem_reference.stepping import Attempt, Step, Steps, march
 
 log = logging.getLogger(__name__)
 
@@ -58,7 +58,7 @@ def solve_body(body: Continuum, settings: BodySettings) -> Solved:
     def cost() -> dict[str, float]:
         return counts | {"seconds": time.perf_counter() - begin, "unknowns": float(march_of.equations.space.size)}
 
-    for step in march(march_of.attempt, body.frames, settings.first_step, settings.smallest_step):
+    for step in march(march_of.attempt, body.frames, Steps(settings.first_step, settings.smallest_step)):
         for name, count in zip(counts, (step.iterations, step.steps, step.cutbacks), strict=True):
             counts[name] += count
         if step.status != "converged":

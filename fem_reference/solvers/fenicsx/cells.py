@@ -1,0 +1,173 @@
+"""The sums over cells: residual and tangent of the energy, by compiled loops (``cells.c``), in chunks that fit into a cache."""
+
+import ctypes
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import basix
+import numpy as np
+from dolfinx import fem
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from fem_reference.continuum import ELEMENTS
+from fem_reference.mesh import Floats, Ints
+from fem_reference.solvers.fenicsx import compiling
+from fem_reference.solvers.fenicsx.forms import Form
+
+_CHUNK = 256  # cells
+_FIELDS = ("weights", "shape", "slopes", "values", "pressures")
+Places = NDArray[np.int32]
+
+
+class _Element(ctypes.Structure):
+    _fields_ = tuple((name, ctypes.c_void_p) for name in _FIELDS)
+
+
+class Structure(NamedTuple):
+    """Where the entries of a matrix over this rank's unknowns are, ghosts too: ``starts`` of rows in the sorted ``columns``."""
+
+    starts: Places
+    columns: Places
+
+
+@dataclass
+class Tangent:
+    """The ``entries`` (e + 1,) of a matrix, where in them those of each cell are, ``places`` (m, u, u), and the ``unit`` in which
+    pressures are unknown; the last entry takes what belongs to what is prescribed.
+    """
+
+    entries: Floats
+    places: Places
+    unit: float = 1.0
+
+
+class CellSums:
+    """The sums over this rank's own cells. ``unknowns`` (m, u): those of each cell, component by component of the displacement,
+    then the pressures; ``structure``: of the tangent.
+    """
+
+    def __init__(self, form: Form, unknowns: fem.Function, element: str) -> None:
+        space, msh = unknowns.function_space, unknowns.function_space.mesh
+        self.form, self.mesh = form, msh
+        self.count = msh.topology.index_map(3).size_local
+        self.size = len(unknowns.x.array)
+        self.unknowns = _unknowns(space)[: self.count]
+        self.nodes = space.sub(0).sub(0).dofmap.list.shape[1]
+        tables = _tables(element, msh, form.rule)
+        self.kept = [np.ascontiguousarray(tables[name]) for name in _FIELDS]  # C only has their addresses
+        self.element = _Element(*(table.ctypes.data for table in self.kept))
+        self.corners = np.ascontiguousarray(msh.geometry.x[msh.geometry.dofmap[: self.count]])
+        self.code = compiling.library(
+            Path(__file__).with_name("cells.c"),
+            {
+                "POINTS": len(form.rule[1]),
+                "NODES": self.nodes,
+                "PRESSURES": self.unknowns.shape[1] - 3 * self.nodes,
+                "GEOMETRY": self.corners.shape[1],
+                "KINDS": form.kinds,
+            },
+        )
+
+    def structure(self) -> Structure:
+        """The entries that cells have, and all of the diagonal."""
+        rows = np.repeat(np.arange(self.count), self.unknowns.shape[1])
+        has = csr_array(
+            (np.ones(len(rows), bool), (rows, self.unknowns.ravel())), shape=(self.count, self.size), dtype=bool
+        )
+        diagonal = csr_array(
+            (np.ones(self.size, bool), (np.arange(self.size), np.arange(self.size))), shape=(self.size, self.size)
+        )
+        found = csr_array(has.T @ has + diagonal)
+        found.sort_indices()
+        return Structure(found.indptr.astype(np.int32), found.indices.astype(np.int32))
+
+    def places(self, structure: Structure, fixed: NDArray[np.bool_]) -> Places:
+        """Where in the entries of ``structure`` those of each cell are (m, u, u); those of an unknown that is ``fixed`` (n,) are at
+        one place beyond the last.
+        """
+        found = np.empty((*self.unknowns.shape, self.unknowns.shape[1]), np.int32)
+        self.code.find_places(
+            ctypes.c_long(self.count),
+            *(_address(array) for array in (self.unknowns, structure.starts, structure.columns, fixed.view(np.int8))),
+            ctypes.c_int(len(structure.columns)),
+            _address(found),
+        )
+        return found
+
+    def add_residual(self, residual: Floats) -> None:
+        """Add what is out of balance to ``residual`` (n,), over this rank's unknowns, ghosts too."""
+        for some in self._chunks():
+            self._add(self.form.first, some, residual)
+
+    def add_tangent(self, into: Tangent, residual: Floats, moves: Floats | None) -> None:
+        """Add the tangent ``into`` its entries, and what is out of balance to ``residual``: where there are ``moves`` (n,) of the
+        displacement, what they change it by as well, to first order.
+        """
+        for some in self._chunks():
+            self._add(self.form.second, some, residual, into, moves)
+
+    def add_points(self, into: Tangent, cells: Ints, basis: Floats, slope: Floats) -> None:
+        """Add the tangent of tractions at points of ``cells`` (n,) that are carried by their ``basis`` (n, k): the ``slope``
+        (n, 3, 3) of the tractions in where the points are.
+        """
+        arrays = (cells.astype(np.int32), np.ascontiguousarray(basis), np.ascontiguousarray(slope))
+        self.code.add_points(
+            ctypes.c_long(len(cells)), *(_address(array) for array in (*arrays, into.places, into.entries))
+        )
+
+    def _chunks(self) -> list[slice]:
+        return [slice(first, min(first + _CHUNK, self.count)) for first in range(0, self.count, _CHUNK)]
+
+    def _add(
+        self, given: Any, some: slice, residual: Floats, into: Tangent | None = None, moves: Floats | None = None
+    ) -> None:
+        values = given.eval(self.mesh, np.arange(some.start, some.stop, dtype=np.int32))
+        self.code.add_cells(
+            ctypes.byref(self.element),
+            ctypes.c_long(some.stop - some.start),
+            _address(self.corners[some]),
+            _address(values),
+            ctypes.c_int(values.shape[-1]),
+            _address(self.unknowns[some]),
+            None if into is None else _address(into.places[some]),
+            _address(residual),
+            None if into is None else _address(into.entries),
+            ctypes.c_double(1.0 if into is None else into.unit),
+            None if moves is None else _address(moves),
+        )
+
+
+def _address(array: NDArray[Any]) -> ctypes.c_void_p:
+    assert array.flags.c_contiguous
+    return ctypes.c_void_p(array.ctypes.data)
+
+
+def _unknowns(space: fem.FunctionSpace) -> Places:
+    """By cell, ghosts too, its unknowns: component by component of the displacement, then the pressures."""
+    parts = [space.sub(0).sub(component) for component in range(3)]
+    parts += [space.sub(1)] if space.num_sub_spaces > 1 else []
+    return np.concatenate([part.dofmap.list for part in parts], axis=1).astype(np.int32)
+
+
+def _tables(element: str, msh: Any, rule: tuple[Floats, Floats]) -> dict[str, Floats]:
+    """What ``cells.c`` is told of an element at the points of a ``rule``."""
+    kind, degree, pressure = ELEMENTS[element]
+    points, weights = rule
+    cell, warped = basix.CellType[kind], basix.LagrangeVariant.gll_warped
+    displaced = basix.create_element(basix.ElementFamily.P, cell, degree, warped).tabulate(1, points)[..., 0]
+    shape = basix.create_element(basix.ElementFamily.P, cell, msh.geometry.cmap.degree, warped)
+    if pressure is None:
+        pressures = np.zeros((len(points), 1))
+    elif pressure == 0:
+        pressures = np.ones((len(points), 1))
+    else:
+        pressures = basix.create_element(basix.ElementFamily.P, cell, pressure, warped).tabulate(0, points)[0, :, :, 0]
+    return {
+        "weights": np.asarray(weights),
+        "shape": np.moveaxis(shape.tabulate(1, points)[1:, :, :, 0], 0, -1),
+        "slopes": np.moveaxis(displaced[1:], 0, -1),
+        "values": displaced[0],
+        "pressures": pressures,
+    }

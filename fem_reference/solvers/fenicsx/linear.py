@@ -1,0 +1,133 @@
+"""Systems of linear equations: by a sparse factorisation (MUMPS), which serves as long as it is a good preconditioner."""
+
+from itertools import count
+
+import numpy as np
+from petsc4py import PETSc
+
+from fem_reference.solvers.fenicsx.settings import BodySettings
+from fem_reference.solvers.fenicsx.spent import Spent
+
+# What MUMPS calls its entries: its error; negative pivots; the last front, by one process, else those of it are not counted; by how
+# much more memory than it estimates it may take, in per cent.
+_ERROR, _NEGATIVE, _ROOT_BY_ONE, _MORE_MEMORY = 1, 12, 13, 14
+_FLOPS, _ENTRIES = 3, 29  # of its numbers after a factorisation, the former among the real ones
+# A factorisation takes as long as that many of its operations by entry, of a back-substitution: measured on meshes of 16 000 and of
+# 200 000 unknowns.
+_OPERATIONS = 22.0
+_LEAST, _MOST = 12, 80  # Krylov iterations that an old factorisation may take, whatever its size
+_INVERSE_ITERATIONS, _RESOLVED = 4, 0.1  # by which single precision is put to the test
+_EXACT = 1e-10  # a relative residual that leaves Newton's method quadratic
+SMALL = 4000  # unknowns: below, a factorisation costs no more than a few iterations of anything else
+_number = count()
+
+
+class LinearSolveError(ArithmeticError):
+    """The tangent is singular, or there is no memory to factorise it."""
+
+
+class Factorised:
+    """Solves with the ``matrix`` as it is now. With ``lagged`` by FGMRES with a factorisation of it as it was: where that takes
+    longer than a new factorisation, there is one. LDL^T of a symmetric matrix, else LU.
+    """
+
+    def __init__(self, matrix: PETSc.Mat, symmetric: bool, lagged: bool, precision: str, spent: Spent) -> None:
+        self.matrix, self.symmetric, self.spent = matrix, symmetric, spent
+        self.lagged = lagged
+        self._choose(precision)
+        self.fresh = self.there = False
+        self.limit = _LEAST
+
+    def _choose(self, precision: str) -> None:
+        self.precision = precision
+        self.krylov = PETSc.KSP().create(self.matrix.comm)
+        self.krylov.setOptionsPrefix(f"fem_reference_{next(_number)}_")
+        self.krylov.setType("fgmres")
+        self.krylov.setGMRESRestart(_MOST)
+        self.krylov.setOperators(self.matrix, self.matrix)
+        self.preconditioner = self.krylov.getPC()
+        self.preconditioner.setType("cholesky" if self.symmetric else "lu")  # with MUMPS the former is LDL^T
+        self.preconditioner.setFactorSolverType("mumps")
+        PETSc.Options().setValue(
+            f"{self.krylov.getOptionsPrefix()}pc_precision", precision
+        )  # read when it factorises first
+        self.krylov.setFromOptions()
+        self.preconditioner.setFactorSetUpSolverType()
+        self.factors = self.preconditioner.getFactorMatrix()
+        self.factors.setMumpsIcntl(_ROOT_BY_ONE, 1)
+        self.factors.setMumpsIcntl(_MORE_MEMORY, 50)
+
+    def changed(self) -> None:
+        """The matrix is another now."""
+        self.fresh = False
+
+    def factorise(self) -> None:
+        """Factorise the matrix as it is. ``LinearSolveError`` where that cannot be done."""
+        with self.spent.on("factorisation"):
+            self.preconditioner.setReusePreconditioner(False)
+            self.krylov.setOperators(self.matrix, self.matrix)
+            self.preconditioner.setUp()
+            self.preconditioner.setReusePreconditioner(True)
+        self.spent.counts["factorisations"] += 1
+        if self.factors.getMumpsInfog(_ERROR) < 0:
+            self.there = False
+            raise LinearSolveError(f"MUMPS reports {self.factors.getMumpsInfog(_ERROR)}")
+        self.fresh = self.there = True
+        counted = self.factors.getMumpsInfog(_ENTRIES)
+        entries = counted if counted > 0 else -1e6 * counted  # MUMPS counts many in millions
+        self.limit = int(min(max(self.factors.getMumpsRinfog(_FLOPS) / entries / _OPERATIONS, _LEAST), _MOST))
+
+    def solve(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> None:
+        """Solve for ``x``, up to ``tolerance`` times the norm of ``b``, or exactly; ``LinearSolveError`` if that cannot be done."""
+        if not self.lagged:
+            tolerance = _EXACT
+        if self.there and (self.lagged or self.fresh) and self._iterate(b, x, tolerance, self.limit):
+            return
+        self.factorise()
+        if not self._iterate(b, x, tolerance, _MOST):
+            raise LinearSolveError("FGMRES does not converge with the factorisation of the matrix itself")
+
+    def _iterate(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float, most: int) -> bool:
+        with self.spent.on("krylov"):
+            self.krylov.setTolerances(rtol=tolerance, atol=0.0, max_it=most)
+            self.krylov.solve(b, x)
+        self.spent.counts["krylov_iterations"] += self.krylov.getIterationNumber()
+        return bool(self.krylov.is_converged)
+
+    def negative_pivots(self) -> int:
+        """Of the matrix as it is, factorised where it is not yet. Where single precision does not resolve the directions in which
+        the matrix is softest, double precision is used from then on. ``LinearSolveError`` where it cannot be factorised.
+        """
+        if not self.fresh:
+            self.factorise()
+        if self.precision == "single" and not self._resolved():
+            self._choose("double")
+            self.factorise()
+        return int(self.factors.getMumpsInfog(_NEGATIVE))
+
+    def _resolved(self) -> bool:
+        """Whether the factorisation M is the matrix A in the softest directions too: in a vector v, which inverse iteration turned
+        towards them, M^-1 A v is v but for a tenth. So none of them can have another sign in M.
+        """
+        random = np.random.default_rng(self.matrix.comm.rank)
+        image = self.matrix.createVecLeft()
+        vector = image.duplicate()
+        image.array[:] = random.normal(size=image.local_size)
+        for _ in range(_INVERSE_ITERATIONS):
+            self.preconditioner.apply(image, vector)
+            vector.normalize()
+            vector.copy(image)
+        self.matrix.mult(vector, image)
+        again = vector.duplicate()
+        self.preconditioner.apply(image, again)
+        again.axpy(-1.0, vector)
+        deviation = again.norm()
+        assert isinstance(deviation, float)
+        return deviation < _RESOLVED
+
+
+def make(matrix: PETSc.Mat, symmetric: bool, settings: BodySettings, spent: Spent) -> Factorised:
+    """The solver that ``settings`` ask for, or the one for the size of ``matrix``."""
+    kind = settings.linear_solver or ("direct" if matrix.getSize()[0] < SMALL else "lagged")
+    precision = settings.precision or ("double" if kind == "direct" else "single")
+    return Factorised(matrix, symmetric, kind == "lagged", precision, spent)

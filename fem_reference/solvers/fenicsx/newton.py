@@ -1,0 +1,115 @@
+"""Newton's method: inexact where exactness is not worth its time, and damped where a whole step would turn a cell inside out."""
+
+import numpy as np
+
+from fem_reference.mesh import Floats
+from fem_reference.solvers.fenicsx.determinants import Determinants
+from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolveError
+from fem_reference.solvers.fenicsx.settings import BodySettings
+from fem_reference.solvers.fenicsx.spent import Spent
+from fem_reference.solvers.fenicsx.system import System
+
+# A step is halved until det F keeps this share of itself everywhere, or down to this length, where its next state is looked at.
+_KEPT, _SHORTEST = 0.1, 1e-2
+# Eisenstat and Walker 1996 (doi 10.1137/0917003), choice 2: the tolerance of the first linear system, its factor and its bounds.
+_FIRST, _FACTOR, _LOOSEST, _TIGHTEST = 1e-3, 0.5, 1e-3, 1e-9
+# It is given up where in so many iterations the residual did not fall to this share of its best before.
+_PATIENCE, _PROGRESS = 6, 0.5
+# Where a linear solution would end below what Newton's method has to reach, it goes on to this share of it: what is left of the
+# last system is what is left of all.
+_PAST = 1e-2
+
+
+class Newton:
+    """Solves a ``system`` by whole steps of ``linear``; a line search would weigh forces [N] against volumes [mm3]: it stalls where
+    bodies bend or are soft.
+    """
+
+    def __init__(
+        self, system: System, linear: Factorised, determinants: Determinants, settings: BodySettings, spent: Spent
+    ) -> None:
+        self.system, self.linear, self.determinants, self.spent = system, linear, determinants, spent
+        self.residual, self.most = settings.residual, settings.newton_iterations
+        self.step = system.b.duplicate()
+
+    def solve(self, frame: float) -> tuple[str | None, int]:
+        """Solve at ``frame``: why it did not succeed (None: it did), and the iterations. Where every step turns a cell inside out,
+        it ends there.
+        """
+        iterations, last = 0, np.nan
+        best, since = np.inf, 0
+        smallest = self.determinants.values_now()
+        norm = self._begin(frame)
+        while norm > self.residual or self.system.lacking():
+            if iterations == self.most:
+                return f"did not converge in {iterations} iterations", iterations
+            best, since = (norm, 0) if norm < _PROGRESS * best else (best, since + 1)
+            if since > _PATIENCE:
+                return f"made no progress in {since} iterations, of {iterations}", iterations
+            scaled = self.system.b.norm()
+            try:
+                self.linear.solve(self.system.b, self.step, self._tolerance(scaled, last))
+            except LinearSolveError as why:
+                return f"met a tangent that cannot be solved with ({why}) in iteration {iterations + 1}", iterations
+            smallest = self._take(smallest)
+            iterations, last = iterations + 1, scaled
+            if not self.determinants.everywhere(smallest > 0):
+                return f"turned a cell inside out in iteration {iterations}, however short its step", iterations
+            self._meet(frame)
+            norm = self.system.residual()
+            if norm > self.residual:
+                norm = self._linearise()
+            if not np.isfinite(norm):
+                return f"went where a law has no value in {iterations} iterations", iterations
+        return None, iterations
+
+    def _begin(self, frame: float) -> float:
+        """The first iteration's system. An obstruction that jumps to its next pose would meet points that have not moved yet, push
+        them with forces that are no measure of anything, and send the first iteration astray: so that one starts from the settled
+        pushes, and is linear in how the obstructions go on.
+        """
+        moves = -self.system.missing()
+        if self.system.contact is None:
+            return self._linearise(moves)
+        norm = self._linearise(moves, self.system.contact.predicted(frame, moves))
+        if norm <= self.residual:  # nothing moves by itself, and only the new gaps can tell
+            self._meet(frame)
+            norm = self._linearise(moves)
+        return norm
+
+    def _linearise(self, moves: Floats | None = None, tractions: Floats | None = None) -> float:
+        moves = -self.system.missing() if moves is None else moves
+        self.linear.changed()
+        return self.system.linearise(moves if moves.any() else None, tractions)
+
+    def _meet(self, frame: float) -> None:
+        if self.system.contact is not None:
+            with self.spent.on("contact"):
+                self.system.contact.update(frame)
+
+    def _tolerance(self, norm: float, last: float) -> float:
+        """Of the linear system whose right-hand side has a ``norm``, relative to it; ``last`` is the norm of the one before."""
+        if norm == 0:
+            return _FIRST
+        wanted = _FIRST if np.isnan(last) else float(np.clip(_FACTOR * (norm / last) ** 2, _TIGHTEST, _LOOSEST))
+        enough = self.residual * min(
+            1.0, self.system.tangent.unit
+        )  # for pressures too, which weigh less in linear systems
+        if wanted * norm < enough:
+            wanted = min(wanted, _PAST * enough / norm)
+        return max(wanted, 1e-13)
+
+    def _take(self, smallest: Floats) -> Floats:
+        """Take the step, or as much of it as det F allows; det F afterwards."""
+        unknowns, owned = self.system.unknowns.x, self.system.owned
+        before, share = np.array(unknowns.array), 1.0
+        step = np.where(self.system.fixed, self.system.missing(), 0.0)
+        step[:owned] += np.where(self.system.fixed[:owned], 0.0, self.system.scale[:owned] * self.step.array)
+        while True:
+            unknowns.array[:owned] = before[:owned] - share * step[:owned]
+            unknowns.scatter_forward()
+            now = self.determinants.values_now()
+            if self.determinants.everywhere(now > _KEPT * smallest) or share < _SHORTEST:
+                return now
+            share /= 2
+            self.spent.counts["halved_steps"] += 1

@@ -1,0 +1,33 @@
+"""Where the time goes: seconds by phase, and counts."""
+
+import time
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+
+class Spent:
+    """``seconds`` by phase of this process, and ``counts`` by name. A phase within another counts in its own only."""
+
+    def __init__(self) -> None:
+        self.seconds: defaultdict[str, float] = defaultdict(float)
+        self.counts: Counter[str] = Counter()
+        self.within: list[str] = []
+        self.since = time.perf_counter()
+
+    @contextmanager
+    def on(self, phase: str) -> Iterator[None]:
+        """Meanwhile time is spent on ``phase``."""
+        self._note()
+        self.within.append(phase)
+        try:
+            yield
+        finally:
+            self._note()
+            self.within.pop()
+
+    def _note(self) -> None:
+        now = time.perf_counter()
+        if self.within:
+            self.seconds[self.within[-1]] += now - self.since
+        self.since = now

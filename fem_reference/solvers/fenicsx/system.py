@@ -1,0 +1,176 @@
+"""The equations of a body in equilibrium: what is out of balance, and its tangent, summed from cells, springs, loads and contact.
+
+Every method is collective: all ranks call it.
+"""
+
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem, la
+from dolfinx.fem.petsc import create_vector
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy.sparse import csr_array
+
+from fem_reference.mesh import Floats
+from fem_reference.solvers.fenicsx import compiling
+from fem_reference.solvers.fenicsx.cells import CellSums, Structure, Tangent
+from fem_reference.solvers.fenicsx.contact import Pushes
+from fem_reference.solvers.fenicsx.forms import Form
+from fem_reference.solvers.fenicsx.holds import Hold
+from fem_reference.solvers.fenicsx.spent import Spent
+
+_ROUNDING = 1e-11  # [mm] of positions
+
+
+class System:
+    """Residual ``b`` and tangent ``matrix`` of the ``unknowns``. Those that are prescribed are left out: their residual is 0, their
+    row and column of the tangent a 1 on the diagonal.
+    """
+
+    def __init__(self, form: Form, unknowns: fem.Function, element: str, holds: list[Hold], spent: Spent) -> None:
+        space = unknowns.function_space
+        self.unknowns, self.holds, self.spent = unknowns, holds, spent
+        self.index_map, self.block = space.dofmap.index_map, space.dofmap.index_map_bs
+        self.owned, self.size = self.index_map.size_local * self.block, len(unknowns.x.array)
+        self.fixed: NDArray[np.bool_] = np.zeros(self.size, bool)
+        for hold in holds:
+            self.fixed[hold.exact] = True
+        self.cells = CellSums(form, unknowns, element)
+        structure = self.structure = self.cells.structure()
+        self.tangent = Tangent(np.zeros(len(structure.columns) + 1), self.cells.places(structure, self.fixed))
+        self.scale = np.ones(self.size)  # of the unknowns of linear systems
+        self.b, self.work = create_vector(space), la.vector(self.index_map, self.block)
+        self._make_matrix(structure)
+        springs = sum((hold.springs(form.measure(hold.entry.on)) for hold in holds), 0)
+        self.springs, self.loads = (
+            SurfaceSums(terms, unknowns, structure, self.fixed) if terms else None for terms in (springs, form.loads)
+        )
+        self.contact: Pushes | None = None
+
+    def _make_matrix(self, structure: Structure) -> None:
+        """A matrix that takes the entries of the tangent; those of ghost rows go to the ranks that own them."""
+        blocks = self.index_map.local_to_global(np.arange(self.size // self.block, dtype=np.int32))
+        names = (blocks[:, None] * self.block + np.arange(self.block)).ravel().astype(PETSc.IntType)
+        rows = np.repeat(np.arange(self.size), np.diff(structure.starts))
+        whole = self.index_map.size_global * self.block
+        self.matrix = PETSc.Mat().create(self.unknowns.function_space.mesh.comm)
+        self.matrix.setSizes(((self.owned, whole), (self.owned, whole)))
+        self.matrix.setType(PETSc.Mat.Type.AIJ)
+        self.matrix.setPreallocationCOO(names[rows], names[structure.columns])
+        diagonal = np.flatnonzero(structure.columns == rows)
+        own = np.flatnonzero(self.fixed[: self.owned])
+        self.prescribed_diagonal = diagonal[own]  # each row has its diagonal entry, in the order of the rows
+
+    def residual(self, tractions: Floats | None = None) -> float:
+        """Sum what is out of balance into ``b``, and return its norm; ``tractions`` of contact other than those at present may be
+        given.
+        """
+        with self.spent.on("assembly"):
+            self.work.array[:] = 0
+            self.cells.add_residual(self.work.array)
+            return self._finish(tractions, None)
+
+    def linearise(self, moves: Floats | None = None, tractions: Floats | None = None) -> float:
+        """As ``residual``, and sum the tangent into ``matrix``; what ``moves`` (n,) of prescribed unknowns change is added to first
+        order.
+        """
+        with self.spent.on("assembly"):
+            entries = self.tangent.entries
+            self.work.array[:], entries[:] = 0, 0
+            self.cells.add_tangent(self.tangent, self.work.array, moves)
+            for terms in self._on_surface:
+                terms.add_tangent(entries)
+            for points in self.contact.tangent() if self.contact else ():
+                self.cells.add_points(self.tangent, *points)
+            entries[self.prescribed_diagonal] = 1.0
+            self.matrix.setValuesCOO(entries[:-1])  # type: ignore[arg-type]  # its stubs know sequences only
+            return self._finish(tractions, moves)
+
+    @property
+    def _on_surface(self) -> list["SurfaceSums"]:
+        return [terms for terms in (self.springs, self.loads) if terms is not None]
+
+    def _finish(self, tractions: Floats | None, moves: Floats | None) -> float:
+        """What is not of the cells, and the parts of other ranks."""
+        for terms in self._on_surface:
+            terms.add_residual(self.work.array, moves)
+        if self.contact:
+            self.contact.add_residual(self.work.array, tractions)
+        self.work.scatter_reverse(la.InsertMode.add)
+        self.b.array[:] = np.where(self.fixed[: self.owned], 0.0, self.work.array[: self.owned])
+        norm = float(self.b.norm())
+        self.b.array[:] *= self.scale[: self.owned]
+        return norm
+
+    def balance_units(self) -> None:
+        """Measure pressures in a unit in which they weigh in linear systems as displacements do [mm], instead of volumes [mm3]
+        against forces [N]: by the tangent at present.
+        """
+        space = self.unknowns.function_space
+        if space.num_sub_spaces == 1:
+            return
+        self.linearise()
+        names = np.unique(space.sub(1).dofmap.list[: self.cells.count])
+        pressures = np.zeros(self.size, bool)
+        pressures[names] = True
+        rows = np.repeat(np.arange(self.size), np.diff(self.structure.starts))
+        squares = self.tangent.entries[:-1] ** 2
+        moved = ~pressures[rows] & ~self.fixed[rows]
+        of_pressures = pressures[self.structure.columns]
+        sums = [float(squares[moved & (of_pressures == which)].sum()) for which in (False, True)]
+        stiff, coupling = self.unknowns.function_space.mesh.comm.allreduce(np.array(sums), MPI.SUM)
+        if coupling > 0:
+            self.tangent.unit = self.scale[pressures] = float(np.sqrt(stiff / coupling))
+
+    def missing(self) -> Floats:
+        """By how much (n,) the unknowns are more than what is prescribed; 0 where nothing is."""
+        found = np.zeros(self.size)
+        for hold in self.holds:
+            found[hold.exact] = self.unknowns.x.array[hold.exact] - hold.targets
+        return found
+
+    def lacking(self) -> bool:
+        """Whether on any rank an unknown is not what is prescribed, but for rounding."""
+        most = np.abs(self.missing()).max(initial=0.0)
+        return bool(self.unknowns.function_space.mesh.comm.allreduce(most, MPI.MAX) > _ROUNDING)
+
+    def reactions(self) -> Floats:
+        """What is out of balance (n,) without springs and without what is prescribed, on the ranks that own the unknowns."""
+        self.work.array[:] = 0
+        self.cells.add_residual(self.work.array)
+        if self.loads:
+            self.loads.add_residual(self.work.array, None)
+        if self.contact:
+            self.contact.add_residual(self.work.array, None)
+        self.work.scatter_reverse(la.InsertMode.add)
+        return np.array(self.work.array)
+
+
+class SurfaceSums:
+    """Terms of the weak form on parts of the surface, with their tangent in the entries of a ``structure``."""
+
+    def __init__(self, terms: Any, unknowns: fem.Function, structure: Structure, fixed: NDArray[np.bool_]) -> None:
+        step = ufl.TrialFunction(unknowns.function_space)
+        self.residual, self.slope = compiling.form(terms), compiling.form(ufl.derivative(terms, unknowns, step))
+        self.matrix = fem.create_matrix(self.slope)
+        size = len(fixed)
+        rows = np.repeat(np.arange(size), np.diff(self.matrix.indptr))
+        keys = np.repeat(np.arange(size), np.diff(structure.starts)) * size + structure.columns
+        self.places = np.searchsorted(keys, rows * size + self.matrix.indices)
+        self.places[fixed[rows] | fixed[self.matrix.indices]] = len(keys)
+
+    def add_residual(self, residual: Floats, moves: Floats | None) -> None:
+        """Add the terms to ``residual`` (n,), and to first order what ``moves`` (n,) of the unknowns change in them."""
+        fem.assemble_vector(residual, self.residual)
+        if moves is not None:
+            entries = (self.matrix.data, self.matrix.indices, self.matrix.indptr)
+            residual += csr_array(entries, shape=(len(residual), len(residual))) @ moves
+
+    def add_tangent(self, entries: Floats) -> None:
+        """Add the tangent to the ``entries`` of the structure."""
+        self.matrix.data[:] = 0
+        fem.assemble_matrix(self.matrix, self.slope)
+        np.add.at(entries, self.places, self.matrix.data)
