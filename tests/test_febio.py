@@ -14,47 +14,27 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import acting
+import feb_file
 import meshio
 import numpy as np
 import pytest
-import shapes
 import small
+from feb_file import FRAMES, TURNS, cells, effects, nodes, numbers
 from scipy.spatial.transform import Rotation as Turn
 
 from fem_reference import casefile, exchange
 from fem_reference.effects import total_energy
 from fem_reference.errors import InputError
-from fem_reference.exchange import febio
+from fem_reference.exchange import febio, febio_material
 from fem_reference.mesh import tet_volumes, triangle_areas
-from fem_reference.motion import Rotation, Translation, apply
-from fem_reference.problem import Body, Problem
-from fem_reference.records import parse
+from fem_reference.motion import apply
+from fem_reference.problem import Problem
 from fem_reference.scene import Scene
-
-FRAMES = (10, 15, 20, 25)
-TURNS = Rotation((1, 2, 2), (3.0, -4.0, 5.0), (10.0, 18.0, 40.0), (0.0, -0.7, 0.4))
-SLIDES = Translation((0, -3, 4), (10.0, 12.5, 30.0), (0.0, 2.0, 9.0))
-
-
-def effects(*names: str) -> tuple[Any, ...]:
-    changes = {"contact": {"bones": ["top"]}}
-    return tuple(
-        parse(acting.effects.find(name), acting.PARAMETERS[name] | changes.get(name, {}), "test") for name in names
-    )
 
 
 @pytest.fixture(scope="module")
 def bar() -> Problem:
-    """A bar held by a bone that slides and one that turns and pushes, beside one that rests; its fibres point anywhere."""
-    acts = effects("neo_hooke", "incompressible", "fibre_passive_febio", "contact")
-    plain = shapes.bar((2, 2, 3), (10, 10, 30), {"bottom": SLIDES, "top": TURNS}, acts, FRAMES)
-    ball = shapes.sphere(0, 5.0)
-    bones = {bone.name: replace(bone, surface=ball) for bone in plain.bones}
-    held = tuple(replace(held, bone=bones[held.bone.name]) for held in plain.held)
-    along = np.random.default_rng(3).normal(size=(len(plain.mesh.tets), 3))
-    directions = along / np.linalg.norm(along, axis=1)[:, None]
-    rests = Body("rests & <waits>", ball.moved_to(ball.points + [50, 0, 0]), None)
-    return replace(plain, bones=(*bones.values(), rests), held=held, directions=directions)
+    return feb_file.bar()
 
 
 @pytest.fixture(scope="module")
@@ -62,21 +42,6 @@ def feb(bar: Problem, tmp_path_factory: pytest.TempPathFactory) -> Element:
     folder = tmp_path_factory.mktemp("febio")
     febio.write(bar, folder)
     return ElementTree.parse(folder / "scene.feb").getroot()
-
-
-def numbers(element: Element) -> list[float]:
-    return [float(text) for text in (element.text or "").split(",")]
-
-
-def nodes(feb: Element) -> np.ndarray:
-    """Positions by number, from 1; the numbers are all there, in their order."""
-    found = list(feb.iterfind("Mesh/Nodes/node"))
-    assert [int(node.attrib["id"]) for node in found] == list(range(1, len(found) + 1))
-    return np.array([[np.nan] * 3, *map(numbers, found)])
-
-
-def cells(feb: Element, name: str, tag: str = "Elements") -> np.ndarray:
-    return np.array([numbers(cell) for cell in feb.find(f"Mesh/{tag}[@name='{name}']")], int)
 
 
 def test_the_sections_are_those_of_the_format(feb: Element) -> None:
@@ -243,8 +208,51 @@ def test_febio_passes_every_frame_wanted(feb: Element) -> None:
     assert [numbers(point)[0] for point in must.iterfind("points/pt")] == [0, 5, 10, 15]
     assert must.find("interpolate").text == "STEP"
     control = feb.find("Control")
-    assert float(control.find("time_steps").text) * float(control.find("step_size").text) == FRAMES[-1] - FRAMES[0]
+    steps, size = (float(control.find(key).text) for key in ("time_steps", "step_size"))
+    assert steps * size == pytest.approx(FRAMES[-1] - FRAMES[0], rel=1e-15)
     assert control.find("time_stepper/dtmax").attrib["lc"] == "1"
+
+
+@pytest.mark.parametrize(
+    ("frames", "step", "count"), [((0, 10, 20), 2, 10), ((0, 1, 2), 1, 2), ((10, 15, 20), 5 / 3, 6), ((3, 7), 2, 2)]
+)
+def test_steps_are_two_frames_or_what_is_shorter_and_goes_up_evenly(
+    bar: Problem, frames: tuple[int, ...], step: float, count: int
+) -> None:
+    feb = febio.model(replace(bar, frames=frames))
+    control = feb.find("Control")
+    assert float(control.find("step_size").text) == float(control.find("time_stepper/dtmax").text) == step
+    assert int(control.find("time_steps").text) == count
+    longest = [numbers(point)[1] for point in feb.iterfind("LoadData/load_controller[@id='1']/points/pt")]
+    assert set(longest) == {step}
+
+
+def test_what_febio_does_where_a_step_fails_and_when_it_stops(feb: Element) -> None:
+    stepper, solver = feb.find("Control/time_stepper"), feb.find("Control/solver")
+    wanted = {"max_retries": 20, "aggressiveness": 1, "cutback": 0.5}
+    assert {key: float(stepper.find(key).text) for key in wanted} == wanted
+    assert {key: float(solver.find(key).text) for key in ("dtol", "etol")} == {"dtol": 1e-3, "etol": 1e-5}
+
+
+def test_contact_has_its_whole_tangent(bar: Problem, feb: Element) -> None:
+    """That of sliding is not symmetric; without contact FEBio's solver is left as it is."""
+    assert feb.find("Contact/contact/symmetric_stiffness").text == "0"
+    assert feb.find("Control/solver/symmetric_stiffness").text == "non-symmetric"
+    plain = febio.model(replace(bar, effects=bar.effects[:3]))
+    assert plain.find("Control/solver/symmetric_stiffness") is None
+
+
+@pytest.mark.parametrize("moving", [("bottom",), ("top",), ("bottom", "top"), ()])
+def test_load_controllers_are_numbered_without_gaps(bar: Problem, moving: tuple[str, ...]) -> None:
+    """FEBio refuses an id that its list has no place for: here as well where the first bone rests."""
+    bones = tuple(bone if bone.name in moving else replace(bone, motion=None) for bone in bar.bones)
+    held = tuple(replace(held, bone=bones[i]) for i, held in enumerate(bar.held))
+    feb = febio.model(replace(bar, bones=bones, held=held))
+    ids = [int(curve.attrib["id"]) for curve in feb.iterfind("LoadData/load_controller")]
+    assert ids == list(range(1, len(moving) + 2))
+    for bone in bones:
+        for frame in (*FRAMES, 12.5):
+            assert np.allclose(pose(feb, f"bone_{bone.name}", frame - 10), bone.pose(frame), rtol=0, atol=1e-13)
 
 
 def test_fibres_are_the_first_axis_of_each_element(feb: Element, bar: Problem) -> None:
@@ -261,7 +269,7 @@ def test_fibres_are_the_first_axis_of_each_element(feb: Element, bar: Problem) -
 def test_the_law_is_the_same(matrix: tuple[str, ...]) -> None:
     """FEBio's energy c1 (I1 - 3) + c2 (I2 - 3) + k/2 (J - 1)^2 with its constants, of the isochoric invariants of eigenvalues."""
     acts = effects(*matrix, "incompressible_penalty")
-    constants = febio.constants(acts)
+    constants = febio_material.matrix_constants(acts) | febio_material.volume_constants(acts)
     assert constants["pressure_model"] == 2
     for state in map(acting.state, acting.deformations()):
         squares = np.linalg.eigvalsh(np.array(state.C, float))
@@ -298,15 +306,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ("changes", "match"),
     [
         (
-            {"effect[0]": {"name": "fibre_passive", **acting.PARAMETERS["fibre_passive"]}},
-            r'effect\[0\]: got "fibre_passive", want what FEBio',
+            {"effect[0]": {"name": "fibre_active", **acting.PARAMETERS["fibre_active"]}},
+            r'effect\[0\]: got "fibre_active", want what FEBio has in the same form: neo_hooke',
         ),
         ({"effect[0]": {"name": "contact", "stiffness": "1 kPa/mm"}}, "effect: got no matrix: neither neo_hooke"),
         ({"effect[1]": {"name": "contact", "stiffness": "1 kPa/mm"}}, "effect: got neither incompressible nor"),
-        (
-            {"attachment[1]": {"name": "insertion", "bone": "lid", "within": "2 mm", "stiffness": "1 MPa/mm"}},
-            r"attachment\[1\]\.stiffness: got 1 MPa/mm, want no springs",
-        ),
     ],
 )
 def test_what_febio_has_not_is_refused_before_any_work(
