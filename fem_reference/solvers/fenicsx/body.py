@@ -15,12 +15,13 @@ from petsc4py import PETSc
 
 from fem_reference.continuum import ELEMENTS, Continuum
 from fem_reference.mesh import Floats, Ints
-from fem_reference.solvers.fenicsx import compiling, forms, linear, meshes, pushed_points
+from fem_reference.solvers.fenicsx import choice, compiling, forms, meshes, pushed_points
 from fem_reference.solvers.fenicsx.clock import Clock
 from fem_reference.solvers.fenicsx.contact import Pushes
 from fem_reference.solvers.fenicsx.determinants import Determinants
 from fem_reference.solvers.fenicsx.holds import Hold
 from fem_reference.solvers.fenicsx.known import Known, State
+from fem_reference.solvers.fenicsx.linear import Factorised
 from fem_reference.solvers.fenicsx.newton import Newton
 from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.spent import Spent
@@ -54,9 +55,10 @@ class Body:
         self.system = System(form, self.unknowns, settings.element, self.held, self.spent)
         symmetric = has_energy(body)
         self.system.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)  # type: ignore[arg-type]  # as its stubs have it
-        self.linear = linear.make(self.system.matrix, symmetric, settings, self.spent)
+        self.linear = choice.make(self.system, symmetric, settings, self.spent)
         self.newton = Newton(self.system, self.linear, self.determinants, settings, self.spent)
-        self.stability = Stability(self.system, self.linear, self.unknowns) if symmetric else None
+        counts = symmetric and isinstance(self.linear, Factorised)
+        self.stability = Stability(self.system, self.linear, self.unknowns) if counts else None
         self.contact = self.system.contact = self._contact(body, form) if body.contact else None
         self.system.balance_units()
         self.known = Known(self.comm)

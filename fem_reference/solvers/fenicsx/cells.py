@@ -117,6 +117,24 @@ class CellSums:
             ctypes.c_long(len(cells)), *(_address(array) for array in (*arrays, into.places, into.entries))
         )
 
+    def softness(self) -> Floats:
+        """By cell, the mass matrix (m, p, p) of the pressures [mm3/MPa] over what resists them: twice the shear stiffness, by the mean
+        of the diagonal of the energy's second derivatives, and the bulk modulus.
+        """
+        kinds, pressures = self.form.kinds, self.unknowns.shape[1] - 3 * self.nodes
+        count = 3 * kinds + 1
+        rows = [count + v * count - v * (v - 1) // 2 for v in range(count)]  # of the diagonal
+        stiff = [rows[i * kinds + k] for i in range(3) for k in range(3)]
+        weights, basis = self.kept[0], self.kept[4].reshape(-1, pressures)
+        shape = self.kept[1]
+        found = np.empty((self.count, pressures, pressures))
+        for some in self._chunks():
+            given = self.form.second.eval(self.mesh, np.arange(some.start, some.stop, dtype=np.int32))
+            soft = 0.5 / np.abs(given[..., stiff].mean(axis=-1)) - given[..., rows[-1]]
+            volumes = np.abs(np.linalg.det(np.einsum("mgi,qgr->mqir", self.corners[some], shape)))
+            found[some] = np.einsum("mq,qc,qd->mcd", soft * volumes * weights, basis, basis)
+        return found
+
     def _chunks(self) -> list[slice]:
         return [slice(first, min(first + _CHUNK, self.count)) for first in range(0, self.count, _CHUNK)]
 

@@ -5,7 +5,6 @@ from itertools import count
 import numpy as np
 from petsc4py import PETSc
 
-from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.spent import Spent
 
 # What MUMPS calls its entries: its error; negative pivots; the last front, by one process, else those of it are not counted; by how
@@ -18,7 +17,6 @@ _OPERATIONS = 22.0
 _LEAST, _MOST = 12, 80  # Krylov iterations that an old factorisation may take, whatever its size
 _INVERSE_ITERATIONS, _RESOLVED = 4, 0.1  # by which single precision is put to the test
 _EXACT = 1e-10  # a relative residual that leaves Newton's method quadratic
-SMALL = 4000  # unknowns: below, a factorisation costs no more than a few iterations of anything else
 _number = count()
 
 
@@ -124,10 +122,3 @@ class Factorised:
         deviation = again.norm()
         assert isinstance(deviation, float)
         return deviation < _RESOLVED
-
-
-def make(matrix: PETSc.Mat, symmetric: bool, settings: BodySettings, spent: Spent) -> Factorised:
-    """The solver that ``settings`` ask for, or the one for the size of ``matrix``."""
-    kind = settings.linear_solver or ("direct" if matrix.getSize()[0] < SMALL else "lagged")
-    precision = settings.precision or ("double" if kind == "direct" else "single")
-    return Factorised(matrix, symmetric, kind == "lagged", precision, spent)

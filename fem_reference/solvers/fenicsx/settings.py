@@ -30,7 +30,7 @@ class BodySettings(Record):
     newton_iterations: int = Field(default=14, gt=0)
     residual: float = Field(default=1e-8, gt=0)
     quadrature_degree: int | None = Field(default=None, gt=0)
-    linear_solver: Literal["direct", "lagged"] | None = None
+    linear_solver: Literal["direct", "lagged", "multigrid"] | None = None
     precision: Literal["single", "double"] | None = None
     time_limit: Time | None = None
 

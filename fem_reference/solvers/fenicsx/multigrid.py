@@ -1,0 +1,186 @@
+"""Systems of linear equations too large for a factorisation: FGMRES with two levels of elements, P2 and P1, and a mass matrix of the
+pressure.
+
+The preconditioner is block triangular (Murphy, Golub and Wathen 2000, doi 10.1137/S1064827599355153). For the displacement: one
+cycle between the quadratic element and the linear one on the same cells, smoothed by Chebyshev polynomials, the coarse level
+factorised. For the pressure: the mass matrix over local stiffness, to which the Schur complement is spectrally equivalent
+(Wathen and Silvester 1993, doi 10.1137/0730031).
+"""
+
+from itertools import count
+
+import basix
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy.sparse import coo_array, csr_array
+
+from fem_reference.continuum import ELEMENTS
+from fem_reference.mesh import Ints
+from fem_reference.solvers.fenicsx.linear import LinearSolveError
+from fem_reference.solvers.fenicsx.spent import Spent
+from fem_reference.solvers.fenicsx.system import System
+
+_SMOOTHING = 2  # the degree of the polynomial
+_MOST = 200  # iterations; and how many more than with a fresh preconditioner are worth it
+_TIRED = 15
+_number = count()
+
+
+class Multigrid:
+    """Solves with the matrix of a ``system`` on one rank, whose ``element`` is quadratic and has a pressure."""
+
+    lagged = True
+
+    def __init__(self, system: System, element: str, spent: Spent) -> None:
+        self.system, self.matrix, self.spent = system, system.matrix, spent
+        cells = system.cells
+        displaced = np.unique(cells.unknowns[:, : 3 * cells.nodes])
+        pressures = np.unique(cells.unknowns[:, 3 * cells.nodes :])
+        self.sets = [PETSc.IS().createGeneral(names.astype(PETSc.IntType)) for names in (displaced, pressures)]
+        self.number = np.zeros(system.size, np.int64)  # of an unknown in its block
+        self.number[displaced], self.number[pressures] = np.arange(len(displaced)), np.arange(len(pressures))
+        self.coarse, self.fixed = self._interpolation(element, displaced)
+        self.blocks = _Blocks(self.sets)
+        self.krylov = PETSc.KSP().create(self.matrix.comm)
+        self.krylov.setType("fgmres")
+        self.krylov.setGMRESRestart(_MOST)
+        self.krylov.setOperators(self.matrix, self.matrix)
+        self.krylov.getPC().setType("python")
+        self.krylov.getPC().setPythonContext(self.blocks)
+        self.worn, self.first = True, 0
+
+    def changed(self) -> None:
+        """The matrix is another now; the preconditioner serves on."""
+
+    def solve(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> None:
+        """Solve for ``x``, up to ``tolerance`` times the norm of ``b``; ``LinearSolveError`` where that does not succeed."""
+        fresh = self.worn
+        if fresh:
+            self._renew()
+        if self._iterate(b, x, tolerance):
+            iterations = self.krylov.getIterationNumber()
+            per_digit = iterations / -np.log10(tolerance)
+            self.first = per_digit if fresh else self.first
+            self.worn = per_digit > 1.5 * self.first and iterations > _TIRED
+            return
+        if not fresh:
+            self._renew()
+        if fresh or not self._iterate(b, x, tolerance):
+            raise LinearSolveError(f"multigrid does not converge in {_MOST} iterations")
+
+    def _iterate(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> bool:
+        with self.spent.on("krylov"):
+            self.krylov.setTolerances(rtol=tolerance, atol=0.0, max_it=_MOST)
+            self.krylov.solve(b, x)
+        self.spent.counts["krylov_iterations"] += self.krylov.getIterationNumber()
+        return bool(self.krylov.is_converged)
+
+    def _renew(self) -> None:
+        """The preconditioner of the matrix as it is."""
+        with self.spent.on("factorisation"):
+            stiff, coupling = (self.matrix.createSubMatrix(self.sets[0], columns) for columns in self.sets)
+            self.blocks.renew(stiff, coupling, self._cycle(stiff), self._mass())
+        self.spent.counts["factorisations"] += 1
+        self.worn = False
+
+    def _cycle(self, stiff: PETSc.Mat) -> PETSc.PC:
+        """One cycle between the two elements."""
+        coarse = stiff.ptap(self.coarse)
+        coarse.zeroRowsColumns(self.fixed, diag=1.0)
+        stiff.setBlockSizes(3, 3)  # the components of a node are neighbours
+        stiff = stiff.convert(PETSc.Mat.Type.BAIJ)
+        prefix, options = f"fem_reference_multigrid_{next(_number)}_", PETSc.Options()
+        cycle = PETSc.PC().create(stiff.comm)
+        cycle.setOptionsPrefix(prefix)
+        cycle.setOperators(stiff, stiff)
+        cycle.setType("mg")
+        cycle.setMGLevels(2)
+        cycle.setMGInterpolation(1, self.coarse)
+        below = cycle.getMGCoarseSolve()
+        below.setOperators(coarse, coarse)
+        below.setType("preonly")
+        below.getPC().setType("lu")
+        below.getPC().setFactorSolverType("mumps")
+        smoother = cycle.getMGSmoother(1)
+        smoother.setOperators(stiff, stiff)
+        smoother.setType("chebyshev")
+        smoother.setTolerances(max_it=_SMOOTHING)
+        smoother.getPC().setType("pbjacobi")
+        cycle.setUp()
+        for name in [name for name in options.getAll() if name.startswith(prefix)]:
+            options.delValue(name)
+        return cycle
+
+    def _interpolation(self, element: str, displaced: Ints) -> tuple[PETSc.Mat, NDArray[np.int32]]:
+        """From the linear element to the quadratic one on the same cells, 0 where something is prescribed; and which unknowns of the
+        former are: those at corners where one of the latter is.
+        """
+        cells, system = self.system.cells, self.system
+        kind, degree, _ = ELEMENTS[element]
+        cell, warped = basix.CellType[kind], basix.LagrangeVariant.gll_warped
+        places = basix.create_element(basix.ElementFamily.P, cell, degree, warped).points
+        shares = basix.create_element(basix.ElementFamily.P, cell, 1, warped).tabulate(0, places)[0, :, :, 0]
+        corners = cells.mesh.geometry.dofmap[: cells.count, : shares.shape[1]]
+        _, corner = np.unique(corners, return_inverse=True)
+        corner = corner.reshape(corners.shape)
+        node, vertex = np.nonzero(np.abs(shares) > 1e-12)
+        parts = []
+        for i in range(3):
+            rows = self.number[cells.unknowns[:, i * cells.nodes + node]]
+            parts.append((rows.ravel(), (3 * corner[:, vertex] + i).ravel()))
+        rows, columns = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
+        values = np.tile(np.tile(shares[node, vertex], cells.count), 3)
+        _, once = np.unique(rows * (3 * corner.max() + 3) + columns, return_index=True)
+        rows, columns, values = rows[once], columns[once], values[once]
+        held = system.fixed[displaced]
+        fixed = np.unique(columns[(values > 1 - 1e-12) & held[rows]])
+        gone = held[rows] | np.isin(columns, fixed)
+        shape = (len(displaced), int(3 * corner.max() + 3))
+        found = csr_array(coo_array((np.where(gone, 0.0, values), (rows, columns)), shape=shape))
+        csr = (found.indptr.astype(np.int32), found.indices.astype(np.int32), found.data)
+        return PETSc.Mat().createAIJ(shape, csr=csr, comm=self.matrix.comm), fixed.astype(np.int32)
+
+    def _mass(self) -> PETSc.PC:
+        """The mass matrix of the pressure over local stiffness, solved by a factorisation."""
+        system, cells = self.system, self.system.cells
+        blocks = cells.softness() * system.tangent.unit**2
+        names = self.number[cells.unknowns[:, 3 * cells.nodes :]]
+        rows, columns = np.repeat(names, names.shape[1], axis=1), np.tile(names, (1, names.shape[1]))
+        size = self.sets[1].getSize()
+        found = csr_array(coo_array((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)))
+        csr = (found.indptr.astype(np.int32), found.indices.astype(np.int32), found.data)
+        mass = PETSc.Mat().createAIJ((size, size), csr=csr, comm=self.matrix.comm)
+        solver = PETSc.PC().create(self.matrix.comm)
+        solver.setOperators(mass, mass)
+        solver.setType("cholesky")
+        solver.setFactorSolverType("mumps")
+        solver.setUp()
+        return solver
+
+
+class _Blocks:
+    """The block triangular preconditioner as PETSc applies it."""
+
+    def __init__(self, sets: list[PETSc.IS]) -> None:
+        self.sets = sets
+
+    def renew(self, stiff: PETSc.Mat, coupling: PETSc.Mat, cycle: PETSc.PC, mass: PETSc.PC) -> None:
+        """Take other blocks: of the tangent, and solvers for the displacement and the pressure."""
+        self.coupling, self.cycle, self.mass = coupling, cycle, mass
+        self.displaced, self.moved = stiff.createVecs()
+        self.pressed = coupling.createVecRight()
+
+    def apply(self, _: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """First the pressure, by what the volumes ask; then the displacement, by what is left of the forces."""
+        forces, volumes = (x.getSubVector(names) for names in self.sets)
+        self.mass.apply(volumes, self.pressed)
+        self.pressed.scale(-1.0)
+        self.coupling.mult(self.pressed, self.displaced)
+        self.displaced.aypx(-1.0, forces)
+        self.cycle.apply(self.displaced, self.moved)
+        for names, part, found in zip(self.sets, (forces, volumes), (self.moved, self.pressed), strict=True):
+            x.restoreSubVector(names, part)
+            into = y.getSubVector(names)
+            found.copy(into)
+            y.restoreSubVector(names, into)
