@@ -39,7 +39,7 @@ _AFTER_THE_RUN = (
     "cli",
     "exchange",
     "regression",
-    "benchmark.py",
+    "benchmark",
     "families.py",
     "standings.py",
     "__main__.py",

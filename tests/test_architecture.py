@@ -45,12 +45,12 @@ ORDER = [
     "execution",
     "refinement",
     "families",
-    "benchmark",
     "field_execution",
     "overview",
     "field_verbs",
     "truths",
     "verification",
+    "benchmark",
     "cli",
     "__main__",
 ]

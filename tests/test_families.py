@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import small
 
-from fem_reference import benchmark, casefile, cli, families, overview, report, runs, standings
+from fem_reference import casefile, cli, families, overview, report, runs, standings
+from fem_reference.benchmark import candidates
 from fem_reference.execution import Bench
 from fem_reference.metrics import Measure
 from fem_reference.report import standings_page
@@ -46,7 +47,7 @@ def case(tmp_path, monkeypatch):
     monkeypatch.setattr(fenicsx, "require", lambda _: None)
     monkeypatch.setattr(fenicsx, "solve", shift)
     monkeypatch.setattr(families, "families", lambda: ROWS)
-    monkeypatch.setattr(benchmark, "families", lambda: ROWS)
+    monkeypatch.setattr(candidates, "families", lambda: ROWS)
     return small.write(tmp_path / "bar")
 
 
@@ -191,7 +192,7 @@ def test_the_page_is_whole_or_not_there(tmp_path) -> None:
 
 
 def test_the_benchmark_times_what_iterates(case, capsys, monkeypatch) -> None:
-    monkeypatch.setattr(benchmark, "REPEATS", 2)
+    monkeypatch.setattr(candidates, "REPEATS", 2)
     target = case.parent / "speed.json"
     assert cli.main(["benchmark", str(case), "--json", str(target), "--quiet"]) == cli.DONE
     facts = json.loads(target.read_text())
@@ -206,18 +207,18 @@ def test_the_benchmark_times_what_iterates(case, capsys, monkeypatch) -> None:
 
 
 def test_a_ratio_is_told_where_the_report_has_a_speed() -> None:
-    timing = benchmark.Timing("gluteus_maximus", "pbd", "pbd", 19752, (0.02, 0.01), 33.0)
+    timing = candidates.Timing("gluteus_maximus", "pbd", "pbd", 19752, (0.02, 0.01), 33.0)
     assert (timing.per_second, timing.ratio) == pytest.approx((100.0, 100 / 33))
-    told = benchmark.text([timing], benchmark.Machine(10.0, 2.0))
+    told = candidates.text([timing], candidates.Machine(10.0, 2.0))
     assert "pbd 50 to 100, 3.03 times the report's program (33 a second)" in told
 
 
 def test_a_solver_that_fails_has_no_time(case, monkeypatch) -> None:
     monkeypatch.setattr(pbd, "solve", lambda *_: Outcome("diverged", "lost"))
-    timings, machine = benchmark.measure([Bench(casefile.read_muscle(case), case.parent)])
+    timings, machine = candidates.measure([Bench(casefile.read_muscle(case), case.parent)])
     assert [one.per_second for one in timings] == [None, None]
-    assert "pbd failed" in benchmark.text(timings, machine)
-    json.dumps(benchmark.facts(timings, machine), allow_nan=False)
+    assert "pbd failed" in candidates.text(timings, machine)
+    json.dumps(candidates.facts(timings, machine), allow_nan=False)
     assert cli.main(["benchmark", str(case), "--quiet"]) == cli.DONE  # it is told, not judged
 
 
@@ -225,7 +226,7 @@ def test_lines_do_not_iterate_and_a_short_scene_cannot_be_timed(case, capsys) ->
     path = case / "case.toml"
     line = '[[candidate]]\nname = "pb_line"\nsolver = "line_of_action"\n\n'
     path.write_text(path.read_text().replace("[[expect]]", f"{line}[[expect]]"))
-    assert [entry.name for entry, _ in benchmark._candidates(Bench(casefile.read_muscle(case), case.parent))] == [
+    assert [entry.name for entry, _ in candidates._candidates(Bench(casefile.read_muscle(case), case.parent))] == [
         "pbd",
         "still",
     ]

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from fem_reference import __version__, field_verbs
-from fem_reference.cli import check, export, verbs
+from fem_reference.cli import benchmark, check, export, verbs
 
 
 def parser() -> argparse.ArgumentParser:
@@ -54,10 +54,8 @@ def parser() -> argparse.ArgumentParser:
         solving.add_argument("--ranks", type=int, metavar="N", help=ranks)
     page = add("page", verbs.page, "write a page over several cases", case=False)
     _add_page_options(page, unit)
-    speed = "time the solvers of Table 5.1 in processor time, beside the machine's own speed"
-    timing = add("benchmark", verbs.time_solvers, speed, case=False)
-    timed = f"cases to time them on (default: {', '.join(verbs.TIMED_WITH_DATA)} where the data is, else {', '.join(verbs.TIMED)})"
-    timing.add_argument("cases", metavar="CASE", nargs="*", help=timed)
+    speed = "time the solvers of Table 5.1 in processor time, beside the machine's own speed, or the reference by phase"
+    benchmark.add_options(add("benchmark", benchmark.benchmark, speed, case=False))
     catalogue = add("verify", verbs.verify, "measure problems whose answers are known and write the page", case=False)
     known = "an entry, a family or a shell pattern of them (default: all)"
     catalogue.add_argument("names", metavar="NAME", nargs="*", help=known)

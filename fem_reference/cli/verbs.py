@@ -1,11 +1,9 @@
 """What each verb does; it prints what came of it and returns the exit status."""
 
 import argparse
-import os
 from pathlib import Path
 
 from fem_reference import (
-    benchmark,
     casefile,
     comparison,
     families,
@@ -26,12 +24,11 @@ from fem_reference.field_execution import FieldBench
 from fem_reference.field_verbs import Told
 from fem_reference.overview import comparison_text, field_scene_facts, run_facts, run_text, scene_facts, standings_text
 from fem_reference.report.standings_page import facts as standings_facts
-from fem_reference.scene import DATA_SETTING, Candidate, Scene, SolverChoice
+from fem_reference.scene import Candidate, Scene, SolverChoice
 from fem_reference.verification import verb as verification
 
 MAIN_JOB = "hip_flexion"
 TABLE = "table-5-1"
-TIMED, TIMED_WITH_DATA = ("hip_flexion", "box_squeeze"), ("gluteus_maximus", "box_squeeze_report")
 
 
 def demo(options: argparse.Namespace) -> int:
@@ -117,18 +114,6 @@ def _foreign(options: argparse.Namespace, cases: list[str]) -> dict[str, list[Ca
         found.setdefault(name, []).append(recorded_in(folder, options.unit))
         check_names([candidate.name for candidate in found[name]])
     return found
-
-
-def time_solvers(options: argparse.Namespace) -> int:
-    """Time the solvers of Table 5.1."""
-    cases = options.cases or (TIMED_WITH_DATA if os.environ.get(DATA_SETTING) else TIMED)
-    benches = [Bench(casefile.read_muscle(case), out(options) / "runs") for case in cases]
-    for bench in benches:
-        benchmark.check(bench.scene)
-        bench.setup()  # what is missing shows before anything is timed
-    timings, machine = benchmark.measure(benches)
-    tell(benchmark.facts(timings, machine), benchmark.text(timings, machine), options)
-    return DONE
 
 
 def verify(options: argparse.Namespace) -> int:
