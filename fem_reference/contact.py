@@ -8,7 +8,7 @@ import numpy as np
 from fem_reference.geometry.rigid_bodies import Obstacle
 from fem_reference.geometry.signed_distance import FAR
 from fem_reference.geometry.skins import Skin
-from fem_reference.mesh import Floats
+from fem_reference.mesh import Floats, Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +51,26 @@ class Contact:
             return 0.0
         first, last = self.relaxed
         return float(np.clip((last - frame) / (last - first), 0, 1))
+
+
+class Nearby:
+    """Which of the points may be within ``law.smoothing`` of an ``obstruction``: by the ``gap`` (n,) that each had at least where
+    it was ``asked`` last (n, 3), in the obstruction's frame.
+    """
+
+    def __init__(self, law: Contact, obstruction: Obstruction, count: int) -> None:
+        self.law, self.shape = law, obstruction.shape
+        self.gap, self.asked = np.full(count, -np.inf), np.zeros((count, 3))
+        self.touched = np.ones(count, bool)  # asked since the last settled state
+
+    def ask(self, local: Floats) -> Ints:
+        """The points that may be near, at ``local`` (n, 3)."""
+        moved = np.linalg.norm(local - self.asked, axis=1)
+        return np.flatnonzero(~(self.gap - self.shape.steepest * moved > self.law.smoothing))
+
+    def note(self, near: Ints, local: Floats, gap: Floats) -> None:
+        """What the points that were asked answered."""
+        self.gap[near], self.asked[near], self.touched[near] = np.minimum(gap, self.shape.reach), local[near], True
 
 
 def nearest_on_way(obstruction: Obstruction, starts: Floats, ways: Floats, least: float) -> Floats:

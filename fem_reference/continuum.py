@@ -14,6 +14,7 @@ from fem_reference.effects import Effect, Load
 from fem_reference.errors import InputError
 from fem_reference.mesh import Floats, Ints
 from fem_reference.runs import Outcome
+from fem_reference.states import NodalState
 
 Kind = Literal["tetrahedron", "hexahedron"]
 # By element: kind of cell, degree of the displacement, and of the pressure (None: no such unknown; 0: constant in each cell).
@@ -190,7 +191,8 @@ class Reached:
     ``forces`` (3,) [N] that hold it there, along the prescribed components, and their ``moments`` (3,) [N mm] about the origin (at
     nodes of two regions that prescribe the same component, the force counts in both), and what obstructions exert; ``scalars``:
     min_det_F_quadrature, min_det_F_vertices, volume_ratio, energy [N mm] of what acts inside, newton_iterations, cut_backs; with
-    contact the greatest contact_depth [mm] and contact_pressure [MPa] and the contact_area at rest [mm2].
+    contact the greatest contact_depth [mm] and contact_pressure [MPa] and the contact_area at rest [mm2]; ``state``: the unknowns
+    of the cells, where they were asked for.
     """
 
     frame: float
@@ -198,6 +200,7 @@ class Reached:
     forces: dict[str, Floats]
     moments: dict[str, Floats]
     scalars: dict[str, float] = field(default_factory=dict)
+    state: NodalState | None = None
 
 
 @dataclass(frozen=True, eq=False)

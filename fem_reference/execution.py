@@ -29,6 +29,7 @@ log = logging.getLogger(__name__)
 _AFTER_THE_RUN = (
     "metrics",
     "report",
+    "results.py",
     "study.py",
     "judge.py",
     "comparison.py",
@@ -48,7 +49,12 @@ _AFTER_THE_RUN = (
     "field_execution.py",
     "field_verbs.py",
 )
-_MACHINE_ONLY = {"ranks", "time_limit"}  # settings that change the time and not the answer
+_MACHINE_ONLY = {
+    "ranks",
+    "time_limit",
+    "linear_solver",
+    "precision",
+}  # settings that change the time and not the answer
 
 
 class Bench:
@@ -87,7 +93,7 @@ class Bench:
         built = self.problem()
         origin = self.origin(solver, settings) | {"mesh": built.mesh_facts}
         identity = {"name": name, "solver": solver, "origin": origin, "frames": built.frames}
-        writer = runs.Writer(folder, identity, built.surface, built.fibres, built.mesh)
+        writer = runs.Writer(folder, identity, built.surface, built.fibres, built.mesh, built.directions)
         outcome = solvers.find(solver, self.scene.place).solve(built, settings, writer.add)
         if not writer.frames:  # it failed before its first frame, which is rest
             writer.add(Frame(built.frames[0], built.surface.points, built.fibres.points))

@@ -139,7 +139,7 @@ def write_field(
     space = np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
     kind = {2: "line", 3: "triangle", 4: "tetra"}[cells.shape[1]]
     of_cells = {name: [values] for name, values in (cell_data or {}).items()}
-    with _whole(path) as part:
+    with whole(path) as part:
         meshio.Mesh(space, [(kind, cells)], data, of_cells).write(part, "gmsh" if path.suffix == ".msh" else None)
 
 
@@ -156,12 +156,12 @@ def write_text(path: Path, text: str) -> None:
     if path.exists() and not path.is_file():
         path.write_text(text, encoding="utf-8")
         return
-    with _whole(path) as part:
+    with whole(path) as part:
         part.write_text(text, encoding="utf-8")
 
 
 @contextmanager
-def _whole(path: Path) -> Iterator[Path]:
+def whole(path: Path) -> Iterator[Path]:
     """A name beside ``path`` to write to, which takes its place when all went well and is gone otherwise."""
     part = path.with_name(f".{path.stem}-{os.getpid()}{path.suffix}")
     try:
@@ -293,7 +293,7 @@ def _vtk_write(path: Path, writer: Any, data: Any, rest: Floats, positions: Floa
     displacement.SetName("displacement")
     data.GetPointData().SetVectors(displacement)
     writer.SetInputData(data)
-    with _whole(path) as part, _vtk_messages() as messages:
+    with whole(path) as part, _vtk_messages() as messages:
         writer.SetFileName(str(part))
         if not writer.Write() or writer.GetErrorCode():
             raise OSError(f"{path}: {messages.GetOutput()}")

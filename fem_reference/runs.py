@@ -5,6 +5,7 @@
                                  /rest/           surface.vtp and fibres.vtp at rest, of a solver that moves no surface
                                  /fibres.pvd      fibre polylines, where the solver has an interior
                                  /tets.pvd        tetrahedra, where the solver has them
+                                 /state/          the unknowns of the tetrahedra, where they were asked for (``states``)
 
 A file appears whole or not at all; ``run.json`` is written after the frame files that it names. A run whose status is
 ``running`` was cut off; it is not read as a result.
@@ -22,7 +23,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from fem_reference import files
+from fem_reference import files, states
 from fem_reference.errors import InputError
 from fem_reference.mesh import Floats, Polylines, Surface, TetMesh
 
@@ -37,7 +38,8 @@ QUIET = 1.0
 @dataclass(frozen=True, eq=False)
 class Frame:
     """One requested frame: positions [mm] of the surface (n, 3), None of a solver of lines alone, and where the solver has them
-    of the fibre points (m, 3) and tet points (k, 3); ``scalars`` by name; ``note`` is what progress says of it.
+    of the fibre points (m, 3) and tet points (k, 3); ``scalars`` by name; ``note`` is what progress says of it; ``state`` the
+    unknowns of the tets, where they were asked for.
     """
 
     number: int
@@ -46,6 +48,7 @@ class Frame:
     tets: Floats | None = None
     scalars: dict[str, float] = field(default_factory=dict)
     note: str = ""
+    state: states.NodalState | None = None
 
 
 Sink = Callable[[Frame], None]
@@ -87,10 +90,18 @@ class Writer:
     """Writes one run into ``folder``, which it empties first; ``add`` each frame, then ``close``."""
 
     def __init__(
-        self, folder: Path, identity: dict[str, Any], surface: Surface, fibres: Polylines | None, mesh: TetMesh | None
+        self,
+        folder: Path,
+        identity: dict[str, Any],
+        surface: Surface,
+        fibres: Polylines | None,
+        mesh: TetMesh | None,
+        directions: Floats | None = None,
     ) -> None:
-        """``identity``: ``name``, ``solver``, ``origin`` and ``frames`` (the numbers wanted), as they go into run.json."""
-        self.folder, self.surface, self.fibres, self.mesh = folder, surface, fibres, mesh
+        """``identity``: ``name``, ``solver``, ``origin`` and ``frames`` (the numbers wanted), as they go into run.json;
+        ``directions`` (k, 3): the unit vector along the fibres in each tet of ``mesh``, which states are stored with.
+        """
+        self.folder, self.surface, self.fibres, self.mesh, self.directions = folder, surface, fibres, mesh, directions
         self.state: dict[str, Any] = {"format": FORMAT, **identity, "status": "running", "message": "", "numbers": []}
         self.state |= {"scalars": {}, "cost": {}, "parts": []}
         self.begin, self.told = time.perf_counter(), 0.0
@@ -116,8 +127,9 @@ class Writer:
         if self.mesh is not None and (tets := frame.tets) is not None:
             mesh = self.mesh
             parts["tets"] = lambda path: files.write_tets(path, mesh, tets)
+        stored = ["state"] if self._write_unknowns(frame) else []
         self.state["numbers"].append(frame.number)
-        self.state["parts"] = sorted(parts)
+        self.state["parts"] = sorted([*parts, *stored])
         for part, write in parts.items():
             suffix = ".vtu" if part == "tets" else ".vtp"
             (self.folder / part).mkdir(exist_ok=True)
@@ -134,6 +146,15 @@ class Writer:
         cost = {"seconds": time.perf_counter() - self.begin} | outcome.cost
         self.state |= {"status": outcome.status, "message": outcome.message, "cost": cost}
         self._write_state()
+
+    def _write_unknowns(self, frame: Frame) -> bool:
+        """The unknowns of the tets, if the frame has them."""
+        if self.mesh is None or frame.state is None:
+            return False
+        if not self.frames:
+            states.write_rest(self.folder, self.mesh, self.directions)
+        states.write(self.folder, frame.number, frame.state)
+        return True
 
     def _write_rest(self) -> None:
         """The rest state, which the first frame of a solver without a surface is not."""

@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
-from fem_reference.contact import Contact
+from fem_reference.contact import Contact, Nearby, Obstruction
+from fem_reference.geometry.rigid_bodies import Box, Sphere
+from fem_reference.geometry.signed_distance import Grid, build
+from fem_reference.geometry.tessellation import tessellated
 
 D, K = 0.1, 2.0
 LAW = Contact("top", K, D)
@@ -29,3 +32,35 @@ def test_neither_pressure_nor_slope_jumps() -> None:
         (before, after), slopes = LAW.pressure(np.array([joint - 1e-9, joint + 1e-9]))
         assert before == pytest.approx(after, abs=1e-8)
         assert slopes[0] == pytest.approx(slopes[1], abs=1e-7)
+
+
+@pytest.mark.parametrize("kind", ["sphere", "box", "grid"])
+def test_no_point_that_is_near_goes_unasked(kind) -> None:
+    # Points walk at random, now and then by a leap; whoever is within the smoothing must be among those that are asked.
+    shape = {"sphere": Sphere((0.0, 0.0, 0.0), 10.0), "box": Box((0.0, 0.0, 0.0), (16.0, 10.0, 6.0), 0.0)}.get(
+        kind
+    ) or ball()
+    obstruction = Obstruction("ball", shape, lambda _: np.eye(4))
+    random = np.random.default_rng(5)
+    points = random.uniform(-60, 60, (4000, 3))
+    nearby, asked = Nearby(LAW, obstruction, len(points)), 0
+    for step in range(60):
+        points = points + random.normal(size=points.shape) * (20.0 if step % 20 == 19 else 0.3)
+        near = nearby.ask(points)
+        distance = shape.sample(points).distance
+        assert np.isin(np.flatnonzero(distance <= LAW.smoothing), near).all()
+        nearby.note(near, points, distance[near])
+        asked += len(near)
+    assert asked < 0.35 * 60 * len(points)
+
+
+def ball() -> Grid:
+    form = Sphere((0.0, 0.0, 0.0), 10.0)
+    return build(tessellated(form, np.zeros((1, 3)), "ball"), 1.0, 6.0)
+
+
+def test_a_gradient_is_nowhere_steeper_than_said() -> None:
+    grid = ball()
+    points = np.random.default_rng(6).uniform(-18, 18, (20_000, 3))
+    lengths = np.linalg.norm(grid.sample(points).gradient, axis=1)
+    assert 1 <= lengths.max() <= grid.steepest

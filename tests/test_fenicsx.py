@@ -143,9 +143,13 @@ def test_what_cannot_be_reached_is_a_status_that_keeps_the_frames_before() -> No
 
 def test_more_ranks_than_tets_still_solve() -> None:
     problem = shapes.bar((1, 1, 1), (10, 10, 10), {"bottom": None, "top": turning(0.1)}, MUSCLE, (0, 10))
-    outcome, frames = solved(problem, ranks=7, time_limit="60 s")
+    outcome, frames = solved(problem, ranks=7, time_limit="60 s", store_state=True)
     assert outcome.status == "converged"
     assert len(frames) == 2
+    assert frames[-1].state.displacement.shape == (6, 10, 3)
+    assert frames[-1].state.displacement[:, :4] == pytest.approx(
+        (frames[-1].tets - problem.mesh.points)[problem.mesh.tets]
+    )
 
 
 def test_an_error_on_one_rank_ends_all(tmp_path) -> None:

@@ -257,3 +257,17 @@ def test_a_time_limit_ends_one_body_and_not_the_session(session) -> None:  # noq
         process = fresh.process
         assert fresh.solve(body, settings("Q1/P0")).outcome.status == "converged"
         assert fresh.process is process
+
+
+def test_a_shared_edge_counts_once(session) -> None:
+    # Two regions meet in an edge and hold it both: with the third, what holds the body is in balance.
+    push = Affine(((0.0, 0.0, 0.0),) * 3, (0.0, 0.1, -0.2))
+    held = (
+        Prescribed("bottom", "z0", ALL, Rest()),
+        Prescribed("side", "x0", ALL, Affine(((0.0, 0.0, 0.0), (0.0, 0.0, 0.1), (0.0, 0.0, -0.2)), (0.0, 0.0, 0.0))),
+        Prescribed("top", "z1", ALL, push),
+    )
+    body = Continuum(box("P2/P1"), FLESH, held, (0.0, 1.0))
+    forces = session.solve(body, settings("P2/P1")).last.forces
+    assert np.abs(forces["side"]).max() > 1e-4
+    assert sum(forces.values()) == pytest.approx(0, abs=1e-10)

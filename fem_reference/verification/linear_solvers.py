@@ -1,6 +1,7 @@
 """How linear systems are solved changes the time and not the answer: the same body by each solver of the reference."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -41,7 +42,12 @@ class Compared:
         turn = Turn((1.0, 0.0, 2.0), 1.0, (5.0, 5.0, 12.5))
         held = (Prescribed("z0", "z0", (0, 1, 2), Rest()), Prescribed("z1", "z1", (0, 1, 2), turn))
         body = Continuum(mesh, MUSCLE, held, (0.0, 1.0), Along((0.0, 0.0, 1.0)))
-        settings = {"linear_solver": solver, "precision": precision, "residual": residual, "first_step": 0.25}
+        settings: dict[str, Any] = {
+            "linear_solver": solver,
+            "precision": precision,
+            "residual": residual,
+            "first_step": 0.25,
+        }
         return lab.solve(body, ELEMENT, **settings).last.points
 
 

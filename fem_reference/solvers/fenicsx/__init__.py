@@ -4,7 +4,6 @@ This side needs no FEniCSx: it runs ``worker`` in processes of its own (``mpiexe
 a file, and sinks frames as the worker reports them. A worker that dies is the status *crashed*, not an exception.
 """
 
-import os
 import pickle
 import shutil
 import sys
@@ -16,18 +15,19 @@ from typing import Any
 import numpy as np
 
 from fem_reference.children import command
-from fem_reference.continuum import check_element
+from fem_reference.continuum import Continuum, check_element
 from fem_reference.deformable import as_continuum
 from fem_reference.effects import Effect
-from fem_reference.errors import MissingSoftware
+from fem_reference.errors import InputError, MissingSoftware
 from fem_reference.geometry.embedding import Locator
 from fem_reference.mesh import Floats, Ints
 from fem_reference.motion import apply
 from fem_reference.problem import Problem
 from fem_reference.records import join
 from fem_reference.runs import Frame, Outcome, Sink
+from fem_reference.solvers.fenicsx import resources
 from fem_reference.solvers.fenicsx.field import FieldSettings, solve_field
-from fem_reference.solvers.fenicsx.jobs import Job
+from fem_reference.solvers.fenicsx.jobs import Job, stored_state
 from fem_reference.solvers.fenicsx.processes import require_installed, running
 from fem_reference.solvers.fenicsx.session import session, solve_body
 from fem_reference.solvers.fenicsx.settings import BodySettings, Settings
@@ -61,6 +61,7 @@ def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
     """Solve every requested frame in worker processes; frames carry surface, fibres and tets."""
     require(settings)
     body = as_continuum(problem)
+    settings = _planned(settings, body)
     with tempfile.TemporaryDirectory(prefix="fem_reference-") as folder:
         job = Path(folder) / "job.pickle"
         job.write_bytes(pickle.dumps(Job(body, settings, _samples(problem))))
@@ -115,15 +116,29 @@ def _samples(problem: Problem) -> dict[str, tuple[Ints, Floats]]:
 def _command(settings: Settings, job: Path) -> list[str]:
     """The worker's command line. The wheel's MPI has its ``mpiexec`` beside the interpreter; one on the PATH may not fit."""
     # Under mpi4py's own runner an error on one rank ends all of them; without it the others wait for ever.
-    worker = command("-m", "mpi4py", "-m", f"{__name__}.worker", str(job))
-    beside = Path(sys.executable).with_name("mpiexec")
-    mpiexec = str(beside) if beside.exists() else shutil.which("mpiexec")
-    ranks = settings.ranks or (min(2, len(os.sched_getaffinity(0))) if mpiexec else 1)
+    worker, mpiexec = command("-m", "mpi4py", "-m", f"{__name__}.worker", str(job)), _mpiexec()
+    ranks = settings.ranks or 1
     if ranks == 1:
         return worker
     if mpiexec is None:
         raise MissingSoftware(f"{ranks} ranks need mpiexec, which is neither beside {sys.executable} nor on the PATH")
     return [mpiexec, "-n", str(ranks), *worker]
+
+
+def _planned(settings: Settings, body: Continuum) -> Settings:
+    """The settings with what the size of ``body`` and the machine ask for where they leave it open."""
+    chosen = resources.planned(settings, body.mesh, resources.available())
+    if chosen.linear_solver == "multigrid" and (chosen.ranks or 1) > 1:
+        raise InputError("ranks", chosen.ranks, "1, on which multigrid works")
+    if chosen.ranks:
+        return chosen
+    count = resources.unknowns(body.mesh, chosen.element)
+    return chosen.model_copy(update={"ranks": resources.ranks(chosen, count) if _mpiexec() else 1})
+
+
+def _mpiexec() -> str | None:
+    beside = Path(sys.executable).with_name("mpiexec")
+    return str(beside) if beside.exists() else shutil.which("mpiexec")
 
 
 def _run(command_line: list[str], settings: Settings, sink: Sink) -> Outcome:
@@ -151,4 +166,5 @@ def _frame(event: dict[str, Any]) -> Frame:
             for name in arrays
             if name.startswith("force ")
         }
-        return Frame(event["frame"], arrays["surface"], arrays["fibres"], arrays["nodes"], scalars | pulls, note)
+        places = arrays["surface"], arrays["fibres"], arrays["nodes"]
+        return Frame(event["frame"], *places, scalars | pulls, note, stored_state(arrays))

@@ -4,7 +4,7 @@ Every method is collective: all ranks call it and, where it returns a value, get
 """
 
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import basix.ufl
 import numpy as np
@@ -23,6 +23,7 @@ from fem_reference.solvers.fenicsx.holds import Hold
 from fem_reference.solvers.fenicsx.known import Known, State
 from fem_reference.solvers.fenicsx.linear import Factorised
 from fem_reference.solvers.fenicsx.newton import Newton
+from fem_reference.solvers.fenicsx.nodal import Nodal
 from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.stability import Stability, has_energy
@@ -58,12 +59,13 @@ class Body:
         self.linear = choice.make(self.system, symmetric, settings, self.spent)
         self.newton = Newton(self.system, self.linear, self.determinants, settings, self.spent)
         counts = symmetric and isinstance(self.linear, Factorised)
-        self.stability = Stability(self.system, self.linear, self.unknowns) if counts else None
+        self.stability = Stability(self.system, cast(Factorised, self.linear), self.unknowns) if counts else None
         self.contact = self.system.contact = self._contact(body, form) if body.contact else None
         self.system.balance_units()
         self.known = Known(self.comm)
         self.recalled: State | None = None
         self.nodes = meshes.Nodes(body.mesh, self.cells, ufl.split(self.unknowns)[0])
+        self.nodal = Nodal(self.cells, settings.element, self.unknowns, self.clock) if settings.store_state else None
 
     def _contact(self, body: Continuum, form: forms.Form) -> Pushes:
         """What obstructions do."""
@@ -193,6 +195,10 @@ class Body:
     def node_positions(self) -> Floats:
         """Where the nodes of the body's mesh are now (n, 3) [mm]."""
         return self.nodes.positions(self.mesh)
+
+    def state(self) -> dict[str, Any]:
+        """By name, the arrays of ``states.NodalState``; nothing where they were not asked for."""
+        return {} if self.nodal is None else self.nodal.state().arrays
 
     def positions(self, cells: Ints, points: Floats) -> Floats:
         """Where the material points ``points`` (n, 3), each seen from cell ``cells`` (n,), are now; (n, 3) on every rank."""

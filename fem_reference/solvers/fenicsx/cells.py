@@ -118,8 +118,8 @@ class CellSums:
         )
 
     def softness(self) -> Floats:
-        """By cell, the mass matrix (m, p, p) of the pressures [mm3/MPa] over what resists them: twice the shear stiffness, by the mean
-        of the diagonal of the energy's second derivatives, and the bulk modulus.
+        """By cell, the mass matrix (m, p, p) of the pressures [mm3/MPa] over what resists them: twice the shear stiffness, by the
+        mean of the diagonal of the energy's second derivatives, and the bulk modulus.
         """
         kinds, pressures = self.form.kinds, self.unknowns.shape[1] - 3 * self.nodes
         count = 3 * kinds + 1

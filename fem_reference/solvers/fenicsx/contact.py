@@ -11,7 +11,7 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
-from fem_reference.contact import Contact, Obstruction, nearest_on_way
+from fem_reference.contact import Contact, Nearby, Obstruction, nearest_on_way
 from fem_reference.mesh import Floats, Ints
 from fem_reference.motion import apply
 from fem_reference.solvers.fenicsx.pushed_points import PushedPoints
@@ -32,26 +32,6 @@ class Push:
     local: Floats
 
 
-class _Nearby:
-    """Which of the points may be within ``law.smoothing`` of an ``obstruction``: by the ``gap`` (n,) that each had at least where
-    it was ``asked`` last (n, 3), in the obstruction's frame.
-    """
-
-    def __init__(self, law: Contact, obstruction: Obstruction, count: int) -> None:
-        self.law, self.shape = law, obstruction.shape
-        self.gap, self.asked = np.full(count, -np.inf), np.zeros((count, 3))
-        self.touched = np.ones(count, bool)  # asked since the last settled state
-
-    def ask(self, local: Floats) -> Ints:
-        """The points that may be near, at ``local`` (n, 3)."""
-        moved = np.linalg.norm(local - self.asked, axis=1)
-        return np.flatnonzero(~(self.gap - self.shape.steepest * moved > self.law.smoothing))
-
-    def note(self, near: Ints, local: Floats, gap: Floats) -> None:
-        """What the points that were asked answered."""
-        self.gap[near], self.asked[near], self.touched[near] = np.minimum(gap, self.shape.reach), local[near], True
-
-
 class Pushes:
     """What obstructions do to this rank's pushed points."""
 
@@ -66,7 +46,7 @@ class Pushes:
         """``frame``: where the body rests."""
         self.law, self.obstructions, self.points, self.unknowns, self.frame = law, obstructions, points, unknowns, frame
         count = len(points.areas)
-        self.nearby = [_Nearby(law, entry, count) for entry in obstructions]
+        self.nearby = [Nearby(law, entry, count) for entry in obstructions]
         self.overlaps = [np.zeros(count) for _ in obstructions]
         self.update(frame)
         if law.relaxed:

@@ -1,10 +1,13 @@
-"""What is passed to the process that solves."""
+"""What is passed to the process that solves, and what a frame brings back."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from fem_reference.continuum import Continuum
 from fem_reference.mesh import Floats, Ints
 from fem_reference.solvers.fenicsx.settings import BodySettings
+from fem_reference.states import NodalState
 
 
 @dataclass(frozen=True, eq=False)
@@ -16,3 +19,9 @@ class Job:
     body: Continuum
     settings: BodySettings
     samples: dict[str, tuple[Ints, Floats]]
+
+
+def stored_state(arrays: Mapping[str, Any]) -> NodalState | None:
+    """The unknowns of the cells among the ``arrays`` of a frame, None where they were not asked for."""
+    own = {name.removeprefix("state "): arrays[name] for name in arrays if name.startswith("state ")}
+    return NodalState.of(own) if own else None

@@ -1,5 +1,5 @@
-"""Systems of linear equations too large for a factorisation: FGMRES with two levels of elements, P2 and P1, and a mass matrix of the
-pressure.
+"""Systems of linear equations too large for a factorisation: FGMRES with two levels of elements, P2 and P1, and a mass matrix of
+the pressure.
 
 The preconditioner is block triangular (Murphy, Golub and Wathen 2000, doi 10.1137/S1064827599355153). For the displacement: one
 cycle between the quadratic element and the linear one on the same cells, smoothed by Chebyshev polynomials, the coarse level
@@ -11,7 +11,6 @@ from itertools import count
 
 import basix
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import coo_array, csr_array
 
@@ -37,10 +36,10 @@ class Multigrid:
         cells = system.cells
         displaced = np.unique(cells.unknowns[:, : 3 * cells.nodes])
         pressures = np.unique(cells.unknowns[:, 3 * cells.nodes :])
-        self.sets = [PETSc.IS().createGeneral(names.astype(PETSc.IntType)) for names in (displaced, pressures)]
+        self.sets = [PETSc.IS().createGeneral(names.tolist()) for names in (displaced, pressures)]
         self.number = np.zeros(system.size, np.int64)  # of an unknown in its block
         self.number[displaced], self.number[pressures] = np.arange(len(displaced)), np.arange(len(pressures))
-        self.coarse, self.fixed = self._interpolation(element, displaced)
+        self.coarse, self.fixed = self._interpolation(element, displaced.astype(np.int64))
         self.blocks = _Blocks(self.sets)
         self.krylov = PETSc.KSP().create(self.matrix.comm)
         self.krylov.setType("fgmres")
@@ -87,7 +86,7 @@ class Multigrid:
     def _cycle(self, stiff: PETSc.Mat) -> PETSc.PC:
         """One cycle between the two elements."""
         coarse = stiff.ptap(self.coarse)
-        coarse.zeroRowsColumns(self.fixed, diag=1.0)
+        coarse.zeroRowsColumns(self.fixed.tolist(), diag=1.0)
         stiff.setBlockSizes(3, 3)  # the components of a node are neighbours
         stiff = stiff.convert(PETSc.Mat.Type.BAIJ)
         prefix, options = f"fem_reference_multigrid_{next(_number)}_", PETSc.Options()
@@ -112,9 +111,9 @@ class Multigrid:
             options.delValue(name)
         return cycle
 
-    def _interpolation(self, element: str, displaced: Ints) -> tuple[PETSc.Mat, NDArray[np.int32]]:
-        """From the linear element to the quadratic one on the same cells, 0 where something is prescribed; and which unknowns of the
-        former are: those at corners where one of the latter is.
+    def _interpolation(self, element: str, displaced: Ints) -> tuple[PETSc.Mat, Ints]:
+        """From the linear element to the quadratic one on the same cells, 0 where something is prescribed; and which unknowns of
+        the former are: those at corners where one of the latter is.
         """
         cells, system = self.system.cells, self.system
         kind, degree, _ = ELEMENTS[element]
@@ -139,7 +138,7 @@ class Multigrid:
         shape = (len(displaced), int(3 * corner.max() + 3))
         found = csr_array(coo_array((np.where(gone, 0.0, values), (rows, columns)), shape=shape))
         csr = (found.indptr.astype(np.int32), found.indices.astype(np.int32), found.data)
-        return PETSc.Mat().createAIJ(shape, csr=csr, comm=self.matrix.comm), fixed.astype(np.int32)
+        return PETSc.Mat().createAIJ(shape, csr=csr, comm=self.matrix.comm), fixed
 
     def _mass(self) -> PETSc.PC:
         """The mass matrix of the pressure over local stiffness, solved by a factorisation."""
@@ -168,12 +167,12 @@ class _Blocks:
     def renew(self, stiff: PETSc.Mat, coupling: PETSc.Mat, cycle: PETSc.PC, mass: PETSc.PC) -> None:
         """Take other blocks: of the tangent, and solvers for the displacement and the pressure."""
         self.coupling, self.cycle, self.mass = coupling, cycle, mass
-        self.displaced, self.moved = stiff.createVecs()
+        self.displaced, self.moved = stiff.createVecRight(), stiff.createVecRight()
         self.pressed = coupling.createVecRight()
 
     def apply(self, _: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """First the pressure, by what the volumes ask; then the displacement, by what is left of the forces."""
-        forces, volumes = (x.getSubVector(names) for names in self.sets)
+        forces, volumes = x.getSubVector(self.sets[0]), x.getSubVector(self.sets[1])
         self.mass.apply(volumes, self.pressed)
         self.pressed.scale(-1.0)
         self.coupling.mult(self.pressed, self.displaced)

@@ -4,7 +4,7 @@ import numpy as np
 
 from fem_reference.mesh import Floats
 from fem_reference.solvers.fenicsx.determinants import Determinants
-from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolveError
+from fem_reference.solvers.fenicsx.linear import LinearSolveError, LinearSolver
 from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.system import System
@@ -26,7 +26,7 @@ class Newton:
     """
 
     def __init__(
-        self, system: System, linear: Factorised, determinants: Determinants, settings: BodySettings, spent: Spent
+        self, system: System, linear: LinearSolver, determinants: Determinants, settings: BodySettings, spent: Spent
     ) -> None:
         self.system, self.linear, self.determinants, self.spent = system, linear, determinants, spent
         self.residual, self.most = settings.residual, settings.newton_iterations

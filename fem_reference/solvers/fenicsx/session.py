@@ -12,7 +12,7 @@ import numpy as np
 from fem_reference.children import command
 from fem_reference.continuum import Continuum, Reached, Solved, check
 from fem_reference.runs import Outcome
-from fem_reference.solvers.fenicsx.jobs import Job
+from fem_reference.solvers.fenicsx.jobs import Job, stored_state
 from fem_reference.solvers.fenicsx.processes import Process, require_installed, running
 from fem_reference.solvers.fenicsx.settings import BodySettings
 
@@ -65,7 +65,7 @@ def _state(event: dict[str, Any]) -> Reached:
             {name.removeprefix(kind): arrays[name] for name in arrays if name.startswith(kind)}
             for kind in ("force ", "moment ")
         )
-        state = Reached(event["frame"], arrays["nodes"], forces, moments, event["scalars"])
+        state = Reached(event["frame"], arrays["nodes"], forces, moments, event["scalars"], stored_state(arrays))
     path.unlink()
     return state
 

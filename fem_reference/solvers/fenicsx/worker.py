@@ -99,6 +99,7 @@ class Worker:
         arrays |= {"nodes": self.body.node_positions()}
         arrays |= {f"force {name}": force for name, force in forces.items()}
         arrays |= {f"moment {name}": moment for name, moment in moments.items()}
+        arrays |= {f"state {name}": array for name, array in self.body.state().items()}
         counts = {"newton_iterations": float(reached.iterations), "cut_backs": float(reached.cutbacks)}
         path = self.folder / f"frame_{reached.frame}.npz"
         scalars = self.body.scalars() | counts | self.negative_modes(reached.frame)

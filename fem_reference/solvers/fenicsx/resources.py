@@ -1,0 +1,112 @@
+"""What a solution takes and what the machine has: unknowns, memory, free cores; needs no FEniCSx."""
+
+import os
+import time
+from itertools import combinations
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from fem_reference.continuum import ELEMENTS, Cells
+from fem_reference.errors import InputError
+from fem_reference.solvers.fenicsx.settings import BodySettings
+
+# Unknowns below which a factorisation costs no more than a few iterations of anything else.
+SMALL = 4000
+# Unknowns from which on multigrid is faster than a factorisation a frame.
+LARGE = 350_000
+# Megabytes of a process without a body, of each unknown beside factors (with multigrid, all), and of factors in double precision
+# of 16 000 unknowns, which grow by a power: measured on gluteus_maximus from 16 000 to 560 000 unknowns. MUMPS allocates more
+# than it uses.
+_EMPTY, _EACH, _EACH_MULTIGRID, _FACTORS, _POWER = 250.0, 6.5e-3, 9.5e-3, 60.0, 1.38
+# From so many unknowns on a second rank pays, where a core is free for it.
+_WORTH_RANKS = 20_000
+_GLANCE = 0.2  # [s] for which is looked how busy the cores are
+
+
+def unknowns(cells: Cells, element: str) -> int:
+    """How many unknowns a body of ``cells`` has with an ``element``, about: every edge has a node of a quadratic one."""
+    kind, degree, pressure = ELEMENTS[element]
+    corners = cells.cells[:, : 4 if kind == "tetrahedron" else 8]
+    count = len(np.unique(corners))
+    pressures = {None: 0, 0: len(corners), 1: count}[pressure]
+    if degree == 2:
+        if kind == "hexahedron":
+            count *= 8  # as many edges, faces and cells as fill a grid
+        else:
+            pairs = np.concatenate([np.sort(corners[:, pair], axis=1) for pair in combinations(range(4), 2)])
+            count += len(np.unique(pairs[:, 0].astype(np.int64) * (corners.max() + 1) + pairs[:, 1]))
+    return 3 * count + pressures
+
+
+def memory(count: int, solver: str, precision: str) -> float:
+    """Megabytes that a solution of ``count`` unknowns takes, about."""
+    if solver == "multigrid":
+        return _EMPTY + _EACH_MULTIGRID * count
+    factors = _FACTORS * float((count / 16_000) ** _POWER)
+    return _EMPTY + _EACH * count + (factors if precision == "double" else factors / 2)
+
+
+def available() -> float:
+    """Megabytes that are free, as the system has it; infinite where it does not say."""
+    try:
+        lines = Path("/proc/meminfo").read_text(encoding="utf-8").splitlines()
+        return next(float(line.split()[1]) / 1024 for line in lines if line.startswith("MemAvailable"))
+    except (OSError, StopIteration, ValueError):
+        return float("inf")
+
+
+def planned[S: BodySettings](settings: S, cells: Cells, free: float) -> S:
+    """The settings with a solver of linear systems and its precision: those asked for, or what the size asks for and what fits into
+    the ``free`` megabytes. InputError where nothing does.
+    """
+    count = unknowns(cells, settings.element)
+    for kind in [settings.linear_solver] if settings.linear_solver else _fitting(settings.element, count):
+        precision = settings.precision or ("double" if kind == "direct" else "single")
+        needed = memory(count, kind, precision)
+        if needed <= free:
+            return settings.model_copy(update={"linear_solver": kind, "precision": precision})
+    raise InputError(
+        "memory", f"{needed:.0f} MB for {count} unknowns ({kind})", f"at most the {free:.0f} MB free: larger cells"
+    )
+
+
+def _fitting(element: str, count: int) -> list[Literal["direct", "lagged", "multigrid"]]:
+    """The solvers of linear systems for an ``element`` and so many unknowns, the one to be preferred first."""
+    _, degree, pressure = ELEMENTS[element]
+    if count < SMALL:
+        return ["direct"]
+    if degree == 1 or pressure is None:
+        return ["lagged"]
+    return ["lagged", "multigrid"] if count < LARGE else ["multigrid"]
+
+
+def idle_cores() -> int:
+    """How many of the cores that this process may use nobody uses; all of them where the system does not say."""
+    mine = os.sched_getaffinity(0)
+    before = _idle(mine)
+    if before is None:
+        return len(mine)
+    begin = time.perf_counter()
+    time.sleep(_GLANCE)
+    after = _idle(mine)
+    ticks = (time.perf_counter() - begin) * os.sysconf("SC_CLK_TCK")
+    return len(mine) if after is None else round((after - before) / ticks)
+
+
+def _idle(cores: set[int]) -> float | None:
+    """Ticks of the clock for which ``cores`` have been idle since the system started."""
+    try:
+        lines = Path("/proc/stat").read_text(encoding="utf-8").splitlines()
+        fields = {line.split()[0]: line.split() for line in lines}
+        return sum(float(fields[f"cpu{core}"][4]) for core in cores)
+    except (OSError, KeyError, IndexError, ValueError):
+        return None
+
+
+def ranks(settings: BodySettings, count: int) -> int:
+    """How many ranks a solution of ``count`` unknowns shall have: two where that pays and a core is free for each."""
+    if settings.linear_solver == "multigrid" or count < _WORTH_RANKS:
+        return 1
+    return 2 if idle_cores() >= 2 else 1
