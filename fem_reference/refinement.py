@@ -18,6 +18,7 @@ from fem_reference.execution import Bench, complete
 from fem_reference.metrics import Yardstick
 from fem_reference.runs import Run
 from fem_reference.scene import Scene
+from fem_reference.solvers import fenicsx
 from fem_reference.study import ErrorBars, Ladder
 
 log = logging.getLogger(__name__)
@@ -82,7 +83,8 @@ def obtain(bench: Bench, reference: Run) -> ErrorBars | None:
     if reference.outcome.status != "converged" or reference.fibres is None or not reference.has_surface:
         log.info("error bar: none, of a reference that did not converge or has no interior")
         return None
-    ladder = _ladder(bench, reference)
+    with fenicsx.shared():
+        ladder = _ladder(bench, reference)
     log.info("error bar: measuring the runs against each other")
     bars = study.error_bars(ladder, Yardstick.of(reference, reference.fibres, bench.setup().bones, bench.setup().free))
     if reference.folder is not None:

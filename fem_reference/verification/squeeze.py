@@ -36,7 +36,8 @@ def _smooth(lab: Lab, element: str, bulk: float, *, growing: bool = False) -> tu
     )
     frames = (0.0, 1.0, 2.0) if growing else tuple(np.linspace(0, 2, 2 * STEPS + 1).tolist())
     body = Continuum(mesh, neo_hooke(MU, bulk), prescribed, frames)
-    solved = lab.solve(body, element, first_step=0.05, smallest_step=1e-3, residual=RESIDUAL)
+    # Every state by Newton's method, those of the way back too.
+    solved = lab.solve(body, element, first_step=0.05, smallest_step=1e-3, residual=RESIDUAL, reuse=False)
     return (*solved.states[:-1], solved.last)
 
 

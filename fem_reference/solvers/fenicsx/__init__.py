@@ -29,7 +29,7 @@ from fem_reference.solvers.fenicsx import resources
 from fem_reference.solvers.fenicsx.field import FieldSettings, solve_field
 from fem_reference.solvers.fenicsx.jobs import Job, stored_state
 from fem_reference.solvers.fenicsx.processes import require_installed, running
-from fem_reference.solvers.fenicsx.session import session, solve_body
+from fem_reference.solvers.fenicsx.session import present, session, shared, solve_body
 from fem_reference.solvers.fenicsx.settings import BodySettings, Settings
 
 __all__ = [
@@ -39,6 +39,7 @@ __all__ = [
     "check_effects",
     "require",
     "session",
+    "shared",
     "solve",
     "solve_body",
     "solve_field",
@@ -66,7 +67,7 @@ def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
         job = Path(folder) / "job.pickle"
         job.write_bytes(pickle.dumps(Job(body, settings, _samples(problem))))
         passed: list[int] = []
-        outcome = _run(_command(settings, job), settings, lambda frame: _pass_on(problem, frame, sink, passed))
+        outcome = _solved(job, settings, lambda frame: _pass_on(problem, frame, sink, passed))
     if outcome.status != "converged" and body.frames[0] < body.first and not passed:
         begin = (
             "while what overlaps bones at rest was relaxed, before the first frame (which is shown as it was given): "
@@ -74,6 +75,19 @@ def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
         outcome = replace(outcome, message=begin + outcome.message)
     key = " (muscle.tet_size)" if outcome.message.endswith("smaller cells") else ""  # which a scene calls them
     return replace(outcome, message=outcome.message + key, cost={"seconds_mesh": problem.seconds} | outcome.cost)
+
+
+def _solved(job: Path, settings: Settings, sink: Sink) -> Outcome:
+    """The job in a file, by the process that is shared now or by processes of its own."""
+    own = present() if settings.ranks == 1 else None
+    if own is None:
+        return _run(_command(settings, job), settings, sink)
+
+    def take(event: dict[str, Any]) -> None:
+        sink(_frame(event))
+        Path(event["file"]).unlink()
+
+    return own.run(job, settings.time_limit, take, "frames")
 
 
 def _pass_on(problem: Problem, frame: Frame, sink: Sink, passed: list[int]) -> None:

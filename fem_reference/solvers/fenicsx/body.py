@@ -35,7 +35,7 @@ class Body:
     """The unknowns of a body, made of an element of ``ELEMENTS``, and their equations."""
 
     def __init__(self, body: Continuum, settings: BodySettings) -> None:
-        self.comm = MPI.COMM_WORLD
+        self.comm, self.reuse = MPI.COMM_WORLD, settings.reuse
         self.effects = body.effects
         self.mesh = meshes.distribute(self.comm, body.mesh)
         # Where each of this rank's own cells stood in the body's mesh.
@@ -109,7 +109,7 @@ class Body:
 
     def recall(self, frame: float) -> bool:
         """Take up the state that was solved before under what acts at ``frame``, if there is one; its residual proves it."""
-        if self.clock.matters:
+        if self.clock.matters or not self.reuse:
             return False
         before = np.array(self.unknowns.x.array)
         self._set(frame)
@@ -165,7 +165,7 @@ class Body:
         if self.stability is not None:
             with self.clock.slow(np.array(self.unknowns.x.array)):
                 modes = self.stability.negative_modes()
-        if not self.clock.matters:
+        if self.reuse and not self.clock.matters:
             self.known.add(State(self._acting(frame), np.array(self.unknowns.x.array), modes))
         return modes
 

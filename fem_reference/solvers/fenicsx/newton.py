@@ -89,7 +89,7 @@ class Newton:
 
     def _tolerance(self, norm: float, last: float) -> float:
         """Of the linear system whose right-hand side has a ``norm``, relative to it; ``last`` is the norm of the one before."""
-        if norm == 0:
+        if norm == 0 or last == 0:
             return _FIRST
         wanted = _FIRST if np.isnan(last) else float(np.clip(_FACTOR * (norm / last) ** 2, _TIGHTEST, _LOOSEST))
         enough = self.residual * min(

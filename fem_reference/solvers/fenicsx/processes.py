@@ -27,9 +27,14 @@ _PATIENCE = 5.0  # [s] until a process that was asked to end is killed
 MARK = "@fem_reference "  # begins each line of the worker's output that is meant for us
 
 
+def installed() -> bool:
+    """Whether FEniCSx is."""
+    return any(importlib.util.find_spec(name) for name in ("dolfinx_solver", "dolfinx"))
+
+
 def require_installed() -> None:
     """MissingSoftware where FEniCSx is not installed."""
-    if not any(importlib.util.find_spec(name) for name in ("dolfinx_solver", "dolfinx")):
+    if not installed():
         raise MissingSoftware(
             "FEniCSx is not installed: pip install 'fem_reference[fenicsx]' (Linux x86-64), or conda's fenics-dolfinx"
         )

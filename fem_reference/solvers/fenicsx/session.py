@@ -2,8 +2,9 @@
 
 import pickle
 import tempfile
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, nullcontext
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from fem_reference.children import command
 from fem_reference.continuum import Continuum, Reached, Solved, check
 from fem_reference.runs import Outcome
 from fem_reference.solvers.fenicsx.jobs import Job, stored_state
-from fem_reference.solvers.fenicsx.processes import Process, require_installed, running
+from fem_reference.solvers.fenicsx.processes import Process, installed, require_installed, running
 from fem_reference.solvers.fenicsx.settings import BodySettings
 
 
@@ -35,27 +36,34 @@ class Session:
         check(body, settings.element)
         job = self.folder / "job.pickle"
         job.write_bytes(pickle.dumps(Job(body, settings, {})))
+        states: list[Reached] = []
+        outcome = self.run(job, settings.time_limit, lambda event: states.append(_state(event)), "states")
+        return Solved(tuple(states), outcome)
+
+    def run(self, job: Path, time_limit: float | None, sink: Callable[[dict[str, Any]], None], kept: str) -> Outcome:
+        """Solve the ``job`` in a file, with each frame that is reported given to ``sink``; ``kept`` names what that keeps."""
         if self.process is None:
             self.process = self.stack.enter_context(running(command("-m", _WORKER, "-"), None, fed=True))
-        with self.process.limited(settings.time_limit):
-            solved = _solved(self.process, job)
-        if self.process.overran is not None or solved.outcome.status == "crashed":
+        with self.process.limited(time_limit):
+            outcome = _followed(self.process, job, sink, kept)
+        if self.process.overran is not None or outcome.status == "crashed":
             self.process = None
-        return solved
+        return outcome
 
 
 _WORKER = "fem_reference.solvers.fenicsx.worker"
 
 
-def _solved(process: Process, job: Path) -> Solved:
-    """What ``process`` makes of the ``job``."""
+def _followed(process: Process, job: Path, sink: Callable[[dict[str, Any]], None], kept: str) -> Outcome:
+    """How ``process`` comes through the ``job``."""
     process.feed(str(job))
-    states: list[Reached] = []
+    count = 0
     for event in process.events():
         if "frame" not in event:
-            return Solved(tuple(states), Outcome(event["status"], event["message"], event["cost"]))
-        states.append(_state(event))
-    return Solved(tuple(states), process.ending(f"{len(states)} states are kept"))
+            return Outcome(event["status"], event["message"], event["cost"])
+        sink(event)
+        count += 1
+    return process.ending(f"{count} {kept} are kept")
 
 
 def _state(event: dict[str, Any]) -> Reached:
@@ -86,3 +94,24 @@ def solve_body(body: Continuum, settings: BodySettings) -> Solved:
     """The states of ``body`` by a session of its own."""
     with session() as own:
         return own.solve(body, settings)
+
+
+_shared: ContextVar[Session | None] = ContextVar("shared", default=None)
+
+
+@contextmanager
+def shared() -> Iterator[None]:
+    """Meanwhile all solutions on one rank are found in one process: what it has loaded and compiled serves the next. Without
+    FEniCSx nothing is solved, and nothing shared.
+    """
+    with session() if installed() else nullcontext() as own:
+        before = _shared.set(own)
+        try:
+            yield
+        finally:
+            _shared.reset(before)
+
+
+def present() -> Session | None:
+    """The session that is shared now, None where there is none."""
+    return _shared.get()

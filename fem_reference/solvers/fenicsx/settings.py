@@ -20,6 +20,7 @@ class BodySettings(Record):
     own; ``"lagged"``, as exactly as it is worth it, by FGMRES with a factorisation that serves until a new one is cheaper; by
     default as the size asks. ``precision``: of factorisations, by default double of direct ones and single of lagged ones. Both
     change the time and not the answer.
+    ``reuse``: whether a frame under the same load as an earlier one takes up the state of then.
     ``time_limit``: when to give up, by default never. ``store_state``: whether each frame also carries the unknowns of every cell,
     from which ``results`` evaluates stress, pressure, det F and fibre stretch.
     """
@@ -33,6 +34,7 @@ class BodySettings(Record):
     quadrature_degree: int | None = Field(default=None, gt=0)
     linear_solver: Literal["direct", "lagged", "multigrid"] | None = None
     precision: Literal["single", "double"] | None = None
+    reuse: bool = True
     time_limit: Time | None = None
     store_state: bool = False
 

@@ -6,6 +6,7 @@ import pickle
 import resource
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ class Worker:
     def __init__(self, job: Job, folder: Path) -> None:
         """``folder``: where the frames are written."""
         begin = time.perf_counter()
+        _forget_peak()
         self.job, self.folder, self.settings = job, folder, job.settings
         self.body = Body(job.body, job.settings)
         self.set_up = time.perf_counter() - begin
@@ -118,7 +120,7 @@ class Worker:
     def cost(self) -> dict[str, float]:
         """Seconds by phase as the first rank sees them, counts, and memory over all ranks."""
         spent = self.body.spent
-        memory = self.body.comm.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+        memory = self.body.comm.allreduce(_peak_memory())
         return {
             "seconds_set_up": self.set_up,
             "seconds_solve": self.solving,
@@ -127,10 +129,24 @@ class Worker:
             **{name: float(spent.counts[name]) for name in ("factorisations", "krylov_iterations", "halved_steps")},
             **{name: float(count) for name, count in self.counts.items()},
             "unknowns": float(self.body.size),
-            "peak_memory_mb": memory / 1024,
+            "peak_memory_mb": memory,
             "ranks": float(self.body.comm.size),
             "threads": 1.0,
         }
+
+
+def _forget_peak() -> None:
+    """Begin anew to watch the memory of this process, which may have solved larger bodies before; Linux can."""
+    with suppress(OSError):
+        Path("/proc/self/clear_refs").write_text("5", encoding="utf-8")
+
+
+def _peak_memory() -> float:
+    """The most memory [MB] since then, or since this process began."""
+    with suppress(OSError, StopIteration):
+        lines = Path("/proc/self/status").read_text(encoding="utf-8").splitlines()
+        return next(float(line.split()[1]) / 1024 for line in lines if line.startswith("VmHWM"))
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def main(argument: str) -> None:
