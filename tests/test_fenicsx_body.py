@@ -153,6 +153,16 @@ def test_what_was_reached_is_kept_where_a_body_inverts(session) -> None:
         _ = solved.last
 
 
+@pytest.mark.parametrize(("largest", "steps"), [(None, 1), (0.25, 4), (0.2, 5)])
+def test_no_load_step_of_a_solve_is_above_the_largest(largest, steps, session) -> None:
+    # From frame 0 to 1 without a cut-back: as many steps as the largest goes into it, where the first one may take all of it.
+    pull = Affine(((0.0, 0.0, 0.0),) * 3, (0.0, 0.0, 0.05))
+    solved = session.solve(turned(box("Q1/P0"), pull), settings("Q1/P0", first_step=1.0, largest_step=largest))
+    assert solved.outcome.status == "converged"
+    assert solved.outcome.cost["cut_backs"] == 0
+    assert solved.outcome.cost["load_steps"] == steps
+
+
 def test_a_session_outlives_its_process(session) -> None:
     body = turned(box("Q1/P0"), Turn((0.0, 0.0, 1.0), 0.3))
     before = session.solve(body, settings("Q1/P0")).last

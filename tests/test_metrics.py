@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapes
 from numpy.testing import assert_allclose
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
@@ -204,6 +205,29 @@ def test_statistics_are_weighted_by_area() -> None:
     assert np.quantile(share, 0.95) > 0.97  # an unweighted percentile would not pass
 
 
+def test_geometric_distances_are_weighted_by_area() -> None:
+    """The top of a box whose vertices crowd at its rim, raised by less than they are from it.
+
+    Every vertex of the raised top is ``raise_by`` off, and so are those of the old top but at its rim: there the sides still
+    pass. By sums of thirds of triangles, in each of both directions: the top has half of the whole area, and the inner vertices
+    have the middle cell of 10 x 10 mm, half of each cell of 1 x 10 mm and, of the cells of 1 x 1 mm, two thirds and two sixths.
+    """
+    ticks, height, raise_by = np.array([0.0, 1, 11, 12]), 3.0, 0.5
+    box = shapes.skin(shapes.box((3, 3, 1), (3.0, 3.0, height)))
+    rest = box.moved_to(np.column_stack([ticks[box.points[:, :2].round().astype(int)], box.points[:, 2]]))
+    raised = rest.points + np.where(rest.points[:, 2:] == height, [0, 0, raise_by], 0)
+    still = _run([rest.points], rest=rest)
+    inside = Polylines(np.array([[5.0, 6, 1], [7, 6, 2]]), np.array([0, 2]))
+    found = _values(_run([raised], rest=rest), still, Yardstick.of(still, inside, ()))
+    area = 2 * 12**2 + 4 * 12 * height
+    top, inner = area / 2, 10 * 10 + 4 * (1 * 10) / 2 + 2 / 3 + 2 / 6
+    share = (top + inner) / (2 * area)
+    assert_allclose(found["surface_deviation.distance_mean"], raise_by * share, rtol=1e-12)
+    assert_allclose(found["surface_deviation.distance_rms"], raise_by * np.sqrt(share), rtol=1e-12)
+    # Without weights the share is that of the vertices: 16 and 4 of twice 32.
+    assert np.sqrt(20 / 64 / share) < 0.9
+
+
 @pytest.mark.parametrize("interior", [True, False])
 @pytest.mark.parametrize("factor", [0.8, 1.25])
 def test_a_stretch_of_everything_stretches_every_fibre(factor: float, interior: bool) -> None:
@@ -216,6 +240,19 @@ def test_a_stretch_of_everything_stretches_every_fibre(factor: float, interior: 
     assert_allclose(found["fibre_length.mean"], change * lengths.mean(), rtol=1e-10)
     assert_allclose(found["fibre_length.rms"], abs(change) * np.sqrt(np.mean(lengths**2)), rtol=1e-10)
     assert_allclose(found["fibre_length.max"], abs(change) * lengths.max(), rtol=1e-10)
+
+
+@pytest.mark.parametrize("interior", [True, False])
+def test_percent_of_a_fibre_is_of_its_length_at_rest(interior: bool) -> None:
+    """20 % longer against 50 % longer is 30 % of the rest length shorter: not 20 % of the reference's, nor 25 % of the run's."""
+    run, reference = (
+        _run([_scaled(SPHERE.points, factor)], [_scaled(FIBRES.points, factor)] if interior else None)
+        for factor in (1.2, 1.5)
+    )
+    found = _values(run, reference, Yardstick.of(reference, FIBRES, ()))
+    assert_allclose(found["fibre_length.mean_percent"], -30, rtol=1e-10)
+    for statistic in ("rms_percent", "max_percent"):
+        assert_allclose(found[f"fibre_length.{statistic}"], 30, rtol=1e-10)
 
 
 def test_a_run_without_fibres_is_compared_like_with_like() -> None:
