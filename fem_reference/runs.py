@@ -29,7 +29,7 @@ from fem_reference.mesh import Floats, Polylines, Surface, TetMesh
 
 log = logging.getLogger(__name__)
 
-Status = Literal["converged", "diverged", "inverted", "out of steps", "timed out", "crashed"]
+Status = Literal["converged", "diverged", "inverted", "collapsed", "out of steps", "timed out", "crashed"]
 FORMAT = 1
 # Between the first and the last frame, progress is told no more often than this [s].
 QUIET = 1.0

@@ -17,6 +17,7 @@ ORDER = [
     "records",
     "formula",
     "jets",
+    "limits",
     "effects",
     "children",
     "formats",

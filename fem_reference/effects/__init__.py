@@ -20,6 +20,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 from pydantic import Field, field_validator
 
+from fem_reference.limits import Limit
 from fem_reference.records import Record
 from fem_reference.units import unit_of
 
@@ -152,6 +153,10 @@ class Effect(Record):
         """How much of it acts at a frame: all of it, unless it has a course."""
         return 1.0
 
+    def limits(self) -> tuple[Limit, ...]:
+        """The ranges that it is meant for; none unless its docstring gives one."""
+        return ()
+
     @property
     def title(self) -> str:
         """What it is called beside the other effects of a scene."""
@@ -218,14 +223,20 @@ class Prestrain(Effect):
         raise NotImplementedError(f"{type(self).__name__} has no elastic deformation")
 
 
-def total_energy(acting: Sequence[tuple[Effect, Any]], state: State) -> Any:
-    """The sum of the energies per rest volume [MPa] of ``acting``, (effect, amount) each, at ``state``, whose F is the whole
-    deformation gradient. A prestrain changes F before the step as it does F now: its own course moves nothing.
-    """
+def elastic_state(acting: Sequence[tuple[Effect, Any]], state: State) -> State:
+    """``state`` with the F that the energies of ``acting`` see: the elastic one, where there is a prestrain."""
     for effect, amount in acting:
         if isinstance(effect, Prestrain):
             now, before = (effect.elastic(replace(state, F=F, amount=amount)) for F in (state.F, state.F_before))
             state = replace(state, F=now, F_before=before)
+    return state
+
+
+def total_energy(acting: Sequence[tuple[Effect, Any]], state: State) -> Any:
+    """The sum of the energies per rest volume [MPa] of ``acting``, (effect, amount) each, at ``state``, whose F is the whole
+    deformation gradient. A prestrain changes F before the step as it does F now: its own course moves nothing.
+    """
+    state = elastic_state(acting, state)
     energies = [(effect, amount) for effect, amount in acting if isinstance(effect, Energy)]
     return sum(effect.energy(replace(state, amount=amount)) for effect, amount in energies)
 

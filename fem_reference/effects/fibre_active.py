@@ -5,6 +5,7 @@ from typing import Any, ClassVar
 from pydantic import Field
 
 from fem_reference.effects import Coursed, Energy, State
+from fem_reference.limits import Limit
 from fem_reference.units import PositivePressure
 
 
@@ -14,11 +15,17 @@ class FibreActive(Coursed, Energy):
 
     ``stress`` [MPa]: the peak active stress; ``optimal_stretch``: the fibre stretch at optimal length; ``course``: the activation.
     Source: Blemker, Pinsky and Delp 2005, doi 10.1016/j.jbiomech.2004.04.009.
+
+    Meant for ``l`` from 0.4 to 1.6, where that source gives fibres a tension: beyond them an activation does nothing.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
     stress: PositivePressure
     optimal_stretch: float = Field(gt=0)
+
+    def limits(self) -> tuple[Limit, ...]:
+        """Of the fibre stretch."""
+        return (Limit("fibre stretch", 0.4 * self.optimal_stretch, 1.6 * self.optimal_stretch),)
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa], zero at rest."""

@@ -5,6 +5,7 @@ from typing import Any, ClassVar
 from pydantic import Field
 
 from fem_reference.effects import Energy, State
+from fem_reference.limits import Limit
 from fem_reference.units import PositivePressure
 
 
@@ -15,6 +16,9 @@ class FibrePassive(Energy):
     ``stress`` [MPa]: the peak active stress, by which Blemker normalises; ``p1``, ``p2``: without unit; ``optimal_stretch``: the
     fibre stretch at optimal length; ``linear_from``: in ``l``. Source: Blemker, Pinsky and Delp 2005,
     doi 10.1016/j.jbiomech.2004.04.009.
+
+    Meant for ``l`` up to 1.6, or ``linear_from`` where that is beyond: there the active tension of the same source ends, and no
+    data of longer fibres stands behind this law. Slack fibres are without limit.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
@@ -23,6 +27,10 @@ class FibrePassive(Energy):
     p2: float = Field(gt=0)
     optimal_stretch: float = Field(gt=0)
     linear_from: float = Field(gt=1)
+
+    def limits(self) -> tuple[Limit, ...]:
+        """Of the fibre stretch."""
+        return (Limit("fibre stretch", high=max(1.6, self.linear_from) * self.optimal_stretch),)
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa], zero in slack fibres."""

@@ -3,6 +3,7 @@
 from typing import Any, ClassVar
 
 from fem_reference.effects import Energy, State
+from fem_reference.limits import Limit
 from fem_reference.units import PositivePressure
 
 
@@ -10,10 +11,19 @@ class Incompressible(Energy):
     """``p (J - 1) - p^2 / (2 K)``: the perturbed Lagrangian whose stationary point in p is ``p = K (J - 1)``.
 
     ``bulk``: bulk modulus K [MPa]. Source: Sussman and Bathe 1987, doi 10.1016/0045-7949(87)90265-3, with U = K/2 (J - 1)^2.
+
+    Meant for J near 1, here from 1/2 to 2. The slope ``dU / d(log J) = K J (J - 1)`` is steepest at 1/2: below it each shrinking
+    by the same factor meets less resistance, and U stays below K/2 down to J = 0, so that isochoric energies can shrink a body to
+    almost nothing (``verification/collapse.py`` has an example). Above 1 the law has no such end; there 2 is as far from 1 as 1/2
+    is, by the logarithm, and far beyond what water-filled tissue does.
     """
 
     unknowns: ClassVar[tuple[str, ...]] = ("pressure",)
     bulk: PositivePressure
+
+    def limits(self) -> tuple[Limit, ...]:
+        """Of the volume."""
+        return (Limit("V/V0", 0.5, 2.0),)
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa]."""

@@ -3,16 +3,21 @@
 from typing import Any
 
 from fem_reference.effects import Energy, State
+from fem_reference.limits import Limit
 from fem_reference.units import PositivePressure
 
 
 class IncompressiblePenalty(Energy):
     """``K/2 (J - 1)^2``: what ``incompressible`` is where its pressure is free at every point.
 
-    ``bulk``: bulk modulus K [MPa].
+    ``bulk``: bulk modulus K [MPa]. Meant for J from 1/2 to 2, as ``incompressible`` is, and for its reasons.
     """
 
     bulk: PositivePressure
+
+    def limits(self) -> tuple[Limit, ...]:
+        """Of the volume."""
+        return (Limit("V/V0", 0.5, 2.0),)
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa]."""

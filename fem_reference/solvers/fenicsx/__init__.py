@@ -174,6 +174,8 @@ def _frame(event: dict[str, Any]) -> Frame:
     note = f"{scalars['newton_iterations']:.0f} Newton iterations, det F at least {smallest:.2g}"
     if scalars.get("negative_modes", 0) > 0:
         note += f", unstable equilibrium (negative modes: {scalars['negative_modes']:.0f})"
+    if scalars.get("outside_law", 0) > 0:
+        note += f", a law outside its range in {scalars['outside_law']:.0f} cells"
     with np.load(event["file"]) as arrays:
         pulls = {
             name.replace("force ", "force_"): float(np.linalg.norm(arrays[name]))

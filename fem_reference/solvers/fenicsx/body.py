@@ -28,6 +28,7 @@ from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.stability import Stability, has_energy
 from fem_reference.solvers.fenicsx.system import System
+from fem_reference.solvers.fenicsx.validity import Validity
 from fem_reference.stepping import Attempt
 
 
@@ -52,6 +53,7 @@ class Body:
         self.rest_volume = self.integral(self.volume_form)
         self.held = [Hold(self.unknowns, entry, form.regions[entry.on]) for entry in body.prescribed]
         self.determinants = Determinants(self.mesh, self.cells, form.determinant, form.rule[0], body.mesh.kind)
+        self.validity = Validity(self.mesh, self.cells, form, body)
         self.spent = Spent()
         self.system = System(form, self.unknowns, settings.element, self.held, self.spent)
         symmetric = has_energy(body)
@@ -85,7 +87,8 @@ class Body:
 
     def attempt(self, frame: float) -> Attempt:
         """Solve at ``frame`` from the present state; on failure go back to it. A state in which det F is not positive, at a
-        quadrature point or a vertex, is inverted whatever Newton's method says.
+        quadrature point or a vertex, is inverted whatever Newton's method says, and one in which cells have lost most of their
+        volume is collapsed.
         """
         before = np.array(self.unknowns.x.array)
         self.clock.start(frame, before)
@@ -94,7 +97,8 @@ class Body:
         failure, iterations = self.newton.solve(frame)
         smallest = self.determinants.smallest()
         through = self.contact.tunnelled(self.comm) if self.contact and failure is None else None
-        if failure is None and smallest.value > 0 and through is None:
+        lost = self.validity.collapsed() if failure is None and smallest.value > 0 else None
+        if failure is None and smallest.value > 0 and through is None and lost is None:
             self.clock.settle(frame)
             if self.contact:
                 self.contact.settle()
@@ -104,6 +108,8 @@ class Body:
             self.contact.go_back()
         if through is not None:
             return Attempt("diverged", iterations, f"Newton's method converged, but {through}")
+        if lost is not None:
+            return Attempt("collapsed", iterations, f"Newton's method converged, but {lost}")
         how = failure or f"converged, but det F fell to {smallest}"
         return Attempt("diverged" if smallest.value > 0 else "inverted", iterations, f"Newton's method {how}")
 

@@ -11,7 +11,7 @@ from ufl.algorithms import expand_derivatives
 from ufl.constantvalue import Zero
 
 from fem_reference.continuum import Continuum
-from fem_reference.effects import Effect, Energy, Load, State, total_energy
+from fem_reference.effects import Effect, Energy, Load, State, elastic_state, total_energy
 from fem_reference.mesh import Floats, Ints
 from fem_reference.solvers.fenicsx import compiling, meshes, quadrature
 from fem_reference.solvers.fenicsx.settings import BodySettings
@@ -39,7 +39,8 @@ class Form:
     triangle of the second ones, ``second``: compiled expressions of what ``cells.c`` names, with ``kinds`` variables a component
     of the displacement. ``loads`` on the surface, a residual, 0 where there are none.
 
-    ``energy`` that is stored and ``volume`` as integrals, det F as ``determinant``; to be set: ``amounts`` by effect, ``rate``
+    ``energy`` that is stored and ``volume`` as integrals, det F as ``determinant``, the ``fibre_stretch`` that energies see (None
+    without fibres); to be set: ``amounts`` by effect, ``rate``
     [1/s] of the load step and the unknowns ``before`` it (None where time does not matter); ``rule``: points (q, 3) and weights
     (q,) of the quadrature, of ``degree``; ``regions``: by name, this rank's facets.
     """
@@ -59,6 +60,7 @@ class Form:
         self.before, self.rate = fem.Function(unknowns.function_space) if timed else None, fem.Constant(msh, 0.0)
         state, variables = _state(unknowns, self._fibre(body, cells), self.before, self.rate)
         self.determinant = state.J
+        self.fibre_stretch = None if state.fibre is None else elastic_state(acting, state).fibre_stretch
         stored = [(effect, amount) for effect, amount in acting if not isinstance(effect, Energy) or effect.stored]
         self.volume, self.energy = state.J * self.dx, total_energy(stored, state) * self.dx
         self.kinds, first, second = _derivatives(total_energy(acting, state), variables)

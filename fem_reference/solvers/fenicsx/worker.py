@@ -18,6 +18,7 @@ from fem_reference.solvers.fenicsx.processes import MARK
 
 from fem_reference.solvers.fenicsx import compiling  # isort: skip - after the door
 from fem_reference.solvers.fenicsx.body import Body  # isort: skip
+from fem_reference.solvers.fenicsx.validity import Ranges  # isort: skip
 from fem_reference.stepping import Attempt, Step, Steps, march  # isort: skip
 
 
@@ -34,6 +35,8 @@ class Worker:
         self.solving = self.checking = 0.0
         self.counts = {"newton_iterations": 0, "load_steps": 0, "cut_backs": 0}
         self.unstable: dict[float, float] = {}  # negative modes by frame
+        self.ranges = Ranges()
+        self.collapse = ""  # to what attempts since the last good state led, where a body collapsed in one
 
     def run(self) -> None:
         """March through the frames and report how it ended."""
@@ -48,17 +51,21 @@ class Worker:
             ):
                 self.counts[name] += count
             if reached.status != "converged":
-                self.report(status=reached.status, message=self.sentence(reached), cost=self.cost())
+                status = "collapsed" if self.collapse else reached.status
+                self.report(status=status, message=self.sentence(reached), cost=self.cost())
                 return
             self.report_frame(reached)
         wanted = sum(frame >= self.job.body.first for frame in frames)
-        self.report(status="converged", message=f"all {wanted} frames reached{self.instability()}", cost=self.cost())
+        message = f"all {wanted} frames reached{self.instability()}{self.ranges}"
+        self.report(status="converged", message=message, cost=self.cost())
 
     def attempt(self, frame: float) -> Attempt:
         """Solve at ``frame`` from the last state; on failure go back to it."""
         begin = time.perf_counter()
         result = self.body.attempt(frame)
         self.solving += time.perf_counter() - begin
+        if result.failure in (None, "collapsed"):
+            self.collapse = result.sentence
         return result
 
     def negative_modes(self, frame: float) -> dict[str, float]:
@@ -82,11 +89,13 @@ class Worker:
 
     def sentence(self, reached: Step) -> str:
         """Why a frame could not be reached, where, and what to try."""
+        other = "a larger bulk modulus" if self.collapse else "smaller cells"
+        self.ranges.add(reached.at, self.body.validity.examine(reached.at)[1])
         return (
-            f"{reached.sentence} beyond frame {reached.at:.2f} with steps down to {self.settings.smallest_step}; "
+            f"{self.collapse or reached.sentence} beyond frame {reached.at:.2f} with steps down to {self.settings.smallest_step}; "
             f"in the last good state det F is smallest, {self.body.determinants.smallest()}{self.deepest()}"
-            f"{self.instability().replace('of them', 'of the frames reached')}; "
-            "try a smaller motion or smaller cells"
+            f"{self.instability().replace('of them', 'of the frames reached')}{self.ranges}; "
+            f"try a smaller motion or {other}"
         )
 
     def deepest(self) -> str:
@@ -104,7 +113,10 @@ class Worker:
         arrays |= {f"state {name}": array for name, array in self.body.state().items()}
         counts = {"newton_iterations": float(reached.iterations), "cut_backs": float(reached.cutbacks)}
         path = self.folder / f"frame_{reached.frame}.npz"
-        scalars = self.body.scalars() | counts | self.negative_modes(reached.frame)
+        measured, outside = self.body.validity.examine(reached.frame)
+        scalars = self.body.scalars() | measured | counts | self.negative_modes(reached.frame)
+        if reached.frame >= self.job.body.first:
+            self.ranges.add(reached.frame, outside)
         if scalars.get("negative_modes", 0) > 0 and reached.frame >= self.job.body.first:
             self.unstable[reached.frame] = scalars["negative_modes"]
         if self.body.comm.rank == 0:

@@ -1,0 +1,17 @@
+"""Where a law is meant: the range of a measure of deformation."""
+
+from dataclasses import dataclass
+from math import inf
+from typing import Literal
+
+# V/V0 is det F; the fibre stretch is that of the energies: isochoric, and with what is prestretched.
+Measure = Literal["V/V0", "fibre stretch"]
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A law is meant for states whose ``measure`` lies from ``low`` to ``high``, both without unit."""
+
+    measure: Measure
+    low: float = 0.0
+    high: float = inf

@@ -1,0 +1,157 @@
+"""Whether the laws of a body are used where they are meant, and whether the body has collapsed: judged by means over cells.
+
+By means, since the strain at the rim of what is held has no bound in the exact solution: det F at a vertex there may be far off in
+a cell that has kept its volume. A mean may be off there too, in single cells (0.37 and 1.9 in ``gluteus_maximus``, with a bulk
+modulus of a thousand shear moduli): there laws are named, and a body has collapsed only where more of it than that is lost.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import basix
+import numpy as np
+from dolfinx import mesh
+from mpi4py import MPI
+
+from fem_reference.continuum import Continuum
+from fem_reference.limits import Limit
+from fem_reference.mesh import Floats, Ints
+from fem_reference.solvers.fenicsx import compiling
+from fem_reference.solvers.fenicsx.forms import Form, Rule
+
+# A cell with less of its volume at rest has collapsed, whatever the laws say: about four fifths of muscle are water, which does not
+# leave it in a motion (Ward and Lieber 2005, Density and hydration of fresh and fixed human skeletal muscle); below a fifth there
+# would be no room for the rest of it alone. A body has where such cells are more than this share of it at rest: those at a rim are
+# fewer the smaller they are.
+COLLAPSED, SHARE = 0.2, 0.01
+_SCALARS = {"V/V0": "cell_volume_ratio", "fibre stretch": "cell_fibre_stretch"}
+
+
+@dataclass(frozen=True)
+class Extreme:
+    """The smallest or greatest mean over a cell, which cell of the body that is, and its rest position [mm]."""
+
+    value: float
+    cell: int
+    at: tuple[float, float, float]
+
+    def __str__(self) -> str:
+        x, y, z = self.at
+        return f"{self.value:.3g} in cell {self.cell} at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
+
+
+@dataclass(frozen=True)
+class Outside:
+    """A ``law``, as scene files name it, outside the range of its ``limit``: how far at worst."""
+
+    law: str
+    limit: Limit
+    extreme: Extreme
+
+    def __str__(self) -> str:
+        below = self.extreme.value < self.limit.low
+        bound = f"below {self.limit.low:.3g}" if below else f"above {self.limit.high:.3g}"
+        return f"{self.limit.measure} is {self.extreme}, {bound}"
+
+
+class Ranges:
+    """The laws that were outside their ranges over the states of a run."""
+
+    def __init__(self) -> None:
+        self.first: dict[str, tuple[float, Outside]] = {}
+        self.frames: dict[str, set[float]] = {}
+
+    def add(self, frame: float, found: Iterable[Outside]) -> None:
+        """Those of the state at a frame."""
+        for one in found:
+            self.first.setdefault(one.law, (frame, one))
+            self.frames.setdefault(one.law, set()).add(frame)
+
+    def __str__(self) -> str:
+        return "".join(
+            f"; {law} is outside the range that it is meant for in {len(self.frames[law])} of the states reached, "
+            f"first at frame {frame:g}: {one}"
+            for law, (frame, one) in self.first.items()
+        )
+
+
+class Validity:
+    """The means over the cells of a body of what its laws have limits on. Its methods are collective."""
+
+    def __init__(self, msh: mesh.Mesh, cells: Ints, form: Form, body: Continuum) -> None:
+        """``cells``: which cell of the body each of this rank's is."""
+        self.mesh, self.cells, self.effects = msh, cells, body.effects
+        wanted = {"V/V0": form.determinant}
+        if any(limit.measure == "fibre stretch" for effect in body.effects for limit in effect.limits()):
+            wanted["fibre stretch"] = form.fibre_stretch
+        # Compiled here and by all ranks together: one without cells evaluates none of them.
+        self.values = {name: compiling.expression(value, form.rule[0]) for name, value in wanted.items()}
+        self.volumes, self.centres = _volumes(msh, len(cells), form.rule)
+
+    def collapsed(self) -> str | None:
+        """How much of the body has lost too much of its volume, and where most, None where that is none or next to none."""
+        means = self._means("V/V0")
+        volumes = self.volumes.sum(axis=1)
+        lost, whole = self.mesh.comm.allreduce(np.array([volumes[means < COLLAPSED].sum(), volumes.sum()]), MPI.SUM)
+        if lost <= SHARE * whole:
+            return None
+        return f"{100 * lost / whole:.0f} % of the body collapsed: V/V0 is {self._least(means)}, below {COLLAPSED:g}"
+
+    def examine(self, frame: float) -> tuple[dict[str, float], list[Outside]]:
+        """Of the present state, that of a ``frame``: the extremes of the means and in how many cells a law is outside its range,
+        ``outside_law``; and each law outside it.
+        """
+        scalars: dict[str, float] = {}
+        found: list[Outside] = []
+        outside = np.zeros(len(self.cells), bool)
+        for measure in self.values:
+            means = self._means(measure)
+            low, high = self._least(means), self._least(means, -1.0)
+            scalars |= {f"min_{_SCALARS[measure]}": low.value, f"max_{_SCALARS[measure]}": high.value}
+            for law, limit in self._limits(measure, frame):
+                outside |= (means < limit.low) | (means > limit.high)
+                found += [Outside(law, limit, low)] if low.value < limit.low else []
+                found += [Outside(law, limit, high)] if high.value > limit.high else []
+        return scalars | {"outside_law": float(self.mesh.comm.allreduce(int(outside.sum()), MPI.SUM))}, found
+
+    def _limits(self, measure: str, frame: float) -> list[tuple[str, Limit]]:
+        """The limits on a measure of the laws that act at a frame, by name of the law."""
+        return [
+            (type(effect).__module__.rpartition(".")[2], limit)
+            for effect in self.effects
+            if effect.amount(frame) != 0
+            for limit in effect.limits()
+            if limit.measure == measure
+        ]
+
+    def _means(self, measure: str) -> Floats:
+        """By cell of this rank (n,)."""
+        if len(self.cells) == 0:
+            return np.zeros(0)
+        values = self.values[measure].eval(self.mesh, np.arange(len(self.cells), dtype=np.int32))
+        return np.average(np.asarray(values).reshape(self.volumes.shape), axis=1, weights=self.volumes)
+
+    def _least(self, means: Floats, sign: float = 1.0) -> Extreme:
+        """The least of ``sign means`` (n,) over all ranks."""
+        mine = Extreme(sign * np.inf, -1, (0.0, 0.0, 0.0))
+        if len(means):
+            i = int(np.argmin(sign * means))
+            x, y, z = self.centres[i].tolist()
+            mine = Extreme(float(means[i]), int(self.cells[i]), (x, y, z))
+        everywhere: list[Extreme] = self.mesh.comm.allgather(mine)
+        return min(everywhere, key=lambda one: sign * one.value)
+
+
+def _volumes(msh: mesh.Mesh, count: int, rule: Rule) -> tuple[Floats, Floats]:
+    """Of the first ``count`` cells at rest: the volumes (n, q) [mm3] that the points of a ``rule`` stand for, and the centres
+    (n, 3) [mm].
+    """
+    points, weights = rule
+    kind = basix.CellType[msh.topology.cell_name()]
+    warped = basix.LagrangeVariant.gll_warped
+    element = basix.create_element(basix.ElementFamily.P, kind, msh.geometry.cmap.degree, warped)
+    shape, *slopes = element.tabulate(1, points)[..., 0]
+    nodes = msh.geometry.x[msh.geometry.dofmap[:count]]
+    volumes = weights * np.abs(np.linalg.det(np.einsum("dqk,nki->nqid", np.stack(slopes), nodes)))
+    centres = np.einsum("nq,qk,nki->ni", volumes, shape, nodes)
+    return volumes, centres / volumes.sum(axis=1)[:, None]

@@ -1,0 +1,106 @@
+"""A block whose bulk modulus is low, squeezed between smooth plates until no state near its rest volume is left.
+
+An isochoric neo-Hookean energy pulls at the volume, which the law ``K/2 (J - 1)^2`` cannot keep: its pressure is K at most. Free at
+its sides the block is in balance where ``mu/3 (J/stretch - stretch^2) = K J^(5/3) (1 - J)``. But for ``stretch^2`` that is
+``mu/(3 stretch) = K J^(2/3) (1 - J)``, whose right side is 0.326 K at most, at J = 2/5: below a stretch of some mu/K the only state
+left is one near ``J = stretch^3``, a block that has shrunk alike along all axes, without shear and without force on the plate.
+"""
+
+from functools import partial
+
+import numpy as np
+
+from fem_reference.catalogue import Entry, Finding, Lab
+from fem_reference.continuum import ELEMENTS, Continuum, Prescribed, Solved
+from fem_reference.truths import find
+from fem_reference.verification import shapes
+from fem_reference.verification.courses import Affine
+from fem_reference.verification.parts import SYMMETRY, effect, resistance
+
+MU = 0.01  # [MPa]
+POISSON, NEARLY_INCOMPRESSIBLE = 0.3, 0.499
+DOWN_TO = 0.1  # of the height: there the only state in balance has a thousandth of the volume at rest
+# On the branch of states near rest, which falls steeply here: from 0.59 of the volume to 0.42.
+STRETCHES = (1.0, 0.8, 0.6, 0.5, 0.45, 0.43, 0.425, 0.42, 0.415, 0.41, 0.405, 0.4)
+STIFFER = 0.32  # a Poisson ratio with which the volume stays above a half there
+LOWEST = 0.5  # V/V0 of the range of the law
+_STILL = ((0.0, 0.0, 0.0),) * 3
+
+
+def bulk_modulus(poisson: float) -> float:
+    """Of a material of the shear modulus ``MU`` [MPa]."""
+    return 2 * MU * (1 + poisson) / (3 * (1 - 2 * poisson))
+
+
+def squeezed(lab: Lab, element: str, poisson: float, stretches: tuple[float, ...]) -> Solved:
+    """The states of an eighth of a cube, free at its sides, at ``stretches`` of its height, the first of which is 1."""
+    mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), ELEMENTS[element][0])
+    plate = Prescribed("plate", "z1", (2,), Affine(_STILL, (0.0, 0.0, -1.0)))
+    acting = effect("neo_hooke", mu=f"{MU} MPa"), resistance(element, bulk_modulus(poisson))
+    frames = tuple(1 - stretch for stretch in stretches)
+    body = Continuum(mesh, acting, (*SYMMETRY, plate), frames)
+    return lab.solve(body, element, first_step=0.1, smallest_step=1e-3, residual=1e-11)
+
+
+def collapses(lab: Lab, element: str, poisson: float) -> Finding:
+    """1 where the squeeze does not come through, keeps no state below a fifth of its volume, and names the law that was
+    outside its range; else 0. Newton's method finds a collapsed state or, on the steep branch towards it, none.
+    """
+    solved = squeezed(lab, element, poisson, tuple(np.linspace(1, DOWN_TO, 7).tolist()))
+    least = min(state.scalars["min_cell_volume_ratio"] for state in solved.states)
+    ended, message = solved.outcome.status in ("collapsed", "diverged"), solved.outcome.message
+    found = ended and least >= 0.2 and "incompressible is outside the range" in message
+    return Finding(float(found), note=f"{solved.outcome.status}: {message}")
+
+
+def outside(lab: Lab, element: str, poisson: float) -> Finding:
+    """In how many states a law is outside its range."""
+    solved = squeezed(lab, element, poisson, STRETCHES)
+    found = sum(state.scalars["outside_law"] > 0 for state in (*solved.states[:-1], solved.last))
+    return Finding(float(found), note=solved.outcome.message)
+
+
+def _volume(stretch: float) -> float:
+    return float(find("loads").squeezed_volume(MU, bulk_modulus(POISSON), stretch))
+
+
+def _outside_truth() -> float:
+    return float(sum(_volume(stretch) < LOWEST for stretch in STRETCHES))
+
+
+def _one() -> float:
+    return 1.0
+
+
+ENTRIES = (
+    Entry(
+        name="collapse_is_no_result",
+        family="collapse",
+        title="Squeezed to a tenth of its height, a block of the Poisson ratio 0.3 is no result, and its law is named, by P2/P1",
+        unit="1",
+        truth=_one,
+        within=0.1,
+        relative=False,
+        because="it is yes (1) or no (0), and nothing between",
+        kind="property",
+        source="validation/loads.py: the only state in balance has a thousandth of the volume, which no flesh has",
+        measure=partial(collapses, element="P2/P1", poisson=POISSON),
+        spoil="a Poisson ratio of 0.499, with which 0.993 of the volume are kept",
+        spoiled=partial(collapses, element="P2/P1", poisson=NEARLY_INCOMPRESSIBLE),
+    ),
+    Entry(
+        name="law_outside_its_range",
+        family="collapse",
+        title="In how many states of a squeeze, from 1 to 0.4 of the height, less than half of the volume is left, by Q1/P0",
+        unit="1",
+        truth=_outside_truth,
+        within=0.1,
+        relative=False,
+        because="it is a number of states, each of them homogeneous, so that every element has it",
+        kind="closed form",
+        source="validation/loads.py: one scalar equation for the volume, from the energy by hand (Holzapfel 2000, ch. 6.4)",
+        measure=partial(outside, element="Q1/P0", poisson=POISSON),
+        spoil="a Poisson ratio of 0.32",
+        spoiled=partial(outside, element="Q1/P0", poisson=STIFFER),
+    ),
+)
