@@ -2,6 +2,7 @@
 
 import importlib.util
 import itertools
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from fem_reference.errors import InputError, MissingSoftware
 from fem_reference.records import parse
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import BodySettings
+from fem_reference.solvers.fenicsx.jobs import Job
 from fem_reference.verification import shapes
 from fem_reference.verification.courses import Affine, Rest, Turn
 
@@ -269,15 +271,22 @@ def test_a_time_limit_ends_one_body_and_not_the_session(session) -> None:  # noq
         assert fresh.process is process
 
 
-def test_a_shared_edge_counts_once(session) -> None:
-    # Two regions meet in an edge and hold it both: with the third, what holds the body is in balance.
-    push = Affine(((0.0, 0.0, 0.0),) * 3, (0.0, 0.1, -0.2))
+def test_what_attachments_share_counts_once(session, tmp_path) -> None:
+    # Two regions meet in an edge and hold it both. Of a muscle, which has points to be followed, all forces are in balance.
     held = (
         Prescribed("bottom", "z0", ALL, Rest()),
-        Prescribed("side", "x0", ALL, Affine(((0.0, 0.0, 0.0), (0.0, 0.0, 0.1), (0.0, 0.0, -0.2)), (0.0, 0.0, 0.0))),
-        Prescribed("top", "z1", ALL, push),
+        Prescribed("side", "x0", ALL, Affine(((0.0, 0.0, 0.0), (0.0, 0.0, 0.1), (0.0, 0.0, -0.2)))),
+        Prescribed("top", "z1", ALL, Affine(((0.0, 0.0, 0.0),) * 3, (0.0, 0.1, -0.2))),
     )
     body = Continuum(box("P2/P1"), FLESH, held, (0.0, 1.0))
-    forces = session.solve(body, settings("P2/P1")).last.forces
-    assert np.abs(forces["side"]).max() > 1e-4
-    assert sum(forces.values()) == pytest.approx(0, abs=1e-10)
+    centre = body.mesh.points[body.mesh.cells[0]].mean(axis=0)
+    job, found = tmp_path / "job.pickle", []
+    job.write_bytes(pickle.dumps(Job(body, settings("P2/P1"), {"surface": (np.array([0]), centre[None])})))
+    outcome = session.run(job, None, lambda event: found.append(dict(np.load(event["file"]))), "frames")
+    assert outcome.status == "converged"
+    forces = [found[-1][f"force {entry.name}"] for entry in held]
+    assert np.abs(forces[1]).max() > 1e-4
+    assert np.abs(sum(forces)).max() < 1e-10
+    # Of a body of the catalogue each region has all of what its unknowns take.
+    whole = session.solve(body, settings("P2/P1")).last.forces
+    assert np.abs(sum(whole.values())).max() > 1e-4

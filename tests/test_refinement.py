@@ -16,7 +16,7 @@ from fem_reference.runs import Frame, Outcome
 from fem_reference.scene import Scene
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import Settings
-from fem_reference.stepping import Attempt, march
+from fem_reference.stepping import Attempt, Steps, march
 
 CONTACT = '\n[[effect]]\nname = "contact"\nstiffness = "100 kPa/mm"\nsmoothing = "0.2 mm"\n'
 LOAD_STEP = 1e-5
@@ -186,9 +186,7 @@ def test_load_steps_are_at_most_half_as_long(case, every, largest) -> None:
         march(
             lambda at: taken.append(at) or Attempt(None, 2),
             frames.numbers,
-            changed["first_step"],
-            0.1,
-            changed["largest_step"],
+            Steps(changed["first_step"], 0.1, changed["largest_step"]),
         )
     )
     assert max(np.diff(taken)) <= min(every, largest or every) / 2

@@ -179,10 +179,12 @@ class Body:
         """A compiled form, summed over the ranks."""
         return float(self.comm.allreduce(fem.assemble_scalar(form), MPI.SUM))
 
-    def forces(self) -> tuple[dict[str, Floats], dict[str, Floats]]:
-        """By name of what is prescribed, the force (3,) [N] that holds it there and its moment (3,) [N mm] about the origin."""
+    def forces(self, *, divided: bool) -> tuple[dict[str, Floats], dict[str, Floats]]:
+        """By name of what is prescribed, the force (3,) [N] that holds it there and its moment (3,) [N mm] about the origin. What
+        an unknown of several regions takes is ``divided`` between them, so that all forces are in balance, or counts in each.
+        """
         balance, now = self.system.reactions(), np.array(self.unknowns.x.array)
-        shared = self._shared
+        shared = self._shared if divided else np.ones(len(now), np.int64)
         held = {hold.entry.name: hold.force(balance, now, shared) for hold in self.held}
         held |= self.contact.forces() if self.contact else {}
         forces = {name: self.comm.allreduce(force, MPI.SUM) for name, (force, _) in held.items()}

@@ -13,7 +13,7 @@ from fem_reference.states import NodalState
 @dataclass(frozen=True, eq=False)
 class Job:
     """A ``body`` and how to solve it; ``samples``: by name, the cell (n,) of each point and the points (n, 3) at rest whose
-    positions are wanted.
+    positions are wanted. Of a muscle there are some; then forces at edges that its attachments share are divided between them.
     """
 
     body: Continuum

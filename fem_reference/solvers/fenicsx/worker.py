@@ -105,7 +105,7 @@ class Worker:
 
     def report_frame(self, reached: Step) -> None:
         """Write the frame's positions and forces beside the job and tell of it."""
-        forces, moments = self.body.forces()
+        forces, moments = self.body.forces(divided=bool(self.job.samples))
         arrays = {name: self.body.positions(*sample) for name, sample in self.job.samples.items()}
         arrays |= {"nodes": self.body.node_positions()}
         arrays |= {f"force {name}": force for name, force in forces.items()}
