@@ -31,7 +31,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "the first time, what is compiled is made beforehand)"
     )
     parser.add_argument("--repeats", type=int, metavar="N", help=often)
-    ranks = "with --reference: MPI processes of a muscle (default: 2 where there are); fusiform bodies have 1"
+    ranks = "with --reference: MPI processes of a muscle (default: as run has it); fusiform bodies have 1"
     parser.add_argument("--ranks", type=int, metavar="N", help=ranks)
 
 

@@ -50,7 +50,7 @@ def parser() -> argparse.ArgumentParser:
         known = "how well the reference is known: solve it on coarser tetrahedra and with finer steps too"
         judging.add_argument("--error-bar", action="store_true", help=known)
     for solving in (demo, run, comparison, checking):
-        ranks = "MPI processes of the reference (default: 2 where there are)"
+        ranks = "MPI processes of the reference (default: 1, or 2 for large bodies where cores are free)"
         solving.add_argument("--ranks", type=int, metavar="N", help=ranks)
     page = add("page", verbs.page, "write a page over several cases", case=False)
     _add_page_options(page, unit)
