@@ -40,7 +40,7 @@ class BodySettings(Record):
 
 
 class Settings(BodySettings):
-    """Numerics of a muscle; ``ranks``: MPI processes, by default two where the machine has them: they change the time, not the
+    """Numerics of a muscle; ``ranks``: MPI processes, by default one, two where that pays and cores are free: they change the time, not the
     answer.
     """
 
