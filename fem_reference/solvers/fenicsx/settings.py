@@ -40,8 +40,8 @@ class BodySettings(Record):
 
 
 class Settings(BodySettings):
-    """Numerics of a muscle; ``ranks``: MPI processes, by default one, two where that pays and cores are free: they change the time, not the
-    answer.
+    """Numerics of a muscle; ``ranks``: MPI processes, by default one, two where that pays and cores are free: they change the
+    time, not the answer.
     """
 
     ranks: int | None = Field(default=None, gt=0)
