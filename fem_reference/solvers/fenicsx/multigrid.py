@@ -7,8 +7,6 @@ factorised. For the pressure: the mass matrix over local stiffness, to which the
 (Wathen and Silvester 1993, doi 10.1137/0730031).
 """
 
-from itertools import count
-
 import basix
 import numpy as np
 from petsc4py import PETSc
@@ -23,13 +21,10 @@ from fem_reference.solvers.fenicsx.system import System
 _SMOOTHING = 2  # the degree of the polynomial
 _MOST = 200  # iterations; and how many more than with a fresh preconditioner are worth it
 _TIRED = 15
-_number = count()
 
 
 class Multigrid:
     """Solves with the matrix of a ``system`` on one rank, whose ``element`` is quadratic and has a pressure."""
-
-    lagged = True
 
     def __init__(self, system: System, element: str, spent: Spent) -> None:
         self.system, self.matrix, self.spent = system, system.matrix, spent
@@ -89,9 +84,7 @@ class Multigrid:
         coarse.zeroRowsColumns(self.fixed.tolist(), diag=1.0)
         stiff.setBlockSizes(3, 3)  # the components of a node are neighbours
         stiff = stiff.convert(PETSc.Mat.Type.BAIJ)
-        prefix, options = f"fem_reference_multigrid_{next(_number)}_", PETSc.Options()
         cycle = PETSc.PC().create(stiff.comm)
-        cycle.setOptionsPrefix(prefix)
         cycle.setOperators(stiff, stiff)
         cycle.setType("mg")
         cycle.setMGLevels(2)
@@ -107,8 +100,6 @@ class Multigrid:
         smoother.setTolerances(max_it=_SMOOTHING)
         smoother.getPC().setType("pbjacobi")
         cycle.setUp()
-        for name in [name for name in options.getAll() if name.startswith(prefix)]:
-            options.delValue(name)
         return cycle
 
     def _interpolation(self, element: str, displaced: Ints) -> tuple[PETSc.Mat, Ints]:
