@@ -12,6 +12,8 @@ import numpy as np
 from fem_reference.contact import Contact, Obstruction
 from fem_reference.effects import Effect, Load
 from fem_reference.errors import InputError
+from fem_reference.geometry.fibres import Directions
+from fem_reference.geometry.skins import Skin
 from fem_reference.mesh import Floats, Ints
 from fem_reference.runs import Outcome
 from fem_reference.states import NodalState
@@ -36,7 +38,7 @@ def check(body: "Continuum", element: str) -> None:
     """
     check_element(element, body.mesh.kind, body.mesh.degree, body.effects, "element")
     _check_prescribed(body.prescribed)
-    held = [entry.on for entry in body.prescribed]
+    held = [entry.on for entry in body.prescribed if isinstance(entry.on, str)]
     pushed = [body.contact.on] if body.contact and isinstance(body.contact.on, str) else []
     used = dict.fromkeys([*held, *pushed, *(effect.on for effect in body.effects if isinstance(effect, Load))])
     for on in used:
@@ -59,6 +61,8 @@ def _check_prescribed(prescribed: tuple["Prescribed", ...]) -> None:
             raise InputError(
                 f"prescribed.{entry.name}.stiffness", f"{entry.stiffness:g}", "more than 0, or None: exact"
             )
+        if entry.stiffness is None and not isinstance(entry.on, str):
+            raise InputError(f"prescribed.{entry.name}.stiffness", "none on a skin", "springs")
 
 
 def _check_regions(mesh: "Cells", names: tuple[str, ...]) -> None:
@@ -134,21 +138,16 @@ class Cells:
 
 @dataclass(frozen=True, eq=False)
 class Prescribed:
-    """What is prescribed on the facets ``on``: along each of ``components`` (0, 1, 2 for x, y, z) the displacement that ``course``
-    gives for rest points (n, 3) [mm] at a frame number, (n, 3) [mm]; a picklable callable. With a ``stiffness`` [MPa/mm] it is not
-    exact: springs over the area pull towards it.
+    """What is prescribed on the facets ``on``, or on a skin: along each of ``components`` (0, 1, 2 for x, y, z) the displacement
+    that ``course`` gives for rest points (n, 3) [mm] at a frame number, (n, 3) [mm]; a picklable callable. With a ``stiffness``
+    [MPa/mm] it is not exact: springs over the area pull towards it; a skin has no unknowns that could be prescribed exactly.
     """
 
     name: str
-    on: str
+    on: str | Skin
     components: tuple[int, ...]
     course: Callable[[Floats, float], Floats]
     stiffness: float | None = None
-
-
-Directions = Callable[
-    [Ints, Floats], Floats
-]  # of cells (n,) and rest points (n, 3) in them: unit vectors (n, 3); picklable
 
 
 @dataclass(frozen=True, eq=False)

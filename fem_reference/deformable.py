@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fem_reference.contact import Contact, Obstruction
-from fem_reference.continuum import ByCell, Cells, Continuum, Prescribed
+from fem_reference.continuum import Cells, Continuum, Prescribed
 from fem_reference.effects import Interaction
 from fem_reference.effects.contact import Contact as ContactEffect
 from fem_reference.mesh import Floats, boundary
@@ -41,23 +41,29 @@ class Follows:
 
 
 def as_continuum(problem: Problem) -> Continuum:
-    """The muscle as a body: its bones prescribe where the facets that they hold are; the rest of its skin is ``"free"``."""
+    """The muscle as a body: its bones prescribe where the facets that they hold exactly are, or pull at what they hold by springs;
+    the rest of its skin is ``"free"``.
+    """
     mesh = problem.mesh
-    held = np.concatenate([np.zeros((0, 3), int), *(mesh.facets[entry.attachment] for entry in problem.held)])
+    exact = {entry.attachment: mesh.facets[entry.attachment] for entry in problem.held if entry.stiffness is None}
+    held = np.concatenate([np.zeros((0, 3), int), *exact.values()])
     skin, _ = boundary(mesh.tets)
     taken = {tuple(facet) for facet in np.sort(held, axis=1).tolist()}
     free = skin[[tuple(facet) not in taken for facet in np.sort(skin, axis=1).tolist()]]
-    cells = Cells(mesh.points, mesh.tets, "tetrahedron", 1, {**mesh.facets, "free": free})
+    cells = Cells(mesh.points, mesh.tets, "tetrahedron", 1, {**exact, "free": free})
     first = problem.frames[0]
     prescribed = tuple(
         Prescribed(
-            entry.attachment, entry.attachment, (0, 1, 2), Follows(From(first, entry.bone.pose)), entry.stiffness
+            entry.attachment,
+            problem.held_skins.get(entry.attachment, entry.attachment),
+            (0, 1, 2),
+            Follows(From(first, entry.bone.pose)),
+            entry.stiffness,
         )
         for entry in problem.held
     )
-    fibre = None if problem.directions is None else ByCell(problem.directions)
     acting = tuple(effect for effect in problem.effects if not isinstance(effect, Interaction))
-    body = Continuum(cells, acting, prescribed, problem.frames, fibre, interval=problem.interval)
+    body = Continuum(cells, acting, prescribed, problem.frames, problem.fibre, interval=problem.interval)
     return body if problem.contact is None else _among_bones(body, problem, problem.contact)
 
 

@@ -234,9 +234,8 @@ def _known(result: Comparison) -> list[str]:
 
 def _bar(result: Comparison, bar: ErrorBar) -> str:
     assert result.error_bars is not None  # the bar is of them
-    order = "no order" if math.isnan(bar.order) else f"order {bar.order:.1f}"
     at = f"frame {result.error_bars.numbers[bar.worst]}"
-    return f"\N{PLUS-MINUS SIGN} {bar.values[bar.worst]:.2g} {bar.unit} at {at}, {order}, {bar.course}"
+    return f"\N{PLUS-MINUS SIGN} {bar.values[bar.worst]:.2g} {bar.unit} at {at}"
 
 
 def run_facts(scene: Scene, run: Run) -> dict[str, Any]:

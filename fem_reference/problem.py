@@ -3,14 +3,14 @@
 import logging
 import os
 import time
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference import files
+from fem_reference import files, scene_fibres
 from fem_reference.effects import Effect
 from fem_reference.effects.contact import Contact as ContactEffect
 from fem_reference.effects.contact import among
@@ -18,13 +18,13 @@ from fem_reference.errors import InputError
 from fem_reference.geometry import block
 from fem_reference.geometry.attachments import facets_under, pick
 from fem_reference.geometry.distance import distances
-from fem_reference.geometry.embedding import Locator
-from fem_reference.geometry.fibres import directions, nearest_directions, trace
+from fem_reference.geometry.fibres import Directions
 from fem_reference.geometry.intersections import self_intersections
+from fem_reference.geometry.nested import refined
 from fem_reference.geometry.rigid_bodies import Obstacle, solid
 from fem_reference.geometry.sectors import held_area, held_shares
 from fem_reference.geometry.signed_distance import Grid, cached, signed_distances
-from fem_reference.geometry.skins import Skin, skin_of
+from fem_reference.geometry.skins import Skin, free_skin, held_skin, spacing
 from fem_reference.geometry.tessellation import tessellated
 from fem_reference.geometry.tetrahedra import tetrahedralise
 from fem_reference.mesh import (
@@ -124,9 +124,9 @@ class Setup:
 
 @dataclass(frozen=True, eq=False)
 class Problem(Setup):
-    """A setup filled with tetrahedra (``mesh.facets`` by attachment), with its effects and fibres; ``directions`` (k, 3), the unit
-    vector along the fibres in each tet, where an effect needs it; ``skin``, what bones push on, where they do; ``mesh_facts`` are
-    what the mesh is like, ``seconds`` how long it took to make.
+    """A setup filled with tetrahedra (``mesh.facets`` by attachment), with its effects and fibres; ``fibre``, the direction of the
+    fibres at any point, where an effect needs it; ``skin``, what bones push on, where they do; ``held_skins``, by attachment that
+    holds by springs, what these pull at; ``mesh_facts`` are what the mesh is like, ``seconds`` how long it took to make.
     """
 
     mesh: TetMesh
@@ -134,8 +134,15 @@ class Problem(Setup):
     fibres: Polylines
     mesh_facts: dict[str, float | str]
     seconds: float
-    directions: Floats | None = None
+    fibre: Directions | None = None
     skin: Skin | None = None
+    held_skins: dict[str, Skin] = field(default_factory=dict)
+
+    @cached_property
+    def directions(self) -> Floats | None:
+        """Unit vectors (k, 3) along the fibres in the middle of each tet, where an effect needs them."""
+        middles = self.mesh.points[self.mesh.tets].mean(axis=1)
+        return None if self.fibre is None else self.fibre(np.arange(len(middles)), middles)
 
     @property
     def contact(self) -> ContactEffect | None:
@@ -159,12 +166,16 @@ def build(scene: Scene, rest: Setup) -> Problem:
     distances_known = {} if contact is None else _distance_facts(rest)
     if contact is not None:
         _check_outside(scene, rest, contact)
-    mesh = _filled(scene, rest)
+    mesh = _filled(scene, rest, scene.muscle.tet_size)
+    exact = tuple(held.attachment for held in rest.held if held.stiffness is None)
+    for _ in range(scene.muscle.refinements):
+        mesh = refined(mesh, rest.surface, exact)
     for i, held in enumerate(rest.held):
         if len(mesh.facets[held.attachment]) == 0:
             place = join(scene.place, f"attachment[{i}]")
             raise InputError(place, "an area smaller than the tetrahedra resolve", "a smaller muscle.tet_size")
-    fibres = _fibres(scene, mesh)
+    fibres, fibre = scene_fibres.of(scene, rest.surface, partial(_filled, scene, rest))
+    apart = spacing(rest.surface)
     return Problem(
         rest.surface,
         rest.bones,
@@ -176,8 +187,13 @@ def build(scene: Scene, rest: Setup) -> Problem:
         fibres=fibres,
         mesh_facts=_mesh_facts(rest, mesh, scene.muscle.tet_size / 2) | distances_known,
         seconds=time.perf_counter() - begin,
-        directions=_directions(scene, mesh, fibres),
-        skin=_skin(scene, rest, mesh),
+        fibre=fibre if any("fibre" in effect.needs for effect in scene.effects) else None,
+        skin=None if contact is None else free_skin(rest.surface, rest.free, mesh, apart),
+        held_skins={
+            held.attachment: held_skin(rest.surface, held_shares(rest.surface, held.vertices), mesh, apart)
+            for held in rest.held
+            if held.stiffness is not None
+        },
     )
 
 
@@ -199,23 +215,16 @@ def _distance_facts(rest: Setup) -> dict[str, float | str]:
     }
 
 
-def _filled(scene: Scene, rest: Setup) -> TetMesh:
-    """The tets, with the facets that each attachment holds: up to its rim where the mesher keeps it, else those under it."""
+def _filled(scene: Scene, rest: Setup, size: float) -> TetMesh:
+    """Tets of a ``size`` [mm], with the facets that each attachment holds: up to its rim where the mesher keeps it, else those
+    under it.
+    """
     shares = {held.attachment: held_shares(rest.surface, held.vertices) for held in rest.held}
-    if scene.muscle.mesher == "block":
-        mesh = block.fill(rest.surface, scene.muscle.tet_size)
-    else:
-        mesh = tetrahedralise(rest.surface, scene.muscle.tet_size, shares)
+    blocks = scene.muscle.mesher == "block"
+    mesh = block.fill(rest.surface, size) if blocks else tetrahedralise(rest.surface, size, shares)
     if set(mesh.facets) == set(shares):
         return mesh
     return replace(mesh, facets={name: facets_under(mesh, rest.surface, held) for name, held in shares.items()})
-
-
-def _skin(scene: Scene, rest: Setup, mesh: TetMesh) -> Skin | None:
-    """What bones push on, where they do: the surface that they do not hold, at points half a tet apart or nearer."""
-    if among(scene.effects) is None:
-        return None
-    return skin_of(rest.surface, rest.free, mesh, scene.muscle.tet_size / 2)
 
 
 def _body(scene: Scene, i: int, muscle: Surface) -> Body:
@@ -247,39 +256,6 @@ def _held(scene: Scene, surface: Surface, bones: tuple[Body, ...]) -> tuple[Held
         taken[vertices] = True
         held.append(Held(attachment.name, by_name[attachment.bone], vertices, attachment.stiffness))
     return tuple(held)
-
-
-def _fibres(scene: Scene, mesh: TetMesh) -> Polylines:
-    if scene.fibres.polylines is not None:
-        given = scene.fibres.polylines
-        return _inside(mesh, files.read_polylines(scene.file(given.file, "fibres.polylines.file"), given.unit))
-    traced = scene.fibres.traced
-    assert traced is not None  # a Fibres record has one of the two
-    return trace(mesh, traced.start, traced.end, traced.count)
-
-
-def _directions(scene: Scene, mesh: TetMesh, fibres: Polylines) -> Floats | None:
-    """Where an effect needs it, the fibre direction in each tet: of the field that fibres are traced in, or of the nearest one."""
-    if not any("fibre" in effect.needs for effect in scene.effects):
-        return None
-    traced = scene.fibres.traced
-    return directions(mesh, traced.start, traced.end) if traced else nearest_directions(mesh, fibres)
-
-
-def _inside(mesh: TetMesh, fibres: Polylines) -> Polylines:
-    """The fibres with every point outside the tets moved to the nearest point of their skin: outside, a solution says nothing."""
-    locator = Locator(mesh)
-    outside = locator.embed(fibres.points).outside
-    points = np.array(fibres.points)
-    points[outside > 0] = distances(points[outside > 0], locator.skin).closest
-    if outside.max() > 0:
-        log.info(
-            "fibres: %d of %d points moved into the muscle, by up to %.1f mm",
-            (outside > 0).sum(),
-            len(points),
-            outside.max(),
-        )
-    return Polylines(points, fibres.offsets)
 
 
 def _mesh_facts(rest: Setup, mesh: TetMesh, far: float) -> dict[str, float | str]:

@@ -31,13 +31,15 @@ HOME = home(Path(__file__).resolve().parent)
 
 
 class Muscle(Record):
-    """The deformable body: a closed triangle surface, the size of the tetrahedra it is filled with, and how: with good tetrahedra
-    (``"quality"``), or an axis-aligned box with a grid of boxes, each cut into six (``"block"``).
+    """The deformable body: a closed triangle surface, the size of the tetrahedra it is filled with, how often each of them is then
+    cut into eight (``refinements``), and how it is filled: with good tetrahedra (``"quality"``), or an axis-aligned box with a
+    grid of boxes, each cut into six (``"block"``).
     """
 
     surface: str
     unit: LengthUnit
     tet_size: PositiveLength
+    refinements: int = Field(default=0, ge=0, le=4)
     mesher: Literal["quality", "block"] = "quality"
 
 

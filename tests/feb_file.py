@@ -8,6 +8,7 @@ import acting
 import numpy as np
 import shapes
 
+from fem_reference.continuum import ByCell
 from fem_reference.motion import Rotation, Translation
 from fem_reference.problem import Body, Problem
 from fem_reference.records import parse
@@ -34,7 +35,7 @@ def bar() -> Problem:
     along = np.random.default_rng(3).normal(size=(len(plain.mesh.tets), 3))
     directions = along / np.linalg.norm(along, axis=1)[:, None]
     rests = Body("rests & <waits>", ball.moved_to(ball.points + [50, 0, 0]), None)
-    return replace(plain, bones=(*bones.values(), rests), held=held, directions=directions)
+    return replace(plain, bones=(*bones.values(), rests), held=held, fibre=ByCell(directions))
 
 
 def numbers(element: Element) -> list[float]:

@@ -32,6 +32,7 @@ ORDER = [
     "contact",
     "continuum",
     "results",
+    "scene_fibres",
     "problem",
     "exchange",
     "deformable",

@@ -16,6 +16,7 @@ import pytest
 import small
 
 from fem_reference import casefile, cli, exchange, files, problem, report
+from fem_reference.continuum import ByCell
 from fem_reference.errors import InputError
 from fem_reference.exchange import open_formats
 from fem_reference.execution import Bench
@@ -40,7 +41,7 @@ def built(scene: Scene) -> Problem:
     """The small scene, with a direction of fibres in each tet, no two the same."""
     bar = problem.build(scene, problem.setup(scene))
     along = np.random.default_rng(6).normal(size=(len(bar.mesh.tets), 3))
-    return replace(bar, directions=along / np.linalg.norm(along, axis=1)[:, None])
+    return replace(bar, fibre=ByCell(along / np.linalg.norm(along, axis=1)[:, None]))
 
 
 @pytest.fixture(scope="module")

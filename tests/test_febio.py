@@ -290,7 +290,7 @@ def test_constants_of_fibres_and_kind_of_element(feb: Element, bar: Problem) -> 
     found = {entry.tag: float(entry.text) for entry in muscle if entry.tag != "fiber"}
     assert found == {"pressure_model": 2, "k": 10, "c1": 0.005, "c2": 0, "c3": 0.01, "c4": 12, "c5": 3, "lam_max": 1.3}
     assert feb.find("MeshDomains/SolidDomain").attrib["type"] == "three-field-solid"
-    plain = febio.model(replace(bar, effects=effects("neo_hooke", "incompressible_penalty"), directions=None))
+    plain = febio.model(replace(bar, effects=effects("neo_hooke", "incompressible_penalty"), fibre=None))
     assert plain.find("Material/material[@name='muscle']").attrib["type"] == "Mooney-Rivlin"
     assert plain.find("MeshDomains/SolidDomain").attrib["type"] == "elastic-solid"
     assert plain.find("Contact") is None

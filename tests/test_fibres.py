@@ -1,5 +1,7 @@
 """Traced fibres: straight in a bar, arcs in a ring, the same lines again and on a moved mesh."""
 
+import pickle
+
 import numpy as np
 import pytest
 import shapes
@@ -7,8 +9,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
 from fem_reference.errors import InputError
+from fem_reference.geometry import fibres
 from fem_reference.geometry.embedding import embed
-from fem_reference.geometry.fibres import directions, nearest_directions, trace
+from fem_reference.geometry.fibres import NearestLine, fibre_field
 from fem_reference.mesh import Polylines, TetMesh, boundary
 
 INNER, OUTER = 20.0, 30.0  # radii of the ring [mm]
@@ -18,6 +21,16 @@ HIP = np.array([146.0, 238.0, -431.0])  # [mm]
 def _bar(cells: int = 4) -> TetMesh:
     """A bar of 20 x 20 x 60 mm along z."""
     return shapes.box((cells, cells, 3 * cells), (20.0, 20.0, 60.0))
+
+
+def trace(mesh: TetMesh, start: str, end: str, count: int) -> Polylines:
+    """Fibres from one region to another."""
+    return fibres.trace(fibre_field(mesh, start, end), count)
+
+
+def directions(mesh: TetMesh, start: str, end: str) -> np.ndarray:
+    """Their directions in the middle of each tet."""
+    return fibre_field(mesh, start, end)(np.arange(len(mesh.tets)), mesh.points[mesh.tets].mean(axis=1))
 
 
 def _ring(fineness: int) -> TetMesh:
@@ -130,7 +143,9 @@ def test_more_fibres_than_there_is_room_for() -> None:
 def test_nothing_between_the_attachments() -> None:
     bar = _bar(2)
     skin, _ = boundary(bar.tets)
-    with pytest.raises(InputError, match=r'fibres\.traced: got nothing between "all" and "all", want two attachments'):
+    with pytest.raises(
+        InputError, match=r"fibres\.traced: got nothing between the two attachments, want two attachments"
+    ):
         trace(TetMesh(bar.points, bar.tets, {"all": skin}), "all", "all", 1)
 
 
@@ -171,7 +186,19 @@ def test_where_all_is_held_by_one_bone_fibres_go_the_mean_way() -> None:
 def test_nearest_directions_are_those_of_the_nearest_line() -> None:
     # One line along x low in the bar, one along y high in it; the ends of the first and the start of the second are no segment.
     lines = Polylines(np.array([[0.0, 10, 5], [20, 10, 5], [10, 0, 55], [10, 20, 55]]), np.array([0, 2, 4]))
-    found = nearest_directions(_bar(), lines)
-    heights = _bar().points[_bar().tets].mean(axis=1)[:, 2]
+    points = _bar().points[_bar().tets].mean(axis=1)
+    found = NearestLine(lines)(np.arange(len(points)), points)
+    heights = points[:, 2]
     assert_allclose(found[heights < 25], np.tile([1.0, 0, 0], ((heights < 25).sum(), 1)))
     assert_allclose(found[heights > 35], np.tile([0, 1.0, 0], ((heights > 35).sum(), 1)))
+
+
+@pytest.mark.parametrize(
+    "of", [fibre_field(_bar(2), "bottom", "top"), NearestLine(Polylines(np.eye(3), np.array([0, 3])))]
+)
+def test_other_processes_get_the_same_directions(of) -> None:
+    points = np.array([[3.0, 4, 5], [10, 10, 30]])
+    cells = np.zeros(2, int)
+    before = of(cells, points)
+    assert_array_equal(pickle.loads(pickle.dumps(of))(cells, points), before)
+    assert_array_equal(of(cells, points), before)

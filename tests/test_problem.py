@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 import small
 
-from fem_reference import casefile, files, problem
+from fem_reference import casefile, files, problem, scene_fibres
 from fem_reference.deformable import as_continuum
 from fem_reference.errors import InputError
-from fem_reference.geometry.embedding import embed
 from fem_reference.geometry.rigid_bodies import Box, HalfSpace
 from fem_reference.geometry.tetrahedra import tetrahedralise
 from fem_reference.mesh import Polylines, boundary, check_closed, enclosed_volume
@@ -85,11 +84,20 @@ def test_a_body_rests_where_it_has_no_motion(built) -> None:
 def test_given_fibres_stay_inside_the_muscle(built) -> None:
     inside, far = [5.0, 5.0, 20.0], [5.0, 30.0, 20.0]
     given = Polylines(np.array([inside, far]), np.array([0, 2]))
-    moved = problem._inside(built.mesh, given)
+    moved = scene_fibres.inside(built.surface, given)
     assert np.array_equal(moved.points[0], inside)
-    # The nearest point of the side, which bulges to y = 5 + 5 * 1.3 = 11.5 halfway up, within what coarsening moves it.
-    assert moved.points[1] == pytest.approx([5, 11.5, 20], abs=0.7)
-    assert embed(built.mesh, moved.points).outside.max() < 1e-9
+    # The nearest point of the side, which bulges to y = 5 + 5 * 1.3 = 11.5 halfway up.
+    assert moved.points[1] == pytest.approx([5, 11.5, 20], abs=1e-9)
+
+
+def test_fibres_and_contact_do_not_depend_on_the_tetrahedra(bar) -> None:
+    scene = casefile.read(bar)
+    one, other = (
+        build_scene(scene.model_copy(update={"muscle": scene.muscle.model_copy(update={"tet_size": size})}))
+        for size in (4.5, 6.0)
+    )
+    assert len(one.mesh.tets) != len(other.mesh.tets)
+    assert np.array_equal(one.fibres.points, other.fibres.points)
 
 
 def test_given_fibres_are_read(bar) -> None:

@@ -19,16 +19,21 @@ from fem_reference.solvers.fenicsx import Settings
 from fem_reference.stepping import Attempt, Steps, march
 
 CONTACT = '\n[[effect]]\nname = "contact"\nstiffness = "100 kPa/mm"\nsmoothing = "0.2 mm"\n'
-LOAD_STEP = 1e-5
+VISCOSITY = '\n[[effect]]\nname = "viscosity"\neta = "1 kPa s"\n'
+CONTACT_GIVES = 1e-5
 WRITE = report.write
 
 
-def swell(problem, settings, sink) -> Outcome:
-    """In place of the reference: all points move away from the origin, by more the larger the tetrahedra and the load steps are."""
-    facts = problem.mesh_facts
-    length = (facts["volume_mm3"] / facts["tets"]) ** (1 / 3)
+def growth(tets: float) -> float:
+    """What so many tetrahedra add to the growth of a frame number."""
+    return 6e-7 * tets
+
+
+def swell(problem, _settings, sink) -> Outcome:
+    """In place of the reference: all points move away from the origin, by more the more tets and the softer contact."""
+    give = 0 if problem.contact is None else CONTACT_GIVES * 0.1 / problem.contact.stiffness
     for number in problem.frames:
-        factor = 1 + number * (1e-3 + 1e-4 * length + LOAD_STEP * settings.first_step)
+        factor = 1 + number * (growth(problem.mesh_facts["tets"]) + give)
         sink(Frame(number, problem.surface.points * factor, problem.fibres.points * factor))
     return Outcome("converged", "done", {"seconds": 1.0})
 
@@ -54,7 +59,7 @@ def rows(facts, of, metric, statistic):
     found = [
         row for row in facts["error_bars"] if (row["of"], row["metric"], row["statistic"]) == (of, metric, statistic)
     ]
-    return np.array([row["value"] for row in found]), found[0]["order"], found[0]["course"]
+    return np.array([row["value"] for row in found])
 
 
 def scene_of(case: Path, more: str = "") -> Scene:
@@ -66,33 +71,34 @@ def scene_of(case: Path, more: str = "") -> Scene:
 def test_the_bar_covers_an_error_that_is_known(case, capsys, monkeypatch) -> None:
     monkeypatch.setattr(report, "write", WRITE)
     monkeypatch.setattr(gallery, "_command", lambda _job, _folder: ["/nowhere/python"])
+    path = case / "case.toml"
+    path.write_text(path.read_text() + CONTACT)
     status, facts = call(case, "run")
     assert (status, facts["error_bars"], facts["verdicts"][0]["error_bar"]) == (cli.VERDICT_FAIL, [], None)  # it swells
     page = case.parent / "out" / "bar" / "report.html"
     assert "With <code>--error-bar</code> the reference is solved" in page.read_text()
     status, facts = call(case, "run", "--error-bar")
     assert (status, facts["verdict"]) == (cli.DONE, "cannot say")
-    values, order, course = rows(facts, "change", "surface_deviation", "max")
-    bench = Bench(casefile.read_muscle(case), case.parent / "out" / "runs")
-    built = bench.problem()
-    length = (built.mesh_facts["volume_mm3"] / built.mesh_facts["tets"]) ** (1 / 3)
-    furthest = np.linalg.norm(built.surface.points, axis=1).max()
-    # Of first order in the tetrahedra, 1.25 times their error; halving load steps of 5 changes half their error, twice that is all.
-    wanted = np.array([0, 5, 10, 15, 20]) * furthest * (1.25e-4 * length + 5 * LOAD_STEP)
-    assert values == pytest.approx(wanted, rel=1e-6)
-    assert (order, course) == (pytest.approx(1, abs=1e-6), "converges")
-    printed = capsys.readouterr().out
-    assert "how well the reference is known" in printed
-    assert "order 1.0, converges" in printed
+    scene = casefile.read_muscle(case)
+    fine, coarse = (
+        Bench(one, case.parent / "out" / "runs").problem() for one in (scene, refinement._coarser(scene)[0])
+    )
+    tets = [built.mesh_facts["tets"] for built in (fine, coarse)]
+    furthest = np.linalg.norm(fine.surface.points, axis=1).max()
+    # Of order 1 in tetrahedra 1.5 times as large: 1.25 / (1.5 - 1) of the difference. Twice the stiffness takes half of what
+    # contact gives away, twice that is all.
+    wanted = np.array([0, 5, 10, 15, 20]) * furthest * (2.5 * abs(growth(tets[0]) - growth(tets[1])) + CONTACT_GIVES)
+    assert rows(facts, "change", "surface_deviation", "max") == pytest.approx(wanted, rel=1e-6)
+    assert "how well the reference is known" in capsys.readouterr().out
     text = page.read_text()
-    assert "6, 7.50, 9.38 mm" in text
-    assert "with one other cause of error halved at a time (load steps)" in text
+    assert "(9 mm instead of 6 mm)" in text
+    assert "cause of error halved at a time (contact stiffness, contact smoothing and distances to bones)" in text
     assert ">error bar</text>" in text
 
 
 def test_it_is_kept_with_its_run_until_the_metrics_change_or_the_file_is_damaged(case, monkeypatch, capsys) -> None:
     call(case, "run", "--error-bar")
-    first, _, _ = rows(call(case, "compare")[1], "deviation", "surface_deviation", "rms")
+    first = rows(call(case, "compare")[1], "deviation", "surface_deviation", "rms")
     assert (first[1:] > 0).all()
     monkeypatch.setattr(refinement, "_measuring_hash", lambda: "others")
     assert call(case, "run")[1]["error_bars"] == []
@@ -101,7 +107,7 @@ def test_it_is_kept_with_its_run_until_the_metrics_change_or_the_file_is_damaged
     capsys.readouterr()
     assert call(case, "run")[0] == cli.BAD_INPUT
     assert "error_bar.json: got JSONDecodeError" in capsys.readouterr().err
-    again, _, _ = rows(call(case, "run", "--error-bar")[1], "deviation", "surface_deviation", "rms")
+    again = rows(call(case, "run", "--error-bar")[1], "deviation", "surface_deviation", "rms")
     assert np.array_equal(again, first)
 
 
@@ -119,8 +125,7 @@ def test_progress_says_which_run_and_how_many(case, caplog) -> None:
     caplog.set_level(logging.INFO, logger="fem_reference")
     bench = Bench(casefile.read_muscle(case), case.parent / "runs")
     assert refinement.obtain(bench, bench.obtain("reference", bench.scene.reference, "reference")) is not None
-    assert "error bar: run 1 of 3, tetrahedra of 7.5 mm; at most about" in caplog.text
-    assert "error bar: run 3 of 3, load steps" in caplog.text
+    assert "error bar: run 1 of 1, tetrahedra of 9 mm; about" in caplog.text
 
 
 def test_a_run_that_failed_has_none(case, monkeypatch) -> None:
@@ -145,13 +150,13 @@ def test_a_coarser_run_that_fails_leaves_frames_without_a_bar(case, monkeypatch)
 
     monkeypatch.setattr(fenicsx, "solve", fail)
     _, facts = call(case, "run", "--error-bar")
-    values, _, _ = rows(facts, "change", "surface_deviation", "max")
+    values = rows(facts, "change", "surface_deviation", "max")
     assert values.tolist()[1:] == [None] * 4
     assert (facts["verdict"], facts["verdicts"][0]["error_bar"]) == ("cannot say", None)
 
 
 def test_sizes_that_make_no_other_mesh_are_refused(case, monkeypatch) -> None:
-    monkeypatch.setattr(refinement, "_length", lambda _: 1.0)
+    monkeypatch.setattr(refinement, "RATIO", 1.0)
     bench = Bench(casefile.read_muscle(case), case.parent / "runs")
     reference = bench.obtain("reference", bench.scene.reference, "reference")
     with pytest.raises(InputError, match=r"muscle.tet_size: got meshes of .* tetrahedra, want a size that coarser"):
@@ -159,11 +164,10 @@ def test_sizes_that_make_no_other_mesh_are_refused(case, monkeypatch) -> None:
 
 
 def test_a_scene_that_cannot_be_coarser_is_named(case, monkeypatch) -> None:
-    real = refinement._resized
-    monkeypatch.setattr(refinement, "_resized", lambda scene, size: real(scene, size * 10))
+    monkeypatch.setattr(refinement, "RATIO", 10.0)
     bench = Bench(casefile.read_muscle(case), case.parent / "runs")
     reference = bench.obtain("reference", bench.scene.reference, "reference")
-    with pytest.raises(InputError, match=r"error bar, tetrahedra of 7.5 mm: got a scene that cannot be set up"):
+    with pytest.raises(InputError, match=r"error bar, tetrahedra of 60 mm: got a scene that cannot be set up"):
         refinement.obtain(bench, reference)
 
 
@@ -179,8 +183,7 @@ def test_load_steps_are_at_most_half_as_long(case, every, largest) -> None:
     scene = scene_of(case)
     frames = scene.frames.model_copy(update={"last": 90, "every": every})
     settings = Settings(first_step=5.0, largest_step=largest)
-    (steps,) = refinement.variations(scene.model_copy(update={"frames": frames}), settings)
-    changed = steps.changes["reference"].settings
+    changed = refinement._finer_steps(scene.model_copy(update={"frames": frames}), settings)["reference"].settings
     taken = [0.0]
     list(
         march(
@@ -193,14 +196,28 @@ def test_load_steps_are_at_most_half_as_long(case, every, largest) -> None:
     assert set(frames.numbers) <= set(taken)
 
 
-def test_what_takes_no_load_steps_has_none_varied(case) -> None:
-    assert refinement.variations(scene_of(case), object()) == ()
+def test_load_steps_are_varied_where_time_matters(case) -> None:
+    assert refinement.variations(scene_of(case), Settings()) == ()
+    path = case / "case.toml"
+    path.write_text(path.read_text().replace("every = 5", 'every = 5\ninterval = "20 ms"'))
+    timed = scene_of(case, VISCOSITY)
+    assert [entry.name for entry in refinement.variations(timed, Settings())] == ["load steps"]
+    assert refinement.variations(timed, object()) == ()
+
+
+def test_the_coarse_member_of_a_pair_has_the_tetrahedra_before_their_last_refinement(case) -> None:
+    scene = scene_of(case)
+    nested = scene.model_copy(update={"muscle": scene.muscle.model_copy(update={"refinements": 2})})
+    coarser, sizes, order = refinement._coarser(nested)
+    assert (coarser.muscle.refinements, sizes, order) == (1, (1.5, 3.0), refinement.NESTED_ORDER)
+    coarser, sizes, order = refinement._coarser(scene)
+    assert (coarser.muscle.tet_size, sizes, order) == (9.0, (6.0, 9.0), 1.0)
 
 
 def test_contact_is_varied_cause_by_cause(case) -> None:
     scene = scene_of(case, CONTACT)
     varied = {entry.name: entry.changes for entry in refinement.variations(scene, Settings(first_step=5.0))}
-    assert list(varied) == ["load steps", "contact stiffness", "contact smoothing", "distances to bones"]
+    assert list(varied) == ["contact stiffness", "contact smoothing", "distances to bones"]
     assert [effect.stiffness for effect in varied["contact stiffness"]["effect"][2:]] == [pytest.approx(0.2)]
     assert [effect.smoothing for effect in varied["contact smoothing"]["effect"][2:]] == [pytest.approx(0.1)]
     assert varied["contact stiffness"]["effect"][:2] == scene.effects[:2]
@@ -209,4 +226,3 @@ def test_contact_is_varied_cause_by_cause(case) -> None:
     # Each is another scene with another key, or has other settings: no run is mistaken for another.
     keys = {scene.model_copy(update=changes).key for changes in varied.values()}
     assert len(keys | {scene.key}) == 4
-    assert varied["load steps"]["reference"] != scene.reference

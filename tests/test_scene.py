@@ -427,7 +427,7 @@ def test_every_key_is_needed(bar: Path, line: str) -> None:
             "colour",
             "attachment, bone, candidate, effect, expect, fibres, frames, muscle, proves, reference, spoil, title",
         ),
-        ("[muscle]\n", "muscle.colour", "mesher, surface, tet_size, unit"),
+        ("[muscle]\n", "muscle.colour", "mesher, refinements, surface, tet_size, unit"),
         (
             "[[bone]]\n",
             "bone[0].colour",

@@ -1,9 +1,9 @@
-"""The skin that rigid bodies push on: a rule of points on a surface, each carried by a tet."""
+"""Points on a surface that rigid bodies push on and springs pull at: a rule, each point carried by a tet."""
 
 import numpy as np
 from numpy.testing import assert_allclose
 
-from fem_reference.geometry.skins import skin_of
+from fem_reference.geometry.skins import free_skin, held_skin, spacing
 from fem_reference.mesh import Surface, TetMesh, boundary, triangle_areas
 
 
@@ -14,7 +14,7 @@ def unit_tet() -> tuple[Surface, TetMesh]:
 
 def test_it_stands_for_the_whole_area() -> None:
     surface, mesh = unit_tet()
-    skin = skin_of(surface, np.ones(4, bool), mesh, 2.0)
+    skin = free_skin(surface, np.ones(4, bool), mesh, 2.0)
     assert len(skin.points) == 12
     assert_allclose(skin.areas.sum(), 1.5 + np.sqrt(3) / 2, rtol=1e-14)
 
@@ -23,21 +23,40 @@ def test_what_is_held_is_left_out_and_squares_are_exact() -> None:
     # On the face z = 0: 1/2, 1/12 and 1/24 for 1, x^2 and x y.
     surface, mesh = unit_tet()
     free = np.array([True, True, True, False])
-    skin = skin_of(surface, free, mesh, 2.0)
+    skin = free_skin(surface, free, mesh, 2.0)
     assert_allclose(skin.points[:, 2], 0)
     assert (skin.points[:, :2] > 0.1).all()  # inside, not on its edges
     assert_allclose(skin.areas, 1 / 6)
     assert_allclose(skin.areas @ skin.points[:, 0] ** 2, 1 / 12, rtol=1e-14)
     assert_allclose(skin.areas @ (skin.points[:, 0] * skin.points[:, 1]), 1 / 24, rtol=1e-14)
     assert (skin.cells == 0).all()
-    assert len(skin_of(surface, np.zeros(4, bool), mesh, 2.0).points) == 0
+    assert len(free_skin(surface, np.zeros(4, bool), mesh, 2.0).points) == 0
 
 
 def test_long_triangles_are_cut() -> None:
     surface, mesh = unit_tet()
     free = np.array([True, True, True, False])
-    fine = skin_of(surface, free, mesh, 0.4)
+    fine = free_skin(surface, free, mesh, 0.4)
     ends = np.sqrt(2 * fine.areas.max())
     assert ends < 0.4
     assert_allclose(fine.areas.sum(), triangle_areas(surface.points, np.array([[0, 1, 2]])).sum(), rtol=1e-14)
     assert_allclose(fine.areas @ fine.points[:, 0] ** 2, 1 / 12, rtol=1e-14)
+
+
+def test_what_springs_pull_at_has_the_area_that_is_held() -> None:
+    # On the face z = 0 with shares 1, 0, 0 of its corners, so 1 - x - y inside: a third of the area, and 1/24 of x.
+    surface, mesh = unit_tet()
+    below = np.flatnonzero((surface.points[surface.triangles][:, :, 2] == 0).all(axis=1))
+    shares = np.zeros(surface.triangles.shape)
+    shares[below] = surface.triangles[below] == 0
+    for apart in (2.0, 0.4):
+        skin = held_skin(surface, shares, mesh, apart)
+        assert_allclose(skin.points[:, 2], 0)
+        assert_allclose(skin.areas.sum(), 1 / 6, rtol=1e-14)
+        assert_allclose(skin.areas @ skin.points[:, 0], 1 / 24, rtol=1e-14)
+    assert len(held_skin(surface, np.zeros(shares.shape), mesh, 2.0).points) == 0
+
+
+def test_the_spacing_goes_with_the_surface() -> None:
+    surface, _ = unit_tet()
+    assert_allclose(spacing(surface.moved_to(3 * surface.points + 7)), 3 * spacing(surface), rtol=1e-12)

@@ -1,4 +1,4 @@
-"""The error bar of a reference covers errors that are known, and says where sizes of tetrahedra tell nothing."""
+"""The error bar of a reference covers errors that are known, and says nothing where nothing is known."""
 
 import json
 from dataclasses import replace
@@ -12,97 +12,27 @@ from fem_reference.errors import InputError
 from fem_reference.mesh import Polylines
 from fem_reference.metrics import Yardstick
 from fem_reference.runs import Outcome, Run
-from fem_reference.study import Ladder, error_bars, observed_order, of_sizes
+from fem_reference.study import Pair, error_bars, typical
 
-LENGTHS = (1.0, 1.3, 1.5)  # of no common ratio, as those of meshes
-LEAST = 1e-6
 REST = shapes.sphere(2, 10.0)
 FIBRE = Polylines(np.array([[0.0, 0, -5], [0, 0, 5]]), np.array([0, 2]))
 NUMBERS = (0, 10, 20)
 TIMES = np.array([0.0, 1.0, 2.0])
 
 
-def differences(error) -> tuple[np.ndarray, np.ndarray]:
-    """What three meshes differ by over the frames, where ``error`` of a length is the error at time 1."""
-    one, two, three = (error(length) * TIMES for length in LENGTHS)
-    return two - one, three - two
+def test_a_difference_that_crosses_zero_is_as_large_as_the_distance_of_the_surfaces_makes_it() -> None:
+    apart = np.array([0.0, 1.0, 2.0, 1.0, 0.0])
+    crossing = np.array([0.0, 0.5, 0.0, -0.5, 0.0])
+    # Root mean squares over the frames: 0.5^2 2 / (1 + 4 + 1) of each square of a distance.
+    assert typical(crossing, apart) == pytest.approx([0, 0.5, 2 * np.sqrt(0.5 / 6), 0.5, 0], abs=1e-12)
+    assert typical(0.3 * apart, apart) == pytest.approx(0.3 * apart, rel=1e-12)
+    assert typical(np.zeros(2), np.zeros(2)).tolist() == [0, 0]
 
 
-@pytest.mark.parametrize("order", [0.5, 0.7, 1.0])
-def test_an_error_of_known_order_is_covered_with_the_safety_of_the_index(order) -> None:
-    # x(h) = x + a h^p: extrapolation gives the error a h^p itself, to the tolerance of the root that p is (1e-12).
-    values, found, course = of_sizes(*differences(lambda h: -3 * h**order), LENGTHS, LEAST)
-    assert found == pytest.approx(order, abs=1e-9)
-    assert (values, course) == (pytest.approx(1.25 * 3 * TIMES, rel=1e-8), "converges")
-
-
-@pytest.mark.parametrize("order", [2.0, 3.0])
-def test_a_higher_order_is_told_and_makes_no_smaller_bar_than_order_one(order) -> None:
-    near, far = differences(lambda h: 3 * h**order)
-    values, found, course = of_sizes(near, far, LENGTHS, LEAST)
-    assert (found, course) == (pytest.approx(order, abs=1e-9), "converges")
-    # Order 1 from either pair of meshes: d h1 / (h2 - h1), and the coarser pair scaled by (h2 - h1) / (h3 - h2).
-    wanted = 1.25 * np.maximum(near / 0.3, far / 0.2)
-    assert values == pytest.approx(wanted, rel=1e-12)
-    assert (values >= 3 * TIMES).all()
-
-
-def test_where_differences_do_not_shrink_the_bar_is_that_of_the_lowest_order() -> None:
-    near, far = 0.2 * TIMES, 0.1 * TIMES
-    values, order, course = of_sizes(near, far, LENGTHS, LEAST)
-    assert (order < 0, course) == (True, "does not converge")
-    assert values == pytest.approx(1.25 * near / (1.3**0.5 - 1), rel=1e-12)
-
-
-def test_an_oscillating_error_is_covered_and_told() -> None:
-    signs = {1.0: 1, 1.3: -1, 1.5: 1}
-    values, _, course = of_sizes(*differences(lambda h: signs[h] * h), LENGTHS, LEAST)
-    assert course == "oscillates"
-    assert (values >= TIMES).all()
-
-
-def test_a_frame_where_two_meshes_agree_by_chance_takes_the_third_into_account() -> None:
-    near, far = np.array([0.3, 0.0]), np.array([0.2, 0.2])
-    values, order, _ = of_sizes(near, far, LENGTHS, LEAST)
-    assert values[1] > 0.5 * values[0]
-    assert order == pytest.approx(observed_order(0.4 / 0.3, LENGTHS))
-
-
-def test_rounding_is_no_lack_of_convergence() -> None:
-    values, order, course = of_sizes(np.array([0, 2e-9]), np.array([0, 1e-9]), LENGTHS, LEAST)
-    assert np.isnan(order)
-    assert course == "equal"
-    assert (values < 1e-7).all()
-    values, _, course = of_sizes(np.zeros(2), np.zeros(2), LENGTHS, LEAST)
-    assert (values.tolist(), course) == ([0, 0], "equal")
-
-
-def test_two_meshes_that_agree_where_the_third_does_not_have_a_bar() -> None:
-    values, order, course = of_sizes(np.zeros(2), np.array([0.0, 0.1]), LENGTHS, LEAST)
-    assert (order, course) == (20, "converges")
-    assert values[1] > 0
-
-
-def test_a_frame_that_a_mesh_did_not_reach_has_no_bar_and_takes_none_from_others() -> None:
-    near, far = differences(lambda h: h)
-    far[2] = np.nan
-    values, order, course = of_sizes(near, far, LENGTHS, LEAST)
-    assert (values[:2], order, course) == (pytest.approx([0, 1.25]), pytest.approx(1), "converges")
-    assert np.isnan(values[2])
-    values, order, course = of_sizes(near * np.nan, far, LENGTHS, LEAST)
-    assert np.isnan(values).all()
-    assert (np.isnan(order), course) == (True, "not known")
-
-
-@pytest.mark.parametrize("order", [-3.0, -0.4, 0.0, 0.3, 2.0, 6.0])
-def test_observed_order_finds_the_order_of_a_ratio(order) -> None:
-    h1, h2, h3 = (np.log(h) if order == 0 else h**order for h in LENGTHS)
-    assert observed_order((h3 - h2) / (h2 - h1), LENGTHS) == pytest.approx(order, abs=1e-9)
-
-
-def test_observed_order_has_ends() -> None:
-    assert observed_order(1e-9, LENGTHS) == -20
-    assert observed_order(1e9, LENGTHS) == 20
+def test_a_frame_that_a_run_did_not_reach_is_not_known_and_takes_nothing_from_others() -> None:
+    found = typical(np.array([0.0, 0.5, np.nan]), np.array([0.0, 1.0, np.nan]))
+    assert np.isnan(found[2])
+    assert found[:2] == pytest.approx([0, 0.5])
 
 
 def run(growth: float) -> Run:
@@ -112,34 +42,39 @@ def run(growth: float) -> Run:
     return Run("reference", "test", Outcome("converged", ""), NUMBERS, REST, positions, FIBRE, fibres)
 
 
-def bars(*, varied: float = 0.0) -> study.ErrorBars:
-    """Of a growth of 0.1 + 0.01 h, and of a variation by ``varied``; on lengths as above."""
-    runs = tuple(run(0.1 + 0.01 * length) for length in LENGTHS)
-    others = {"load steps": run(0.115 + varied)} if varied else {}
-    return error_bars(Ladder(runs, (4.0, 5.0, 6.0), LENGTHS, others), Yardstick.of(runs[0], FIBRE, ()))
+def pair(coarse: float, *, order: float = 1.0, varied: float = 0.0, exact: float | None = None) -> Pair:
+    """A growth of 0.1, and of ``coarse`` on tetrahedra of twice the size; there one more by ``varied``, and one ``exact``."""
+    others = {"contact stiffness": run(coarse + varied)} if varied else {}
+    return Pair(run(0.1), run(coarse), (4.0, 8.0), order, others, None if exact is None else run(exact))
+
+
+def bars(**given: float) -> study.ErrorBars:
+    """Of a growth that is 0.01 more on the larger tetrahedra."""
+    found = pair(0.11, **given)
+    return error_bars(found, Yardstick.of(found.fine, FIBRE, ()))
 
 
 @pytest.mark.parametrize("of", ["change", "deviation"])
-def test_bars_cover_what_metrics_make_of_the_error(of) -> None:
-    found = bars()
-    # Every vertex is 10 mm out, so that an error of 0.01 h is 0.1 h mm: 1.25 times that of h = 1. The fibre is 10 mm long.
+@pytest.mark.parametrize("order", [1.0, 1.5, 2.0])
+def test_bars_cover_an_error_of_their_order_with_the_safety_of_the_index(of, order) -> None:
+    found = bars(order=order)
+    # Every vertex is 10 mm out, so that sizes h and 2 h differ by 0.1 mm: of an error a h^p that is a h^p (2^p - 1).
+    error = 0.1 / (2**order - 1)
     for metric, statistic in (("surface_deviation", "rms"), ("surface_deviation", "max"), ("fibre_length", "mean")):
         bar = found.find(of, metric, statistic)
-        assert (bar.values, bar.order) == (pytest.approx(0.125 * TIMES, abs=1e-9), pytest.approx(1, abs=1e-6))
-        assert (bar.course, bar.unit) == ("converges", "mm")
-        assert bar.parts == {"tetrahedra": pytest.approx(0.25)}
-    # A sphere has no other shape when it grows, and the growth of volume is not linear: 3 (1 + g)^2 dg, less than 10 % off order 1.
-    assert found.find(of, "dihedral_angle", "rms").course == "equal"
-    assert found.find(of, "volume", "deviation").order == pytest.approx(1, abs=0.2)
+        assert (bar.values, bar.unit) == (pytest.approx(1.25 * error * TIMES, abs=1e-9), "mm")
+        assert bar.parts == {"tetrahedra": pytest.approx(2.5 * error)}
+        assert (bar.model, bar.worst) == (None, 2)
+    # A sphere has no other shape when it grows.
+    assert found.find(of, "dihedral_angle", "rms").values == pytest.approx([0, 0, 0], abs=1e-6)
     assert found.find(of, "volume", "shape") is None
 
 
 def test_the_fibres_of_other_meshes_are_not_mistaken_for_those_of_the_reference() -> None:
-    # Runs that all carry the yardstick's fibre, but unmoved: were it used, no length would change.
-    runs = tuple(
-        replace(one, fibre_positions=np.stack([FIBRE.points] * 3)) for one in (run(0.11), run(0.113), run(0.115))
-    )
-    found = error_bars(Ladder(runs, (4.0, 5.0, 6.0), LENGTHS, {}), Yardstick.of(runs[0], FIBRE, ()))
+    # Runs that all carry the measured fibre, but unmoved: were it used, no length would change.
+    given = pair(0.11)
+    still = [replace(one, fibre_positions=np.stack([FIBRE.points] * 3)) for one in (given.fine, given.coarse)]
+    found = error_bars(replace(given, fine=still[0], coarse=still[1]), Yardstick.of(still[0], FIBRE, ()))
     assert found.find("deviation", "fibre_length", "mean").values[1] == pytest.approx(0.125, abs=1e-9)
 
 
@@ -147,8 +82,13 @@ def test_a_variation_adds_twice_what_halving_its_cause_changes() -> None:
     # An error of first order of which half is taken away: as much again is left, and the reference has both.
     bar = bars(varied=0.002).find("deviation", "surface_deviation", "rms")
     assert bar.values == pytest.approx((0.125 + 2 * 0.02) * TIMES, abs=1e-9)
-    assert bar.parts["load steps"] == pytest.approx(0.08)
-    assert bar.worst == 2
+    assert bar.parts["contact stiffness"] == pytest.approx(0.08)
+
+
+def test_another_model_is_no_part_of_the_bar() -> None:
+    bar = bars(exact=0.16).find("deviation", "surface_deviation", "rms")
+    assert bar.values == pytest.approx(0.125 * TIMES, abs=1e-9)
+    assert bar.model == pytest.approx(0.5 * TIMES, abs=1e-9)
 
 
 def test_what_asks_nothing_of_the_reference_has_no_error_of_it() -> None:
@@ -160,22 +100,17 @@ OF = {"run": "fenicsx-1", "metrics": "abc"}
 
 
 def test_what_is_stored_reads_back(tmp_path) -> None:
-    kept = bars(varied=0.002)
-    gap = replace(kept.bars[3], values=np.array([0, np.nan, 1.5]), order=np.nan)
+    kept = bars(varied=0.002, exact=0.12)
+    gap = replace(kept.bars[3], values=np.array([0, np.nan, 1.5]), model=None)
     kept = replace(kept, bars=(*kept.bars[:3], gap, *kept.bars[4:]))
     study.save(kept, tmp_path, OF)
     read = study.load(tmp_path, OF)
-    assert (read.numbers, read.sizes, len(read.bars)) == (kept.numbers, kept.sizes, len(kept.bars))
+    assert (read.numbers, read.sizes, read.order) == (kept.numbers, kept.sizes, kept.order)
     for one, other in zip(read.bars, kept.bars, strict=True):
-        assert (one.of, one.metric, one.statistic, one.unit, one.course) == (
-            other.of,
-            other.metric,
-            other.statistic,
-            other.unit,
-            other.course,
-        )
+        assert (one.of, one.metric, one.statistic, one.unit) == (other.of, other.metric, other.statistic, other.unit)
         assert np.array_equal(one.values, other.values, equal_nan=True)
-        assert np.array_equal(one.order, other.order, equal_nan=True)
+        assert (one.model is None) == (other.model is None)
+        assert one.model is None or np.array_equal(one.model, other.model)
         assert one.parts == other.parts
     assert read.bars[3].worst == 1
 
@@ -194,9 +129,10 @@ def change(key: str, value):
 DAMAGE = {
     "values": change("values", [0.0]),
     "no list": change("values", 1.0),
-    "course": change("course", "fine"),
+    "of": change("of", "all"),
+    "model": change("model", [0.0]),
     "parts": change("parts", [1.0]),
-    "text": change("order", "one"),
+    "text": lambda table: table.update(order="one"),
     "key": lambda table: table.pop("numbers"),
 }
 
@@ -212,6 +148,6 @@ def test_a_damaged_file_is_named(tmp_path, what) -> None:
 
 
 def test_a_file_that_was_cut_off_is_named(tmp_path) -> None:
-    (tmp_path / study.FILE).write_text('{"format": 1, "of"')
+    (tmp_path / study.FILE).write_text('{"format": 2, "of"')
     with pytest.raises(InputError, match=r"error_bar.json: got JSONDecodeError"):
         study.load(tmp_path, OF)

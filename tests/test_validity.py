@@ -8,7 +8,7 @@ import pytest
 import shapes as bodies
 
 from fem_reference import effects
-from fem_reference.continuum import ELEMENTS, Continuum, Prescribed
+from fem_reference.continuum import ELEMENTS, ByCell, Continuum, Prescribed
 from fem_reference.effects import Effect, State
 from fem_reference.limits import Limit
 from fem_reference.motion import Translation
@@ -215,7 +215,7 @@ def test_ranks_agree_on_what_is_outside(session) -> None:  # noqa: ARG001 - it s
     flesh = (effect("neo_hooke", mu="10 kPa"), effect("incompressible", bulk="1 MPa"), ACTIVE)
     pull = Translation((0.0, 0.0, 1.0), (0.0, 1.0), (0.0, 17.0))
     problem = bodies.bar((1, 1, 2), (10, 10, 20), {"bottom": None, "top": pull}, flesh, (0, 1))
-    problem = replace(problem, directions=np.tile([0.0, 0.0, 1.0], (len(problem.mesh.tets), 1)))
+    problem = replace(problem, fibre=ByCell(np.tile([0.0, 0.0, 1.0], (len(problem.mesh.tets), 1))))
     found = []
     for ranks in (1, 2):
         frames = []

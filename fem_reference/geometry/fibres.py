@@ -1,6 +1,10 @@
-"""Fibres traced through a muscle: the lines of steepest ascent of a Laplace field from one attachment to the other."""
+"""Directions of fibres in a muscle, and fibres traced along them: the lines of steepest ascent of a Laplace field from one
+attachment to the other.
+"""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import igl
 import numpy as np
@@ -21,83 +25,119 @@ _TIES = 1e-6
 _HALFWAY = 0.5 - _TIES  # where the field is 1/2 but for round-off it is above
 
 Bools = NDArray[np.bool_]
+# Of cells (n,) and rest points (n, 3) in them: unit vectors (n, 3); picklable.
+Directions = Callable[[Ints, Floats], Floats]
 
 
 @dataclass(frozen=True, eq=False)
-class _Field:
-    """A field's ``values`` (n,) and ``gradients`` (n, 3) at the points of a mesh, and the mean edge ``size`` [mm]."""
+class FibreField:
+    """A Laplace field between two attachments: ``values`` (n,) and ``gradients`` (n, 3) at the points of a ``mesh`` of its own, 0
+    on the triangles ``start`` (m, 3), 1 on ``end``.
+    """
 
-    locator: Locator
+    mesh: TetMesh
     values: Floats
     gradients: Floats
-    size: float
+    start: Ints
+    end: Ints
+
+    def __getstate__(self) -> dict[str, object]:
+        """What is made from the rest when it is needed is not passed to other processes."""
+        return {name: value for name, value in vars(self).items() if name not in ("locator", "size")}
+
+    def __call__(self, cells: Ints, points: Floats) -> Floats:  # noqa: ARG002
+        """Unit vectors (n, 3) along the fibres at rest ``points`` (n, 3), whatever ``cells`` they are in."""
+        found = self.directions(points)
+        flat = np.linalg.norm(found, axis=1) < 0.5  # no slope: all around is one attachment
+        if flat.any():
+            mean = self.gradients.mean(axis=0)
+            found[flat] = mean / np.linalg.norm(mean)
+        return found
+
+    @cached_property
+    def locator(self) -> Locator:
+        """Finds points in the mesh."""
+        return Locator(self.mesh)
+
+    @cached_property
+    def size(self) -> float:
+        """The mean length of the edges of the mesh [mm]."""
+        mesh = self.mesh
+        edges = mesh.points[mesh.tets[:, [0, 0, 0, 1, 1, 2]]] - mesh.points[mesh.tets[:, [1, 2, 3, 2, 3, 3]]]
+        return float(np.linalg.norm(edges, axis=2).mean())
 
     def directions(self, points: Floats) -> Floats:
         """Unit vectors (m, 3) of steepest ascent at ``points`` (m, 3)."""
-        found = self.locator.embed(points).interpolate(self.locator.mesh, self.gradients)
+        found = self.locator.embed(points).interpolate(self.mesh, self.gradients)
         return np.asarray(found / np.maximum(np.linalg.norm(found, axis=1), np.finfo(float).tiny)[:, None])
 
     def on_the_way(self, points: Floats) -> Bools:
         """Which of ``points`` (m, 3) are in the mesh and not yet at an attachment, (m,)."""
         embedding = self.locator.embed(points)
-        values = embedding.interpolate(self.locator.mesh, self.values)
+        values = embedding.interpolate(self.mesh, self.values)
         return np.asarray((embedding.outside == 0) & (values > _NEAR) & (values < 1 - _NEAR))
 
 
-def trace(mesh: TetMesh, start: str, end: str, count: int) -> Polylines:
-    """``count`` lines of 40 points each from the attachment ``start`` to ``end`` (keys of ``mesh.facets``).
-
-    They are spread over the section halfway; InputError when the muscle has room for fewer.
-    """
-    field = _field(mesh, mesh.facets[start], mesh.facets[end])
-    seeds = _seeds(field)
-    if len(seeds) == 0:
-        got = f'nothing between "{start}" and "{end}"'
-        raise InputError("fibres.traced", got, "two attachments with muscle between them")
-    seeds = _spread(seeds, 4 * count)
-    back, came_back = _follow(field, seeds, mesh.facets[start], -1.0)
-    ahead, came_ahead = _follow(field, seeds, mesh.facets[end], 1.0)
-    whole = np.flatnonzero(came_back & came_ahead)[:count]
-    if len(whole) < count:
-        want = f'at most {len(whole)}, the fibres that could be traced from "{start}" to "{end}"'
-        raise InputError("fibres.traced.count", count, want)
-    lines = [_resample(np.concatenate([back[i][::-1], ahead[i][1:]])) for i in whole]
-    return Polylines(np.concatenate(lines), np.arange(count + 1) * _POINTS)
-
-
-def directions(mesh: TetMesh, start: str, end: str) -> Floats:
-    """Unit vectors (k, 3) along the fibres that :func:`trace` follows, one for each tet: the field's direction at its middle."""
-    field = _field(mesh, mesh.facets[start], mesh.facets[end])
-    found = field.directions(mesh.points[mesh.tets].mean(axis=1))
-    flat = np.linalg.norm(found, axis=1) < 0.5  # no slope: all around is one attachment
-    found[flat] = found[~flat].mean(axis=0) / np.linalg.norm(found[~flat].mean(axis=0))
-    return found
-
-
-def nearest_directions(mesh: TetMesh, lines: Polylines) -> Floats:
-    """Unit vectors (k, 3), one for each tet: along the segment of ``lines`` whose middle is nearest to the tet's."""
-    starts = np.setdiff1d(np.arange(len(lines.points) - 1), lines.offsets[1:] - 1)
-    ways = lines.points[starts + 1] - lines.points[starts]
-    lengths = np.linalg.norm(ways, axis=1)
-    middles = (lines.points[starts] + ways / 2)[lengths > 0]
-    _, nearest = cKDTree(middles).query(mesh.points[mesh.tets].mean(axis=1))
-    return np.asarray((ways[lengths > 0] / lengths[lengths > 0][:, None])[nearest])
-
-
-def _field(mesh: TetMesh, start: Ints, end: Ints) -> _Field:
-    """The Laplace field that is 0 on the triangles ``start``, 1 on ``end``, without flux elsewhere; linear elements.
+def fibre_field(mesh: TetMesh, start: str, end: str) -> FibreField:
+    """The Laplace field that is 0 on the attachment ``start`` (a key of ``mesh.facets``), 1 on ``end``, without flux elsewhere;
+    linear elements.
 
     On a coarse mesh attachments may touch: there it is 1/2.
     """
-    zeros, ones = np.unique(start), np.unique(end)
+    zeros, ones = np.unique(mesh.facets[start]), np.unique(mesh.facets[end])
     values = np.zeros(len(mesh.points))
     values[ones] = 1.0
     values[np.intersect1d(zeros, ones)] = 0.5
     basis = skfem.Basis(skfem.MeshTet(mesh.points.T.copy(), mesh.tets.T.copy()), skfem.ElementTetP1())
     values = skfem.solve(*skfem.condense(laplace.assemble(basis), x=values, D=np.union1d(zeros, ones)))
-    edges = mesh.points[mesh.tets[:, [0, 0, 0, 1, 1, 2]]] - mesh.points[mesh.tets[:, [1, 2, 3, 2, 3, 3]]]
-    size = float(np.linalg.norm(edges, axis=2).mean())
-    return _Field(Locator(mesh), values, _gradients(mesh, values), size)
+    return FibreField(mesh, values, _gradients(mesh, values), mesh.facets[start], mesh.facets[end])
+
+
+def trace(field: FibreField, count: int) -> Polylines:
+    """``count`` lines of 40 points each along ``field``, from one attachment to the other.
+
+    They are spread over the section halfway; InputError when the muscle has room for fewer.
+    """
+    seeds = _seeds(field)
+    if len(seeds) == 0:
+        got = "nothing between the two attachments"
+        raise InputError("fibres.traced", got, "two attachments with muscle between them")
+    seeds = _spread(seeds, 4 * count)
+    back, came_back = _follow(field, seeds, field.start, -1.0)
+    ahead, came_ahead = _follow(field, seeds, field.end, 1.0)
+    whole = np.flatnonzero(came_back & came_ahead)[:count]
+    if len(whole) < count:
+        want = f"at most {len(whole)}, the fibres that could be traced"
+        raise InputError("fibres.traced.count", count, want)
+    lines = [_resample(np.concatenate([back[i][::-1], ahead[i][1:]])) for i in whole]
+    return Polylines(np.concatenate(lines), np.arange(count + 1) * _POINTS)
+
+
+@dataclass(frozen=True, eq=False)
+class NearestLine:
+    """Directions along the segment of ``lines`` whose middle is nearest."""
+
+    lines: Polylines
+
+    def __getstate__(self) -> dict[str, object]:
+        """As ``FibreField`` has it."""
+        return {"lines": self.lines}
+
+    def __call__(self, cells: Ints, points: Floats) -> Floats:  # noqa: ARG002
+        """Unit vectors (n, 3) at rest ``points`` (n, 3)."""
+        middles, directions = self._segments
+        _, nearest = cKDTree(middles).query(points)
+        return np.asarray(directions[nearest])
+
+    @cached_property
+    def _segments(self) -> tuple[Floats, Floats]:
+        """The middle of each segment (k, 3) and its direction (k, 3)."""
+        lines = self.lines
+        starts = np.setdiff1d(np.arange(len(lines.points) - 1), lines.offsets[1:] - 1)
+        along = lines.points[starts + 1] - lines.points[starts]
+        lengths = np.linalg.norm(along, axis=1)
+        middles = (lines.points[starts] + along / 2)[lengths > 0]
+        return middles, (along / np.maximum(lengths, np.finfo(float).tiny)[:, None])[lengths > 0]
 
 
 def _gradients(mesh: TetMesh, values: Floats) -> Floats:
@@ -114,12 +154,12 @@ def _gradients(mesh: TetMesh, values: Floats) -> Floats:
     return np.asarray(np.stack(sums, axis=1) / share[:, None])
 
 
-def _seeds(field: _Field) -> Floats:
+def _seeds(field: FibreField) -> Floats:
     """Points (k, 3) on the section where the field is 1/2, away from the skin.
 
     Where the section cuts a tet, the middle of the cut and the points halfway from there to its corners.
     """
-    mesh = field.locator.mesh
+    mesh = field.mesh
     ends = mesh.tets[:, [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]]
     low, high = (field.values[ends[:, :, side]] - _HALFWAY for side in range(2))
     cut = (low < 0) != (high < 0)
@@ -149,7 +189,7 @@ def _first_best(scores: Floats) -> int:
     return int(np.argmax(scores >= scores.max() - _TIES * np.abs(scores).max()))
 
 
-def _follow(field: _Field, seeds: Floats, goal: Ints, sign: float) -> tuple[list[Floats], Bools]:
+def _follow(field: FibreField, seeds: Floats, goal: Ints, sign: float) -> tuple[list[Floats], Bools]:
     """Lines from ``seeds`` (k, 3) along the field (``sign`` 1) or against it (-1) to the attachment ``goal`` (m, 3).
 
     And which of them came there rather than out of the skin, (k,).
@@ -168,12 +208,12 @@ def _follow(field: _Field, seeds: Floats, goal: Ints, sign: float) -> tuple[list
         if len(going) == 0:
             break
     lasts = np.array([line[-1] for line in lines])
-    square, _, closest = igl.point_mesh_squared_distance(lasts, field.locator.mesh.points, goal)
+    square, _, closest = igl.point_mesh_squared_distance(lasts, field.mesh.points, goal)
     whole = [np.array([*line, point]) for line, point in zip(lines, closest, strict=True)]
     return whole, np.sqrt(square) <= field.size / 2
 
 
-def _runge_kutta(field: _Field, points: Floats, step: float) -> Floats:
+def _runge_kutta(field: FibreField, points: Floats, step: float) -> Floats:
     """``points`` (k, 3) one step [mm] further, by the classical fourth order rule."""
     first = field.directions(points)
     second = field.directions(points + step / 2 * first)

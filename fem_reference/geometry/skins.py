@@ -2,21 +2,21 @@
 
 from dataclasses import dataclass
 
-import igl
 import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference.geometry.embedding import Locator
-from fem_reference.mesh import Floats, Ints, Surface, TetMesh, triangle_areas
+from fem_reference.mesh import Floats, Ints, Surface, TetMesh
 
 _RULE = np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6
+# Points on a surface are so many to its diagonal, or more: on muscles of the hip, 3 mm apart.
+_ACROSS = 80
 
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """Material points that obstructions push on, for a surface that the cells follow only roughly: the straight ``cells`` (n,)
-    they move with, ``points`` (n, 3) [mm] where they are at rest, somewhat outside their cell perhaps, and the rest ``areas``
-    (n,) [mm2] that each stands for.
+    """Material points of a surface that the cells follow only roughly: the straight ``cells`` (n,) they move with, ``points``
+    (n, 3) [mm] where they are at rest, somewhat outside their cell perhaps, and the rest ``areas`` (n,) [mm2] that each stands for.
     """
 
     cells: Ints
@@ -24,20 +24,44 @@ class Skin:
     areas: Floats
 
 
-def skin_of(surface: Surface, free: NDArray[np.bool_], mesh: TetMesh, spacing: float) -> Skin:
-    """The skin of the triangles of a ``surface`` whose vertices are all ``free`` (n,), as what the tets of ``mesh`` carry along:
-    three points inside each, a rule that is exact for squares and has none on sharp edges, where two faces would be pushed at
-    once; triangles are cut in four until their edges are no longer than ``spacing`` [mm] on average.
+def spacing(surface: Surface) -> float:
+    """How far apart [mm] points on a ``surface`` are at most, on average: the same whatever it is filled with."""
+    return float(np.linalg.norm(np.ptp(surface.points, axis=0))) / _ACROSS
+
+
+def free_skin(surface: Surface, free: NDArray[np.bool_], mesh: TetMesh, apart: float) -> Skin:
+    """The triangles of a ``surface`` whose vertices are all ``free`` (n,), as what the tets of ``mesh`` carry along."""
+    triangles = surface.triangles[free[surface.triangles].all(axis=1)]
+    return _skin(surface.points[triangles], np.ones(triangles.shape), mesh, apart)
+
+
+def held_skin(surface: Surface, shares: Floats, mesh: TetMesh, apart: float) -> Skin:
+    """The part of a ``surface`` whose triangles are held to the ``shares`` (m, 3) of their corners, linearly between them: the
+    areas are those held.
     """
-    points, triangles = surface.points, surface.triangles[free[surface.triangles].all(axis=1)]
-    while len(triangles) and _edge_length(points, triangles) > spacing:
-        points, triangles = igl.upsample(points, triangles)
-    inside = np.einsum("qk,tki->tqi", _RULE, points[triangles]).reshape(-1, 3)
-    areas = np.repeat(triangle_areas(points, triangles) / 3, 3)
+    some = shares.any(axis=1)
+    return _skin(surface.points[surface.triangles[some]], shares[some], mesh, apart)
+
+
+def _skin(corners: Floats, shares: Floats, mesh: TetMesh, apart: float) -> Skin:
+    """Three points inside each triangle of ``corners`` (t, 3, 3), a rule that is exact for squares and has none on sharp edges,
+    where two faces would be pushed at once; they are cut in four until their edges are no longer than ``apart`` [mm] on average.
+    """
+    while len(corners) and _edge_length(corners) > apart:
+        corners, shares = _quartered(corners), _quartered(shares[:, :, None])[:, :, 0]
+    inside = np.einsum("qk,tki->tqi", _RULE, corners).reshape(-1, 3)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.repeat(np.linalg.norm(normals, axis=1) / 6, 3) * (shares @ _RULE.T).ravel()
     return Skin(Locator(mesh).embed(inside).tets, inside, areas)
 
 
-def _edge_length(points: Floats, triangles: Ints) -> float:
+def _quartered(corners: Floats) -> Floats:
+    """Triangles of values at their corners (t, 3, d), each cut in four at the middles of its edges, (4 t, 3, d)."""
+    a, b, c = np.swapaxes(corners, 0, 1)
+    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+    return np.concatenate([np.stack(part, axis=1) for part in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
+
+
+def _edge_length(corners: Floats) -> float:
     """The mean over all triangles [mm]."""
-    corners = points[triangles]
     return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())

@@ -78,6 +78,8 @@ def render(comparison: Comparison) -> str:
         bars=known(comparison),
         bar_at=partial(_bar_at, comparison),
         parts=_parts(comparison),
+        modelled=any(bar.model is not None for bar in known(comparison)),
+        model_change=lambda bar: float(np.max(bar.model)),
         variations=listed(_parts(comparison)[1:]) if _parts(comparison)[1:] else "",
         costs=_costs(comparison),
         changes=_changes(comparison.scene),

@@ -107,12 +107,12 @@ def _rows(run: Run, measures: Iterable[Measure]) -> list[dict[str, Any]]:
 
 
 def _bar_rows(comparison: Comparison, bar: ErrorBar) -> list[dict[str, Any]]:
-    """One row a frame, each with how the sizes of tetrahedra behave."""
+    """One row a frame; ``model``: by how much exact attachments change the statistic, where they are springs."""
     columns = {"of": bar.of, "metric": bar.metric, "statistic": bar.statistic, "unit": bar.unit}
-    course = {"order": finite(bar.order), "course": bar.course}
+    model = [None] * len(bar.values) if bar.model is None else [finite(value) for value in bar.model]
     return [
-        columns | {"frame": number, "value": finite(value)} | course
-        for number, value in zip(comparison.reference.numbers, bar.values, strict=True)
+        columns | {"frame": number, "value": finite(value), "model": other}
+        for number, value, other in zip(comparison.reference.numbers, bar.values, model, strict=True)
     ]
 
 

@@ -13,13 +13,13 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fem_reference.continuum import ELEMENTS, Continuum
+from fem_reference.continuum import ELEMENTS, Continuum, Prescribed
 from fem_reference.mesh import Floats, Ints
 from fem_reference.solvers.fenicsx import choice, compiling, forms, meshes, pushed_points
 from fem_reference.solvers.fenicsx.clock import Clock
 from fem_reference.solvers.fenicsx.contact import Pushes
 from fem_reference.solvers.fenicsx.determinants import Determinants
-from fem_reference.solvers.fenicsx.holds import Hold
+from fem_reference.solvers.fenicsx.holds import Hold, PointHold
 from fem_reference.solvers.fenicsx.known import Known, State
 from fem_reference.solvers.fenicsx.linear import Factorised
 from fem_reference.solvers.fenicsx.newton import Newton
@@ -51,7 +51,7 @@ class Body:
         self.clock = Clock(body, form.before, form.rate)
         self.volume_form, self.energy_form = compiling.form(form.volume), compiling.form(form.energy)
         self.rest_volume = self.integral(self.volume_form)
-        self.held = [Hold(self.unknowns, entry, form.regions[entry.on]) for entry in body.prescribed]
+        self.held = [self._hold(entry, form) for entry in body.prescribed]
         self.determinants = Determinants(self.mesh, self.cells, form.determinant, form.rule[0], body.mesh.kind)
         self.validity = Validity(self.mesh, self.cells, form, body)
         self.spent = Spent()
@@ -68,6 +68,14 @@ class Body:
         self.recalled: State | None = None
         self.nodes = meshes.Nodes(body.mesh, self.cells, ufl.split(self.unknowns)[0])
         self.nodal = Nodal(self.cells, settings.element, self.unknowns, self.clock) if settings.store_state else None
+
+    def _hold(self, entry: Prescribed, form: forms.Form) -> Hold | PointHold:
+        """What prescribes ``entry``."""
+        if isinstance(entry.on, str):
+            return Hold(self.unknowns, entry, form.regions[entry.on])
+        parents = np.ravel(self.displacement_dofs)
+        points = pushed_points.on_skin(self.displacement_space, parents, entry.on, self.local)
+        return PointHold(self.unknowns, entry, points)
 
     def _contact(self, body: Continuum, form: forms.Form) -> Pushes:
         """What obstructions do."""
@@ -138,7 +146,7 @@ class Body:
         amounts = [effect.amount(frame) for effect in self.effects]
         poses = [entry.pose(frame).ravel() for entry in self.contact.obstructions] if self.contact else []
         allowed = [self.contact.law.allowance(frame)] if self.contact else []
-        held = [component.values.x.array for hold in self.held for component in hold.components]
+        held = [hold.prescribed for hold in self.held]
         return np.concatenate([amounts, allowed, *poses, *held])
 
     def _set(self, frame: float) -> None:
@@ -196,7 +204,7 @@ class Body:
         """By how many regions each unknown (n,) is prescribed."""
         count = np.zeros(len(self.unknowns.x.array), np.int64)
         for hold in self.held:
-            for component in hold.components:
+            for component in hold.components if isinstance(hold, Hold) else ():
                 count[component.dofs[0]] += 1
         return count
 

@@ -95,9 +95,7 @@ class Pushes:
     def add_residual(self, residual: Floats, tractions: Floats | None) -> None:
         """Add the weak form of ``tractions`` (n, 3), by default those at present, to ``residual`` over this rank's unknowns."""
         tractions = self.tractions() if tractions is None else tractions
-        pushed = np.flatnonzero(tractions.any(axis=1))
-        forces = -self.points.areas[pushed, None] * tractions[pushed]
-        np.add.at(residual, self.points.dofs[pushed], self.points.basis[pushed, :, None] * forces[:, None, :])
+        self.points.add_forces(residual, -self.points.areas[:, None] * tractions)
 
     def tangent(self) -> Iterator[tuple[Ints, Floats, Floats]]:
         """The slope of the residual, obstruction by obstruction: cells (p,) of the points that are pushed, the basis (p, k) that

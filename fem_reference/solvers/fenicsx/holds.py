@@ -1,4 +1,6 @@
-"""What is prescribed on a region: exactly, by conditions on its unknowns, or by springs; and the force that it takes."""
+"""What is prescribed on a region: exactly, by conditions on its unknowns, or by springs over its facets or at points of a skin; and
+the force that it takes.
+"""
 
 from typing import Any
 
@@ -8,6 +10,8 @@ from dolfinx import fem
 
 from fem_reference.continuum import Prescribed
 from fem_reference.mesh import Floats, Ints
+from fem_reference.solvers.fenicsx.forms import Form
+from fem_reference.solvers.fenicsx.pushed_points import PushedPoints
 
 
 class _Component:
@@ -47,10 +51,11 @@ class Hold:
             return np.zeros(0)
         return np.concatenate([component.values.x.array[component.dofs[1]] for component in self.components])
 
-    def springs(self, measure: Any) -> Any:
-        """The weak form of springs that pull towards what is prescribed, 0 where it is exact; ``measure`` is of the region."""
+    def springs(self, form: Form) -> Any:
+        """The weak form of springs that pull towards what is prescribed, 0 where it is exact."""
         if self.entry.stiffness is None:
             return 0
+        measure = form.measure(str(self.entry.on))
         displacement = ufl.split(self.unknowns)[0]
         test = ufl.split(ufl.TestFunction(self.unknowns.function_space))[0]
         stiffness = fem.Constant(self.unknowns.function_space.mesh, float(self.entry.stiffness))
@@ -58,6 +63,11 @@ class Hold:
             stiffness * (displacement[entry.component] - entry.values) * test[entry.component] * measure
             for entry in self.components
         )
+
+    @property
+    def prescribed(self) -> Floats:
+        """All numbers (n,) that are prescribed now."""
+        return np.concatenate([entry.values.x.array for entry in self.components])
 
     def move_to(self, frame: float) -> None:
         """Prescribe what the course gives at ``frame``."""
@@ -75,3 +85,44 @@ class Hold:
             own = entry.dofs[0][entry.own]
             forces[entry.own, entry.component] = residual[own] / shared[own]
         return forces.sum(axis=0), np.cross(places, forces).sum(axis=0)
+
+
+class PointHold:
+    """A ``Prescribed`` by springs at the ``points`` of this rank's cells: they are not unknowns, so that none is exact."""
+
+    exact: Ints = np.zeros(0, np.int64)
+    targets: Floats = np.zeros(0)
+
+    def __init__(self, unknowns: fem.Function, entry: Prescribed, points: PushedPoints) -> None:
+        assert entry.stiffness is not None  # continuum.check
+        self.entry, self.unknowns, self.points = entry, unknowns, points
+        along = np.isin(np.arange(3), entry.components)
+        self.stiffness = entry.stiffness * points.areas[:, None] * along  # [N/mm]
+        self.wanted = np.array(points.rest)
+
+    @property
+    def prescribed(self) -> Floats:
+        """Where (3 n,) the points shall be now [mm]."""
+        return self.wanted.ravel()
+
+    def move_to(self, frame: float) -> None:
+        """Prescribe what the course gives at ``frame``."""
+        self.wanted = self.points.rest + self.entry.course(self.points.rest, frame)
+
+    def add_residual(self, residual: Floats, moves: Floats | None) -> None:
+        """Add what pulls to ``residual`` over this rank's unknowns; as if the unknowns had made ``moves`` (n,), where given."""
+        now = self.unknowns.x.array
+        self.points.add_forces(residual, self._pulls(now if moves is None else now + moves))
+
+    def tangent(self) -> tuple[Ints, Floats, Floats]:
+        """The slope of the residual, as ``Pushes.tangent`` has it."""
+        return self.points.cells, self.points.basis, self.stiffness[:, :, None] * np.eye(3)
+
+    def force(self, _residual: Floats, now: Floats, _shared: Ints) -> tuple[Floats, Floats]:
+        """As ``Hold.force``: of springs, it is what they pull with."""
+        pulls = -self._pulls(now)
+        return pulls.sum(axis=0), np.cross(self.points.positions(now), pulls).sum(axis=0)
+
+    def _pulls(self, unknowns: Floats) -> Floats:
+        """The forces (n, 3) [N] of the points on the springs."""
+        return self.stiffness * (self.points.positions(unknowns) - self.wanted)

@@ -1,4 +1,4 @@
-"""The material points that rigid bodies push on: where they are in the cells, and how displacement reaches them."""
+"""Material points that rigid bodies push on or springs pull at: where they are in the cells, how displacement reaches them."""
 
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -30,6 +30,11 @@ class PushedPoints:
         """Where the points are now (n, 3) [mm]."""
         nodes, carried = self._carried
         return np.asarray(self.rest + carried @ unknowns[nodes])
+
+    def add_forces(self, residual: Floats, forces: Floats) -> None:
+        """Add the weak form of ``forces`` (n, 3) [N] at the points to ``residual``, over this rank's unknowns."""
+        nodes, carried = self._carried
+        residual[nodes] += carried.T @ forces  # each unknown once
 
     @cached_property
     def _carried(self) -> tuple[Ints, csr_array]:

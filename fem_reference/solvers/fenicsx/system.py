@@ -19,7 +19,7 @@ from fem_reference.solvers.fenicsx import compiling
 from fem_reference.solvers.fenicsx.cells import CellSums, Structure, Tangent
 from fem_reference.solvers.fenicsx.contact import Pushes
 from fem_reference.solvers.fenicsx.forms import Form
-from fem_reference.solvers.fenicsx.holds import Hold
+from fem_reference.solvers.fenicsx.holds import Hold, PointHold
 from fem_reference.solvers.fenicsx.spent import Spent
 
 _ROUNDING = 1e-11  # [mm] of positions
@@ -30,7 +30,9 @@ class System:
     row and column of the tangent a 1 on the diagonal.
     """
 
-    def __init__(self, form: Form, unknowns: fem.Function, element: str, holds: list[Hold], spent: Spent) -> None:
+    def __init__(
+        self, form: Form, unknowns: fem.Function, element: str, holds: list[Hold | PointHold], spent: Spent
+    ) -> None:
         space = unknowns.function_space
         self.unknowns, self.holds, self.spent = unknowns, holds, spent
         self.index_map, self.block = space.dofmap.index_map, space.dofmap.index_map_bs
@@ -44,7 +46,8 @@ class System:
         self.scale = np.ones(self.size)  # of the unknowns of linear systems
         self.b, self.work = create_vector(space), la.vector(self.index_map, self.block)
         self._make_matrix(structure)
-        springs = sum((hold.springs(form.measure(hold.entry.on)) for hold in holds), 0)
+        self.ties = [hold for hold in holds if isinstance(hold, PointHold)]
+        springs = sum((hold.springs(form) for hold in holds if isinstance(hold, Hold)), 0)
         self.springs, self.loads = (
             SurfaceSums(terms, unknowns, structure, self.fixed) if terms else None for terms in (springs, form.loads)
         )
@@ -83,7 +86,8 @@ class System:
             self.cells.add_tangent(self.tangent, self.work.array, moves)
             for terms in self._on_surface:
                 terms.add_tangent(entries)
-            for points in self.contact.tangent() if self.contact else ():
+            ties = [tie.tangent() for tie in self.ties]
+            for points in [*ties, *(self.contact.tangent() if self.contact else ())]:
                 self.cells.add_points(self.tangent, *points)
             entries[self.prescribed_diagonal] = 1.0
             self.matrix.setValuesCOO(entries[:-1])  # type: ignore[arg-type]  # its stubs know sequences only
@@ -97,6 +101,8 @@ class System:
         """What is not of the cells, and the parts of other ranks."""
         for terms in self._on_surface:
             terms.add_residual(self.work.array, moves)
+        for tie in self.ties:
+            tie.add_residual(self.work.array, moves)
         if self.contact:
             self.contact.add_residual(self.work.array, tractions)
         self.work.scatter_reverse(la.InsertMode.add)

@@ -47,6 +47,10 @@ def solve_body(body: Continuum, settings: BodySettings) -> Solved:
     check(body, settings.element)
     if body.contact is not None:
         raise InputError("contact", "obstructions", "a body without, as this solver knows no contact")
+    if any(not isinstance(entry.on, str) for entry in body.prescribed):
+        raise InputError(
+            "prescribed", "springs at points of a skin", "springs on facets, as this solver knows no others"
+        )
     timed = [effect.title for effect in body.effects if "interval" in effect.needs]
     if timed:
         raise InputError("effects", ", ".join(timed), "effects without rates, as this solver knows no time")
@@ -93,7 +97,7 @@ class _March:
         self.body, self.settings = body, settings
         self.equations = Equations(body, settings.element, settings.quadrature_degree)
         self.unknowns = np.zeros(self.equations.space.size)
-        self.nodes = {entry.name: self.equations.space.nodes_on(entry.on) for entry in body.prescribed}
+        self.nodes = {entry.name: self.equations.space.nodes_on(str(entry.on)) for entry in body.prescribed}
 
     def attempt(self, frame: float) -> Attempt:
         """Solve at ``frame`` from the last state, which stays where it fails. A state in which det F is not positive, at a

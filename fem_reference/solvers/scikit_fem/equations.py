@@ -48,7 +48,7 @@ class Equations:
             part
             for entry in body.prescribed
             if entry.stiffness is not None
-            for part in self._surface(entry.on, partial(_spring_law, entry))
+            for part in self._surface(str(entry.on), partial(_spring_law, entry))
         ]
 
     def assembled(self, unknowns: Floats, frame: float, springs: bool = True) -> tuple[Floats, Any]:

@@ -13,8 +13,9 @@ import skfem
 from scipy.spatial.distance import cdist
 from skfem.quadrature import get_quadrature
 
-from fem_reference.continuum import ELEMENTS, Cells, Directions, reference_nodes
+from fem_reference.continuum import ELEMENTS, Cells, reference_nodes
 from fem_reference.errors import InputError
+from fem_reference.geometry.fibres import Directions
 from fem_reference.mesh import Floats, Ints
 
 VARIABLES = 13

@@ -1,0 +1,120 @@
+"""Refinement of tetrahedra each into eight: nested, graded towards rims, its new boundary points on the surface that is filled."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_reference.geometry.distance import distances
+from fem_reference.mesh import Floats, Ints, Surface, TetMesh, boundary, tet_qualities, tet_volumes
+
+EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
+# The eight parts of a tet, of its corners 0 to 3 and the points 4 to 9 on its edges in the order above, by which of the three
+# diagonals between opposite edges cuts the octahedron in the middle.
+_CORNERS = [[0, 4, 5, 6], [4, 1, 7, 8], [5, 7, 2, 9], [6, 8, 9, 3]]
+_DIAGONALS = np.array([[4, 9], [5, 8], [6, 7]])
+_PARTS = np.array(
+    [
+        [*_CORNERS, [4, 9, 5, 6], [4, 9, 7, 5], [4, 9, 8, 7], [4, 9, 6, 8]],
+        [*_CORNERS, [5, 8, 4, 7], [5, 8, 6, 4], [5, 8, 9, 6], [5, 8, 7, 9]],
+        [*_CORNERS, [6, 7, 4, 5], [6, 7, 8, 4], [6, 7, 9, 8], [6, 7, 5, 9]],
+    ]
+)
+# A face with corners a, b, c and points on its edges (ab, ac, bc): its four parts.
+_FACE_PARTS = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2], [3, 5, 4]])
+# Towards an edge of a rim, where displacement goes with the root of the distance, a cell is cut at this share: every refinement
+# then takes as much of the error there as in a smooth part (Bacuta, Nistor and Zikatanov 2005, doi 10.1007/s00211-005-0588-3).
+GRADED = 0.25
+# A new point moves onto the surface as far as the tets around it keep this share of their volume and of their quality.
+_KEPT_VOLUME, _KEPT_QUALITY = 0.3, 0.5
+_ROUNDS, _SHORTER = 12, 0.6
+
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class _Cut:
+    """The edges of a mesh: ``ends`` (e, 2), which of them each tet has, ``of_tets`` (k, 6), and a new point on each, ``points``
+    (e, 3).
+    """
+
+    ends: Ints
+    of_tets: Ints
+    points: Floats
+
+
+def refined(mesh: TetMesh, surface: Surface | None, rims: tuple[str, ...] = ()) -> TetMesh:
+    """Every tet of ``mesh`` in eight; facets of regions in four. Edges are cut in the middle, those that begin at a rim of the
+    regions ``rims`` at a quarter. New points of the boundary move onto ``surface``, as far as tets stay sound; None: nowhere.
+    """
+    cut = _cut(mesh, _on_rims(mesh, rims))
+    points = np.concatenate([mesh.points, cut.points])
+    tets = _children(points, np.hstack([mesh.tets, len(mesh.points) + cut.of_tets]))
+    keys = cut.ends[:, 0] * len(mesh.points) + cut.ends[:, 1]
+    facets = {name: _quartered(faces, keys, len(mesh.points)) for name, faces in mesh.facets.items()}
+    if surface is not None:
+        points = _snapped(points, tets, len(mesh.points), surface)
+    return TetMesh(points, tets, facets, mesh.maker)
+
+
+def _cut(mesh: TetMesh, on_rim: Bools) -> _Cut:
+    """The edges, each with its new point; ``on_rim`` (n,) are the points of the mesh on a rim."""
+    ends, which = np.unique(np.sort(mesh.tets[:, EDGES].reshape(-1, 2), axis=1), axis=0, return_inverse=True)
+    first, second = on_rim[ends[:, 0]], on_rim[ends[:, 1]]
+    at = np.where(first & ~second, GRADED, np.where(second & ~first, 1 - GRADED, 0.5))[:, None]
+    points = mesh.points[ends[:, 0]] * (1 - at) + mesh.points[ends[:, 1]] * at
+    return _Cut(ends, which.reshape(-1, 6), points)
+
+
+def _on_rims(mesh: TetMesh, rims: tuple[str, ...]) -> Bools:
+    """Which points (n,) are on the rim of one of these regions: on an edge between a facet of it and one that is not."""
+    found = np.zeros(len(mesh.points), bool)
+    for name in rims:
+        faces = mesh.facets[name]
+        sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        edges, count = np.unique(sides, axis=0, return_counts=True)
+        found[edges[count == 1]] = True
+    return found
+
+
+def _children(points: Floats, nodes: Ints) -> Ints:
+    """The tets (8 k, 4) of tets with ten ``nodes`` (k, 10), eight after eight: the octahedron in the middle is cut along its
+    shortest diagonal.
+    """
+    ends = points[nodes[:, _DIAGONALS]]
+    shortest = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2).argmin(axis=1)
+    tets = np.take_along_axis(nodes, _PARTS[shortest].reshape(len(nodes), -1), axis=1).reshape(-1, 4)
+    turned = tet_volumes(points, tets) < 0
+    tets[turned] = tets[turned][:, [0, 2, 1, 3]]
+    return tets
+
+
+def _quartered(faces: Ints, keys: Ints, count: int) -> Ints:
+    """The parts (4 m, 3) of ``faces`` (m, 3), turned as they are; ``keys`` are those of the edges in order."""
+    if len(faces) == 0:
+        return faces
+    pairs = np.sort(faces[:, [[0, 1], [0, 2], [1, 2]]], axis=2)
+    middles = count + np.searchsorted(keys, pairs[:, :, 0] * count + pairs[:, :, 1])
+    return np.hstack([faces, middles])[:, _FACE_PARTS].reshape(-1, 3)
+
+
+def _snapped(points: Floats, tets: Ints, old: int, surface: Surface) -> Floats:
+    """The ``points`` with those of the boundary from number ``old`` on moved to the nearest point of the surface, or as much of
+    that as the tets around them bear.
+    """
+    faces, _ = boundary(tets)
+    new = np.unique(faces)
+    new = new[new >= old]
+    away = distances(points[new], surface).closest - points[new]
+    volumes, qualities = tet_volumes(points, tets), tet_qualities(points, tets)
+    share = np.ones(len(new))
+    for _ in range(_ROUNDS):
+        moved = np.array(points)
+        moved[new] += share[:, None] * away
+        bad = (tet_volumes(moved, tets) < _KEPT_VOLUME * volumes) | (
+            tet_qualities(moved, tets) < _KEPT_QUALITY * qualities
+        )
+        if not bad.any():
+            return moved
+        share[np.isin(new, tets[bad])] *= _SHORTER
+    return points
