@@ -8,6 +8,7 @@ from fem_reference.mesh import Floats
 from fem_reference.metrics import Measure, Yardstick, at_rest, find, measure
 from fem_reference.metrics.fibre_length import extension_error
 from fem_reference.problem import Setup
+from fem_reference.ranking import Ranking, rankings
 from fem_reference.records import join
 from fem_reference.runs import Run
 from fem_reference.scene import Expectation, Scene
@@ -31,6 +32,11 @@ class Comparison:
     extension_error: Measure
     verdicts: tuple[Verdict, ...]
     error_bars: ErrorBars | None = None
+
+    @property
+    def rankings(self) -> tuple[Ranking, ...]:
+        """Which candidates are nearer, as far as the error bars tell them apart; nothing without these."""
+        return rankings(self.deviations, self.error_bars.of_deviations) if self.error_bars else ()
 
     @property
     def word(self) -> Word:

@@ -32,6 +32,7 @@ _AFTER_THE_RUN = (
     "results.py",
     "study.py",
     "judge.py",
+    "ranking.py",
     "comparison.py",
     "catalogue.py",
     "truths.py",

@@ -13,7 +13,6 @@ from fem_reference.report.tables import seconds_per_frame
 from fem_reference.runs import Run
 from fem_reference.scene import Candidate, Scene
 from fem_reference.standings import Family, Scenario, Standing, Table, families
-from fem_reference.study import ErrorBars
 
 log = logging.getLogger(__name__)
 
@@ -77,7 +76,7 @@ def _on(bench: Bench, rows: Iterable[Family], foreign: list[Run]) -> tuple[Scena
     bars = refinement.stored(reference)
     assert reference.fibres is not None  # a reference has an interior
     yardstick = Yardstick.of(reference, reference.fibres, bench.setup().bones, bench.setup().free)
-    found = [_standing(scene, REFERENCE, reference, _known(bars))]
+    found = [_standing(scene, REFERENCE, reference, bars.of_deviations if bars else ())]
     meeting = [(row.name, *entry) for row in rows for entry in chosen(scene, row)]
     for i, (family, candidate, place) in enumerate(meeting):
         log.info("%s: %s, solver %d of %d", scene.name, candidate.name, i + 1, len(meeting))
@@ -109,10 +108,3 @@ def _seconds_per_frame(run: Run) -> float | None:
         if key in run.outcome.cost:
             return run.outcome.cost[key]
     return seconds_per_frame(run)
-
-
-def _known(bars: ErrorBars | None) -> tuple[Measure, ...]:
-    """How well deviations from the reference are known, as measures."""
-    if bars is None:
-        return ()
-    return tuple(Measure(bar.metric, bar.statistic, bar.unit, bar.values) for bar in bars.bars if bar.of == "deviation")

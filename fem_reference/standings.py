@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from fem_reference.metrics import Measure, find
+from fem_reference.ranking import Ranking, rankings
 from fem_reference.records import Record, parse
 from fem_reference.runs import Outcome
 from fem_reference.scene import Candidate
@@ -140,6 +141,12 @@ class Table:
             return Overall(np.nan, np.nan, "", 0, lost) if lost else None
         worst, case = max(told, key=lambda entry: abs(entry[0]))
         return Overall(float(np.median([abs(value) for value, _ in told])), worst, case, len(told), lost)
+
+    def rankings(self, case: str) -> tuple[Ranking, ...]:
+        """Who is nearer on a case, as far as the reference's error bars tell them apart; nothing without these."""
+        here = [one for one in self.standings if one.case == case]
+        bars = [measure for one in here if one.of_reference for measure in one.measures]
+        return rankings({one.name: one.measures for one in here if not one.of_reference}, bars)
 
     def speed(self, family: str, name: str) -> tuple[Scenario, float] | None:
         """The scenario of the most triangles on which the time for a frame [s] of ``name`` is known, and that time."""

@@ -74,6 +74,13 @@ class ErrorBars:
         wanted = (of, metric, statistic)
         return next((bar for bar in self.bars if (bar.of, bar.metric, bar.statistic) == wanted), None)
 
+    @property
+    def of_deviations(self) -> tuple[Measure, ...]:
+        """How well deviations from the reference are known, as measures."""
+        return tuple(
+            Measure(bar.metric, bar.statistic, bar.unit, bar.values) for bar in self.bars if bar.of == "deviation"
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Pair:

@@ -42,6 +42,7 @@ ORDER = [
     "metrics",
     "study",
     "judge",
+    "ranking",
     "comparison",
     "regression",
     "standings",
@@ -60,7 +61,7 @@ ORDER = [
     "__main__",
 ]
 # These see runs and never who made them.
-BLIND_TO_SOLVERS = ["metrics", "study", "judge", "comparison", "regression", "standings", "report"]
+BLIND_TO_SOLVERS = ["metrics", "study", "judge", "ranking", "comparison", "regression", "standings", "report"]
 DOORS = {
     "dolfinx": ["solvers/fenicsx/"],
     "dolfinx_solver": ["solvers/fenicsx/"],

@@ -67,15 +67,15 @@ def test_expectations_meet_the_runs_that_they_are_of() -> None:
 def test_expectations_of_the_reference_and_of_candidates_have_bars_of_their_own() -> None:
     expected = (expectation("reference", "33.1 %"), expectation("candidates", "33.1 %"))
     bars = tuple(
-        ErrorBar(of, "volume", "deviation", "%", np.array([0.0, value]), 1.0, "converges", {})
+        ErrorBar(of, "volume", "deviation", "%", np.array([0.0, value]), {})
         for of, value in (("change", 0.002), ("deviation", 0.004))
     )
-    known = ErrorBars((0, 10), (4.0, 5.0, 6.0), bars)
+    known = ErrorBars((0, 10), (4.0, 8.0), 1.5, bars)
     result = compare(scene(*expected), SETUP, run("reference", (1, 1.1)), (run("right", (1, 1.21)),), known)
     # The tolerance is 0.01 %: a third of it lies between the two.
     assert [(one.word, one.error_bar) for one in result.verdicts] == [("pass", 0.002), ("cannot say", 0.004)]
     assert result.error_bars is known
-    bare = ErrorBars((0, 10), (4.0, 5.0, 6.0), ())
+    bare = ErrorBars((0, 10), (4.0, 8.0), 1.5, ())
     result = compare(scene(*expected), SETUP, run("reference", (1, 1.1)), (run("right", (1, 1.21)),), bare)
     assert [(one.word, one.error_bar) for one in result.verdicts] == [("pass", None), ("pass", None)]
 

@@ -46,11 +46,11 @@ WAYS = [(0, 0, 0), (6, 0, 5), (12, 0, 10)]
 def bars(value: float = BAR) -> ErrorBars:
     """The same error bar for every statistic of a deviation, but none in the first frame."""
     made = [
-        ErrorBar("deviation", *name.split("."), unit, value * np.array([0.0, 1, 1]), 1.0, "converges", {})
+        ErrorBar("deviation", *name.split("."), unit, value * np.array([0.0, 1, 1]), {})
         for name, unit in metrics.units().items()
         if not metrics.of_itself(name.split(".")[0])
     ]
-    return ErrorBars(NUMBERS, (4.0, 5.0, 6.0), tuple(made))
+    return ErrorBars(NUMBERS, (4.0, 8.0), 1.5, tuple(made))
 
 
 def today(ways=WAYS, known: ErrorBars | None = None, **changes) -> Today:

@@ -154,7 +154,19 @@ def alone(comparison: Comparison) -> Comparison:
 def test_summary_has_the_documented_keys_and_survives_json(comparison):
     told = report.summary(comparison)
     assert json.loads(json.dumps(told, allow_nan=False)) == told
-    keys = ["case", "solver", "status", "message", "verdict", "cost", "measures", "from_rest", "verdicts", "error_bars"]
+    keys = [
+        "case",
+        "solver",
+        "status",
+        "message",
+        "verdict",
+        "cost",
+        "measures",
+        "from_rest",
+        "verdicts",
+        "error_bars",
+        "rankings",
+    ]
     assert list(told) == keys
     assert told["error_bars"] == []
     assert (told["case"], told["solver"], told["status"], told["verdict"]) == ("press", "fenicsx", "converged", "pass")
@@ -332,25 +344,25 @@ def test_curves_tell_where_a_run_is_not_a_number(comparison):
 def with_bars(comparison: Comparison) -> Comparison:
     """A tenth of each greatest value of "quick", not known in the last frame, of the reference and of deviations from it."""
     bars = [
-        ErrorBar(
-            of, one.metric, one.statistic, one.unit, known, 1.25, "oscillates", {"tetrahedra": 0.5, "load steps": NAN}
-        )
+        ErrorBar(of, one.metric, one.statistic, one.unit, known, {"tetrahedra": 0.5, "load steps": NAN}, 3 * known)
         for of in ("change", "deviation")
         for one in comparison.deviations["quick"]
         for known in [np.append(np.abs(one.values[:-1]) / 10, NAN)]
     ]
-    return replace(comparison, error_bars=ErrorBars(NUMBERS, (2.0, 2.5, 3.125), tuple(bars)))
+    return replace(comparison, error_bars=ErrorBars(NUMBERS, (2.0, 4.0), 1.5, tuple(bars)))
 
 
 def test_how_well_the_reference_is_known_is_told(comparison):
     assert "With <code>--error-bar</code> the reference is solved" in page.render(comparison)
     text = page.render(with_bars(comparison))
-    assert "2, 2.50, 3.12 mm" in text
-    assert "one other cause of error halved at a time (load steps)" in text
+    assert "(4 mm instead of 2 mm)" in text
+    assert "order 1.50)" in text
+    assert "By how much exact ones would change a statistic" in text
+    assert "cause of error halved at a time (load steps)" in text
     assert "--error-bar" not in text
     # The worst frame of "quick" is the last, where the bar is not known; that of "torn" is the one before.
     assert '<small>± <span class="bad">not a number</span>' in text
-    assert text.count('<td class="text">oscillates</td>') == 2 * len(comparison.deviations["quick"])
+    assert text.count("<th>exact attachments</th>") == 2
     rows = report.summary(with_bars(comparison))["error_bars"]
     found = [row for row in rows if (row["of"], row["metric"], row["statistic"]) == ("change", "volume", "deviation")]
     assert [row["value"] for row in found] == [
@@ -360,7 +372,17 @@ def test_how_well_the_reference_is_known_is_told(comparison):
         pytest.approx(3 / 70),
         None,
     ]
-    assert (found[0]["order"], found[0]["course"], found[0]["unit"]) == (1.25, "oscillates", "%")
+    assert (found[1]["model"], found[1]["unit"]) == (pytest.approx(3 / 70), "%")
+
+
+def test_candidates_are_ranked_where_the_reference_is_known(comparison):
+    assert "Who is nearer to the truth" not in page.render(comparison)
+    known = with_bars(comparison)
+    assert "Who is nearer to the truth" in page.render(known)
+    ranked = report.summary(known)["rankings"]
+    assert {row["name"] for row in ranked} == {run.name for run in comparison.candidates}
+    # "torn" has no number in its last frame: it comes last, whatever is known.
+    assert [row["rank"] for row in ranked if row["by"] == "Surface, rms"] == [[1, 1], [2, 2]]
 
 
 def test_curves_have_a_band_as_wide_as_the_error_bar(comparison):

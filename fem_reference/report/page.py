@@ -77,6 +77,7 @@ def render(comparison: Comparison) -> str:
         curves=curves(comparison),
         bars=known(comparison),
         bar_at=partial(_bar_at, comparison),
+        rankings=comparison.rankings,
         parts=_parts(comparison),
         modelled=any(bar.model is not None for bar in known(comparison)),
         model_change=lambda bar: float(np.max(bar.model)),

@@ -11,6 +11,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from fem_reference import ranking
 from fem_reference.report.curves import LOOK, PALETTE, REFERENCE, Curve, inline
 from fem_reference.report.tables import finite
 from fem_reference.report.templates import template
@@ -67,6 +68,7 @@ def facts(table: Table) -> dict[str, Any]:
         "missing": table.missing,
         "report": [one.model_dump(mode="json", exclude={"candidate", "of_case"}) for one in table.families],
         "standings": [_row(one) for one in table.standings],
+        "rankings": {one.case: ranking.facts(table.rankings(one.case)) for one in table.scenarios},
         "versions": table.versions,
         "machines": list(table.machines),
     }

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fem_reference import ranking
 from fem_reference.comparison import Comparison
 from fem_reference.judge import Verdict
 from fem_reference.metrics import Measure
@@ -22,7 +23,7 @@ def summary(comparison: Comparison) -> dict[str, Any]:
 
     ``measures`` holds each candidate's deviation from the reference, and under ``"reference"`` its own change from rest
     with the inversion numbers that its solver recorded; ``from_rest`` the change from rest of every run; ``error_bars`` how
-    well the reference is known, empty where nobody asked.
+    well the reference is known and ``rankings`` whom that tells apart, empty where nobody asked.
     """
     reference = comparison.reference
     deviations = [row for run in comparison.candidates for row in _rows(run, comparison.deviations[run.name])]
@@ -38,6 +39,7 @@ def summary(comparison: Comparison) -> dict[str, Any]:
         "from_rest": [row for rows in from_rest.values() for row in rows],
         "verdicts": [_verdict(verdict) for verdict in comparison.verdicts],
         "error_bars": [row for bar in known(comparison) for row in _bar_rows(comparison, bar)],
+        "rankings": ranking.facts(comparison.rankings),
     }
 
 

@@ -1,0 +1,121 @@
+"""Who is nearer to the reference: what differs by less than the reference is known to is not told apart."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from fem_reference.metrics import Measure, find
+
+# What solvers are ranked by: metric, statistic, words.
+RANKED = (
+    ("surface_deviation", "rms", "Surface, rms"),
+    ("fibre_length", "rms_percent", "Fibre length, rms"),
+    ("volume", "deviation", "Volume"),
+)
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """How far ``name`` is from the reference in its worst frame, a magnitude: known to ``bar`` there, NaN where nobody knows."""
+
+    name: str
+    value: float
+    bar: float
+
+
+@dataclass(frozen=True)
+class Place:
+    """A deviation with the ranks that it may have, ``first`` to ``last``, and the names that it cannot be told from, ``alike``."""
+
+    deviation: Deviation
+    first: int
+    last: int
+    alike: tuple[str, ...]
+
+    @property
+    def rank(self) -> str:
+        """In words: ``2``, or ``2 to 4``."""
+        return str(self.first) if self.first == self.last else f"{self.first} to {self.last}"
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """The ``places`` by one statistic, the least deviation first; ``title`` is what it is called, in ``unit``."""
+
+    title: str
+    unit: str
+    places: tuple[Place, ...]
+
+    @property
+    def pairs(self) -> tuple[int, int]:
+        """How many pairs can be told apart, of how many."""
+        count = len(self.places)
+        alike = sum(len(place.alike) for place in self.places) // 2
+        return count * (count - 1) // 2 - alike, count * (count - 1) // 2
+
+
+def ranked(deviations: Iterable[Deviation]) -> tuple[Place, ...]:
+    """The places of ``deviations``: one is less than another where their bars do not reach each other; a deviation that is not a
+    number comes after all that are one.
+
+    >>> [place.rank for place in ranked([Deviation("a", 5.0, 0.4), Deviation("b", 2.0, 0.4), Deviation("c", 2.5, 0.4)])]
+    ['1 to 2', '1 to 2', '3']
+    """
+    ordered = sorted(deviations, key=lambda one: math.inf if math.isnan(one.value) else one.value)
+    found = []
+    for one in ordered:
+        better = sum(_less(other, one) for other in ordered)
+        worse = sum(_less(one, other) for other in ordered)
+        alike = tuple(
+            other.name for other in ordered if other is not one and not _less(other, one) and not _less(one, other)
+        )
+        found.append(Place(one, better + 1, len(ordered) - worse, alike))
+    return tuple(found)
+
+
+def _less(one: Deviation, other: Deviation) -> bool:
+    """Whether ``one`` is nearer to the truth than ``other`` for sure."""
+    if math.isnan(other.value):
+        return not math.isnan(one.value)
+    return one.value + one.bar < other.value - other.bar
+
+
+def rankings(measured: dict[str, tuple[Measure, ...]], bars: Iterable[Measure]) -> tuple[Ranking, ...]:
+    """By each statistic of ``RANKED``, those of ``measured`` (measures against the reference by name) that have it; ``bars``: how
+    well deviations are known. None where nobody knows that.
+    """
+    known, found = tuple(bars), []
+    for metric, statistic, title in RANKED:
+        bar = find(known, metric, statistic)
+        measures = {name: find(all_of, metric, statistic) for name, all_of in measured.items()}
+        if bar is None:
+            continue
+        places = ranked(
+            Deviation(name, abs(float(one.values[one.worst])), float(bar.values[one.worst]))
+            for name, one in measures.items()
+            if one is not None
+        )
+        if len(places) > 1:
+            found.append(Ranking(title, bar.unit, places))
+    return tuple(found)
+
+
+def facts(found: Iterable[Ranking]) -> list[dict[str, object]]:
+    """As valid JSON: a number that is not finite is None."""
+    return [
+        {
+            "by": one.title,
+            "unit": one.unit,
+            "name": place.deviation.name,
+            "value": _finite(place.deviation.value),
+            "error_bar": _finite(place.deviation.bar),
+            "rank": [place.first, place.last],
+            "cannot_be_told_from": list(place.alike),
+        }
+        for one in found
+        for place in one.places
+    ]
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
