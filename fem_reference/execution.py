@@ -33,6 +33,8 @@ _AFTER_THE_RUN = (
     "study.py",
     "judge.py",
     "ranking.py",
+    "claims.py",
+    "true_errors.py",
     "comparison.py",
     "catalogue.py",
     "truths.py",

@@ -43,6 +43,7 @@ ORDER = [
     "study",
     "judge",
     "ranking",
+    "claims",
     "comparison",
     "regression",
     "standings",
@@ -50,6 +51,7 @@ ORDER = [
     "report",
     "execution",
     "refinement",
+    "true_errors",
     "families",
     "field_execution",
     "overview",
@@ -61,7 +63,7 @@ ORDER = [
     "__main__",
 ]
 # These see runs and never who made them.
-BLIND_TO_SOLVERS = ["metrics", "study", "judge", "ranking", "comparison", "regression", "standings", "report"]
+BLIND_TO_SOLVERS = ["metrics", "study", "judge", "ranking", "claims", "comparison", "regression", "standings", "report"]
 DOORS = {
     "dolfinx": ["solvers/fenicsx/"],
     "dolfinx_solver": ["solvers/fenicsx/"],

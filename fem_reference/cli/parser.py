@@ -69,9 +69,9 @@ def parser() -> argparse.ArgumentParser:
 
 
 def _add_page_options(page: argparse.ArgumentParser, unit: str) -> None:
-    names = sorted([*field_verbs.PAGES, verbs.TABLE])
+    names = sorted([*field_verbs.PAGES, verbs.TABLE, verbs.CLAIMS])
     page.add_argument("name", metavar="NAME", choices=names, help=f"one of {', '.join(names)}")
-    some = f"for {verbs.TABLE}: this case, not all of them; may be repeated"
+    some = f"for {verbs.TABLE} and {verbs.CLAIMS}: this case, not all of them; may be repeated"
     page.add_argument("--case", action="append", default=[], metavar="CASE", help=some)
     foreign = f"for {verbs.TABLE}: frames that your solver made of a case; may be repeated"
     page.add_argument("--candidate", action="append", default=[], metavar="CASE=DIR", help=foreign)

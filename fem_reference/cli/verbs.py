@@ -14,7 +14,9 @@ from fem_reference import (
     report,
     runs,
     solvers,
+    true_errors,
 )
+from fem_reference.claims import Cover
 from fem_reference.cli.choosing import check_names, checked_bench, choose, own_candidates, recorded_in, scene_of
 from fem_reference.cli.telling import DONE, SOLVER_FAILED, VERDICT_FAIL, lines, out, tell
 from fem_reference.errors import InputError
@@ -23,12 +25,14 @@ from fem_reference.field.scene import FieldScene
 from fem_reference.field_execution import FieldBench
 from fem_reference.field_verbs import Told
 from fem_reference.overview import comparison_text, field_scene_facts, run_facts, run_text, scene_facts, standings_text
+from fem_reference.report.claims_page import facts as claims_facts
 from fem_reference.report.standings_page import facts as standings_facts
 from fem_reference.scene import Candidate, Scene, SolverChoice
 from fem_reference.verification import verb as verification
 
 MAIN_JOB = "hip_flexion"
 TABLE = "table-5-1"
+CLAIMS = "error-bars"
 
 
 def demo(options: argparse.Namespace) -> int:
@@ -84,8 +88,11 @@ def page(options: argparse.Namespace) -> int:
     """Write a page over several cases."""
     if options.name == TABLE:
         return _table(options)
+    if options.name == CLAIMS and not (options.candidate or options.unit):
+        return _claims(options)
     if options.case or options.candidate or options.unit:
-        raise InputError("page", f"--case, --candidate or --unit for {options.name}", f"them for {TABLE} only")
+        given = "--candidate or --unit" if options.name == CLAIMS else "--case, --candidate or --unit"
+        raise InputError("page", f"{given} for {options.name}", f"them for {TABLE} only")
     return _told(field_verbs.page(options.name, out(options)), options)
 
 
@@ -99,6 +106,19 @@ def _table(options: argparse.Namespace) -> int:
     path = report.write_standings(table, out(options), TABLE)
     tell(standings_facts(table), f"{standings_text(table)}\npage: {path}", options)
     return DONE if all(one.reference.status == "converged" for one in table.scenarios) else SOLVER_FAILED
+
+
+def _claims(options: argparse.Namespace) -> int:
+    """Error bars beside errors."""
+    scenes = [casefile.read_muscle(case) for case in options.case or true_errors.CASES]
+    found = true_errors.stake(scenes, out(options) / "runs")
+    path = report.write_claims(found, out(options), CLAIMS)
+    whole = Cover.of(found.claims)
+    holding = f"{100 * whole.share:.1f} % hold the difference from a finer solution, median ratio {whole.median:.2f}"
+    told = [f"{whole.count} error bars: {holding}"]
+    told += [f"left out: {case}: {why}" for case, why in found.missing.items()]
+    tell(claims_facts(found), "\n".join([*told, f"page: {path}"]), options)
+    return DONE
 
 
 def _foreign(options: argparse.Namespace, cases: list[str]) -> dict[str, list[Candidate]]:

@@ -4,14 +4,15 @@ import json
 from pathlib import Path
 
 from fem_reference import files
+from fem_reference.claims import Claims
 from fem_reference.comparison import Comparison
 from fem_reference.field.example import Example
-from fem_reference.report import field_page, page, standings_page, verify_page
+from fem_reference.report import claims_page, field_page, page, standings_page, verify_page
 from fem_reference.report.tables import as_csv, summary
 from fem_reference.report.verify_page import Verification
 from fem_reference.standings import Table
 
-__all__ = ["summary", "write", "write_examples", "write_standings", "write_verification"]
+__all__ = ["summary", "write", "write_claims", "write_examples", "write_standings", "write_verification"]
 
 
 def write(comparison: Comparison, folder: Path) -> Path:
@@ -51,6 +52,16 @@ def write_standings(table: Table, folder: Path, name: str) -> Path:
     texts = {
         f"{name}.json": json.dumps(standings_page.facts(table), indent=1, allow_nan=False),
         f"{name}.html": standings_page.render(table),
+    }
+    _write(texts, folder)
+    return folder / f"{name}.html"
+
+
+def write_claims(claims: Claims, folder: Path, name: str) -> Path:
+    """Write the page ``name`` of error bars beside errors and its numbers as JSON into ``folder``; the path of the page."""
+    texts = {
+        f"{name}.json": json.dumps(claims_page.facts(claims), indent=1, allow_nan=False),
+        f"{name}.html": claims_page.render(claims),
     }
     _write(texts, folder)
     return folder / f"{name}.html"

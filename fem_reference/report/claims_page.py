@@ -1,0 +1,75 @@
+"""The page ``error-bars``: what is claimed to be known against what a finer solution says."""
+
+import io
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+from fem_reference.claims import CLAIMED, FINER, Claim, Claims, Cover
+from fem_reference.report.curves import LOOK, PALETTE, Curve, inline
+from fem_reference.report.tables import finite
+from fem_reference.report.templates import template
+from fem_reference.report.words import words
+
+UNITS = {"surface_deviation": "mm", "fibre_length": "%", "volume": "%"}
+
+
+def render(claims: Claims) -> str:
+    """The whole page as text."""
+    return template("claims_page.html").render(
+        claims=claims,
+        finer=FINER,
+        whole=Cover.of(claims.claims),
+        by_case={case: Cover.of(one for one in claims.claims if one.case == case) for case in claims.sizes},
+        by_statistic={
+            (metric, statistic): Cover.of(
+                one for one in claims.claims if (one.metric, one.statistic) == (metric, statistic)
+            )
+            for metric, statistic in CLAIMED
+        },
+        widest=lambda case, metric, statistic: widest(claims, case, metric, statistic),
+        drawings=[_drawing(claims, metric) for metric in UNITS],
+    )
+
+
+def widest(claims: Claims, case: str, metric: str, statistic: str) -> Claim:
+    """The claim about a deviation with the widest bar."""
+    found = [one for one in claims.claims if (one.case, one.metric, one.statistic) == (case, metric, statistic)]
+    return max((one for one in found if one.of == "deviation"), key=lambda one: one.bar)
+
+
+def facts(claims: Claims) -> dict[str, Any]:
+    """All of it as valid JSON: a number that is not finite is None."""
+    whole = Cover.of(claims.claims)
+    return {
+        "claims": whole.count,
+        "covered": finite(whole.share),
+        "median_ratio": finite(whole.median),
+        "sizes_mm": claims.sizes,
+        "missing": claims.missing,
+        "rows": [vars(one) | {"bar": finite(one.bar), "error": finite(one.error)} for one in claims.claims],
+    }
+
+
+def _drawing(claims: Claims, metric: str) -> Curve:
+    """Bars against errors, a colour for each case."""
+    title = f"{words(metric).capitalize()}: claimed against true"
+    with mpl.rc_context(LOOK):
+        figure = Figure(figsize=(4.6, 4.0), layout="constrained")
+        FigureCanvasSVG(figure)
+        axes = figure.add_subplot()
+        ends = [1e-4, 1e1]
+        for case, colour in zip(claims.sizes, PALETTE, strict=False):
+            some = [one for one in claims.claims if (one.case, one.metric) == (case, metric) and one.error > ends[0]]
+            axes.plot([one.error for one in some], [one.bar for one in some], ".", color=colour, label=case, alpha=0.7)
+        axes.plot(ends, ends, color="#555555", linewidth=1)
+        axes.plot(ends, [3 * end for end in ends], color="#bbbbbb", linewidth=1, linestyle="--")
+        axes.set(xscale="log", yscale="log", xlim=ends, ylim=ends)
+        axes.set_xlabel(f"difference from the finer solution, {UNITS[metric]}")
+        axes.set_ylabel(f"error bar, {UNITS[metric]}")
+        axes.legend(fontsize="small")
+        text = io.StringIO()
+        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
+    return Curve(title, inline(text.getvalue(), f"claims-{metric}", title))

@@ -1,0 +1,90 @@
+"""Error bars beside the differences from a finer solution: what is covered, and the page."""
+
+import json
+
+import numpy as np
+import pytest
+import small
+
+from fem_reference import casefile, cli, refinement, true_errors
+from fem_reference.claims import CLAIMED, Claim, Claims, Cover, claimed
+from fem_reference.metrics import Measure
+from fem_reference.report import claims_page, write_claims
+from fem_reference.runs import Frame, Outcome
+from fem_reference.solvers import fenicsx
+from fem_reference.study import ErrorBar, ErrorBars
+
+NAN = float("nan")
+
+
+def claim(bar: float, error: float, statistic: str = "rms", case: str = "bar") -> Claim:
+    return Claim(case, "deviation", "surface_deviation", statistic, 10, bar, error)
+
+
+def test_cover_is_a_share_and_a_median_and_leaves_out_what_does_not_differ() -> None:
+    found = Cover.of([claim(2, 1), claim(3, 1), claim(0.5, 1), claim(9, 1), claim(1, 0)])
+    assert (found.count, found.share, found.median) == (4, 0.75, 2.5)
+    assert Cover.of([claim(NAN, 1), claim(2, 1)]).share == 0.5, "what nobody knows holds nothing"
+    assert np.isnan(Cover.of([claim(1, 0)]).share)
+
+
+def test_a_claim_is_a_bar_and_by_how_much_the_finer_solution_differs() -> None:
+    bars = ErrorBars(
+        (0, 10),
+        (1.0, 2.0),
+        1.5,
+        tuple(ErrorBar("change", *name, "mm", np.array([0.0, 0.4]), {}) for name in CLAIMED),
+    )
+    one, other = (tuple(Measure(*name, "mm", np.array([0.0, value])) for name in CLAIMED) for value in (5.0, 4.7))
+    found = claimed("bar", "change", bars, one, other)
+    assert len(found) == 2 * len(CLAIMED)
+    assert [(each.frame, each.bar) for each in found[:2]] == [(0, 0.0), (10, 0.4)]
+    assert [each.error for each in found[:2]] == pytest.approx([0, 0.3])
+
+
+def whole(*cases: str) -> Claims:
+    rows = [
+        Claim(case, of, metric, statistic, frame, 0.3, 0.1 * frame / 10)
+        for case in cases
+        for of in ("change", "deviation")
+        for metric, statistic in CLAIMED
+        for frame in (0, 10, 20)
+    ]
+    return Claims(tuple(rows), dict.fromkeys(cases, (6.0, 4.8)), {"lost": "why it was"})
+
+
+def test_the_page_and_its_numbers(tmp_path) -> None:
+    path = write_claims(whole("one", "other"), tmp_path / "new", "error-bars")
+    text, numbers = path.read_text(), json.loads((path.parent / "error-bars.json").read_text())
+    assert (numbers["claims"], numbers["covered"], numbers["missing"]) == (56, 1.0, {"lost": "why it was"})
+    assert numbers["median_ratio"] == pytest.approx(2.25)  # 3 and 1.5, each half of them
+    assert text.count("<svg") == 3
+    assert "why it was" in text
+    widest = claims_page.widest(whole("one"), "one", "volume", "deviation")
+    assert (widest.of, widest.bar) == ("deviation", 0.3)
+
+
+def test_it_is_asked_for_by_the_command_line(tmp_path, monkeypatch) -> None:
+    """In place of the reference, a swelling whose error is of first order in the size of tetrahedra."""
+
+    def swell(problem, _settings, sink) -> Outcome:
+        facts = problem.mesh_facts
+        length = (facts["volume_mm3"] / facts["tets"]) ** (1 / 3)
+        for number in problem.frames:
+            factor = 1 + 1e-4 * number * length
+            sink(Frame(number, problem.surface.points * factor, problem.fibres.points * factor))
+        return Outcome("converged", "done", {"seconds": 1.0})
+
+    monkeypatch.setattr(fenicsx, "require", lambda _: None)
+    monkeypatch.setattr(fenicsx, "solve", swell)
+    case, out = small.write(tmp_path / "bar"), tmp_path / "out"
+    assert cli.main(["page", "error-bars", "--case", str(case), "--out", str(out), "--quiet"]) == cli.DONE
+    numbers = json.loads((out / "error-bars.json").read_text())
+    # The finer one has a share of 1 - 0.8 of the error; meshes follow the size wanted to some 15 %.
+    assert numbers["covered"] == 1.0
+    assert 2 < numbers["median_ratio"] < 12
+    assert numbers["sizes_mm"] == {"bar": [6.0, pytest.approx(4.8)]}
+    monkeypatch.setattr(refinement, "stored", lambda _: None)
+    monkeypatch.setattr(refinement, "obtain", lambda _bench, _run: None)
+    found = true_errors.stake([casefile.read_muscle(case)], out / "runs")
+    assert list(found.missing) == ["bar"]
