@@ -8,6 +8,8 @@ from fem_reference import casefile, cli, field_verbs
 
 # The way there and back in its two ends and a middle; the bulk of the time is the number of frames.
 FEW = {"frames.every": 100}
+# As its scene fills it, before tetrahedra are cut into eight.
+COARSE = {"muscle.refinements": 0}
 
 
 # The scalar cases, and the candidate that their spoil turns to fail.
@@ -94,7 +96,7 @@ def test_every_case_is_run_here() -> None:
 
 
 def test_hip_flexion_spoiled_fails(tmp_path, monkeypatch) -> None:
-    status, facts = run(casefile.read("hip_flexion", changes=FEW, spoiled=True), tmp_path, monkeypatch)
+    status, facts = run(casefile.read("hip_flexion", changes=FEW | COARSE, spoiled=True), tmp_path, monkeypatch)
     assert status == cli.VERDICT_FAIL
     assert max(map(abs, rows(facts, "volume", "deviation").values())) > 2  # percent, where 0.5 is allowed
 
@@ -121,6 +123,8 @@ def test_gluteus_maximus_against_the_recorded_output(data, tmp_path) -> None:
             "gluteus_maximus",
             "--candidate",
             str(recorded),
+            "--set",
+            "muscle.refinements=0",
             "--out",
             str(tmp_path),
             "--json",
@@ -152,10 +156,15 @@ def test_gluteus_maximus_with_a_truncated_frame(data, tmp_path, capsys) -> None:
     assert not (tmp_path / "out").exists()
 
 
+def coarse(name: str) -> dict[str, object]:
+    """Tetrahedra of a case that are coarse enough for a test."""
+    return {"muscle.tet_size": MUSCLES.get(name, "14 mm")} | ({} if name == "box_squeeze_report" else COARSE)
+
+
 @pytest.mark.parametrize("name", MUSCLES)
 def test_muscles_of_the_report(data, name, tmp_path, monkeypatch) -> None:
     assert data.is_dir()
-    scene = casefile.read(name, changes=FEW | {"muscle.tet_size": MUSCLES[name]})
+    scene = casefile.read(name, changes=FEW | coarse(name))
     status, facts = run(scene, tmp_path, monkeypatch)
     assert (status, facts["verdict"], facts["status"]) == (cli.DONE, "pass", "converged")
     assert scene.frames.numbers == (0, 100, 200, 300)
@@ -167,8 +176,7 @@ def test_muscles_of_the_report_spoiled_fail(data, name, tmp_path, monkeypatch) -
     assert data.is_dir()
     last = 110 if name == "gluteus_maximus" else 100  # where it expects something of a recorded candidate
     changes = {"frames.last": last, "frames.every": last, "expect[1].frame": last}
-    changes["muscle.tet_size"] = MUSCLES.get(name, "14 mm")
-    status, facts = run(casefile.read(name, changes=changes, spoiled=True), tmp_path, monkeypatch)
+    status, facts = run(casefile.read(name, changes=changes | coarse(name), spoiled=True), tmp_path, monkeypatch)
     assert status == cli.VERDICT_FAIL
     spoiled = "penetration" if name == "adductor_brevis" else "volume"
     others = {"surface_deviation", "penetration"} - {
@@ -188,7 +196,7 @@ def test_the_box_spoiled_fails(tmp_path, monkeypatch) -> None:
 
 def test_the_unsolved_case_says_where_and_why_and_keeps_what_it_reached(data, tmp_path, monkeypatch) -> None:
     assert data.is_dir()
-    changes = {"frames.last": 100, "frames.every": 20, "expect[1].frame": 100, "muscle.tet_size": "6 mm"}
+    changes = {"frames.last": 100, "frames.every": 20, "expect[1].frame": 100, "muscle.tet_size": "6 mm"} | COARSE
     changes["reference"] = {"solver": "fenicsx", "smallest_step": 2.0}  # to have it over with
     status, facts = run(casefile.read(UNSOLVED, changes=changes), tmp_path, monkeypatch)
     assert status == cli.SOLVER_FAILED
