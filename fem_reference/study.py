@@ -134,9 +134,8 @@ def error_bars(pair: Pair, yardstick: Yardstick) -> ErrorBars:
             }
             greatest = {name: float(part.max()) for name, part in parts.items()}
             model = None if other is None else np.abs(other[i])
-            bars.append(
-                ErrorBar(of, one.metric, one.statistic, one.unit, sum(parts.values(), np.zeros(1)), greatest, model)
-            )
+            total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))  # of causes that are independent
+            bars.append(ErrorBar(of, one.metric, one.statistic, one.unit, total, greatest, model))
     return ErrorBars(fine.numbers, pair.sizes, pair.order, tuple(bars))
 
 

@@ -87,7 +87,8 @@ def test_the_bar_covers_an_error_that_is_known(case, capsys, monkeypatch) -> Non
     furthest = np.linalg.norm(fine.surface.points, axis=1).max()
     # Of order 1 in tetrahedra 1.5 times as large: 1.25 / (1.5 - 1) of the difference. Twice the stiffness takes half of what
     # contact gives away, twice that is all.
-    wanted = np.array([0, 5, 10, 15, 20]) * furthest * (2.5 * abs(growth(tets[0]) - growth(tets[1])) + CONTACT_GIVES)
+    share = np.hypot(2.5 * (growth(tets[0]) - growth(tets[1])), CONTACT_GIVES)
+    wanted = np.array([0, 5, 10, 15, 20]) * furthest * share
     assert rows(facts, "change", "surface_deviation", "max") == pytest.approx(wanted, rel=1e-6)
     assert "how well the reference is known" in capsys.readouterr().out
     text = page.read_text()
