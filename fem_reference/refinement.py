@@ -10,6 +10,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from fem_reference import study
 from fem_reference.bones import Bone
 from fem_reference.effects import Effect
@@ -32,6 +34,9 @@ NESTED_ORDER = 1.5
 # Another has a mesh of its own for it, larger by so much, and rims that are not graded: order 1, whatever the element (Grisvard
 # 1985, Elliptic Problems in Nonsmooth Domains).
 RATIO, ORDER = 1.5, 1.0
+# Up to this share of the time of a reference its error bars are made without being asked for: a run on larger tetrahedra takes the
+# share of the time that these are of the number.
+CHEAP = 0.2
 
 
 @dataclass(frozen=True)
@@ -42,13 +47,13 @@ class Variation:
     changes: dict[str, Any]
 
 
-def variations(scene: Scene, settings: Any) -> tuple[Variation, ...]:
+def variations(scene: Scene, settings: Any, *, pressed: bool = True) -> tuple[Variation, ...]:
     """What is varied apart from tetrahedra: of contact its stiffness and smoothing, and how well the distances to surfaces of bones
-    are known and how far they are rounded; load steps, where the reference's ``settings`` have them, with drag or viscosity only:
-    else a state does not depend on them.
+    are known and how far they are rounded, unless no bone ``pressed``; load steps, where the reference's ``settings`` have them,
+    with drag or viscosity only: else a state does not depend on them.
     """
     found = []
-    if among(scene.effects) is not None:
+    if among(scene.effects) is not None and pressed:
         found.append(Variation("contact stiffness", {"effect": _scaled(scene, "stiffness", 2.0)}))
         found.append(Variation("contact smoothing", {"effect": _scaled(scene, "smoothing", 0.5)}))
         if any(bone.surface for bone in scene.bone):
@@ -82,20 +87,35 @@ def _closer(scene: Scene) -> tuple[Bone, ...]:
     )
 
 
-def obtain(bench: Bench, reference: Run) -> ErrorBars | None:
+def obtain(bench: Bench, reference: Run, *, model: bool = True) -> ErrorBars | None:
     """The error bars of the ``reference`` of a bench: from runs in the store where they are, else solved now; stored beside it.
-    None for a run that did not converge, and for one without an interior.
+    With ``model``, also what exact attachments would change. None for a run that did not converge, and for one without an interior.
     """
     if reference.outcome.status != "converged" or reference.fibres is None or not reference.has_surface:
         log.info("error bar: none, of a reference that did not converge or has no interior")
         return None
     with fenicsx.shared():
-        pair = _pair(bench, reference)
+        pair = _pair(bench, reference, model)
     log.info("error bar: measuring the runs against each other")
     bars = study.error_bars(pair, Yardstick.of(reference, reference.fibres, bench.setup().bones, bench.setup().free))
     if reference.folder is not None:
         study.save(bars, reference.folder, _of(reference))
     return bars
+
+
+def offered(bench: Bench, reference: Run) -> ErrorBars | None:
+    """The error bars where nobody asked for them: those that are stored, or new ones where they cost less than a fifth of the
+    reference; else None.
+    """
+    found = stored(reference)
+    if found is not None:
+        return found
+    _, (fine, coarse), _ = _coarser(bench.scene)
+    count = 1 + len(_varied(bench, reference))
+    if count * (fine / coarse) ** 3 > CHEAP:
+        return None
+    log.info("error bar: made without being asked for, as it takes less than a fifth of the time")
+    return obtain(bench, reference, model=False)
 
 
 def stored(reference: Run) -> ErrorBars | None:
@@ -108,12 +128,19 @@ def stored(reference: Run) -> ErrorBars | None:
     return bars if bars is None or bars.numbers == reference.numbers else None
 
 
-def _pair(bench: Bench, reference: Run) -> Pair:
+def _varied(bench: Bench, reference: Run) -> tuple[Variation, ...]:
+    """What has to be varied: what bones are like matters only where one pressed."""
+    area = reference.scalars.get("contact_area")
+    settings = bench.settings(bench.scene.reference, "reference")
+    return variations(bench.scene, settings, pressed=area is None or bool(np.nanmax(area) > 0))
+
+
+def _pair(bench: Bench, reference: Run, model: bool) -> Pair:
     coarser, sizes, order = _coarser(bench.scene)
-    varied = variations(bench.scene, bench.settings(bench.scene.reference, "reference"))
+    varied = _varied(bench, reference)
     scenes = {f"tetrahedra of {sizes[1]:.3g} mm": coarser}
     scenes |= {entry.name: coarser.model_copy(update=entry.changes) for entry in varied}
-    if any(entry.stiffness is not None for entry in coarser.attachment):
+    if model and any(entry.stiffness is not None for entry in coarser.attachment):
         held = tuple(entry.model_copy(update={"stiffness": None}) for entry in coarser.attachment)
         scenes[_EXACT] = coarser.model_copy(update={"attachment": held})
     # Newton's method takes less than quadratic time of the unknowns: what larger tetrahedra save is at least their number.

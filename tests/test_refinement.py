@@ -2,6 +2,7 @@
 
 import json
 import logging
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -204,6 +205,30 @@ def test_load_steps_are_varied_where_time_matters(case) -> None:
     timed = scene_of(case, VISCOSITY)
     assert [entry.name for entry in refinement.variations(timed, Settings())] == ["load steps"]
     assert refinement.variations(timed, object()) == ()
+
+
+def test_where_no_bone_pressed_contact_has_no_error(case) -> None:
+    scene = scene_of(case, CONTACT)
+    assert refinement.variations(scene, Settings(), pressed=False) == ()
+    bench = Bench(scene, case.parent / "runs")
+    reference = bench.obtain("reference", scene.reference, "reference")
+    assert len(refinement._varied(bench, reference)) == 3
+    for area, count in ((0.0, 0), (2.0, 3)):
+        pressed = replace(reference, scalars={"contact_area": np.array([0.0, area, 0, 0, np.nan])})
+        assert len(refinement._varied(bench, pressed)) == count
+
+
+def test_a_bar_that_is_cheap_is_made_without_being_asked_for(case) -> None:
+    # Nested, larger tetrahedra are an eighth: one run of them costs less than a fifth; those of a mesh of its own cost more.
+    path = case / "case.toml"
+    _, facts = call(case, "run")
+    assert facts["error_bars"] == []
+    path.write_text(path.read_text().replace('tet_size = "6 mm"', 'tet_size = "6 mm"\nrefinements = 1'))
+    _, facts = call(case, "run")
+    assert len(facts["error_bars"]) > 0
+    assert {row["model"] for row in facts["error_bars"]} == {None}
+    path.write_text(path.read_text() + CONTACT)
+    assert call(case, "run")[1]["error_bars"] == [], "with contact it takes four runs"
 
 
 def test_the_coarse_member_of_a_pair_has_the_tetrahedra_before_their_last_refinement(case) -> None:

@@ -52,7 +52,7 @@ def check(options: argparse.Namespace) -> int:
         _write({options.junit: lost.junit, options.markdown: lost.markdown})
         tell(facts, "\n".join([*why, "verdict: failed"]), options)
         return SOLVER_FAILED
-    bars = refinement.obtain(bench, reference) if options.error_bar else refinement.stored(reference)
+    bars = refinement.obtain(bench, reference) if options.error_bar else refinement.offered(bench, reference)
     return _told(Today.of(scene, bench.setup(), run, reference, bars), options, begin)
 
 

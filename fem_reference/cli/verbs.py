@@ -154,7 +154,7 @@ def _judge(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candida
     solved = {
         entry.name: bench.obtain(entry.name, entry, place) for entry, place in chosen if entry.solver != "recorded"
     }
-    bars = refinement.obtain(bench, reference) if options.error_bar else refinement.stored(reference)
+    bars = refinement.obtain(bench, reference) if options.error_bar else refinement.offered(bench, reference)
     numbers = scene.frames.numbers
     candidates = tuple(complete((read | solved)[entry.name], numbers) for entry, _ in chosen)
     result = comparison.compare(scene, bench.setup(), complete(reference, numbers), candidates, bars)
