@@ -21,7 +21,7 @@ CLAIMED = (
     ("volume", "deviation"),
 )
 # Differences below are rounding, in mm or %.
-_LEAST = 1e-6
+LEAST = 1e-6
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Cover:
     @classmethod
     def of(cls, claims: Iterable[Claim]) -> "Cover":
         """What the claims come to; NaN without any."""
-        known = [claim for claim in claims if claim.error > _LEAST]
+        known = [claim for claim in claims if claim.error > LEAST]
         if not known:
             return cls(0, np.nan, np.nan)
         ratios = np.array([claim.bar / claim.error for claim in known])

@@ -19,7 +19,7 @@ from fem_reference.study import ErrorBars, Of
 class Comparison:
     """``deviations``: by candidate name, its measures against the reference. ``changes``: by run name (``"reference"`` among
     them), its measures against the rest state. ``extension_error`` [mm]: by frame, the greatest error over the fibres that the
-    extension makes on the reference's own surface. ``error_bars``: how well the reference is known, None where nobody asked.
+    extension makes on the reference's own surface. ``error_bars``: how well the reference is known, None without any.
     """
 
     scene: Scene

@@ -45,12 +45,11 @@ def as_continuum(problem: Problem) -> Continuum:
     the rest of its skin is ``"free"``.
     """
     mesh = problem.mesh
-    exact = {entry.attachment: mesh.facets[entry.attachment] for entry in problem.held if entry.stiffness is None}
-    held = np.concatenate([np.zeros((0, 3), int), *exact.values()])
+    held = np.concatenate([np.zeros((0, 3), int), *(mesh.facets[entry.attachment] for entry in problem.held)])
     skin, _ = boundary(mesh.tets)
     taken = {tuple(facet) for facet in np.sort(held, axis=1).tolist()}
     free = skin[[tuple(facet) not in taken for facet in np.sort(skin, axis=1).tolist()]]
-    cells = Cells(mesh.points, mesh.tets, "tetrahedron", 1, {**exact, "free": free})
+    cells = Cells(mesh.points, mesh.tets, "tetrahedron", 1, {**mesh.facets, "free": free})
     first = problem.frames[0]
     prescribed = tuple(
         Prescribed(

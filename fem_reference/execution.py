@@ -149,7 +149,8 @@ def _alone(folder: Path) -> Iterator[None]:
 
 
 def _build(scene: Scene, setup: Setup) -> Problem:
-    log.info("%s: filling the muscle with tetrahedra of %g mm", scene.name, scene.muscle.tet_size)
+    size = scene.muscle.tet_size / 2**scene.muscle.refinements
+    log.info("%s: filling the muscle with tetrahedra of %g mm", scene.name, size)
     built = problem.build(scene, setup)
     facts = built.mesh_facts
     log.info("%s: %d tetrahedra, quality at least %.2f", scene.name, facts["tets"], facts["quality_min"])

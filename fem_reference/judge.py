@@ -24,7 +24,7 @@ _KINDS = {
 @dataclass(frozen=True)
 class Verdict:
     """How an expectation came out: the ``word``, and the ``value`` in ``unit`` at ``frame`` that decided it; ``error_bar``, how
-    well the reference is known there, NaN where nobody knows and None where nobody asked.
+    well the reference is known there, NaN where nobody knows and None without any.
     """
 
     word: Word
@@ -80,7 +80,7 @@ def verdict(
     expectation: Expectation, measures: Iterable[Measure], numbers: tuple[int, ...], bars: Floats | None = None
 ) -> Verdict:
     """The verdict on a checked ``expectation`` from the measures of the run that it is of, over frame ``numbers``; ``bars`` (f,)
-    are the reference's error bars of what it expects, None where nobody asked for them.
+    are the reference's error bars of what it expects, None without any.
     """
     name = (expectation.metric, expectation.statistic)
     found = next(measure for measure in measures if (measure.metric, measure.statistic) == name)

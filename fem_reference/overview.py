@@ -46,6 +46,7 @@ def scene_facts(scene: Scene, setup: Setup) -> dict[str, Any]:
             "triangles": len(surface.triangles),
             "volume_mm3": enclosed_volume(surface.points, surface.triangles),
             "tet_size_mm": scene.muscle.tet_size,
+            "refinements": scene.muscle.refinements,
             "mesher": scene.muscle.mesher,
         },
         "bones": {bone.name: f"{_shape(bone)}, {_motion(bone.motion)}" for bone in setup.bones},
@@ -216,7 +217,7 @@ def _worst(result: Comparison) -> list[str]:
 
 
 def _known(result: Comparison) -> list[str]:
-    """How well the reference is known, a line a statistic; nothing where nobody asked."""
+    """How well the reference is known, a line a statistic; nothing without them."""
     if result.error_bars is None:
         return []
     lines = [

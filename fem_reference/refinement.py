@@ -111,6 +111,8 @@ def offered(bench: Bench, reference: Run) -> ErrorBars | None:
     if found is not None:
         return found
     _, (fine, coarse), _ = _coarser(bench.scene)
+    if reference.outcome.status != "converged":
+        return None
     count = 1 + len(_varied(bench, reference))
     if count * (fine / coarse) ** 3 > CHEAP:
         return None
@@ -149,7 +151,12 @@ def _pair(bench: Bench, reference: Run, model: bool) -> Pair:
     for i, (name, changed) in enumerate(scenes.items()):
         left = seconds * (len(scenes) - i)
         log.info("error bar: run %d of %d, %s; about %.0f s for what is left", i + 1, len(scenes), name, left)
-        runs[name] = _solved(bench, changed, name, reference)
+        try:
+            runs[name] = _solved(bench, changed, name, reference)
+        except InputError as error:
+            if name != _EXACT:
+                raise
+            log.info("error bar: without what exact attachments would change: %s", error)
     coarse, *others = runs.values()
     if coarse.origin["mesh"]["tets"] >= reference.origin["mesh"]["tets"]:
         got = " and ".join(f"{run.origin['mesh']['tets']:.0f}" for run in (reference, coarse))

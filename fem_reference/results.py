@@ -40,7 +40,8 @@ _AT_ONCE = 1024  # points, so that their jets fit in a cache
 @dataclass(frozen=True, eq=False)
 class Results:
     """The ``states`` by frame number of a muscle that fills ``mesh``, where ``effects`` act; ``fibre`` (m, 3), the unit vector
-    along the fibres in each tet, where it is known.
+    along the fibres in the middle of each tet, where it is known. The solution has them at every quadrature point: in a bar of 6 mm
+    tets these differ from it by 2 degrees, root mean square.
     """
 
     mesh: TetMesh

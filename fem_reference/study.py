@@ -151,7 +151,7 @@ def typical(differences: Floats, apart: Floats) -> Floats:
 
 
 def _surface(run: Run) -> Run:
-    """The run without its fibres: those traced in other tetrahedra are others, while the yardstick's extension serves all alike."""
+    """The run without its fibres: candidates are surfaces, so that the lengths of all go through the yardstick's extension."""
     return replace(run, fibres=None, fibre_positions=None)
 
 

@@ -30,7 +30,8 @@ def stake(scenes: Iterable[Scene], store: Path) -> Claims:
             missing[scene.name] = "its reference, or the finer solution, did not reach all frames"
             continue
         claims += found
-        sizes[scene.name] = (scene.muscle.tet_size, FINER * scene.muscle.tet_size)
+        size = scene.muscle.tet_size / 2**scene.muscle.refinements
+        sizes[scene.name] = (size, FINER * size)
     return Claims(tuple(claims), sizes, missing)
 
 
@@ -38,10 +39,12 @@ def _of(scene: Scene, store: Path) -> list[Claim]:
     bench = Bench(scene, store)
     reference = bench.obtain("reference", scene.reference, "reference")
     bars = refinement.stored(reference) or refinement.obtain(bench, reference)
+    if bars is None:
+        return []
     muscle = scene.muscle.model_copy(update={"tet_size": FINER * scene.muscle.tet_size})
     finer = Bench(scene.model_copy(update={"muscle": muscle}), store)
     run = complete(finer.obtain("finer", scene.reference, "reference"), reference.numbers)
-    if bars is None or reference.fibres is None or run.outcome.status != "converged":
+    if reference.fibres is None or run.outcome.status != "converged":
         return []
     yardstick = Yardstick.of(reference, reference.fibres, bench.setup().bones, bench.setup().free)
     names = dict.fromkeys(metric for metric, _ in CLAIMED)

@@ -12,6 +12,7 @@ from fem_reference import effects
 from fem_reference.continuum import ELEMENTS, Cells, Continuum, Prescribed, boundary_facets, check
 from fem_reference.effects import Effect
 from fem_reference.errors import InputError, MissingSoftware
+from fem_reference.geometry.skins import Skin
 from fem_reference.records import parse
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import BodySettings
@@ -90,6 +91,27 @@ def test_a_block_on_springs_moves_by_the_load_over_their_stiffness(element, sess
     assert state.points[mesh.points[:, 2] == 0, 2] == pytest.approx(-load / stiffness, abs=1e-10)
     assert state.forces["springs"] == pytest.approx([0, 0, load * 2.0], abs=1e-11)
     assert state.forces["x0"] == pytest.approx(np.zeros(3), abs=1e-11)
+
+
+@pytest.mark.parametrize("element", ["P2/P1", "P2/P0"])
+def test_springs_at_points_beside_the_cells_take_the_load_and_its_moment(element, session) -> None:
+    # Points 0.05 mm below the face that springs hold, of uneven areas; the pull is off their middle: the block turns on them.
+    stiffness, load = 1e-4, 1e-7  # so soft that the block is rigid, and turns by a thousandth
+    acting = (*FLESH, effect("traction", on="x1", force=f"0, 0, -{load} MPa", course=ONCE))
+    mesh = box(element, (2, 2, 2), (1.0, 1.0, 1.0))
+    at = np.array([[0.2, 0.3, -0.05], [0.7, 0.2, -0.05], [0.3, 0.8, -0.05], [0.9, 0.9, -0.05]])
+    middles = mesh.points[mesh.cells].mean(axis=1)
+    cells = np.array([np.argmin(np.linalg.norm(middles - point, axis=1)) for point in at])
+    skin = Skin(cells, at, np.array([0.2, 0.3, 0.25, 0.25]))
+    springs = Prescribed("springs", skin, (0, 1, 2), Rest(), stiffness)
+    state = session.solve(Continuum(mesh, acting, (springs,), (0.0, 1.0)), settings(element)).last
+    assert state.forces["springs"] == pytest.approx([0, 0, load], abs=1e-11)
+    # The load acts at x = 1, y = z = 1/2: about the origin its moment is (-1/2, 1, 0) load, to the first order of its turning.
+    assert state.moments["springs"] == pytest.approx([load / 2, -load, 0], abs=0.01 * load)
+    # Where the points go with the block, the springs' areas make up the load.
+    rigid, *_ = np.linalg.lstsq(np.column_stack([mesh.points, np.ones(len(mesh.points))]), state.points - mesh.points)
+    moved = np.column_stack([at, np.ones(4)]) @ rigid
+    assert stiffness * skin.areas @ moved == pytest.approx([0, 0, -load], abs=0.01 * load)
 
 
 @BOTH

@@ -10,6 +10,7 @@ from fem_reference import casefile, files, problem, scene_fibres
 from fem_reference.deformable import as_continuum
 from fem_reference.errors import InputError
 from fem_reference.geometry.rigid_bodies import Box, HalfSpace
+from fem_reference.geometry.skins import Skin
 from fem_reference.geometry.tetrahedra import tetrahedralise
 from fem_reference.mesh import Polylines, boundary, check_closed, enclosed_volume
 from fem_reference.motion import apply
@@ -91,13 +92,25 @@ def test_given_fibres_stay_inside_the_muscle(built) -> None:
 
 
 def test_fibres_and_contact_do_not_depend_on_the_tetrahedra(bar) -> None:
+    text = (bar / "case.toml").read_text()
+    (bar / "case.toml").write_text(text.replace("[fibres]", f"{FIBRE}{CONTACT}\n[fibres]"))
     scene = casefile.read(bar)
+    (bar / "case.toml").write_text(text)
+    soft = scene.attachment[1].model_copy(update={"stiffness": 0.1})
+    scene = scene.model_copy(update={"attachment": (scene.attachment[0], soft)})
     one, other = (
         build_scene(scene.model_copy(update={"muscle": scene.muscle.model_copy(update={"tet_size": size})}))
         for size in (4.5, 6.0)
     )
     assert len(one.mesh.tets) != len(other.mesh.tets)
     assert np.array_equal(one.fibres.points, other.fibres.points)
+    points = one.fibres.points[::7]
+    cells = np.zeros(len(points), int)
+    assert np.array_equal(one.fibre(cells, points), other.fibre(cells, points))
+    assert len(one.skin.points) > 0
+    for mine, theirs in ((one.skin, other.skin), (one.held_skins["insertion"], other.held_skins["insertion"])):
+        assert np.array_equal(mine.points, theirs.points)
+        assert np.array_equal(mine.areas, theirs.areas)
 
 
 def test_given_fibres_are_read(bar) -> None:
@@ -129,6 +142,11 @@ def test_an_attachment_that_tets_cannot_resolve_is_named(bar, monkeypatch) -> No
         build(bar)
 
 
+CONTACT = """
+[[effect]]
+name = "contact"
+stiffness = "100 kPa/mm"
+"""
 FIBRE = """
 [[effect]]
 name = "active_tension"
@@ -173,6 +191,9 @@ def test_a_stiffness_of_an_attachment_reaches_the_body(bar) -> None:
     scene = scene.model_copy(update={"attachment": (scene.attachment[0], soft)})
     body = as_continuum(problem.build(scene, problem.setup(scene)))
     assert [entry.stiffness for entry in body.prescribed] == [None, 0.1]
+    assert (body.prescribed[0].on, type(body.prescribed[1].on)) == ("origin", Skin)
+    # A load may still act on what springs hold, and what is free is free of both.
+    assert set(body.mesh.facets) == {"origin", "insertion", "free"}
 
 
 SQUEEZED = """

@@ -47,7 +47,7 @@ def parser() -> argparse.ArgumentParser:
     checking = add("check", check.check, "judge a candidate by its own past and by the reference, for a pipeline")
     check.add_options(checking, unit)
     for judging in (run, comparison, checking):
-        known = "how well the reference is known: solve it on coarser tetrahedra and with finer steps too"
+        known = "how well the reference is known: solve it on larger tetrahedra too, and with stiffer contact where bones press"
         judging.add_argument("--error-bar", action="store_true", help=known)
     for solving in (demo, run, comparison, checking):
         ranks = "MPI processes of the reference (default: 1, or 2 for large bodies where cores are free)"

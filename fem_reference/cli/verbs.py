@@ -118,7 +118,7 @@ def _claims(options: argparse.Namespace) -> int:
     told = [f"{whole.count} error bars: {holding}"]
     told += [f"left out: {case}: {why}" for case, why in found.missing.items()]
     tell(claims_facts(found), "\n".join([*told, f"page: {path}"]), options)
-    return DONE
+    return SOLVER_FAILED if found.missing else DONE
 
 
 def _foreign(options: argparse.Namespace, cases: list[str]) -> dict[str, list[Candidate]]:

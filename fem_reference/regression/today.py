@@ -16,7 +16,7 @@ from fem_reference.study import ErrorBars
 
 @dataclass(frozen=True, eq=False)
 class Today:
-    """A candidate, measured now against the ``reference``; ``error_bars``: how well that is known, None where nobody asked."""
+    """A candidate, measured now against the ``reference``; ``error_bars``: how well that is known, None without any."""
 
     scene: Scene
     candidate: Run

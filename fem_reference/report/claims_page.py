@@ -7,7 +7,7 @@ import matplotlib as mpl
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from fem_reference.claims import CLAIMED, FINER, Claim, Claims, Cover
+from fem_reference.claims import CLAIMED, FINER, LEAST, Claim, Claims, Cover
 from fem_reference.report.curves import LOOK, PALETTE, Curve, inline
 from fem_reference.report.tables import finite
 from fem_reference.report.templates import template
@@ -60,9 +60,12 @@ def _drawing(claims: Claims, metric: str) -> Curve:
         figure = Figure(figsize=(4.6, 4.0), layout="constrained")
         FigureCanvasSVG(figure)
         axes = figure.add_subplot()
-        ends = [1e-4, 1e1]
-        for case, colour in zip(claims.sizes, PALETTE, strict=False):
-            some = [one for one in claims.claims if (one.case, one.metric) == (case, metric) and one.error > ends[0]]
+        shown = [one for one in claims.claims if one.metric == metric and one.error > LEAST and one.bar > 0]
+        values = [value for one in shown for value in (one.bar, one.error)]
+        ends = [0.5 * min(values, default=0.1), 2 * max(values, default=1.0)]
+        for i, case in enumerate(claims.sizes):
+            some = [one for one in shown if one.case == case]
+            colour = PALETTE[i % len(PALETTE)]
             axes.plot([one.error for one in some], [one.bar for one in some], ".", color=colour, label=case, alpha=0.7)
         axes.plot(ends, ends, color="#555555", linewidth=1)
         axes.plot(ends, [3 * end for end in ends], color="#bbbbbb", linewidth=1, linestyle="--")

@@ -25,7 +25,7 @@ from fem_reference.report.viewer import view
 from fem_reference.report.words import listed, ratio, words
 from fem_reference.runs import Run
 from fem_reference.scene import Scene
-from fem_reference.study import Of
+from fem_reference.study import ErrorBar, Of
 
 # The columns of the first table: metric, statistic, the words above a group and above the column, unit.
 COLUMNS = (
@@ -80,7 +80,7 @@ def render(comparison: Comparison) -> str:
         rankings=comparison.rankings,
         parts=_parts(comparison),
         modelled=any(bar.model is not None for bar in known(comparison)),
-        model_change=lambda bar: float(np.max(bar.model)),
+        model_change=_model_change,
         variations=listed(_parts(comparison)[1:]) if _parts(comparison)[1:] else "",
         costs=_costs(comparison),
         changes=_changes(comparison.scene),
@@ -117,7 +117,7 @@ def least(measure: Measure) -> float:
 
 
 def _bar_at(comparison: Comparison, of: Of, metric: str, statistic: str, frame: int) -> float | None:
-    """The error bar of a statistic at a frame number, None where nobody asked."""
+    """The error bar of a statistic at a frame number, None without any."""
     bars = comparison.error_bars
     found = None if bars is None else bars.find(of, metric, statistic)
     return None if bars is None or found is None else float(found.values[bars.numbers.index(frame)])
@@ -126,6 +126,12 @@ def _bar_at(comparison: Comparison, of: Of, metric: str, statistic: str, frame: 
 def _parts(comparison: Comparison) -> list[str]:
     """What was varied for the error bars, tetrahedra first."""
     return list(dict.fromkeys(name for bar in known(comparison) for name in bar.parts))
+
+
+def _model_change(bar: ErrorBar) -> float | None:
+    """The greatest change by another model over the frames that it reached, None without any."""
+    known = np.zeros(0) if bar.model is None else bar.model[np.isfinite(bar.model)]
+    return float(known.max()) if len(known) else None
 
 
 def ticks(top: float) -> list[tuple[float, float]]:

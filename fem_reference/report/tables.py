@@ -23,7 +23,7 @@ def summary(comparison: Comparison) -> dict[str, Any]:
 
     ``measures`` holds each candidate's deviation from the reference, and under ``"reference"`` its own change from rest
     with the inversion numbers that its solver recorded; ``from_rest`` the change from rest of every run; ``error_bars`` how
-    well the reference is known and ``rankings`` whom that tells apart, empty where nobody asked.
+    well the reference is known and ``rankings`` whom that tells apart, empty without any.
     """
     reference = comparison.reference
     deviations = [row for run in comparison.candidates for row in _rows(run, comparison.deviations[run.name])]
@@ -67,7 +67,7 @@ def finite(value: float) -> float | None:
 
 
 def known(comparison: Comparison) -> tuple[ErrorBar, ...]:
-    """The error bars of the reference, none where nobody asked."""
+    """The error bars of the reference, none without any."""
     return () if comparison.error_bars is None else comparison.error_bars.bars
 
 

@@ -100,9 +100,9 @@ def _pass_on(problem: Problem, frame: Frame, sink: Sink, passed: list[int]) -> N
 
 
 def _with_held(problem: Problem, frame: Frame) -> Frame:
-    """The frame with what the mesh makes of the attachments: how far the surface vertices that bones hold are from where the
-    bones have them, ``held_off_rms`` and ``held_off_max`` [mm]. Tets hold facets, which cover the attachments only roughly.
-    As it is where no bone holds anything.
+    """The frame with how far the surface vertices that bones hold are from where the bones have them, ``held_off_rms`` and
+    ``held_off_max`` [mm]: exact attachments are facets of tets, which cover them only roughly, and springs give way. As it is
+    where no bone holds anything.
     """
     surface = frame.surface
     if not problem.held or surface is None:
