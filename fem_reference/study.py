@@ -61,7 +61,7 @@ class ErrorBar:
 @dataclass(frozen=True, eq=False)
 class ErrorBars:
     """The error bars of a reference over frame ``numbers`` (f,), from tetrahedra of ``sizes`` [mm], the reference's own first; the
-    error is of at least the ``order`` in them.
+    error is taken to be of the ``order`` in them.
     """
 
     numbers: tuple[int, ...]
@@ -87,20 +87,22 @@ class Pair:
     """Runs of the reference over the same frames: ``fine``, itself, and ``coarse`` on larger tetrahedra; by name the ``varied``
     ones, each as ``coarse`` with one cause of error halved; and one with ``exact`` attachments, where they are springs.
 
-    ``sizes`` [mm] are those of the tetrahedra, and the error is of at least the ``order`` in them.
+    ``sizes`` [mm] are those of the tetrahedra, and the error is of at least the ``order`` in them; of ``local_order`` where a
+    statistic is that of the worst place: next to the rim of an attachment displacement converges more slowly than elsewhere.
     """
 
     fine: Run
     coarse: Run
     sizes: tuple[float, float]
     order: float
+    local_order: float
     varied: dict[str, Run]
     exact: Run | None = None
 
-    @property
-    def share(self) -> float:
+    def share(self, statistic: str) -> float:
         """The error of the fine run over what the two differ by, with the safety of a grid convergence index."""
-        return float(SAFETY / ((self.sizes[1] / self.sizes[0]) ** self.order - 1))
+        order = self.local_order if is_local(statistic) else self.order
+        return float(SAFETY / ((self.sizes[1] / self.sizes[0]) ** order - 1))
 
 
 def error_bars(pair: Pair, yardstick: Yardstick) -> ErrorBars:
@@ -122,13 +124,16 @@ def error_bars(pair: Pair, yardstick: Yardstick) -> ErrorBars:
         return found.values
 
     bars = []
+    worst = _of_deviations(coarse, fine, measured)
     kinds: tuple[tuple[Of, _Differences], ...] = (("change", _of_changes), ("deviation", _of_deviations))
     for of, differences in kinds:
         near = differences(coarse, fine, measured)
         varied = {name: differences(run, coarse, measured) for name, run in others.items()}
         other = None if exact is None else differences(exact, coarse, measured)
         for i, one in enumerate(measured(fine, fine)):
-            parts = {TETRAHEDRA: pair.share * typical(near[i], apart(coarse, fine))}
+            # The worst places of two runs may be others: by the triangle inequality, what the runs differ by bounds the change too.
+            differing = worst[i] if is_local(one.statistic) else near[i]
+            parts = {TETRAHEDRA: pair.share(one.statistic) * typical(differing, apart(coarse, fine))}
             parts |= {
                 name: VARIATION * typical(found[i], apart(others[name], coarse)) for name, found in varied.items()
             }
@@ -137,6 +142,11 @@ def error_bars(pair: Pair, yardstick: Yardstick) -> ErrorBars:
             total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))  # of causes that are independent
             bars.append(ErrorBar(of, one.metric, one.statistic, one.unit, total, greatest, model))
     return ErrorBars(fine.numbers, pair.sizes, pair.order, tuple(bars))
+
+
+def is_local(statistic: str) -> bool:
+    """Whether a statistic is that of the worst place alone."""
+    return statistic.startswith(("max", "hausdorff"))
 
 
 def typical(differences: Floats, apart: Floats) -> Floats:
