@@ -99,9 +99,9 @@ class Pair:
     varied: dict[str, Run]
     exact: Run | None = None
 
-    def share(self, statistic: str) -> float:
+    def share(self, metric: str, statistic: str) -> float:
         """The error of the fine run over what the two differ by, with the safety of a grid convergence index."""
-        order = self.local_order if is_local(statistic) else self.order
+        order = self.local_order if is_local(metric, statistic) else self.order
         return float(SAFETY / ((self.sizes[1] / self.sizes[0]) ** order - 1))
 
 
@@ -132,8 +132,8 @@ def error_bars(pair: Pair, yardstick: Yardstick) -> ErrorBars:
         other = None if exact is None else differences(exact, coarse, measured)
         for i, one in enumerate(measured(fine, fine)):
             # The worst places of two runs may be others: by the triangle inequality, what the runs differ by bounds the change too.
-            differing = worst[i] if is_local(one.statistic) else near[i]
-            parts = {TETRAHEDRA: pair.share(one.statistic) * typical(differing, apart(coarse, fine))}
+            differing = worst[i] if is_local(one.metric, one.statistic) else near[i]
+            parts = {TETRAHEDRA: pair.share(one.metric, one.statistic) * typical(differing, apart(coarse, fine))}
             parts |= {
                 name: VARIATION * typical(found[i], apart(others[name], coarse)) for name, found in varied.items()
             }
@@ -144,9 +144,9 @@ def error_bars(pair: Pair, yardstick: Yardstick) -> ErrorBars:
     return ErrorBars(fine.numbers, pair.sizes, pair.order, tuple(bars))
 
 
-def is_local(statistic: str) -> bool:
-    """Whether a statistic is that of the worst place alone."""
-    return statistic.startswith(("max", "hausdorff"))
+def is_local(metric: str, statistic: str) -> bool:
+    """Whether a statistic is that of the worst place alone; the length of a fibre is that of many places."""
+    return statistic.startswith(("max", "hausdorff")) and metric != "fibre_length"
 
 
 def typical(differences: Floats, apart: Floats) -> Floats:

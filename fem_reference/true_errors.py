@@ -1,4 +1,4 @@
-"""The finer solutions that error bars are held against."""
+"""The finer solutions that error bars are held against: on smaller tetrahedra, with finer contact."""
 
 import logging
 from collections.abc import Iterable
@@ -41,8 +41,7 @@ def _of(scene: Scene, store: Path) -> list[Claim]:
     bars = refinement.stored(reference) or refinement.obtain(bench, reference)
     if bars is None:
         return []
-    muscle = scene.muscle.model_copy(update={"tet_size": FINER * scene.muscle.tet_size})
-    finer = Bench(scene.model_copy(update={"muscle": muscle}), store)
+    finer = Bench(refinement.finer(bench, reference, FINER), store)
     run = complete(finer.obtain("finer", scene.reference, "reference"), reference.numbers)
     if reference.fibres is None or run.outcome.status != "converged":
         return []

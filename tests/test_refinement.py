@@ -215,10 +215,10 @@ def test_where_no_bone_pressed_contact_has_no_error(case) -> None:
     assert refinement.variations(scene, Settings(), pressed=False) == ()
     bench = Bench(scene, case.parent / "runs")
     reference = bench.obtain("reference", scene.reference, "reference")
-    assert len(refinement._varied(bench, reference)) == 3
+    assert len(refinement._needed(bench, reference)) == 3
     for area, count in ((0.0, 0), (2.0, 3)):
         pressed = replace(reference, scalars={"contact_area": np.array([0.0, area, 0, 0, np.nan])})
-        assert len(refinement._varied(bench, pressed)) == count
+        assert len(refinement._needed(bench, pressed)) == count
 
 
 def test_a_bar_that_is_cheap_is_made_without_being_asked_for(case) -> None:
@@ -255,3 +255,15 @@ def test_contact_is_varied_cause_by_cause(case) -> None:
     # Each is another scene with another key, or has other settings: no run is mistaken for another.
     keys = {scene.model_copy(update=changes).key for changes in varied.values()}
     assert len(keys | {scene.key}) == 4
+
+
+def test_a_finer_scene_has_every_cause_of_error_halved(case) -> None:
+    scene = scene_of(case, CONTACT)
+    bench = Bench(scene, case.parent / "runs")
+    reference = bench.obtain("reference", scene.reference, "reference")
+    finer = refinement.finer(bench, reference, 0.8)
+    (contact,) = finer.effects[2:]
+    assert (finer.muscle.tet_size, contact.stiffness, contact.smoothing) == pytest.approx((4.8, 0.2, 0.1))
+    assert [bone.distance_rounding for bone in finer.bone] == [0.5, 0.5]
+    unpressed = replace(reference, scalars={"contact_area": np.zeros(5)})
+    assert refinement.finer(bench, unpressed, 0.8).effects == scene.effects
