@@ -109,9 +109,6 @@ def error_bars(pair: Pair, yardstick: Yardstick) -> ErrorBars:
     """The bars of every statistic of every metric, of changes and of deviations: what the tetrahedra and the variations add. What
     is said of a run itself has none: it is known.
     """
-    fine, coarse = _surface(pair.fine), _surface(pair.coarse)
-    others = {name: _surface(run) for name, run in pair.varied.items()}
-    exact = None if pair.exact is None else _surface(pair.exact)
     comparing = [name for name in names() if not of_itself(name)]
 
     @cache
@@ -124,9 +121,12 @@ def error_bars(pair: Pair, yardstick: Yardstick) -> ErrorBars:
         return found.values
 
     bars = []
-    worst = _of_deviations(coarse, fine, measured)
-    kinds: tuple[tuple[Of, _Differences], ...] = (("change", _of_changes), ("deviation", _of_deviations))
-    for of, differences in kinds:
+    kinds: tuple[tuple[Of, _Differences, Callable[[Run], Run]], ...]
+    kinds = (("change", _of_changes, lambda run: run), ("deviation", _of_deviations, _surface))
+    for of, differences, seen in kinds:
+        fine, coarse, exact = seen(pair.fine), seen(pair.coarse), pair.exact and seen(pair.exact)
+        others = {name: seen(run) for name, run in pair.varied.items()}
+        worst = _of_deviations(coarse, fine, measured)
         near = differences(coarse, fine, measured)
         varied = {name: differences(run, coarse, measured) for name, run in others.items()}
         other = None if exact is None else differences(exact, coarse, measured)
@@ -141,12 +141,14 @@ def error_bars(pair: Pair, yardstick: Yardstick) -> ErrorBars:
             model = None if other is None else np.abs(other[i])
             total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))  # of causes that are independent
             bars.append(ErrorBar(of, one.metric, one.statistic, one.unit, total, greatest, model))
-    return ErrorBars(fine.numbers, pair.sizes, pair.order, tuple(bars))
+    return ErrorBars(pair.fine.numbers, pair.sizes, pair.order, tuple(bars))
 
 
 def is_local(metric: str, statistic: str) -> bool:
-    """Whether a statistic is that of the worst place alone; the length of a fibre is that of many places."""
-    return statistic.startswith(("max", "hausdorff")) and metric != "fibre_length"
+    """Whether a statistic is that of the worst place alone (the length of a fibre is that of many places), or of the volume, whose
+    small differences converge as slowly.
+    """
+    return metric == "volume" or (statistic.startswith(("max", "hausdorff")) and metric != "fibre_length")
 
 
 def typical(differences: Floats, apart: Floats) -> Floats:
@@ -161,7 +163,7 @@ def typical(differences: Floats, apart: Floats) -> Floats:
 
 
 def _surface(run: Run) -> Run:
-    """The run without its fibres: candidates are surfaces, so that the lengths of all go through the yardstick's extension."""
+    """The run as candidates are: a surface without an interior, so that lengths go through the yardstick's extension."""
     return replace(run, fibres=None, fibre_positions=None)
 
 
