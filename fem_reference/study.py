@@ -28,6 +28,8 @@ FORMAT = 2
 SAFETY = 1.25
 # What is left of an error of first order, when halving its cause changes the result by 1.
 VARIATION = 2.0
+# The volume is nearly kept, and what is left of its change does not converge faster.
+VOLUME_ORDER = 1.0
 TETRAHEDRA = "tetrahedra"
 # The measures of a run against another or (None) its rest, and what two runs differ by in each of them.
 _Measured = Callable[[Run, Run | None], tuple[Measure, ...]]
@@ -102,6 +104,7 @@ class Pair:
     def share(self, metric: str, statistic: str) -> float:
         """The error of the fine run over what the two differ by, with the safety of a grid convergence index."""
         order = self.local_order if is_local(metric, statistic) else self.order
+        order = min(order, VOLUME_ORDER) if metric == "volume" else order
         return float(SAFETY / ((self.sizes[1] / self.sizes[0]) ** order - 1))
 
 
@@ -145,10 +148,8 @@ def error_bars(pair: Pair, yardstick: Yardstick) -> ErrorBars:
 
 
 def is_local(metric: str, statistic: str) -> bool:
-    """Whether a statistic is that of the worst place alone (the length of a fibre is that of many places), or of the volume, whose
-    small differences converge as slowly.
-    """
-    return metric == "volume" or (statistic.startswith(("max", "hausdorff")) and metric != "fibre_length")
+    """Whether a statistic is that of the worst place alone; the length of a fibre is that of many places."""
+    return statistic.startswith(("max", "hausdorff")) and metric != "fibre_length"
 
 
 def typical(differences: Floats, apart: Floats) -> Floats:
