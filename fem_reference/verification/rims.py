@@ -85,7 +85,8 @@ class Rim:
     def order(self, lab: Lab) -> Finding:
         """From what three levels differ by: no truth of the force is needed."""
         values = [self.force(lab, level) for level in range(3)]
-        found = float(np.log2((values[1] - values[0]) / (values[2] - values[1])))
+        first, second = abs(values[1] - values[0]), abs(values[2] - values[1])
+        found = float(np.log2(first / second)) if first > 0 and second > 0 else np.nan
         return Finding(found, note=", ".join(f"{value:.7g} N" for value in values))
 
     def truth(self) -> float:
