@@ -31,9 +31,8 @@ VARIATION = 2.0
 # The volume is nearly kept, and what is left of its change does not converge faster.
 VOLUME_ORDER = 1.0
 TETRAHEDRA = "tetrahedra"
-# The measures of a run against another or (None) its rest, and what two runs differ by in each of them.
+# The measures of a run against another or (None) its rest.
 _Measured = Callable[[Run, Run | None], tuple[Measure, ...]]
-_Differences = Callable[[Run, Run, _Measured], list[Floats]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,24 +123,31 @@ def error_bars(pair: Pair, yardstick: Yardstick) -> ErrorBars:
         return found.values
 
     bars = []
-    kinds: tuple[tuple[Of, _Differences, Callable[[Run], Run]], ...]
-    kinds = (("change", _of_changes, lambda run: run), ("deviation", _of_deviations, _surface))
-    for of, differences, seen in kinds:
-        fine, coarse, exact = seen(pair.fine), seen(pair.coarse), pair.exact and seen(pair.exact)
-        others = {name: seen(run) for name, run in pair.varied.items()}
-        worst = _of_deviations(coarse, fine, measured)
-        near = differences(coarse, fine, measured)
-        varied = {name: differences(run, coarse, measured) for name, run in others.items()}
-        other = None if exact is None else differences(exact, coarse, measured)
+    fine, coarse, *others = (_surface(run) for run in (pair.fine, pair.coarse, *pair.varied.values()))
+    gaps = {name: apart(run, coarse) for name, run in zip(pair.varied, others, strict=True)}
+    # By what a bar is of, what the runs differ by: the reference's own change sees its fibres inside, candidates are surfaces.
+    near: dict[Of, list[Floats]] = {
+        "change": _of_changes(pair.coarse, pair.fine, measured),
+        "deviation": _of_deviations(coarse, fine, measured),
+    }
+    varied: dict[Of, dict[str, list[Floats]]] = {
+        "change": {name: _of_changes(run, pair.coarse, measured) for name, run in pair.varied.items()},
+        "deviation": {
+            name: _of_deviations(run, coarse, measured) for name, run in zip(pair.varied, others, strict=True)
+        },
+    }
+    exact: dict[Of, list[Floats]] = {}
+    if pair.exact is not None:
+        exact["change"] = _of_changes(pair.exact, pair.coarse, measured)
+        exact["deviation"] = _of_deviations(_surface(pair.exact), coarse, measured)
+    for of, differences in near.items():
         for i, one in enumerate(measured(fine, fine)):
             # The worst places of two runs may be others: by the triangle inequality, what the runs differ by bounds the change too.
-            differing = worst[i] if is_local(one.metric, one.statistic) else near[i]
+            differing = near["deviation"][i] if is_local(one.metric, one.statistic) else differences[i]
             parts = {TETRAHEDRA: pair.share(one.metric, one.statistic) * typical(differing, apart(coarse, fine))}
-            parts |= {
-                name: VARIATION * typical(found[i], apart(others[name], coarse)) for name, found in varied.items()
-            }
+            parts |= {name: VARIATION * typical(found[i], gaps[name]) for name, found in varied[of].items()}
             greatest = {name: float(part.max()) for name, part in parts.items()}
-            model = None if other is None else np.abs(other[i])
+            model = np.abs(exact[of][i]) if of in exact else None
             total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))  # of causes that are independent
             bars.append(ErrorBar(of, one.metric, one.statistic, one.unit, total, greatest, model))
     return ErrorBars(pair.fine.numbers, pair.sizes, pair.order, tuple(bars))
