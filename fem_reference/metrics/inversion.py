@@ -3,6 +3,8 @@
 It is told from the surface alone, so of every run; where a solver has an interior, its smallest det F says more.
 """
 
+from functools import lru_cache
+
 import numpy as np
 
 from fem_reference.geometry.windings import outer_windings
@@ -19,16 +21,23 @@ def measure(run: Run, reference: Run, _yardstick: Yardstick) -> tuple[Measure, .
 
     NaN in a frame where a triangle has collapsed: it has no outer side.
     """
-    windings, wanted = (
-        np.array([outer_windings(each.surface.moved_to(points)) for points in each.positions])
-        for each in (run, reference)
-    )
+    windings, wanted = _windings(run), _windings(reference)
     areas = triangle_areas(reference.surface.points, reference.surface.triangles)
     return tuple(
         Measure("inversion", name, UNITS[name], _share(sign * windings, areas) - _share(sign * wanted, areas), where)
         for name, sign in (("inside_out", -1), ("overlapping", 1))
         for where in [_first(sign * windings, run)]
     )
+
+
+@lru_cache(maxsize=4)  # a run is met against many others, and this is most of what measuring costs
+def _windings(run: Run) -> Floats:
+    """The outer windings (f, m) of the triangles in each frame; of frames that repeat one array, once."""
+    still = run.positions.strides[0] == 0
+    once = np.array([outer_windings(run.surface.moved_to(points)) for points in run.positions[: 1 if still else None]])
+    found = np.broadcast_to(once, (len(run.positions), once.shape[1]))
+    found.flags.writeable = False
+    return found
 
 
 def _share(windings: Floats, areas: Floats) -> Floats:
