@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from fem_reference import effects
 from fem_reference.effects import Coursed, Effect, Energy, Interaction, Load, State
-from fem_reference.records import parse
+from fem_reference.foundations.records import parse
 
 COURSE = [{"frame": 0, "amount": 0.0}, {"frame": 10, "amount": 1.0}, {"frame": 30, "amount": 0.5}]
 PARAMETERS: dict[str, dict[str, Any]] = {

@@ -8,10 +8,10 @@ import acting
 import numpy as np
 import shapes
 
-from fem_reference.continuum import ByCell
-from fem_reference.motion import Rotation, Translation
-from fem_reference.problem import Body, Problem
-from fem_reference.records import parse
+from fem_reference.foundations.motion import Rotation, Translation
+from fem_reference.foundations.records import parse
+from fem_reference.problems.body import ByCell
+from fem_reference.problems.muscle import Body, Problem
 
 FRAMES = (10, 15, 20, 25)
 TURNS = Rotation((1, 2, 2), (3.0, -4.0, 5.0), (10.0, 18.0, 40.0), (0.0, -0.7, 0.4))

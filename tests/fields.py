@@ -8,8 +8,8 @@ import shapes
 from scipy.spatial import Delaunay
 
 from fem_reference import effects
-from fem_reference.field.scene import FieldScene, FieldSceneFile
-from fem_reference.records import parse
+from fem_reference.foundations.records import parse
+from fem_reference.scenes.scalar import FieldScene, FieldSceneFile
 
 _HARMLESS = {
     "title": "a test",

@@ -4,9 +4,9 @@ import itertools
 
 import numpy as np
 
-from fem_reference.mesh import Floats, Polylines, Surface, TetMesh, boundary
-from fem_reference.motion import Rotation
-from fem_reference.problem import Body, Held, Problem
+from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh, boundary
+from fem_reference.foundations.motion import Rotation
+from fem_reference.problems.muscle import Body, Held, Problem
 
 
 def box(cells: tuple[int, int, int], size: tuple[float, float, float]) -> TetMesh:

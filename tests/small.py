@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import shapes
 
-from fem_reference import files
-from fem_reference.mesh import Floats, Surface
-from fem_reference.motion import apply
+from fem_reference.foundations.mesh import Floats, Surface
+from fem_reference.foundations.motion import apply
+from fem_reference.io import files
 
 CASE = """
 title = "A bar between two plates"

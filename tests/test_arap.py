@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import shapes
 
-from fem_reference.errors import InputError
-from fem_reference.mesh import Surface, enclosed_volume
-from fem_reference.motion import Rotation, Translation, apply
-from fem_reference.problem import Body, Held, Setup
-from fem_reference.records import parse
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Surface, enclosed_volume
+from fem_reference.foundations.motion import Rotation, Translation, apply
+from fem_reference.foundations.records import parse
+from fem_reference.problems.muscle import Body, Held, Setup
 from fem_reference.solvers import arap
 
 USUAL = {

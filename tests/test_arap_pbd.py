@@ -7,11 +7,11 @@ import pytest
 import shapes
 from test_arap import JUMP, SWING, TURN, held_setup, muscle, started, system_of
 
-from fem_reference.errors import InputError
-from fem_reference.mesh import enclosed_volume
-from fem_reference.motion import Rotation, Translation, apply
-from fem_reference.problem import Held, Setup
-from fem_reference.records import parse
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import enclosed_volume
+from fem_reference.foundations.motion import Rotation, Translation, apply
+from fem_reference.foundations.records import parse
+from fem_reference.problems.muscle import Held, Setup
 from fem_reference.solvers import arap, arap_pbd
 from fem_reference.solvers.pbd import Constraints
 from fem_reference.solvers.pbd_kernels import distances, volume

@@ -9,12 +9,12 @@ import shapes
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from fem_reference import files
-from fem_reference.errors import InputError
-from fem_reference.geometry.attachments import facets_under, pick
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Surface, check_closed, triangle_areas, vertex_areas
 from fem_reference.geometry.sectors import held_shares
-from fem_reference.mesh import Surface, check_closed, triangle_areas, vertex_areas
-from fem_reference.scene import Attachment, Scene
+from fem_reference.io import files
+from fem_reference.problems.attachments import facets_under, pick
+from fem_reference.scenes.muscle import Attachment, Scene
 
 BLOCK = shapes.skin(shapes.box((10, 10, 2), (20.0, 20.0, 4.0)))
 FLOOR = Surface(np.array([[-50.0, -50, -1], [50, -50, -1], [0, 80, -1]]), np.array([[0, 1, 2]]))

@@ -5,9 +5,9 @@ import pytest
 import shapes
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fem_reference.errors import InputError
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Surface, boundary, check_closed, tet_qualities, tet_volumes
 from fem_reference.geometry.block import fill, kuhn, lattice_skin
-from fem_reference.mesh import Surface, boundary, check_closed, tet_qualities, tet_volumes
 
 LOW, SIZE = np.array([-50.0, 10, -50]), (100.0, 80.0, 60.0)
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from fem_reference import casefile
-from fem_reference.execution import Bench
+from fem_reference.scenes import casefile
+from fem_reference.studies.execution import Bench
 
 MU, BULK, AREA = 0.01, 10.0, 1e4  # [MPa], [mm2]
 

@@ -4,7 +4,9 @@ import json
 
 import pytest
 
-from fem_reference import casefile, cli, field_verbs
+from fem_reference import cli
+from fem_reference.cli import scalar
+from fem_reference.scenes import casefile
 
 # The way there and back in its two ends and a middle; the bulk of the time is the number of frames.
 FEW = {"frames.every": 100}
@@ -37,7 +39,7 @@ UNSOLVED = "iliacus"
 
 @pytest.mark.parametrize("name", FIELDS)
 def test_spoiled_scalar_cases_fail(name, tmp_path) -> None:
-    told = field_verbs.run(casefile.read(name, spoiled=True), solver_of(name), tmp_path)
+    told = scalar.run(casefile.read(name, spoiled=True), solver_of(name), tmp_path)
     assert told.word == "fail"
     assert [v["of"] for v in told.facts["verdicts"] if v["word"] == "fail"] == [FIELDS[name]]
 
@@ -48,7 +50,7 @@ def solver_of(name: str) -> str | None:
 
 @pytest.mark.parametrize("name", [name for name in FIELDS if name != "surface_figure"])
 def test_scalar_cases_by_the_listing_alone(name, tmp_path) -> None:
-    told = field_verbs.run(casefile.read(name), solver_of(name), tmp_path)
+    told = scalar.run(casefile.read(name), solver_of(name), tmp_path)
     assert (told.word, told.facts["verdict"], told.facts["status"]) == ("pass", "pass", "converged")
 
 

@@ -11,8 +11,11 @@ from xml.etree import ElementTree
 import pytest
 import small
 
-from fem_reference import casefile, cli, files, problem
-from fem_reference.runs import Frame, Outcome
+from fem_reference import cli
+from fem_reference.io import files
+from fem_reference.problems import muscle
+from fem_reference.runs.store import Frame, Outcome
+from fem_reference.scenes import casefile
 from fem_reference.solvers import fenicsx, pbd
 
 # What the README shows, in the repository of a user.
@@ -42,7 +45,7 @@ class Work:
         self.root, self.case, self.frames = root, root / "bar", root / "mine"
         self.baseline = root / "baselines" / "mine.json"
         scene = casefile.read_muscle(self.case)
-        self.rest, self.numbers = problem.setup(scene).surface, scene.frames.numbers
+        self.rest, self.numbers = muscle.setup(scene).surface, scene.frames.numbers
 
     def write(self, moved: int | None = None) -> None:
         """The candidate's frames, the one numbered ``moved`` 2 mm aside."""

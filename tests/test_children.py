@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 import fem_reference
-from fem_reference.children import command, environment
+from fem_reference.foundations.subprocesses import command, environment
 
 
 def test_a_module_beside_the_user_is_not_taken_for_ours(tmp_path) -> None:

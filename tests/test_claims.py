@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 import small
 
-from fem_reference import casefile, cli, refinement, true_errors
-from fem_reference.claims import CLAIMED, Claim, Claims, Cover, claimed
+from fem_reference import cli
+from fem_reference.assessment.claims import CLAIMED, Claim, Claims, Cover, claimed
+from fem_reference.assessment.error_bars import ErrorBar, ErrorBars
 from fem_reference.metrics import Measure
 from fem_reference.report import claims_page, write_claims
-from fem_reference.runs import Frame, Outcome
+from fem_reference.runs.store import Frame, Outcome
+from fem_reference.scenes import casefile
 from fem_reference.solvers import fenicsx
-from fem_reference.study import ErrorBar, ErrorBars
+from fem_reference.studies import refinement, true_errors
 
 NAN = float("nan")
 

@@ -6,9 +6,9 @@ import shapes
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
+from fem_reference.foundations.mesh import Surface, check_closed, enclosed_volume, triangle_areas
 from fem_reference.geometry.coarsening import coarsen, flip_edges, inflate, slide
 from fem_reference.geometry.distance import distances
-from fem_reference.mesh import Surface, check_closed, enclosed_volume, triangle_areas
 
 
 def _qualities(surface: Surface) -> np.ndarray:

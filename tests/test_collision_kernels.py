@@ -5,10 +5,10 @@ import pytest
 import shapes
 from numpy.testing import assert_allclose, assert_array_equal
 
+from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere
 from fem_reference.geometry.signed_distance import FAR, Grid, build
-from fem_reference.motion import Rotation, Translation, apply
-from fem_reference.problem import Body
+from fem_reference.problems.muscle import Body
 from fem_reference.solvers import collision_kernels as collision
 
 BALL = shapes.sphere(2, 20.0)

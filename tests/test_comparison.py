@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 import shapes
 
-from fem_reference.comparison import compare
-from fem_reference.errors import InputError
-from fem_reference.mesh import Polylines
-from fem_reference.problem import Setup
-from fem_reference.runs import Outcome, Run
-from fem_reference.scene import Expectation
-from fem_reference.study import ErrorBar, ErrorBars
+from fem_reference.assessment.comparison import compare
+from fem_reference.assessment.error_bars import ErrorBar, ErrorBars
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Polylines
+from fem_reference.problems.muscle import Setup
+from fem_reference.runs.store import Outcome, Run
+from fem_reference.scenes.muscle import Expectation
 
 REST = shapes.sphere(2, 10.0)
 FIBRE = Polylines(np.array([[0.0, 0, -5], [0, 0, 5]]), np.array([0, 2]))

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from fem_reference.contact import Contact, Nearby, Obstruction
 from fem_reference.geometry.rigid_bodies import Box, Sphere
 from fem_reference.geometry.signed_distance import Grid, build
 from fem_reference.geometry.tessellation import tessellated
+from fem_reference.problems.contact import Contact, Nearby, Obstruction
 
 D, K = 0.1, 2.0
 LAW = Contact("top", K, D)

@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 import small
 
-from fem_reference import casefile, problem
-from fem_reference.contact import Contact, Obstruction, nearest_on_way
-from fem_reference.continuum import Continuum
-from fem_reference.deformable import as_continuum
-from fem_reference.errors import InputError
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.motion import apply
 from fem_reference.geometry.rigid_bodies import Box
-from fem_reference.motion import apply
+from fem_reference.problems import muscle, shapes
+from fem_reference.problems.body import Continuum
+from fem_reference.problems.contact import Contact, Obstruction, nearest_on_way
+from fem_reference.problems.muscle_body import as_continuum
+from fem_reference.scenes import casefile
 from fem_reference.solvers import fenicsx
-from fem_reference.verification import parts, shapes
+from fem_reference.verification import parts
 from fem_reference.verification.contact import Slide
 
 BALL = '[[bone]]\nname = "ball"\nsphere = {{ centre = "5, {y}, 30 mm", radius = "4 mm" }}\n\n[[attachment]]\nname = "origin"'
@@ -31,8 +32,8 @@ def scene(folder, y: float, contact: str = CONTACT):
 
 def solved(case, ranks: int = 1):
     """The frames of a scene and the depth of the deepest free vertex in the ball in each [mm]."""
-    rest = problem.setup(case)
-    built = problem.build(case, rest)
+    rest = muscle.setup(case)
+    built = muscle.build(case, rest)
     frames = []
     settings = fenicsx.Settings(ranks=ranks, first_step=5, residual=1e-9)
     assert fenicsx.solve(built, settings, frames.append).status == "converged"
@@ -74,7 +75,7 @@ def test_ranks_change_nothing(tmp_path) -> None:
 @pytest.mark.usefixtures("needs_fenicsx")
 def test_what_overlaps_at_rest_is_relaxed_first_and_told(tmp_path) -> None:
     case = scene(tmp_path / "bar", -4.6)  # 0.46 mm deep
-    assert as_continuum(problem.build(case, problem.setup(case))).frames == (-10.0, 0, 5, 10)
+    assert as_continuum(muscle.build(case, muscle.setup(case))).frames == (-10.0, 0, 5, 10)
     frames, depths = solved(case)
     assert [frame.number for frame in frames] == [0, 5, 10]
     first = frames[0].scalars
@@ -85,8 +86,8 @@ def test_what_overlaps_at_rest_is_relaxed_first_and_told(tmp_path) -> None:
 
 def test_bones_push_only_what_they_do_not_hold(tmp_path) -> None:
     case = scene(tmp_path / "bar", -5.5)
-    rest = problem.setup(case)
-    body = as_continuum(problem.build(case, rest))
+    rest = muscle.setup(case)
+    body = as_continuum(muscle.build(case, rest))
     assert [entry.name for entry in body.obstructions] == ["floor", "lid", "ball"]
     assert [type(effect).__name__ for effect in body.effects] == ["NeoHooke", "Incompressible"]
     heights = body.contact.on.points[:, 2]
@@ -98,7 +99,7 @@ def test_bones_push_only_what_they_do_not_hold(tmp_path) -> None:
 def test_only_some_bones_push(tmp_path) -> None:
     some = CONTACT.replace("\n\n", '\nbones = ["ball"]\n\n')
     case = scene(tmp_path / "bar", -5.5, some)
-    assert [entry.name for entry in as_continuum(problem.build(case, problem.setup(case))).obstructions] == ["ball"]
+    assert [entry.name for entry in as_continuum(muscle.build(case, muscle.setup(case))).obstructions] == ["ball"]
     with pytest.raises(InputError, match=r'effect\[2\]\.bones: got "bal", want one of floor, lid, ball'):
         scene(tmp_path / "other", -5.5, some.replace("ball", "bal"))
 
@@ -142,7 +143,7 @@ def test_what_relaxes_waits_for_the_first_frame(tmp_path) -> None:
     )
     path.write_text(turning)
     case = casefile.read(path)
-    body = as_continuum(problem.build(case, problem.setup(case)))
+    body = as_continuum(muscle.build(case, muscle.setup(case)))
     assert body.first == 0
     assert body.obstructions[1].pose(-10.0) == pytest.approx(np.eye(4))
     top = np.array([[5.0, 5.0, 40.0]])
@@ -163,4 +164,4 @@ def test_a_bone_that_pushes_and_an_attachment_have_names_of_their_own(tmp_path) 
 def test_a_bone_that_the_muscle_swallows_is_refused(tmp_path) -> None:
     case = scene(tmp_path / "bar", 5.0)
     with pytest.raises(InputError, match=r"case.toml: bone\[2\]: got a bone wholly inside the muscle"):
-        problem.build(case, problem.setup(case))
+        muscle.build(case, muscle.setup(case))

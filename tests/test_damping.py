@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from test_stability import LENGTH, STILL, THIN, column, critical, effect, flesh, session  # noqa: F401 - a fixture
 
-from fem_reference import casefile
-from fem_reference.continuum import Continuum, Prescribed, check
-from fem_reference.errors import InputError
+from fem_reference.foundations.errors import InputError
+from fem_reference.problems import shapes
+from fem_reference.problems.body import Continuum, Prescribed, check
+from fem_reference.problems.courses import Affine, Rest
+from fem_reference.scenes import casefile
 from fem_reference.solvers.fenicsx import BodySettings
 from fem_reference.solvers.scikit_fem import BodySettings as OtherSettings
 from fem_reference.solvers.scikit_fem import solve_body
-from fem_reference.verification import shapes
-from fem_reference.verification.courses import Affine, Rest
 
 DRAG = effect("damping", coefficient="1 Pa s/mm^2")
 

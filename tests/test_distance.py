@@ -6,8 +6,8 @@ import shapes
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
+from fem_reference.foundations.mesh import Surface
 from fem_reference.geometry.distance import distances
-from fem_reference.mesh import Surface
 
 HIP = np.array([146.0, 238.0, -431.0])  # [mm]
 CUBE = shapes.skin(shapes.box((3, 3, 3), (2.0, 2.0, 2.0)))

@@ -8,14 +8,14 @@ import shapes
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from fem_reference.errors import InputError
-from fem_reference.files import read_surface
+from fem_reference.assessment.judge import check, verdict
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Polylines, Surface, triangle_areas
 from fem_reference.geometry.edges import Edges
-from fem_reference.judge import check, verdict
-from fem_reference.mesh import Polylines, Surface, triangle_areas
+from fem_reference.io.files import read_surface
 from fem_reference.metrics import Measure, Yardstick, at_rest, dihedral_angle, edge_extension, measure, names, units
-from fem_reference.runs import Outcome, Run
-from fem_reference.scene import Expectation
+from fem_reference.runs.store import Outcome, Run
+from fem_reference.scenes.muscle import Expectation
 
 SIZE = (12.0, 7.0, 3.0)
 CELLS = 6

@@ -31,8 +31,8 @@ from acting import (
 
 from fem_reference import effects
 from fem_reference.effects import Energy, FieldEffect, FieldState, Load, Numpy, Place, Prestrain, State
-from fem_reference.errors import InputError
-from fem_reference.records import parse
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.records import parse
 
 FIELD_PARAMETERS = {
     "diffusion": {"coefficient": 2.0},

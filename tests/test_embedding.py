@@ -6,8 +6,8 @@ import shapes
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
+from fem_reference.foundations.mesh import TetMesh
 from fem_reference.geometry.embedding import Locator, embed
-from fem_reference.mesh import TetMesh
 
 HIP = np.array([146.0, 238.0, -431.0])  # [mm]
 

@@ -15,18 +15,21 @@ import numpy as np
 import pytest
 import small
 
-from fem_reference import casefile, cli, exchange, files, problem, report
-from fem_reference.continuum import ByCell
-from fem_reference.errors import InputError
-from fem_reference.exchange import open_formats
-from fem_reference.execution import Bench
-from fem_reference.motion import apply
-from fem_reference.problem import Problem
-from fem_reference.records import parse
+from fem_reference import cli, export, report
+from fem_reference.export import open_formats
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.motion import apply
+from fem_reference.foundations.records import parse
+from fem_reference.io import files
+from fem_reference.problems import muscle
+from fem_reference.problems.body import ByCell
+from fem_reference.problems.muscle import Problem
 from fem_reference.report.tables import seconds_per_frame
-from fem_reference.runs import Outcome, Run
-from fem_reference.scene import Scene
+from fem_reference.runs.store import Outcome, Run
+from fem_reference.scenes import casefile
+from fem_reference.scenes.muscle import Scene
 from fem_reference.solvers import recorded
+from fem_reference.studies.execution import Bench
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +42,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 @pytest.fixture(scope="module")
 def built(scene: Scene) -> Problem:
     """The small scene, with a direction of fibres in each tet, no two the same."""
-    bar = problem.build(scene, problem.setup(scene))
+    bar = muscle.build(scene, muscle.setup(scene))
     along = np.random.default_rng(6).normal(size=(len(bar.mesh.tets), 3))
     return replace(bar, fibre=ByCell(along / np.linalg.norm(along, axis=1)[:, None]))
 
@@ -47,7 +50,7 @@ def built(scene: Scene) -> Problem:
 @pytest.fixture(scope="module")
 def exported(scene: Scene, built: Problem, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("export") / "bar"
-    exchange.export(scene, lambda: built, folder, "open")
+    export.export(scene, lambda: built, folder, "open")
     return folder
 
 
@@ -167,9 +170,9 @@ def test_a_folder_that_is_in_use_is_refused_before_any_work(scene: Scene, tmp_pa
     with pytest.raises(
         InputError, match=r"--to: got .*, which is not empty, want a folder that is not there yet, or empty"
     ):
-        exchange.export(scene, lambda: pytest.fail("built"), tmp_path, "open")
+        export.export(scene, lambda: pytest.fail("built"), tmp_path, "open")
     with pytest.raises(InputError, match=r"--to: got .*mine\.txt\", a file, want a folder"):
-        exchange.export(scene, lambda: pytest.fail("built"), tmp_path / "mine.txt", "open")
+        export.export(scene, lambda: pytest.fail("built"), tmp_path / "mine.txt", "open")
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
 
 
@@ -179,11 +182,11 @@ def test_an_export_that_fails_leaves_nothing(scene: Scene, built: Problem, tmp_p
 
     monkeypatch.setattr(open_formats, "write_lines", fails)
     with pytest.raises(OSError, match="no space left"):
-        exchange.export(scene, lambda: built, tmp_path / "bar", "open")
+        export.export(scene, lambda: built, tmp_path / "bar", "open")
     assert list(tmp_path.iterdir()) == []
     monkeypatch.undo()
     (tmp_path / "bar").mkdir()  # an empty folder is free
-    assert "scene.json" in exchange.export(scene, lambda: built, tmp_path / "bar", "open")
+    assert "scene.json" in export.export(scene, lambda: built, tmp_path / "bar", "open")
 
 
 @pytest.fixture(scope="module")
@@ -237,8 +240,8 @@ def test_gluteus_maximus_goes_out_and_comes_back(data: Path, tmp_path: Path) -> 
     assert (data / "hip").is_dir()
     large = casefile.read("gluteus_maximus", changes={"muscle.tet_size": "20 mm", "frames.every": 100})
     assert isinstance(large, Scene)
-    rest = problem.setup(large)
-    exchange.export(large, lambda: problem.build(large, rest), tmp_path / "export", "open")
+    rest = muscle.setup(large)
+    export.export(large, lambda: muscle.build(large, rest), tmp_path / "export", "open")
     script = Path(__file__).with_name("foreign_solver.py")
     subprocess.run([sys.executable, "-I", script, tmp_path / "export", tmp_path / "frames"], check=True)
     assert sum(row[0] == "origin" for row in rows(tmp_path / "export" / "attachments.csv")) == 1218

@@ -1,6 +1,7 @@
 """Runs are named by all that determines them, made once even when asked for twice at a time, and complete over the frames."""
 
 import logging
+import shutil
 import threading
 from pathlib import Path
 
@@ -9,52 +10,73 @@ import pytest
 import shapes
 import small
 
-from fem_reference import casefile, execution
-from fem_reference.errors import InputError
-from fem_reference.execution import Bench, complete
-from fem_reference.runs import Outcome, Run
-from fem_reference.scene import SolverChoice
+from fem_reference.foundations.errors import InputError
+from fem_reference.runs import key
+from fem_reference.runs.store import Outcome, Run
+from fem_reference.scenes import casefile
+from fem_reference.scenes.muscle import SolverChoice
+from fem_reference.studies import execution
+from fem_reference.studies.execution import Bench, complete
 
 
 def bench(folder: Path, **changes) -> Bench:
     return Bench(casefile.read(small.write(folder / "bar"), changes=changes or None), folder / "runs")
 
 
-def key(made: Bench) -> str:
+def key_of(made: Bench) -> str:
     return made.key("fenicsx", made.settings(made.scene.reference, "reference"))
 
 
 def test_the_key_names_what_determines_a_run(tmp_path) -> None:
-    base = key(bench(tmp_path))
-    assert key(bench(tmp_path)) == base
+    base = key_of(bench(tmp_path))
+    assert key_of(bench(tmp_path)) == base
     different = [
         {"effect[0].mu": "11 kPa"},
         {"frames.every": 10},
         {"muscle.tet_size": "5 mm"},
         {"reference.first_step": 4},
     ]
-    assert len({base, *(key(bench(tmp_path, **changes)) for changes in different)}) == 5
+    assert len({base, *(key_of(bench(tmp_path, **changes)) for changes in different)}) == 5
     # What only judges, names or concerns the machine does not: such runs are shared.
     for changes in ({"title": "another"}, {"expect[0].within": "1 %"}, {"candidate[0].damping": 0.5}):
-        assert key(bench(tmp_path, **changes)) == base
-    assert key(Bench(bench(tmp_path).scene, tmp_path, ranks=1)) == base
+        assert key_of(bench(tmp_path, **changes)) == base
+    assert key_of(Bench(bench(tmp_path).scene, tmp_path, ranks=1)) == base
 
 
-def test_the_key_changes_with_the_code(tmp_path, monkeypatch) -> None:
-    base = key(bench(tmp_path))
-    monkeypatch.setattr(execution, "code_hash", lambda _: "another")
-    assert key(bench(tmp_path)) != base
+def test_the_key_changes_with_every_file_that_the_solver_reaches(tmp_path) -> None:
+    copy = tmp_path / "fem_reference"
+    shutil.copytree(key.PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    (copy / "solvers" / "far.py").write_text("VALUE = 1\n")
+    text = (copy / "solvers" / "pbd.py").read_text()
+    several_lines = "import time\nfrom fem_reference.solvers import (\n    far,\n)\n"
+    (copy / "solvers" / "pbd.py").write_text(text.replace("import time\n", several_lines, 1))
+
+    def hashed(solver: str) -> str:
+        return key.code_hash.__wrapped__(solver, copy)
+
+    before = {solver: hashed(solver) for solver in ("pbd", "fenicsx")}
+    reached = {
+        "pbd": {"solvers/pbd.py", "solvers/pbd_kernels.py", "solvers/far.py", "solvers/common/state_checks.py"},
+        "fenicsx": {"solvers/fenicsx/worker.py", "solvers/fenicsx/cells.c", "solvers/common/load_steps.py"},
+    }
+    both = {"problems/muscle.py", "effects/neo_hooke.py", "runs/store.py", "solvers/__init__.py", "geometry/skins.py"}
+    neither = {"metrics/volume.py", "cli/verbs.py", "assessment/judge.py", "solvers/listing.py"}
+    for name in sorted(set.union(both, neither, *reached.values())):
+        text = (copy / name).read_bytes()
+        (copy / name).write_bytes(text + b"\n")
+        for solver, own in reached.items():
+            assert (hashed(solver) != before[solver]) == (name in own | both), (solver, name)
+        (copy / name).write_bytes(text)
 
 
-def test_the_code_of_a_run_is_that_of_its_solver_and_what_it_imports() -> None:
-    folder = Path(execution.__file__).parent / "solvers"
-    of_pbd = execution._files(folder, "pbd")
-    assert {path.name for path in of_pbd} >= {"pbd.py", "pbd_kernels.py"}
-    assert not any("fenicsx" in path.parts or path.name == "listing.py" for path in of_pbd)
-    of_reference = execution._files(folder, "fenicsx")
-    assert of_reference >= {folder / "fenicsx" / "worker.py", folder / "fenicsx" / "body.py"}
-    assert not of_pbd & of_reference
-    assert len({execution.code_hash(name) for name in ("pbd", "fenicsx", "recorded")}) == 3
+def test_a_copied_case_finds_what_was_solved_before(tmp_path, caplog) -> None:
+    caplog.set_level(logging.INFO, logger="fem_reference")
+    one = casefile.read(small.write(tmp_path / "bar"))
+    other = casefile.read(small.write(tmp_path / "copy"))
+    runs = [Bench(scene, tmp_path / "runs").obtain("pbd", scene.candidate[0], "candidate[0]") for scene in (one, other)]
+    assert one.name != other.name
+    assert runs[0].folder == runs[1].folder
+    assert "solved before, taken from" in caplog.text
 
 
 def test_a_run_made_with_other_packages_is_made_again(tmp_path, monkeypatch, caplog) -> None:

@@ -8,8 +8,8 @@ import pytest
 import shapes
 from numpy.testing import assert_allclose, assert_array_equal
 
+from fem_reference.foundations.mesh import TET_FACES, Surface, check_closed
 from fem_reference.geometry.extension import Extension
-from fem_reference.mesh import TET_FACES, Surface, check_closed
 
 OCTAHEDRON = Surface(
     np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]),

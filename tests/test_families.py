@@ -8,15 +8,19 @@ import numpy as np
 import pytest
 import small
 
-from fem_reference import casefile, cli, families, overview, report, runs, standings
-from fem_reference.benchmark import candidates
-from fem_reference.execution import Bench
+from fem_reference import cli, report
+from fem_reference.assessment import solver_table
+from fem_reference.assessment.solver_table import Family, Overall, Scenario, Standing, Table
 from fem_reference.metrics import Measure
-from fem_reference.report import standings_page
-from fem_reference.runs import Frame, Outcome
-from fem_reference.scene import Candidate
+from fem_reference.report import overview, standings_page
+from fem_reference.runs import store
+from fem_reference.runs.store import Frame, Outcome
+from fem_reference.scenes import casefile
+from fem_reference.scenes.muscle import Candidate
 from fem_reference.solvers import fenicsx, pbd
-from fem_reference.standings import Family, Overall, Scenario, Standing, Table
+from fem_reference.studies import table_5_1
+from fem_reference.studies.benchmark import candidates
+from fem_reference.studies.execution import Bench
 
 PBD = {"sub_iterations": 1, "solver_iterations": 1, "damping": 0.0, "stretch": 1.0, "volume": 1.0, "bending": 0.5}
 ROWS = (
@@ -46,7 +50,7 @@ def case(tmp_path, monkeypatch):
     """The small scene, its reference shifted, and a table of two families."""
     monkeypatch.setattr(fenicsx, "require", lambda _: None)
     monkeypatch.setattr(fenicsx, "solve", shift)
-    monkeypatch.setattr(families, "families", lambda: ROWS)
+    monkeypatch.setattr(table_5_1, "families", lambda: ROWS)
     monkeypatch.setattr(candidates, "families", lambda: ROWS)
     return small.write(tmp_path / "bar")
 
@@ -59,7 +63,7 @@ def page(case, *words: str) -> tuple[int, dict, str]:
 
 def test_the_rows_are_those_of_the_report() -> None:
     # Table 5.1: algorithm, form, speed, precision.
-    assert [(row.name, row.form, row.speed, row.precision) for row in standings.families()] == [
+    assert [(row.name, row.form, row.speed, row.precision) for row in solver_table.families()] == [
         ("Hill-type", "Single line", "+++", "---"),
         ("Via-points", "Polyline", "++", "--"),
         ("Wrap. obst.", "Complex curve", "+", "-"),
@@ -68,7 +72,7 @@ def test_the_rows_are_those_of_the_report() -> None:
         ("ARAP", "Surface model", "++", "?"),
         ("PBD", "Surface model", "++", "?"),
     ]
-    assert standings.report_speeds()["gluteus_medius"].per_second == 57.12  # Table 6.1
+    assert solver_table.report_speeds()["gluteus_medius"].per_second == 57.12  # Table 6.1
 
 
 def test_everybody_is_measured_against_the_reference(case) -> None:
@@ -97,7 +101,7 @@ def test_a_foreign_solver_stands_in_the_same_table(case, tmp_path) -> None:
     folder.mkdir()
     rest = small.body()
     for number in (0, 5, 10, 15, 20):
-        runs.files.write_surface(
+        store.files.write_surface(
             folder / f"frame_{number}.vtp", rest, rest.points + [0, 0, number + 0.25 * (number == 20)]
         )
     (folder / "candidate.toml").write_text("seconds_per_frame = 0.5\nthreads = 3\n")
@@ -113,7 +117,7 @@ def test_a_foreign_solver_stands_in_the_same_table(case, tmp_path) -> None:
 
 def test_a_scene_that_is_not_there_is_left_out_and_told(case, capsys) -> None:
     (case / "bar.vtp").unlink()
-    made = families.stand([casefile.read_muscle(case)], case.parent, {})
+    made = table_5_1.stand([casefile.read_muscle(case)], case.parent, {})
     assert (made.scenarios, made.standings) == ((), ())
     assert "bar.vtp" in made.missing["bar"]
     assert "Left out" in standings_page.render(made)

@@ -22,14 +22,15 @@ import small
 from feb_file import FRAMES, TURNS, cells, effects, nodes, numbers
 from scipy.spatial.transform import Rotation as Turn
 
-from fem_reference import casefile, exchange
+from fem_reference import export
 from fem_reference.effects import total_energy
-from fem_reference.errors import InputError
-from fem_reference.exchange import febio, febio_material
-from fem_reference.mesh import tet_volumes, triangle_areas
-from fem_reference.motion import apply
-from fem_reference.problem import Problem
-from fem_reference.scene import Scene
+from fem_reference.export import febio, febio_material
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import tet_volumes, triangle_areas
+from fem_reference.foundations.motion import apply
+from fem_reference.problems.muscle import Problem
+from fem_reference.scenes import casefile
+from fem_reference.scenes.muscle import Scene
 
 
 @pytest.fixture(scope="module")
@@ -319,7 +320,7 @@ def test_what_febio_has_not_is_refused_before_any_work(
     scene = casefile.read(folder, changes=changes)
     assert isinstance(scene, Scene)
     with pytest.raises(InputError, match=match):
-        exchange.export(scene, lambda: pytest.fail("built"), tmp_path / "bar", "febio")
+        export.export(scene, lambda: pytest.fail("built"), tmp_path / "bar", "febio")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -328,7 +329,7 @@ def test_frames_come_back_from_febios_log(folder: Path, bar: Problem, tmp_path: 
     scene = casefile.read(folder)
     assert isinstance(scene, Scene)
     inside = bar.surface.moved_to(5 + 0.9 * (bar.surface.points - 5))  # no vertex where a node is
-    exchange.export(scene, lambda: replace(bar, surface=inside, bones=bar.bones[:2]), tmp_path / "bar", "febio")
+    export.export(scene, lambda: replace(bar, surface=inside, bones=bar.bones[:2]), tmp_path / "bar", "febio")
     feb = ElementTree.parse(tmp_path / "bar" / "scene.feb").getroot()
     positions = nodes(feb)[1 : 1 + cells(feb, "muscle").max()]
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from feb_file import cells, effects, nodes
 
-from fem_reference.exchange import febio, febio_material
-from fem_reference.mesh import triangle_areas
-from fem_reference.problem import Problem
+from fem_reference.export import febio, febio_material
+from fem_reference.foundations.mesh import triangle_areas
+from fem_reference.problems.muscle import Problem
 
 FIBRE = {"stress": "300 kPa", "p1": 0.05, "p2": 6.6, "linear_from": 1.4}
 STIFFNESS = 0.1  # MPa/mm

@@ -9,8 +9,8 @@ import pytest
 import shapes
 
 from fem_reference import effects
-from fem_reference.motion import Rotation, apply
-from fem_reference.runs import Frame, Outcome
+from fem_reference.foundations.motion import Rotation, apply
+from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import Settings, processes
 from fem_reference.solvers.fenicsx.processes import MARK, running

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 from fem_reference import effects
-from fem_reference.continuum import ELEMENTS, Cells, Continuum, Prescribed, boundary_facets, check
 from fem_reference.effects import Effect
-from fem_reference.errors import InputError, MissingSoftware
+from fem_reference.foundations.errors import InputError, MissingSoftware
+from fem_reference.foundations.records import parse
 from fem_reference.geometry.skins import Skin
-from fem_reference.records import parse
+from fem_reference.problems import shapes
+from fem_reference.problems.body import ELEMENTS, Cells, Continuum, Prescribed, boundary_facets, check
+from fem_reference.problems.courses import Affine, Rest, Turn
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import BodySettings
 from fem_reference.solvers.fenicsx.jobs import Job
-from fem_reference.verification import shapes
-from fem_reference.verification.courses import Affine, Rest, Turn
 
 ALL = (0, 1, 2)
 ONCE = [{"frame": 0, "amount": 0.0}, {"frame": 1, "amount": 1.0}]

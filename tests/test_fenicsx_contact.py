@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
-from fem_reference.contact import Contact, Obstruction
-from fem_reference.continuum import Continuum, Prescribed
-from fem_reference.errors import InputError
+from fem_reference.foundations.errors import InputError
 from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere
+from fem_reference.problems import shapes
+from fem_reference.problems.body import Continuum, Prescribed
+from fem_reference.problems.contact import Contact, Obstruction
+from fem_reference.problems.courses import Rest
 from fem_reference.solvers import scikit_fem
-from fem_reference.verification import contact, parts, shapes
+from fem_reference.verification import contact, parts
 from fem_reference.verification.contact import Slide
-from fem_reference.verification.courses import Rest
 
 HELD = (Prescribed("ground", "z0", (0, 1, 2), Rest()),)
 LAW = Contact("z1", 1.0, 0.01)

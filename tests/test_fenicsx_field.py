@@ -8,9 +8,9 @@ import fields
 import numpy as np
 import pytest
 
-from fem_reference.errors import MissingSoftware
-from fem_reference.field.problem import FieldProblem, Flux, build
-from fem_reference.field.runs import Solution
+from fem_reference.foundations.errors import MissingSoftware
+from fem_reference.problems.scalar import FieldProblem, Flux, build
+from fem_reference.runs.scalar import Solution
 from fem_reference.solvers import fenicsx, scikit_fem
 from fem_reference.solvers.fenicsx import FieldSettings, field
 

@@ -8,17 +8,18 @@ import shapes
 import small
 from acting import make
 
-from fem_reference import casefile, results
-from fem_reference.continuum import Continuum, Prescribed
-from fem_reference.execution import Bench
-from fem_reference.mesh import TetMesh
-from fem_reference.motion import Rotation
-from fem_reference.results import NAMES, Results
-from fem_reference.runs import Frame
+from fem_reference.foundations.mesh import TetMesh
+from fem_reference.foundations.motion import Rotation
+from fem_reference.problems.body import Continuum, Prescribed
+from fem_reference.problems.courses import Affine, Rest
+from fem_reference.problems.shapes import box
+from fem_reference.runs import results
+from fem_reference.runs.results import NAMES, Results
+from fem_reference.runs.store import Frame
+from fem_reference.scenes import casefile
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import BodySettings, Settings
-from fem_reference.verification.courses import Affine, Rest
-from fem_reference.verification.shapes import box
+from fem_reference.studies.execution import Bench
 from validation import homogeneous, laws
 
 MU, BULK = 0.01, 10.0

@@ -8,11 +8,11 @@ import shapes
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from fem_reference.errors import InputError
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Polylines, TetMesh, boundary
 from fem_reference.geometry import fibres
 from fem_reference.geometry.embedding import embed
 from fem_reference.geometry.fibres import NearestLine, fibre_field
-from fem_reference.mesh import Polylines, TetMesh, boundary
 
 INNER, OUTER = 20.0, 30.0  # radii of the ring [mm]
 HIP = np.array([146.0, 238.0, -431.0])  # [mm]

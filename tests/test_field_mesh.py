@@ -5,8 +5,15 @@ import numpy as np
 import pytest
 import shapes
 
-from fem_reference.errors import InputError
-from fem_reference.field.mesh import FieldMesh, barycentric_gradients, check, refined, share_above, stabilisation
+from fem_reference.foundations.errors import InputError
+from fem_reference.geometry.field_mesh import (
+    FieldMesh,
+    barycentric_gradients,
+    check,
+    refined,
+    share_above,
+    stabilisation,
+)
 
 INTERVAL = FieldMesh([[0.0], [0.25], [1.0]], [[0, 1], [1, 2]])
 SQUARE = FieldMesh([[0.0, 0], [1, 0], [1, 1], [0, 1]], [[0, 1, 2], [0, 2, 3]])

@@ -8,12 +8,12 @@ import fields
 import numpy as np
 import pytest
 
-from fem_reference.errors import InputError
-from fem_reference.field import problem as field_problem
-from fem_reference.field.example import Example, FieldMeasure, FieldVerdict, Ladder
-from fem_reference.field.runs import FieldRun, Solution
+from fem_reference.assessment.scalar_example import Example, FieldMeasure, FieldVerdict, Ladder
+from fem_reference.foundations.errors import InputError
+from fem_reference.problems import scalar as field_problem
 from fem_reference.report import field_figures, field_page
-from fem_reference.runs import Outcome
+from fem_reference.runs.scalar import FieldRun, Solution
+from fem_reference.runs.store import Outcome
 
 NAN = float("nan")
 DIFFUSION = {"name": "diffusion", "coefficient": 1.0}

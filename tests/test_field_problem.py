@@ -6,9 +6,10 @@ import fields
 import numpy as np
 import pytest
 
-from fem_reference import casefile, cli
-from fem_reference.errors import InputError
-from fem_reference.field.problem import build
+from fem_reference import cli
+from fem_reference.foundations.errors import InputError
+from fem_reference.problems.scalar import build
+from fem_reference.scenes import casefile
 from fem_reference.solvers import listing, listing_kernels
 
 DIFFUSION = {"name": "diffusion", "coefficient": 1.0}

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import shapes
 
-from fem_reference import files
-from fem_reference.errors import InputError
-from fem_reference.mesh import Polylines
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Polylines
+from fem_reference.io import files
 
 BALL = shapes.sphere(2, 30.0)
 MOVED = BALL.points + np.random.default_rng(1).normal(size=BALL.points.shape)

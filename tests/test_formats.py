@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 import shapes
 
-from fem_reference import files
-from fem_reference.errors import InputError
-from fem_reference.mesh import Surface, enclosed_volume
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Surface, enclosed_volume
+from fem_reference.io import files
 
 BALL = shapes.sphere(2, 30.0)  # 162 vertices that float32 cannot hold, 320 triangles
 UNREADABLE = "want a triangle surface, whole, as .ply .obj .stl .off .msh .vtk .vtp .vtu"
@@ -221,7 +221,7 @@ def test_vtk_stays_silent_in_a_fresh_process(tmp_path: Path) -> None:
     """VTK's own log goes to the file descriptor of stderr, before Python could catch it."""
     (tmp_path / "cut.vtp").write_text("<VTKFile")
     code = (
-        "import pathlib, sys; from fem_reference import files, errors\n"
+        "import pathlib, sys; from fem_reference.io import files\nfrom fem_reference.foundations import errors\n"
         "try: files.read_surface(pathlib.Path(sys.argv[1]), 1.0)\n"
         "except errors.InputError: print('refused')"
     )

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from fem_reference.errors import InputError
-from fem_reference.formula import Formula, evaluate
-from fem_reference.records import Record, parse
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.formula import Formula, evaluate
+from fem_reference.foundations.records import Record, parse
 
 
 class Holder(Record):

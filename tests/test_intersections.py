@@ -9,9 +9,9 @@ import shapes
 from numpy.testing import assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from fem_reference import files
+from fem_reference.foundations.mesh import Surface
 from fem_reference.geometry.intersections import self_intersections
-from fem_reference.mesh import Surface
+from fem_reference.io import files
 
 HIP = np.array([146.0, 238.0, -431.0])  # [mm]
 TURN = Rotation.random(rng=np.random.default_rng(4))

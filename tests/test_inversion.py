@@ -6,11 +6,11 @@ import shapes
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
+from fem_reference.assessment.judge import judge
+from fem_reference.foundations.mesh import Polylines, Surface, triangle_areas
 from fem_reference.geometry.windings import outer_windings
-from fem_reference.judge import judge
-from fem_reference.mesh import Polylines, Surface, triangle_areas
 from fem_reference.metrics import Yardstick, at_rest, inversion
-from fem_reference.runs import Outcome, Run
+from fem_reference.runs.store import Outcome, Run
 
 BALL = shapes.sphere(3, 10.0)
 BAR = shapes.skin(shapes.box((15, 1, 1), (15.0, 1.0, 1.0)))

@@ -5,7 +5,7 @@ import pytest
 from acting import ENERGIES, FIBRE, deformations, make
 
 from fem_reference.effects import Numpy, State
-from fem_reference.jets import Jet, JetFunctions, constant, variables
+from fem_reference.foundations.jets import Jet, JetFunctions, constant, variables
 
 FUNCTIONS = JetFunctions()
 X = np.linspace(0.3, 1.7, 5)

@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fem_reference.errors import InputError
-from fem_reference.judge import check, judge, overall, verdict
+from fem_reference.assessment.judge import check, judge, overall, verdict
+from fem_reference.foundations.errors import InputError
 from fem_reference.metrics import Measure
-from fem_reference.scene import Expectation
+from fem_reference.scenes.muscle import Expectation
 
 NUMBERS = (0, 10, 20)
 

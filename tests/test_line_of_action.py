@@ -14,13 +14,13 @@ import small
 from numpy.testing import assert_allclose
 
 from fem_reference.cli import main
-from fem_reference.errors import InputError
-from fem_reference.mesh import Polylines
-from fem_reference.motion import Rotation, Translation, apply
-from fem_reference.problem import Body, Problem
-from fem_reference.records import parse
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Polylines
+from fem_reference.foundations.motion import Rotation, Translation, apply
+from fem_reference.foundations.records import parse
+from fem_reference.problems.muscle import Body, Problem
 from fem_reference.report import gallery
-from fem_reference.runs import Frame, Outcome
+from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import line_of_action
 
 SWING = Rotation((1, 0, 0), (5, 25, 15), (0.0, 10.0), (0.0, 1.2))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from fem_reference.errors import InputError
+from fem_reference.foundations.errors import InputError
 from fem_reference.solvers import listing_kernels as kernels
 
 OCTAVE = Path(__file__).parent.parent / "validation" / "octave"

@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 import small
 
-from fem_reference import casefile, cli, files, runs
-from fem_reference.mesh import Surface
-from fem_reference.motion import Rotation
+from fem_reference import cli
+from fem_reference.foundations.mesh import Surface
+from fem_reference.foundations.motion import Rotation
+from fem_reference.io import files
+from fem_reference.runs import store
+from fem_reference.scenes import casefile
 
 
 class Job:
@@ -32,7 +35,7 @@ class Job:
 
     def frames(self, folder: Path, change=lambda _, points: points, suffix=".vtp") -> Path:
         """The reference's own surfaces as a candidate, changed."""
-        run = runs.load(self.reference)
+        run = store.load(self.reference)
         folder.mkdir()
         for number, points in zip(run.numbers, run.positions, strict=True):
             files.write_surface(folder / f"frame_{number:04d}{suffix}", run.surface, change(number, points))

@@ -10,14 +10,14 @@ import shapes
 from numpy.testing import assert_allclose
 from test_solvers import shuffled
 
-from fem_reference.errors import InputError
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Surface
+from fem_reference.foundations.motion import Rotation, Translation, apply
+from fem_reference.foundations.records import parse
 from fem_reference.geometry.embedding import Locator
 from fem_reference.geometry.rigid_bodies import HalfSpace
-from fem_reference.mesh import Surface
-from fem_reference.motion import Rotation, Translation, apply
-from fem_reference.problem import Body, Problem
-from fem_reference.records import parse
-from fem_reference.runs import Frame, Outcome
+from fem_reference.problems.muscle import Body, Problem
+from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import mass_spring
 from fem_reference.solvers.spring_kernels import Course, Network, advance, forces
 

@@ -6,8 +6,8 @@ import shapes
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from fem_reference.errors import InputError
-from fem_reference.mesh import (
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import (
     TET_FACES,
     Polylines,
     Surface,

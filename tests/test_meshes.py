@@ -9,13 +9,13 @@ import igl
 import numpy as np
 import pytest
 
-from fem_reference.files import read_polylines, read_surface
+from fem_reference.foundations.mesh import Surface, boundary, check_closed, enclosed_volume, vertex_areas
+from fem_reference.foundations.motion import Rotation, apply
 from fem_reference.geometry.block import fill
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.intersections import self_intersections
-from fem_reference.mesh import Surface, boundary, check_closed, enclosed_volume, vertex_areas
-from fem_reference.motion import Rotation, apply
-from fem_reference.scene import HOME
+from fem_reference.io.files import read_polylines, read_surface
+from fem_reference.scenes.muscle import HOME
 
 FOLDERS = sorted(path for path in (HOME / "meshes").iterdir() if path.is_dir())
 CARDS = {folder: tomllib.loads((folder / "card.toml").read_text(encoding="utf-8"))["file"] for folder in FOLDERS}

@@ -12,11 +12,11 @@ from numpy.testing import assert_allclose
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from fem_reference.judge import judge
-from fem_reference.mesh import Polylines, Surface, check_closed
+from fem_reference.assessment.judge import judge
+from fem_reference.foundations.mesh import Polylines, Surface, check_closed
 from fem_reference.metrics import Measure, Yardstick, at_rest, measure
 from fem_reference.metrics.fibre_length import extension_error
-from fem_reference.runs import Outcome, Run
+from fem_reference.runs.store import Outcome, Run
 
 RADIUS = 40.0
 CENTRE = np.array([146.0, 238.0, -431.0])

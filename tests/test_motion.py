@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fem_reference.motion import Rotation, Translation, apply
+from fem_reference.foundations.motion import Rotation, Translation, apply
 
 AXIS, CENTRE = (1.0, -2.0, 0.5), (10.0, 20.0, -3.0)
 TURN = Rotation(AXIS, CENTRE, (0.0, 10.0, 30.0), (0.0, 1.0, -0.5))

@@ -5,9 +5,17 @@ import pytest
 import shapes
 from numpy.testing import assert_allclose
 
+from fem_reference.foundations.mesh import (
+    Surface,
+    TetMesh,
+    boundary,
+    enclosed_volume,
+    tet_qualities,
+    tet_volumes,
+    triangle_areas,
+)
 from fem_reference.geometry.embedding import embed
 from fem_reference.geometry.nested import GRADED, refined
-from fem_reference.mesh import Surface, TetMesh, boundary, enclosed_volume, tet_qualities, tet_volumes, triangle_areas
 
 
 def bar(cells: int = 2) -> TetMesh:

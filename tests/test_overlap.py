@@ -6,9 +6,9 @@ import shapes
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
+from fem_reference.foundations.mesh import Floats, Surface
 from fem_reference.geometry.overlap import shared_volume
 from fem_reference.geometry.rigid_bodies import Box, HalfSpace, Obstacle, Sphere
-from fem_reference.mesh import Floats, Surface
 
 RADIUS = 50.0
 BALL = shapes.sphere(5, RADIUS)  # its 20480 triangles lie up to 0.015 mm below the sphere

@@ -4,8 +4,8 @@ import numpy as np
 import shapes
 from numpy.testing import assert_allclose, assert_array_equal
 
+from fem_reference.foundations.mesh import Surface, check_closed, enclosed_volume, triangle_areas
 from fem_reference.geometry.parts import Parts, _along_rims, between, collapsed, widened
-from fem_reference.mesh import Surface, check_closed, enclosed_volume, triangle_areas
 
 BLOCK = shapes.skin(shapes.box((8, 8, 2), (16.0, 16.0, 4.0)))
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 import shapes
 
-from fem_reference.errors import InputError
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Polylines, Surface, check_closed, enclosed_volume
+from fem_reference.foundations.motion import Rotation, Translation, apply
+from fem_reference.foundations.records import parse
 from fem_reference.geometry.rigid_bodies import Sphere
 from fem_reference.geometry.signed_distance import build
-from fem_reference.mesh import Polylines, Surface, check_closed, enclosed_volume
-from fem_reference.motion import Rotation, Translation, apply
-from fem_reference.problem import Body, Held, Problem, Setup
-from fem_reference.records import parse
+from fem_reference.problems.muscle import Body, Held, Problem, Setup
 from fem_reference.solvers import pbd
 
 USUAL = {

@@ -7,8 +7,8 @@ import numba
 import numpy as np
 import pytest
 
-from fem_reference.mesh import TET_FACES, Surface
-from fem_reference.motion import Rotation, apply
+from fem_reference.foundations.mesh import TET_FACES, Surface
+from fem_reference.foundations.motion import Rotation, apply
 from fem_reference.solvers import pbd_kernels as kernels
 from fem_reference.solvers.compiled_kernels import kept_code
 from fem_reference.solvers.pbd import Constraints, hinges_of

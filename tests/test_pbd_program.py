@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 import shapes
 
-from fem_reference import casefile, files, problem
-from fem_reference.errors import InputError
-from fem_reference.mesh import Surface, enclosed_volume
-from fem_reference.motion import Rotation, Translation, apply
-from fem_reference.problem import Body, Held, Setup
-from fem_reference.records import parse
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Surface, enclosed_volume
+from fem_reference.foundations.motion import Rotation, Translation, apply
+from fem_reference.foundations.records import parse
+from fem_reference.io import files
+from fem_reference.problems import muscle
+from fem_reference.problems.muscle import Body, Held, Setup
+from fem_reference.scenes import casefile
 from fem_reference.solvers import pbd_program
 from fem_reference.solvers.pbd_kernels import dihedral, dihedrals
 from fem_reference.solvers.pbd_program import Voxels
@@ -383,8 +385,8 @@ def test_voxels_hold_what_the_program_held(data):
         Voxels.of(bone, 64) for bone in (merged(parts), files.read_surface(bones / "femur_report.vtk", 1.0))
     )
     names = {"gluteus_maximus": "gmax", "gluteus_medius": "gmed", "iliacus": "iliacus", "adductor_brevis": "addbrev"}
-    for muscle, code in names.items():
-        points = np.array(files.read_surface(data / "hip" / "muscles" / f"{muscle}.vtk", 1.0).points)
+    for name, code in names.items():
+        points = np.array(files.read_surface(data / "hip" / "muscles" / f"{name}.vtk", 1.0).points)
         table = data / "hip" / "attachments_of_report_program" / f"attach_code_{code}.csv"
         held = np.loadtxt(table, delimiter=",", dtype=int)
         found = np.where(held_in(femur, points), 2, held_in(pelvis, points))
@@ -395,7 +397,7 @@ def test_voxels_hold_what_the_program_held(data):
 
 def test_the_recorded_gluteus_maximus_is_met(data):
     # Its pelvis is here without the left half, which changes the voxels; with it 0.6 mm become 0.3 mm at iteration 100.
-    setup = problem.setup(casefile.read_muscle("gluteus_maximus"))
+    setup = muscle.setup(casefile.read_muscle("gluteus_maximus"))
     ours, theirs = run(setup)[1], recorded(data, "gluteus_maximus", setup.frames)
     rest = setup.surface.points
     assert far(ours[100], theirs[100]) < 0.02 * np.linalg.norm(theirs[100] - rest, axis=1).max()
@@ -405,7 +407,7 @@ def test_the_recorded_gluteus_maximus_is_met(data):
 def test_the_recorded_box_is_met(data):
     # In all 300 iterations, to the last digit: it is recorded in single precision. The squeezed box is chaos: were the last
     # digit of any sum another, it would be lost by iteration 60.
-    setup = problem.setup(casefile.read_muscle("box_squeeze_report"))
+    setup = muscle.setup(casefile.read_muscle("box_squeeze_report"))
     ours, theirs = run(setup)[1], recorded(data, "box", setup.frames)
     assert list(ours) == list(theirs) == list(range(0, 301, 10))
     for number, points in ours.items():
@@ -414,7 +416,7 @@ def test_the_recorded_box_is_met(data):
 
 def test_the_squeezed_box_is_chaos(data):
     # Why the order of every sum is the program's: what differs in the last digit at rest is millimetres away at iteration 100.
-    setup = problem.setup(casefile.read_muscle("box_squeeze_report"))
+    setup = muscle.setup(casefile.read_muscle("box_squeeze_report"))
     nudged = np.random.default_rng(0).uniform(-1, 1, setup.surface.points.shape)
     surface = setup.surface.moved_to((1 + 1e-15 * nudged) * setup.surface.points)
     ours = run(replace(setup, surface=surface, frames=(0, 100)))[1]

@@ -8,15 +8,15 @@ import shapes
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation as Turn
 
-from fem_reference.comparison import compare
-from fem_reference.errors import InputError
-from fem_reference.files import read_surface, write_surface
+from fem_reference.assessment.comparison import compare
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Polylines, Surface
+from fem_reference.foundations.motion import Rotation
 from fem_reference.geometry.rigid_bodies import Box, HalfSpace, Sphere
-from fem_reference.mesh import Polylines, Surface
+from fem_reference.io.files import read_surface, write_surface
 from fem_reference.metrics import Measure, Yardstick, at_rest, measure, penetration
-from fem_reference.motion import Rotation
-from fem_reference.problem import Body, Held, Setup
-from fem_reference.runs import Outcome, Run
+from fem_reference.problems.muscle import Body, Held, Setup
+from fem_reference.runs.store import Outcome, Run
 
 RADIUS = 20.0
 BALL = shapes.sphere(

@@ -6,16 +6,18 @@ import numpy as np
 import pytest
 import small
 
-from fem_reference import casefile, files, problem, scene_fibres
-from fem_reference.deformable import as_continuum
-from fem_reference.errors import InputError
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Polylines, boundary, check_closed, enclosed_volume
+from fem_reference.foundations.motion import apply
 from fem_reference.geometry.rigid_bodies import Box, HalfSpace
 from fem_reference.geometry.skins import Skin
 from fem_reference.geometry.tetrahedra import tetrahedralise
-from fem_reference.mesh import Polylines, boundary, check_closed, enclosed_volume
-from fem_reference.motion import apply
-from fem_reference.overview import scene_facts
-from fem_reference.runs import Frame
+from fem_reference.io import files
+from fem_reference.problems import fibre_field, muscle
+from fem_reference.problems.muscle_body import as_continuum
+from fem_reference.report.overview import scene_facts
+from fem_reference.runs.store import Frame
+from fem_reference.scenes import casefile
 from fem_reference.solvers import fenicsx
 
 
@@ -24,7 +26,7 @@ def build(case):
 
 
 def build_scene(scene):
-    return problem.build(scene, problem.setup(scene))
+    return muscle.build(scene, muscle.setup(scene))
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +61,7 @@ def test_where_the_mesher_keeps_no_rim_facets_are_those_under_the_attachment(bar
     def without_rims(*arguments):
         return replace(tetrahedralise(*arguments), facets={})
 
-    monkeypatch.setattr(problem, "tetrahedralise", without_rims)
+    monkeypatch.setattr(muscle, "tetrahedralise", without_rims)
     sampled = build(bar)
     for name in ("origin", "insertion"):
         # A facet beside a sharp edge of 10 mm may be taken for one under it: 6 x 6 / 2 mm2 at most.
@@ -85,7 +87,7 @@ def test_a_body_rests_where_it_has_no_motion(built) -> None:
 def test_given_fibres_stay_inside_the_muscle(built) -> None:
     inside, far = [5.0, 5.0, 20.0], [5.0, 30.0, 20.0]
     given = Polylines(np.array([inside, far]), np.array([0, 2]))
-    moved = scene_fibres.inside(built.surface, given)
+    moved = fibre_field.inside(built.surface, given)
     assert np.array_equal(moved.points[0], inside)
     # The nearest point of the side, which bulges to y = 5 + 5 * 1.3 = 11.5 halfway up.
     assert moved.points[1] == pytest.approx([5, 11.5, 20], abs=1e-9)
@@ -129,7 +131,7 @@ def test_given_fibres_are_read(bar) -> None:
 def test_a_vertex_has_one_bone(bar) -> None:
     scene = casefile.read(bar, changes={"attachment[1].bone": "floor"})
     with pytest.raises(InputError, match=r"attachment\[1\]: got vertex \d+, which another attachment holds"):
-        problem.setup(scene)
+        muscle.setup(scene)
 
 
 def test_an_attachment_that_tets_cannot_resolve_is_named(bar, monkeypatch) -> None:
@@ -137,7 +139,7 @@ def test_an_attachment_that_tets_cannot_resolve_is_named(bar, monkeypatch) -> No
         mesh = tetrahedralise(*arguments)
         return replace(mesh, facets=mesh.facets | {"insertion": np.zeros((0, 3), np.int64)})
 
-    monkeypatch.setattr(problem, "tetrahedralise", without_insertion)
+    monkeypatch.setattr(muscle, "tetrahedralise", without_insertion)
     with pytest.raises(InputError, match=r"attachment\[1\]: got an area smaller than the tetrahedra resolve"):
         build(bar)
 
@@ -189,7 +191,7 @@ def test_a_stiffness_of_an_attachment_reaches_the_body(bar) -> None:
     scene = casefile.read(bar)
     soft = scene.attachment[1].model_copy(update={"stiffness": 0.1})
     scene = scene.model_copy(update={"attachment": (scene.attachment[0], soft)})
-    body = as_continuum(problem.build(scene, problem.setup(scene)))
+    body = as_continuum(muscle.build(scene, muscle.setup(scene)))
     assert [entry.stiffness for entry in body.prescribed] == [None, 0.1]
     assert (body.prescribed[0].on, type(body.prescribed[1].on)) == ("origin", Skin)
     # A load may still act on what springs hold, and what is free is free of both.
@@ -268,7 +270,7 @@ def squeezed(tmp_path_factory):
 
 
 def test_bones_of_closed_form_are_their_own_distance(squeezed) -> None:
-    floor, lid = problem.setup(squeezed).bones
+    floor, lid = muscle.setup(squeezed).bones
     assert floor.shape == floor.solid == HalfSpace((0, 10, 0), (0, 1, 0))
     assert lid.shape == lid.solid == Box((0, 140, 0), (400, 100, 400), 0)
     for bone in (floor, lid):
@@ -304,7 +306,7 @@ def test_what_is_no_block_is_refused_at_the_key_of_the_surface(bar) -> None:
 
 
 def test_show_says_what_bones_are_and_how_they_move(squeezed, bar) -> None:
-    facts = scene_facts(squeezed, problem.setup(squeezed))
+    facts = scene_facts(squeezed, muscle.setup(squeezed))
     assert facts["muscle"]["mesher"] == "block"
     assert facts["attachments"] == {}
     assert facts["bones"] == {
@@ -313,7 +315,7 @@ def test_show_says_what_bones_are_and_how_they_move(squeezed, bar) -> None:
         "mm at frame: 0 at 0, 40 at 100",
     }
     turning = casefile.read(bar)
-    assert "turns about (5, 5, 30) mm along" in scene_facts(turning, problem.setup(turning))["bones"]["lid"]
+    assert "turns about (5, 5, 30) mm along" in scene_facts(turning, muscle.setup(turning))["bones"]["lid"]
 
 
 def test_a_frame_of_a_body_held_by_nothing_tells_nothing_of_attachments(squeezed) -> None:

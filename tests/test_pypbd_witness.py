@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from test_xpbd import NONE, graph
 
-from fem_reference.mesh import TET_FACES
+from fem_reference.foundations.mesh import TET_FACES
 from fem_reference.solvers import pbd, xpbd
 from fem_reference.solvers.pbd_kernels import (
     LARGEST_TURN,

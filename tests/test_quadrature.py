@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip("basix", reason="FEniCSx is not installed")
 
-from fem_reference.continuum import reference_nodes
+from fem_reference.problems.body import reference_nodes
 from fem_reference.solvers.fenicsx import quadrature
 
 

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
+from fem_reference.assessment.ranking import Deviation, facts, ranked, rankings
 from fem_reference.metrics import Measure
-from fem_reference.ranking import Deviation, facts, ranked, rankings
 
 NAN = float("nan")
 

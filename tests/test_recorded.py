@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 import shapes
 
-from fem_reference import files
-from fem_reference.errors import InputError
-from fem_reference.mesh import Floats, Surface
-from fem_reference.problem import Setup
-from fem_reference.records import parse
-from fem_reference.runs import Frame, Writer
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, Surface
+from fem_reference.foundations.records import parse
+from fem_reference.io import files
+from fem_reference.problems.muscle import Setup
+from fem_reference.runs.store import Frame, Writer
 from fem_reference.solvers import recorded
 
 REST = shapes.sphere(1, 30.0)

@@ -5,8 +5,8 @@ from typing import Any, Literal
 
 import pytest
 
-from fem_reference.errors import InputError
-from fem_reference.records import Record, join, parse
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.records import Record, join, parse
 
 
 class Leaf(Record):

@@ -10,11 +10,11 @@ import pytest
 import small
 
 from fem_reference import cli
-from fem_reference.benchmark import checkout, reference, reference_table, timing
-from fem_reference.benchmark.checkout import Commit
-from fem_reference.benchmark.reference import BEFORE, NOW, Taken, Timing
-from fem_reference.continuum import ByCell, check
-from fem_reference.scene import DATA_SETTING
+from fem_reference.problems.body import ByCell, check
+from fem_reference.scenes.muscle import DATA_SETTING
+from fem_reference.studies.benchmark import checkout, reference, reference_table, timing
+from fem_reference.studies.benchmark.checkout import Commit
+from fem_reference.studies.benchmark.reference import BEFORE, NOW, Taken, Timing
 
 COMMIT = Commit("HEAD~3", "0" * 40, "0000000")
 TINY = ("Q1/P0", 1, 3)
@@ -171,7 +171,7 @@ def test_the_checkout_is_removed_whatever_happens(tmp_path, monkeypatch) -> None
 
     def work() -> float:
         with checkout.checked_out(checkout.find("HEAD")) as root:
-            return 1 / (not (root / "fem_reference" / "execution.py").exists())
+            return 1 / (not (root / "fem_reference" / "studies" / "execution.py").exists())
 
     with pytest.raises(ZeroDivisionError):
         work()

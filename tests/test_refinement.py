@@ -9,16 +9,19 @@ import numpy as np
 import pytest
 import small
 
-from fem_reference import casefile, cli, metrics, refinement, report, study
-from fem_reference.errors import InputError
-from fem_reference.execution import Bench
-from fem_reference.mesh import vertex_areas
+from fem_reference import cli, metrics, report
+from fem_reference.assessment import error_bars
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import vertex_areas
 from fem_reference.report import gallery
-from fem_reference.runs import Frame, Outcome
-from fem_reference.scene import Scene
+from fem_reference.runs.store import Frame, Outcome
+from fem_reference.scenes import casefile
+from fem_reference.scenes.muscle import Scene
 from fem_reference.solvers import fenicsx
+from fem_reference.solvers.common.load_steps import Attempt, Steps, march
 from fem_reference.solvers.fenicsx import Settings
-from fem_reference.stepping import Attempt, Steps, march
+from fem_reference.studies import refinement
+from fem_reference.studies.execution import Bench
 
 CONTACT = '\n[[effect]]\nname = "contact"\nstiffness = "100 kPa/mm"\nsmoothing = "0.2 mm"\n'
 VISCOSITY = '\n[[effect]]\nname = "viscosity"\neta = "1 kPa s"\n'
@@ -107,7 +110,7 @@ def test_it_is_kept_with_its_run_until_the_metrics_change_or_the_file_is_damaged
     assert (first[1:] > 0).all()
     monkeypatch.setattr(refinement, "_measuring_hash", lambda: "others")
     assert call(case, "run")[1]["error_bars"] == []
-    (path,) = (case.parent / "out" / "runs" / "bar").glob(f"*/{study.FILE}")
+    (path,) = (case.parent / "out" / "runs" / "bar").glob(f"*/{error_bars.FILE}")
     path.write_text("{")
     capsys.readouterr()
     assert call(case, "run")[0] == cli.BAD_INPUT

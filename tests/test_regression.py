@@ -11,15 +11,16 @@ import pytest
 import shapes
 
 from fem_reference import metrics
-from fem_reference.errors import InputError
-from fem_reference.mesh import Polylines
+from fem_reference.assessment import baseline, regression
+from fem_reference.assessment.baseline import Limits
+from fem_reference.assessment.error_bars import ErrorBar, ErrorBars
+from fem_reference.assessment.measured import Today, sample
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Polylines
 from fem_reference.metrics import Measure
-from fem_reference.problem import Setup
-from fem_reference.regression import baseline, checking, told
-from fem_reference.regression.baseline import Limits
-from fem_reference.regression.today import Today, sample
-from fem_reference.runs import Outcome, Run
-from fem_reference.study import ErrorBar, ErrorBars
+from fem_reference.problems.muscle import Setup
+from fem_reference.report import regression_texts
+from fem_reference.runs.store import Outcome, Run
 
 # On the digits of a baseline, so that nothing is rounded.
 REST = shapes.sphere(2, 30.0).moved_to(np.round(shapes.sphere(2, 30.0).points, 2))
@@ -63,11 +64,11 @@ def edited(path, change) -> None:
     path.write_text(json.dumps(table))
 
 
-def checked(path, now: Today) -> checking.Check:
-    return checking.check(baseline.read(path, SCENE, "mine"), now)
+def checked(path, now: Today) -> regression.Check:
+    return regression.check(baseline.read(path, SCENE, "mine"), now)
 
 
-def asked(check: checking.Check, question: str, name: str) -> checking.Judgement:
+def asked(check: regression.Check, question: str, name: str) -> regression.Judgement:
     (found,) = (one for one in check.judgements if (one.question, one.name) == (question, name))
     return found
 
@@ -268,7 +269,9 @@ def test_a_run_of_lines_alone_is_checked_by_its_fibres(tmp_path) -> None:
 def test_notes_say_what_else_is_different(path) -> None:
     edited(path, lambda table: table.update(reference="fenicsx-1", fem_reference="0.0.1"))
     other = replace(REFERENCE, positions=REFERENCE.positions + [3.0, 0, 0])
-    check = checking.check(baseline.read(path, SCENE, "mine"), Today.of(SCENE, SETUP, run("mine", WAYS), other, bars()))
+    check = regression.check(
+        baseline.read(path, SCENE, "mine"), Today.of(SCENE, SETUP, run("mine", WAYS), other, bars())
+    )
     assert "measured by fem_reference" in check.notes[0]
     assert check.notes[1] == "the reference is test, that of the baseline was fenicsx-1"
     assert "no sampled vertex moved and yet measures changed" in check.notes[2]
@@ -347,14 +350,14 @@ def test_a_reference_without_an_interior_is_refused() -> None:
 
 
 @pytest.fixture
-def mixed(path) -> checking.Check:
+def mixed(path) -> regression.Check:
     """A check with all three verdicts."""
     edited(path, lambda table: table["measures"]["fibre_length.rms"].update(within=0.1))
     return checked(path, today([*WAYS[:2], (15, 0, 10)], bars()))
 
 
 def test_junit_has_a_case_for_each_judgement(mixed) -> None:
-    suite = ElementTree.fromstring(told.junit(mixed, 1.25)).find("testsuite")
+    suite = ElementTree.fromstring(regression_texts.junit(mixed, 1.25)).find("testsuite")
     cases = suite.findall("testcase")
     assert (suite.get("name"), suite.get("time"), suite.get("errors")) == ("ball.mine", "1.250", "0")
     assert int(suite.get("tests")) == len(cases) == len(mixed.judgements)
@@ -368,27 +371,27 @@ def test_junit_has_a_case_for_each_judgement(mixed) -> None:
 
 def test_notes_are_in_every_telling(mixed) -> None:
     noted = replace(mixed, notes=("a | b",))
-    assert ElementTree.fromstring(told.junit(noted, 0)).find("testsuite/system-out").text == "a | b"
-    assert "- note: a \\| b" in told.markdown(noted)
-    assert "note: a | b" in told.text(noted)
-    assert told.facts(noted)["notes"] == ["a | b"]
+    assert ElementTree.fromstring(regression_texts.junit(noted, 0)).find("testsuite/system-out").text == "a | b"
+    assert "- note: a \\| b" in regression_texts.markdown(noted)
+    assert "note: a | b" in regression_texts.text(noted)
+    assert regression_texts.facts(noted)["notes"] == ["a | b"]
 
 
 def test_markdown_shows_the_worst_first_and_is_short(mixed) -> None:
-    lines = told.markdown(replace(mixed, notes=("one", "two", "three", "four"))).splitlines()
+    lines = regression_texts.markdown(replace(mixed, notes=("one", "two", "three", "four"))).splitlines()
     assert lines[0] == "### fail: mine on ball"
     assert len(lines) <= 30
     assert "- as near to the reference as allowed (within): fail" in "\n".join(lines)
     rows = [line.split(" | ") for line in lines if line.startswith("| ") and "verdict" not in line]
-    assert len(rows) == told.MOST_ROWS
+    assert len(rows) == regression_texts.MOST_ROWS
     assert rows[0][:6] == ["| fail", "unchanged", "positions.moved", "20", "0 mm", "3 mm"]
     words = [row[0].removeprefix("| ") for row in rows]
-    assert words == sorted(words, key=checking.WORST_FIRST.index)
-    assert lines[-1] == f"and {len(mixed.judgements) - told.MOST_ROWS} more, none of them worse."
+    assert words == sorted(words, key=regression.WORST_FIRST.index)
+    assert lines[-1] == f"and {len(mixed.judgements) - regression_texts.MOST_ROWS} more, none of them worse."
 
 
 def test_text_names_failures_and_why_nothing_can_be_said(mixed) -> None:
-    lines = told.text(mixed).splitlines()
+    lines = regression_texts.text(mixed).splitlines()
     assert lines[0] == "fail: positions.moved unchanged at frame 20: 3 mm from what it was, 0.1 mm allowed"
     assert (
         "cannot say: the reference is known to 0.5 mm, more than a third of the 0.1 mm allowed (fibre_length.rms within)"
@@ -396,12 +399,12 @@ def test_text_names_failures_and_why_nothing_can_be_said(mixed) -> None:
     )
     assert lines[-1] == "verdict: fail"
     many = replace(mixed, judgements=mixed.judgements[:1] * 20)
-    assert told.text(many).count("fail: ") == told.MOST_ROWS
-    assert "and 5 more like the last, which --json and --junit name" in told.text(many)
+    assert regression_texts.text(many).count("fail: ") == regression_texts.MOST_ROWS
+    assert "and 5 more like the last, which --json and --junit name" in regression_texts.text(many)
 
 
 def test_facts_are_json(mixed) -> None:
-    facts = told.facts(mixed)
+    facts = regression_texts.facts(mixed)
     assert (facts["verdict"], facts["unchanged"], facts["within"]) == ("fail", "fail", "fail")
     assert {row["verdict"] for row in facts["judgements"]} == {"pass", "fail", "cannot say"}
     json.dumps(facts, allow_nan=False)

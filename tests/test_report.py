@@ -10,21 +10,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fem_reference import casefile, report
-from fem_reference.comparison import Comparison
-from fem_reference.errors import MissingSoftware
+from fem_reference import report
+from fem_reference.assessment.comparison import Comparison
+from fem_reference.assessment.error_bars import ErrorBar, ErrorBars
+from fem_reference.assessment.judge import Verdict
+from fem_reference.foundations.errors import MissingSoftware
+from fem_reference.foundations.mesh import Polylines, Surface
 from fem_reference.geometry.rigid_bodies import HalfSpace
 from fem_reference.geometry.tessellation import tessellated
-from fem_reference.judge import Verdict
-from fem_reference.mesh import Polylines, Surface
 from fem_reference.metrics import Measure, Yardstick
-from fem_reference.problem import Body, Setup
+from fem_reference.problems.muscle import Body, Setup
 from fem_reference.report import gallery, page
 from fem_reference.report.curves import curves
 from fem_reference.report.tables import COLUMNS, seconds_per_frame
 from fem_reference.report.words import duration, number
-from fem_reference.runs import Outcome, Run
-from fem_reference.study import ErrorBar, ErrorBars
+from fem_reference.runs.store import Outcome, Run
+from fem_reference.scenes import casefile
 
 NUMBERS = (0, 10, 20, 30, 40)
 NAN = float("nan")

@@ -10,9 +10,9 @@ import shapes
 from numpy.testing import assert_allclose
 from scipy.spatial import ConvexHull
 
-from fem_reference.errors import InputError
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.rigid_bodies import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere
-from fem_reference.mesh import Floats
 
 START, END = (1.0, 2.0, -1.0), (3.0, -1.0, 5.0)  # of length 7
 AXIS = np.subtract(END, START) / 7

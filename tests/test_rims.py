@@ -5,12 +5,12 @@ import pytest
 import shapes
 from numpy.testing import assert_allclose, assert_array_equal
 
+from fem_reference.foundations.mesh import Floats, Ints, Surface, check_closed, enclosed_volume, triangle_areas
 from fem_reference.geometry.coarsening import coarsen
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.intersections import self_intersections
 from fem_reference.geometry.rims import with_rims
 from fem_reference.geometry.sectors import held_area, held_shares
-from fem_reference.mesh import Floats, Ints, Surface, check_closed, enclosed_volume, triangle_areas
 
 BOX = shapes.skin(shapes.box((32, 24, 32), (80.0, 60.0, 80.0)))
 BALL = shapes.sphere(4, 30.0)

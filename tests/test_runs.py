@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import shapes
 
-from fem_reference import runs
-from fem_reference.errors import InputError
-from fem_reference.mesh import Polylines
-from fem_reference.runs import Frame, Outcome, Writer
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Polylines
+from fem_reference.runs import store
+from fem_reference.runs.store import Frame, Outcome, Writer
 
 SURFACE = shapes.sphere(1, 10.0)
 FIBRES = Polylines(np.array([[0.0, 0, -9], [0, 0, 0], [0, 0, 9], [1, 0, -5], [1, 0, 5]]), np.array([0, 3, 5]))
@@ -31,7 +31,7 @@ def write(folder, *, close=True):
 
 
 def test_what_is_written_reads_back(tmp_path) -> None:
-    run = runs.load(write(tmp_path / "run"))
+    run = store.load(write(tmp_path / "run"))
     assert (run.name, run.solver, run.numbers) == ("reference", "test", (0, 5))
     assert np.array_equal(run.surface.points, SURFACE.points)
     assert np.array_equal(run.surface.triangles, SURFACE.triangles)
@@ -67,7 +67,7 @@ def test_progress_is_logged_with_how_far_and_how_long(tmp_path, caplog) -> None:
 @pytest.mark.parametrize(("quiet", "told"), [(3600.0, [0, 3]), (0.0, [0, 1, 2, 3])])
 def test_progress_is_told_now_and_then(tmp_path, caplog, monkeypatch, quiet, told) -> None:
     caplog.set_level(logging.INFO, logger="fem_reference")
-    monkeypatch.setattr(runs, "QUIET", quiet)
+    monkeypatch.setattr(store, "QUIET", quiet)
     writer = Writer(tmp_path / "run", IDENTITY | {"frames": (0, 1, 2, 3)}, SURFACE, None, None)
     for number in range(4):
         writer.add(Frame(number, SURFACE.points))
@@ -77,30 +77,30 @@ def test_progress_is_told_now_and_then(tmp_path, caplog, monkeypatch, quiet, tol
 def test_a_run_that_was_cut_off_is_no_result(tmp_path) -> None:
     folder = write(tmp_path / "run", close=False)
     with pytest.raises(InputError, match='status: got "running", want a run that came to its end'):
-        runs.load(folder)
-    assert runs.finished(folder) is None
+        store.load(folder)
+    assert store.finished(folder) is None
 
 
 def test_only_a_converged_run_is_finished(tmp_path) -> None:
     writer = Writer(tmp_path / "run", IDENTITY, SURFACE, None, None)
     writer.add(Frame(0, SURFACE.points))
     writer.close(Outcome("diverged", "no"))
-    assert runs.load(tmp_path / "run").outcome.status == "diverged"
-    assert runs.finished(tmp_path / "run") is None
-    assert runs.finished(tmp_path / "nothing") is None
+    assert store.load(tmp_path / "run").outcome.status == "diverged"
+    assert store.finished(tmp_path / "run") is None
+    assert store.finished(tmp_path / "nothing") is None
 
 
 def test_damage_is_named(tmp_path) -> None:
     with pytest.raises(InputError, match=r"run\.json: got FileNotFoundError.*want the run\.json of a stored run"):
-        runs.load(tmp_path)
+        store.load(tmp_path)
     folder = write(tmp_path / "run")
     state = json.loads((folder / "run.json").read_text())
     (folder / "run.json").write_text(json.dumps(state | {"format": 99}))
     with pytest.raises(InputError, match="format: got 99, want 1"):
-        runs.load(folder)
+        store.load(folder)
     (folder / "run.json").write_text(json.dumps(state | {"numbers": []}))
     with pytest.raises(InputError, match="a run without frames"):
-        runs.load(folder)
+        store.load(folder)
 
 
 def test_writing_again_starts_afresh(tmp_path) -> None:
@@ -115,7 +115,7 @@ def test_a_run_of_lines_alone_keeps_its_rest_state(tmp_path) -> None:
     for number in (0, 5):  # straight lines are elsewhere than the fibres from the first frame on
         writer.add(Frame(number, None, FIBRES.points + number + 1))
     writer.close(Outcome("converged", "done"))
-    run = runs.load(tmp_path / "run")
+    run = store.load(tmp_path / "run")
     assert not run.has_surface
     assert run.positions.shape == (2, len(SURFACE.points), 3)
     assert np.isnan(run.positions).all()
@@ -125,4 +125,4 @@ def test_a_run_of_lines_alone_keeps_its_rest_state(tmp_path) -> None:
     assert np.array_equal(run.fibre_positions, np.stack([FIBRES.points + 1, FIBRES.points + 6]))
     assert not (tmp_path / "run" / "surface").exists()
     assert (tmp_path / "run" / "fibres.pvd").exists()
-    assert runs.load(write(tmp_path / "other")).has_surface
+    assert store.load(write(tmp_path / "other")).has_surface

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from fem_reference import casefile
-from fem_reference.bones import CLOSED_FORMS
-from fem_reference.errors import InputError
-from fem_reference.field.problem import build as build_field
-from fem_reference.field.scene import FieldScene
-from fem_reference.geometry.rigid_bodies import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere, solid
-from fem_reference.motion import Rotation, Translation
-from fem_reference.scene import DATA_SETTING, HOME, Scene, home
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.motion import Rotation, Translation
+from fem_reference.geometry.rigid_bodies import CLOSED_FORMS, Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere
+from fem_reference.problems.muscle import solid
+from fem_reference.problems.scalar import build as build_field
+from fem_reference.scenes import casefile
+from fem_reference.scenes.muscle import DATA_SETTING, HOME, Scene, home
+from fem_reference.scenes.scalar import FieldScene
 
 SCENE = """
 title = "A bar"

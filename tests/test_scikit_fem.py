@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import eigsh
 
-from fem_reference.field.problem import build
+from fem_reference.problems.scalar import build
 from fem_reference.solvers import scikit_fem
 from fem_reference.solvers.scikit_fem import FieldSettings
 

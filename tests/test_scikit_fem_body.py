@@ -5,14 +5,15 @@ import pytest
 from scipy.optimize import brentq
 
 from fem_reference import effects, solvers
-from fem_reference.continuum import ELEMENTS, Cells, Continuum, Prescribed, Solved, reference_nodes
-from fem_reference.errors import InputError
-from fem_reference.records import parse
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.records import parse
+from fem_reference.problems import shapes
+from fem_reference.problems.body import ELEMENTS, Cells, Continuum, Prescribed, reference_nodes
+from fem_reference.runs.solved import Solved
 from fem_reference.solvers.scikit_fem import BodySettings, solve_body
 from fem_reference.solvers.scikit_fem.body import _March
 from fem_reference.solvers.scikit_fem.equations import Equations
 from fem_reference.solvers.scikit_fem.spaces import Space
-from fem_reference.verification import shapes
 
 MU, BULK = 0.5, 20.0
 FACES = ("x0", "x1", "y0", "y1", "z0", "z1")

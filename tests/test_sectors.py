@@ -5,8 +5,8 @@ import pytest
 import shapes
 from numpy.testing import assert_allclose
 
+from fem_reference.foundations.mesh import vertex_areas
 from fem_reference.geometry.sectors import held_area, held_shares, sectors, shares_at
-from fem_reference.mesh import vertex_areas
 
 BLOCK = shapes.skin(shapes.box((10, 8, 2), (20.0, 16.0, 4.0)))
 

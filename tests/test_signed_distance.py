@@ -9,12 +9,12 @@ import pytest
 import shapes
 from numpy.testing import assert_allclose
 
-from fem_reference import files
-from fem_reference.errors import InputError
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, Surface
 from fem_reference.geometry import signed_distance
 from fem_reference.geometry.rigid_bodies import Box, Sphere
 from fem_reference.geometry.signed_distance import FAR, Grid, build, cached, resolve, signed_distances
-from fem_reference.mesh import Floats, Surface
+from fem_reference.io import files
 
 RADIUS = 10.0  # [mm]
 BALL = shapes.sphere(4, RADIUS)  # 5120 triangles, up to 0.0115 mm below the sphere

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
+from fem_reference.foundations.mesh import Surface, TetMesh, boundary, triangle_areas
 from fem_reference.geometry.skins import free_skin, held_skin, spacing
-from fem_reference.mesh import Surface, TetMesh, boundary, triangle_areas
 
 
 def unit_tet() -> tuple[Surface, TetMesh]:

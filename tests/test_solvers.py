@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 import shapes
 
-from fem_reference import effects, files, solvers
-from fem_reference.errors import InputError
-from fem_reference.mesh import Polylines, Surface, TetMesh
-from fem_reference.motion import Rotation, apply
-from fem_reference.problem import Held, Problem
-from fem_reference.runs import Frame
-from fem_reference.scene import SolverChoice
+from fem_reference import effects, solvers
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Polylines, Surface, TetMesh
+from fem_reference.foundations.motion import Rotation, apply
+from fem_reference.io import files
+from fem_reference.problems.muscle import Held, Problem
+from fem_reference.runs.store import Frame
+from fem_reference.scenes.muscle import SolverChoice
 
 MUSCLE = (
     effects.find("neo_hooke").model_validate({"mu": "10 kPa"}),

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import shapes
 
-from fem_reference.motion import Rotation, apply
-from fem_reference.soundness import trouble
+from fem_reference.foundations.motion import Rotation, apply
+from fem_reference.solvers.common.state_checks import trouble
 
 REST = shapes.sphere(1, 10.0)
 NONE = np.zeros(0, np.int64)

@@ -9,15 +9,15 @@ import shapes as bodies
 from scipy.optimize import brentq
 
 from fem_reference import effects
-from fem_reference.continuum import ELEMENTS, Continuum, Prescribed
 from fem_reference.effects import Effect
-from fem_reference.motion import Translation
-from fem_reference.records import parse
-from fem_reference.runs import Frame
+from fem_reference.foundations.motion import Translation
+from fem_reference.foundations.records import parse
+from fem_reference.problems import shapes
+from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
+from fem_reference.problems.courses import Affine, Rest
+from fem_reference.runs.store import Frame
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import BodySettings, Settings
-from fem_reference.verification import shapes
-from fem_reference.verification.courses import Affine, Rest
 from fem_reference.verification.parts import SYMMETRY
 
 STILL = ((0.0, 0.0, 0.0),) * 3

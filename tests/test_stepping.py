@@ -2,7 +2,7 @@
 
 from itertools import pairwise
 
-from fem_reference.stepping import Attempt, Steps, march
+from fem_reference.solvers.common.load_steps import Attempt, Steps, march
 
 
 def marched(attempt, frames=(0, 10, 20), first_step=10.0, smallest_step=0.5):

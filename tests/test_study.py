@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 import shapes
 
-from fem_reference import study
-from fem_reference.errors import InputError
-from fem_reference.mesh import Polylines
+from fem_reference.assessment import error_bars
+from fem_reference.assessment.error_bars import Pair, typical
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Polylines
 from fem_reference.metrics import Yardstick
-from fem_reference.runs import Outcome, Run
-from fem_reference.study import Pair, error_bars, typical
+from fem_reference.runs.store import Outcome, Run
 
 REST = shapes.sphere(2, 10.0)
 FIBRE = Polylines(np.array([[0.0, 0, -5], [0, 0, 5]]), np.array([0, 2]))
@@ -48,10 +48,10 @@ def pair(coarse: float, *, order: float = 1.0, varied: float = 0.0, exact: float
     return Pair(run(0.1), run(coarse), (4.0, 8.0), order, order / 2, others, None if exact is None else run(exact))
 
 
-def bars(**given: float) -> study.ErrorBars:
+def bars(**given: float) -> error_bars.ErrorBars:
     """Of a growth that is 0.01 more on the larger tetrahedra."""
     found = pair(0.11, **given)
-    return error_bars(found, Yardstick.of(found.fine, FIBRE, ()))
+    return error_bars.error_bars(found, Yardstick.of(found.fine, FIBRE, ()))
 
 
 @pytest.mark.parametrize("of", ["change", "deviation"])
@@ -77,7 +77,7 @@ def test_the_fibres_of_other_meshes_are_not_mistaken_for_those_of_the_reference(
     # Runs that all carry the measured fibre, but unmoved: were it used, no length would change.
     given = pair(0.11)
     still = [replace(one, fibre_positions=np.stack([FIBRE.points] * 3)) for one in (given.fine, given.coarse)]
-    found = error_bars(replace(given, fine=still[0], coarse=still[1]), Yardstick.of(still[0], FIBRE, ()))
+    found = error_bars.error_bars(replace(given, fine=still[0], coarse=still[1]), Yardstick.of(still[0], FIBRE, ()))
     assert found.find("deviation", "fibre_length", "mean").values[1] == pytest.approx(0.125, abs=1e-9)
 
 
@@ -102,7 +102,7 @@ def test_the_worst_places_of_two_runs_need_not_be_the_same() -> None:
         return replace(run(0.0), positions=np.stack([REST.points + time * outwards for time in TIMES]))
 
     given = replace(pair(0.1), fine=half(1), coarse=half(-1))
-    found = error_bars(given, Yardstick.of(given.fine, FIBRE, ()))
+    found = error_bars.error_bars(given, Yardstick.of(given.fine, FIBRE, ()))
     bar = found.find("change", "surface_deviation", "max")
     assert bar.values == pytest.approx(1.25 / (2**0.5 - 1) * TIMES, abs=1e-6)
 
@@ -119,8 +119,8 @@ def test_what_is_stored_reads_back(tmp_path) -> None:
     kept = bars(varied=0.002, exact=0.12)
     gap = replace(kept.bars[3], values=np.array([0, np.nan, 1.5]), model=None)
     kept = replace(kept, bars=(*kept.bars[:3], gap, *kept.bars[4:]))
-    study.save(kept, tmp_path, OF)
-    read = study.load(tmp_path, OF)
+    error_bars.save(kept, tmp_path, OF)
+    read = error_bars.load(tmp_path, OF)
     assert (read.numbers, read.sizes, read.order) == (kept.numbers, kept.sizes, kept.order)
     for one, other in zip(read.bars, kept.bars, strict=True):
         assert (one.of, one.metric, one.statistic, one.unit) == (other.of, other.metric, other.statistic, other.unit)
@@ -132,10 +132,10 @@ def test_what_is_stored_reads_back(tmp_path) -> None:
 
 
 def test_what_is_stored_is_of_one_run_and_its_metrics_only(tmp_path) -> None:
-    assert study.load(tmp_path, OF) is None
-    study.save(bars(), tmp_path, OF)
-    assert study.load(tmp_path, OF | {"metrics": "others"}) is None
-    assert study.load(tmp_path, OF | {"run": "fenicsx-2"}) is None
+    assert error_bars.load(tmp_path, OF) is None
+    error_bars.save(bars(), tmp_path, OF)
+    assert error_bars.load(tmp_path, OF | {"metrics": "others"}) is None
+    assert error_bars.load(tmp_path, OF | {"run": "fenicsx-2"}) is None
 
 
 def change(key: str, value):
@@ -155,15 +155,15 @@ DAMAGE = {
 
 @pytest.mark.parametrize("what", DAMAGE)
 def test_a_damaged_file_is_named(tmp_path, what) -> None:
-    study.save(bars(), tmp_path, OF)
-    table = json.loads((tmp_path / study.FILE).read_text())
+    error_bars.save(bars(), tmp_path, OF)
+    table = json.loads((tmp_path / error_bars.FILE).read_text())
     DAMAGE[what](table)
-    (tmp_path / study.FILE).write_text(json.dumps(table))
+    (tmp_path / error_bars.FILE).write_text(json.dumps(table))
     with pytest.raises(InputError, match=r"error_bar.json: got .*, want the error bar of a stored run"):
-        study.load(tmp_path, OF)
+        error_bars.load(tmp_path, OF)
 
 
 def test_a_file_that_was_cut_off_is_named(tmp_path) -> None:
-    (tmp_path / study.FILE).write_text('{"format": 2, "of"')
+    (tmp_path / error_bars.FILE).write_text('{"format": 2, "of"')
     with pytest.raises(InputError, match=r"error_bar.json: got JSONDecodeError"):
-        study.load(tmp_path, OF)
+        error_bars.load(tmp_path, OF)

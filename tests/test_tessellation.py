@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from fem_reference.foundations.mesh import Floats, check_closed, enclosed_volume
 from fem_reference.geometry.rigid_bodies import Box, Capsule, Cylinder, HalfSpace, Sampled, Sphere
 from fem_reference.geometry.tessellation import tessellated
-from fem_reference.mesh import Floats, check_closed, enclosed_volume
 
 BESIDE = np.array([[-50.0, 10, -50], [50, 90, 50], [0, 30, 0]])
 START, END = (10.0, -20.0, 5.0), (13.0, -8.0, 9.0)  # 3, 12 and 4 apart: 13

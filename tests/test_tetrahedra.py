@@ -10,14 +10,8 @@ import shapes
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from fem_reference import files
-from fem_reference.errors import InputError
-from fem_reference.geometry import tetrahedra
-from fem_reference.geometry.distance import distances
-from fem_reference.geometry.intersections import self_intersections
-from fem_reference.geometry.sectors import held_area, held_shares
-from fem_reference.geometry.tetrahedra import tetrahedralise
-from fem_reference.mesh import (
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import (
     Surface,
     TetMesh,
     boundary,
@@ -27,6 +21,12 @@ from fem_reference.mesh import (
     tet_volumes,
     triangle_areas,
 )
+from fem_reference.geometry import tetrahedra
+from fem_reference.geometry.distance import distances
+from fem_reference.geometry.intersections import self_intersections
+from fem_reference.geometry.sectors import held_area, held_shares
+from fem_reference.geometry.tetrahedra import tetrahedralise
+from fem_reference.io import files
 
 HIP = np.array([146.0, 238.0, -431.0])  # [mm]
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import shapes
 
+from fem_reference.foundations.mesh import Surface, triangle_areas
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.thinning import thin
-from fem_reference.mesh import Surface, triangle_areas
 
 
 def test_a_surface_of_few_triangles_stays_itself():

@@ -7,8 +7,8 @@ import math
 
 import pytest
 
-from fem_reference import units
-from fem_reference.units import length_unit, quantity, three, unit_of
+from fem_reference.foundations import units
+from fem_reference.foundations.units import length_unit, quantity, three, unit_of
 
 
 @pytest.mark.parametrize(

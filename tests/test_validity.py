@@ -8,16 +8,17 @@ import pytest
 import shapes as bodies
 
 from fem_reference import effects
-from fem_reference.continuum import ELEMENTS, ByCell, Continuum, Prescribed
 from fem_reference.effects import Effect, State
-from fem_reference.limits import Limit
-from fem_reference.motion import Translation
-from fem_reference.records import parse
+from fem_reference.foundations.limits import Limit
+from fem_reference.foundations.motion import Translation
+from fem_reference.foundations.records import parse
+from fem_reference.problems import shapes
+from fem_reference.problems.body import ELEMENTS, ByCell, Continuum, Prescribed
+from fem_reference.problems.courses import Affine, Along, Rest
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import BodySettings, Settings
-from fem_reference.verification import shapes, squeeze
+from fem_reference.verification import squeeze
 from fem_reference.verification.collapse import MU, POISSON, bulk_modulus, squeezed
-from fem_reference.verification.courses import Affine, Along, Rest
 from fem_reference.verification.homogeneous import everywhere
 from fem_reference.verification.parts import resistance
 from validation.loads import squeezed_volume

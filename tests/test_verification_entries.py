@@ -6,9 +6,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fem_reference.catalogue import Entry, Lab, result
-from fem_reference.continuum import Continuum, Reached, Solved
-from fem_reference.runs import Outcome
+from fem_reference.assessment.catalogue import Entry, Lab, result
+from fem_reference.problems.body import Continuum
+from fem_reference.runs.solved import Reached, Solved
+from fem_reference.runs.store import Outcome
 from fem_reference.verification import runner
 
 ENTRIES = runner.entries()

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from fem_reference.truths import find
-from fem_reference.verification import heart, shapes
+from fem_reference.problems import shapes
+from fem_reference.verification import heart
+from fem_reference.verification.truths import find
 
 
 def test_the_crowded_ventricle_is_the_same_body() -> None:

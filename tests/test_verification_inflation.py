@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from fem_reference import truths
-from fem_reference.continuum import Reached, Solved
-from fem_reference.runs import Outcome
-from fem_reference.verification import inflation
+from fem_reference.runs.solved import Reached, Solved
+from fem_reference.runs.store import Outcome
+from fem_reference.verification import inflation, truths
 
 
 def test_the_slope_of_the_energy_is_the_pressure() -> None:

@@ -14,10 +14,10 @@ from typing import get_args
 
 import pytest
 
-from fem_reference import cli, report, truths
-from fem_reference.catalogue import Entry, Finding, Kind, order
-from fem_reference.errors import InputError, MissingSoftware
-from fem_reference.verification import runner
+from fem_reference import cli, report
+from fem_reference.assessment.catalogue import Entry, Finding, Kind, order
+from fem_reference.foundations.errors import InputError, MissingSoftware
+from fem_reference.verification import runner, truths
 
 
 def entry(name, measure=1.0, family="blocks", **changes) -> Entry:

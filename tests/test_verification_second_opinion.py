@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fem_reference.continuum import Reached
+from fem_reference.runs.solved import Reached
 from fem_reference.verification.second_opinion import differences
 
 

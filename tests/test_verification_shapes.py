@@ -9,9 +9,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad
 
-from fem_reference.continuum import Cells, Kind, reference_nodes
-from fem_reference.mesh import Floats, Ints
-from fem_reference.verification import shapes
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.problems import shapes
+from fem_reference.problems.body import Cells, Kind, reference_nodes
 
 KINDS: tuple[Kind, ...] = ("tetrahedron", "hexahedron")
 SHAPES: dict[str, Callable[[Kind, int], Cells]] = {

@@ -8,7 +8,7 @@ import pytest
 from test_field_page import read
 
 from fem_reference import report
-from fem_reference.catalogue import Entry, Finding, Result, result
+from fem_reference.assessment.catalogue import Entry, Finding, Result, result
 from fem_reference.report import verify_figures, verify_page
 from fem_reference.report.verify_page import Verification
 

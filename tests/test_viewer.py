@@ -15,7 +15,7 @@ import shapes
 import test_report
 from browser import PROGRAM, Browser
 
-from fem_reference.problem import Body
+from fem_reference.problems.muscle import Body
 from fem_reference.report import page, viewer
 
 NAN = float("nan")

@@ -7,15 +7,15 @@ import pytest
 from acting import TURN, deformations, make, state
 from test_stability import STILL, THIN, column, critical, effect, flesh, session  # noqa: F401 - a fixture
 
-from fem_reference import casefile
-from fem_reference.continuum import Continuum, Prescribed, check
 from fem_reference.effects import total_energy
-from fem_reference.errors import InputError
+from fem_reference.foundations.errors import InputError
+from fem_reference.problems import shapes
+from fem_reference.problems.body import Continuum, Prescribed, check
+from fem_reference.problems.courses import Affine, Turn
+from fem_reference.scenes import casefile
 from fem_reference.solvers.fenicsx import BodySettings
 from fem_reference.solvers.scikit_fem import BodySettings as OtherSettings
 from fem_reference.solvers.scikit_fem import solve_body
-from fem_reference.verification import shapes
-from fem_reference.verification.courses import Affine, Turn
 from fem_reference.verification.parts import SYMMETRY
 
 THICK = effect("viscosity", eta="20 kPa s")  # with mu = 10 kPa it creeps at 1/2 a second

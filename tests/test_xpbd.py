@@ -8,12 +8,12 @@ import pytest
 import shapes
 from scipy.optimize import brentq
 
-from fem_reference.errors import InputError
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Surface, enclosed_volume
+from fem_reference.foundations.motion import Rotation, Translation, apply
+from fem_reference.foundations.records import parse
 from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere
-from fem_reference.mesh import Surface, enclosed_volume
-from fem_reference.motion import Rotation, Translation, apply
-from fem_reference.problem import Body, Held, Setup
-from fem_reference.records import parse
+from fem_reference.problems.muscle import Body, Held, Setup
 from fem_reference.solvers import pbd, xpbd
 from fem_reference.solvers.collision_kernels import Obstacle
 from fem_reference.solvers.xpbd import Constraints, Step

@@ -18,7 +18,7 @@ from fem_reference.cli.telling import (
     VERDICT_FAIL,
     out,
 )
-from fem_reference.errors import InputError, MissingSoftware
+from fem_reference.foundations.errors import InputError, MissingSoftware
 
 __all__ = ["BAD_INPUT", "DONE", "INTERRUPTED", "SOLVER_FAILED", "TERMINATED", "VERDICT_FAIL", "entry", "main"]
 

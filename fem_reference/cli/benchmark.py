@@ -3,12 +3,12 @@
 import argparse
 import os
 
-from fem_reference import casefile
-from fem_reference.benchmark import candidates, checkout, reference, reference_table
 from fem_reference.cli.telling import DONE, SOLVER_FAILED, out, tell
-from fem_reference.errors import InputError
-from fem_reference.execution import Bench
-from fem_reference.scene import DATA_SETTING
+from fem_reference.foundations.errors import InputError
+from fem_reference.scenes import casefile
+from fem_reference.scenes.muscle import DATA_SETTING
+from fem_reference.studies.benchmark import candidates, checkout, reference, reference_table
+from fem_reference.studies.execution import Bench
 
 TIMED, TIMED_WITH_DATA = ("hip_flexion", "box_squeeze"), ("gluteus_maximus", "box_squeeze_report")
 

@@ -8,15 +8,17 @@ import argparse
 import time
 from pathlib import Path
 
-from fem_reference import files, refinement
+from fem_reference.assessment import baseline, regression
+from fem_reference.assessment.measured import Today
 from fem_reference.cli.choosing import check_names, checked_bench, choose, scene_of
 from fem_reference.cli.telling import DONE, SOLVER_FAILED, VERDICT_FAIL, tell
-from fem_reference.errors import InputError
-from fem_reference.execution import Bench
-from fem_reference.regression import baseline, checking, told
-from fem_reference.regression.today import Today
-from fem_reference.runs import Run
-from fem_reference.scene import Candidate, Scene
+from fem_reference.foundations.errors import InputError
+from fem_reference.io import files
+from fem_reference.report import regression_texts
+from fem_reference.runs.store import Run
+from fem_reference.scenes.muscle import Candidate, Scene
+from fem_reference.studies import refinement
+from fem_reference.studies.execution import Bench
 
 
 def add_options(parser: argparse.ArgumentParser, unit: str) -> None:
@@ -48,7 +50,7 @@ def check(options: argparse.Namespace) -> int:
     if failed:
         why = [f"{one.name}: {one.outcome.status}, {one.outcome.message}" for one in failed]
         facts = {"case": scene.name, "candidate": run.name, "verdict": "failed", "notes": why, "judgements": []}
-        lost = told.lost(scene.name, run.name, why)
+        lost = regression_texts.lost(scene.name, run.name, why)
         _write({options.junit: lost.junit, options.markdown: lost.markdown})
         tell(facts, "\n".join([*why, "verdict: failed"]), options)
         return SOLVER_FAILED
@@ -67,9 +69,14 @@ def _told(today: Today, options: argparse.Namespace, begin: float) -> int:
     """Judge, write what is wanted, and return the exit status."""
     if options.update:
         baseline.update(options.baseline, today)
-    result = checking.check(baseline.read(options.baseline, today.scene, today.candidate.name), today)
-    _write({options.junit: told.junit(result, time.perf_counter() - begin), options.markdown: told.markdown(result)})
-    tell(told.facts(result), told.text(result), options)
+    result = regression.check(baseline.read(options.baseline, today.scene, today.candidate.name), today)
+    _write(
+        {
+            options.junit: regression_texts.junit(result, time.perf_counter() - begin),
+            options.markdown: regression_texts.markdown(result),
+        }
+    )
+    tell(regression_texts.facts(result), regression_texts.text(result), options)
     return VERDICT_FAIL if result.word == "fail" else DONE
 
 

@@ -4,14 +4,15 @@ import argparse
 import re
 from pathlib import Path
 
-from fem_reference import casefile, judge
+from fem_reference.assessment import judge
 from fem_reference.cli.telling import out
-from fem_reference.errors import InputError
-from fem_reference.execution import Bench
-from fem_reference.field.scene import FieldScene
-from fem_reference.records import parse
-from fem_reference.scene import Candidate, Scene
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.records import parse
+from fem_reference.scenes import casefile
+from fem_reference.scenes.muscle import Candidate, Scene
+from fem_reference.scenes.scalar import FieldScene
 from fem_reference.solvers import recorded
+from fem_reference.studies.execution import Bench
 
 
 def scene_of(options: argparse.Namespace) -> Scene | FieldScene:

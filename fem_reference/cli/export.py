@@ -3,11 +3,13 @@
 import argparse
 from pathlib import Path
 
-from fem_reference import casefile, exchange
 from fem_reference.cli.telling import DONE, lines, out, tell
-from fem_reference.errors import InputError
-from fem_reference.execution import Bench
-from fem_reference.scene import Scene
+from fem_reference.export import FORMATS
+from fem_reference.export import export as write
+from fem_reference.foundations.errors import InputError
+from fem_reference.scenes import casefile
+from fem_reference.scenes.muscle import Scene
+from fem_reference.studies.execution import Bench
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -16,7 +18,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--to", type=Path, required=True, metavar="DIR", help="a folder that is not there yet, or empty"
     )
     forms = "open formats alone (default), or FEBio's own besides"
-    parser.add_argument("--format", choices=exchange.FORMATS, default="open", help=forms)
+    parser.add_argument("--format", choices=FORMATS, default="open", help=forms)
 
 
 def export(options: argparse.Namespace) -> int:
@@ -25,7 +27,7 @@ def export(options: argparse.Namespace) -> int:
     if not isinstance(scene, Scene):
         raise InputError(scene.place, "the scene of a scalar field", "the scene of a muscle")
     bench = Bench(scene, out(options) / "runs")
-    written = exchange.export(scene, bench.problem, options.to, options.format)
+    written = write(scene, bench.problem, options.to, options.format)
     facts = {"case": scene.name, "folder": str(options.to), "files": written}
     tell(facts, "\n".join(lines(facts)), options)
     return DONE

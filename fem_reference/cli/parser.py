@@ -4,8 +4,8 @@ import argparse
 from collections.abc import Callable
 from pathlib import Path
 
-from fem_reference import __version__, field_verbs
-from fem_reference.cli import benchmark, check, export, verbs
+from fem_reference import __version__
+from fem_reference.cli import benchmark, check, export, scalar, verbs
 
 
 def parser() -> argparse.ArgumentParser:
@@ -69,7 +69,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def _add_page_options(page: argparse.ArgumentParser, unit: str) -> None:
-    names = sorted([*field_verbs.PAGES, verbs.TABLE, verbs.CLAIMS])
+    names = sorted([*scalar.PAGES, verbs.TABLE, verbs.CLAIMS])
     page.add_argument("name", metavar="NAME", choices=names, help=f"one of {', '.join(names)}")
     some = f"for {verbs.TABLE} and {verbs.CLAIMS}: this case, not all of them; may be repeated"
     page.add_argument("--case", action="append", default=[], metavar="CASE", help=some)

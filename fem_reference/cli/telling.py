@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from fem_reference import files
+from fem_reference.io import files
 
 DONE, VERDICT_FAIL, BAD_INPUT, SOLVER_FAILED = range(4)
 INTERRUPTED, TERMINATED = 130, 143  # what shells report for them

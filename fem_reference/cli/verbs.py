@@ -3,32 +3,32 @@
 import argparse
 from pathlib import Path
 
-from fem_reference import (
-    casefile,
-    comparison,
-    families,
-    field_verbs,
-    files,
-    metrics,
-    refinement,
-    report,
-    runs,
-    solvers,
-    true_errors,
-)
-from fem_reference.claims import Cover
+from fem_reference import metrics, report, solvers
+from fem_reference.assessment import comparison
+from fem_reference.assessment.claims import Cover
+from fem_reference.cli import scalar, verification
 from fem_reference.cli.choosing import check_names, checked_bench, choose, own_candidates, recorded_in, scene_of
+from fem_reference.cli.scalar import Told
 from fem_reference.cli.telling import DONE, SOLVER_FAILED, VERDICT_FAIL, lines, out, tell
-from fem_reference.errors import InputError
-from fem_reference.execution import Bench, complete
-from fem_reference.field.scene import FieldScene
-from fem_reference.field_execution import FieldBench
-from fem_reference.field_verbs import Told
-from fem_reference.overview import comparison_text, field_scene_facts, run_facts, run_text, scene_facts, standings_text
+from fem_reference.foundations.errors import InputError
+from fem_reference.io import files
 from fem_reference.report.claims_page import facts as claims_facts
+from fem_reference.report.overview import (
+    comparison_text,
+    field_scene_facts,
+    run_facts,
+    run_text,
+    scene_facts,
+    standings_text,
+)
 from fem_reference.report.standings_page import facts as standings_facts
-from fem_reference.scene import Candidate, Scene, SolverChoice
-from fem_reference.verification import verb as verification
+from fem_reference.runs import store
+from fem_reference.scenes import casefile
+from fem_reference.scenes.muscle import Candidate, Scene, SolverChoice
+from fem_reference.scenes.scalar import FieldScene
+from fem_reference.studies import refinement, table_5_1, true_errors
+from fem_reference.studies.execution import Bench, complete
+from fem_reference.studies.scalar import FieldBench
 
 MAIN_JOB = "hip_flexion"
 TABLE = "table-5-1"
@@ -46,7 +46,7 @@ def compare(options: argparse.Namespace) -> int:
     scene = scene_of(options)
     if isinstance(scene, FieldScene):
         _refuse_error_bar(options)
-        return _told(field_verbs.compare(scene, options.candidate, out(options)), options)
+        return _told(scalar.compare(scene, options.candidate, out(options)), options)
     wanted = options.candidate or [candidate.name for candidate in scene.candidate]
     return _judge(scene, options, [choose(scene, text, options.unit) for text in wanted])
 
@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
     scene = scene_of(options)
     if isinstance(scene, FieldScene):
         _refuse_error_bar(options)
-        return _told(field_verbs.run(scene, options.solver, out(options)), options)
+        return _told(scalar.run(scene, options.solver, out(options)), options)
     if options.solver is None or options.solver == scene.reference.solver:
         return _judge(scene, options, [])
     _refuse_error_bar(options)
@@ -93,16 +93,16 @@ def page(options: argparse.Namespace) -> int:
     if options.case or options.candidate or options.unit:
         given = "--candidate or --unit" if options.name == CLAIMS else "--case, --candidate or --unit"
         raise InputError("page", f"{given} for {options.name}", f"them for {TABLE} only")
-    return _told(field_verbs.page(options.name, out(options)), options)
+    return _told(scalar.page(options.name, out(options)), options)
 
 
 def _table(options: argparse.Namespace) -> int:
     """The families of the report's table, measured."""
-    scenes = {scene.name: scene for scene in map(casefile.read_muscle, options.case or families.SCENARIOS)}
+    scenes = {scene.name: scene for scene in map(casefile.read_muscle, options.case or table_5_1.SCENARIOS)}
     foreign = _foreign(options, list(scenes))
     for name in scenes if options.case else foreign:
         Bench(scenes[name], out(options)).setup()  # only what nobody asked for by name may be missing
-    table = families.stand(scenes.values(), out(options) / "runs", foreign)
+    table = table_5_1.stand(scenes.values(), out(options) / "runs", foreign)
     path = report.write_standings(table, out(options), TABLE)
     tell(standings_facts(table), f"{standings_text(table)}\npage: {path}", options)
     return DONE if all(one.reference.status == "converged" for one in table.scenarios) else SOLVER_FAILED
@@ -168,7 +168,7 @@ def _judge(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candida
 def list_all(options: argparse.Namespace) -> int:
     """Say what there is."""
     scenes = {name: casefile.read(name).title for name in casefile.cases()}
-    stored = [_stored(path.parent) for path in sorted((out(options) / "runs").glob("*/*/run.json"))]
+    stored = [_stored(path.parent) for path in sorted((out(options) / "runs").rglob("run.json"))]
     facts = {"cases": scenes, "solvers": solvers.names(), "metrics": metrics.names(), "runs": stored}
     width = max(map(len, scenes))
     lines = ["cases:", *(f"  {name:{width}}  {title}" for name, title in scenes.items())]
@@ -180,7 +180,7 @@ def list_all(options: argparse.Namespace) -> int:
 
 def _stored(folder: Path) -> str:
     """A stored run, with its status where it did not converge."""
-    status = runs.status(folder)
+    status = store.status(folder)
     return str(folder) if status == "converged" else f"{folder} ({status})"
 
 

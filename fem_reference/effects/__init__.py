@@ -20,9 +20,10 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 from pydantic import Field, field_validator
 
-from fem_reference.limits import Limit
-from fem_reference.records import Record
-from fem_reference.units import unit_of
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.limits import Limit
+from fem_reference.foundations.records import Record, parse
+from fem_reference.foundations.units import unit_of
 
 
 class Functions(Protocol):
@@ -292,3 +293,15 @@ def find(name: str) -> type[Record]:
         if isinstance(entry, type) and issubclass(entry, Effect | FieldEffect) and entry.__module__ == module.__name__
     )
     return record
+
+
+def make(name: str, **parameters: Any) -> "Effect":
+    """The effect ``name`` with its parameters as scene files write them; InputError where they do not suit it.
+
+    >>> make("neo_hooke", mu="10 kPa").mu
+    0.01
+    """
+    made = parse(find(name), parameters, name)
+    if not isinstance(made, Effect):
+        raise InputError(name, "an effect of scalar fields", f"one of {', '.join(names())}")
+    return made

@@ -3,7 +3,7 @@
 from typing import Any, ClassVar
 
 from fem_reference.effects import Coursed, Energy, State
-from fem_reference.units import PositivePressure
+from fem_reference.foundations.units import PositivePressure
 
 
 class ActiveTension(Coursed, Energy):

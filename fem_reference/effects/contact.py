@@ -5,11 +5,11 @@ from collections.abc import Iterable
 from pydantic import Field
 
 from fem_reference.effects import Effect, Interaction
-from fem_reference.units import AreaStiffness, PositiveLength
+from fem_reference.foundations.units import AreaStiffness, PositiveLength
 
 
 class Contact(Interaction):
-    """A pressure of the gap to each bone; see ``fem_reference.contact.Contact`` for the law.
+    """A pressure of the gap to each bone; see ``fem_reference.problems.contact.Contact`` for the law.
 
     ``stiffness`` [MPa/mm]: where the bone presses with p, the surface gets at most p / stiffness deep. ``smoothing`` [mm]: from
     this distance on a bone is felt. ``bones``: their names, by default all.

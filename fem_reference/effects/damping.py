@@ -3,7 +3,7 @@
 from typing import Any, ClassVar
 
 from fem_reference.effects import Energy, State
-from fem_reference.units import VolumeDamping
+from fem_reference.foundations.units import VolumeDamping
 
 
 class Damping(Energy):

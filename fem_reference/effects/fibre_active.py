@@ -5,8 +5,8 @@ from typing import Any, ClassVar
 from pydantic import Field
 
 from fem_reference.effects import Coursed, Energy, State
-from fem_reference.limits import Limit
-from fem_reference.units import PositivePressure
+from fem_reference.foundations.limits import Limit
+from fem_reference.foundations.units import PositivePressure
 
 
 class FibreActive(Coursed, Energy):

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from fem_reference.effects import Energy, State
-from fem_reference.units import PositivePressure
+from fem_reference.foundations.units import PositivePressure
 
 # On (0, 1), as plain numbers: those of numpy would draw symbols into arrays.
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(10)

@@ -3,7 +3,7 @@
 from typing import Any
 
 from fem_reference.effects import Coursed, Energy, State
-from fem_reference.units import AccelerationVector, Density
+from fem_reference.foundations.units import AccelerationVector, Density
 
 
 class Gravity(Coursed, Energy):

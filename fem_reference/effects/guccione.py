@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 from pydantic import Field
 
 from fem_reference.effects import Energy, State
-from fem_reference.units import PositivePressure
+from fem_reference.foundations.units import PositivePressure
 
 
 class Guccione(Energy):

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 from pydantic import Field, field_validator
 
 from fem_reference.effects import Energy, State
-from fem_reference.units import Angle, PositivePressure
+from fem_reference.foundations.units import Angle, PositivePressure
 
 
 class HolzapfelOgden(Energy):

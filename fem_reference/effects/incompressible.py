@@ -3,8 +3,8 @@
 from typing import Any, ClassVar
 
 from fem_reference.effects import Energy, State
-from fem_reference.limits import Limit
-from fem_reference.units import PositivePressure
+from fem_reference.foundations.limits import Limit
+from fem_reference.foundations.units import PositivePressure
 
 
 class Incompressible(Energy):

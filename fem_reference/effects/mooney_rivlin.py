@@ -5,7 +5,7 @@ from typing import Any
 from pydantic import model_validator
 
 from fem_reference.effects import Energy, State
-from fem_reference.units import Pressure
+from fem_reference.foundations.units import Pressure
 
 
 class MooneyRivlin(Energy):

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from typing import Any
 
-from fem_reference import units
 from fem_reference.effects import Coursed, Load, State
+from fem_reference.foundations import units
 
 
 class Pressure(Coursed, Load):

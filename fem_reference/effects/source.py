@@ -3,7 +3,7 @@
 from typing import Any, Literal
 
 from fem_reference.effects import FieldEffect, FieldState, Place
-from fem_reference.formula import Formula, evaluate
+from fem_reference.foundations.formula import Formula, evaluate
 
 
 class Source(FieldEffect):

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from fem_reference.effects import Coursed, Load, State
-from fem_reference.units import PressureVector
+from fem_reference.foundations.units import PressureVector
 
 
 class Traction(Coursed, Load):

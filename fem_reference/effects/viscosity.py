@@ -5,7 +5,7 @@ than long ones.
 from typing import Any, ClassVar
 
 from fem_reference.effects import Energy, State
-from fem_reference.units import Viscosity as Coefficient
+from fem_reference.foundations.units import Viscosity as Coefficient
 
 
 class Viscosity(Energy):

@@ -7,9 +7,9 @@ from itertools import permutations
 
 import numpy as np
 
-from fem_reference.errors import InputError
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, enclosed_volume
 from fem_reference.geometry.tetrahedra import check_size
-from fem_reference.mesh import Floats, Ints, Surface, TetMesh, enclosed_volume
 
 Counts = tuple[int, int, int]
 

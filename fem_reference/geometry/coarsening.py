@@ -6,8 +6,8 @@ import igl
 import numpy as np
 from numpy.typing import NDArray
 
+from fem_reference.foundations.mesh import Floats, Ints, Surface, enclosed_volume, triangle_areas
 from fem_reference.geometry.distance import distances
-from fem_reference.mesh import Floats, Ints, Surface, enclosed_volume, triangle_areas
 
 # Chosen on four hip muscles and a box. More rounds gain nothing.
 _ROUNDS = 6

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import igl
 import numpy as np
 
-from fem_reference.mesh import Floats, Ints, Surface
+from fem_reference.foundations.mesh import Floats, Ints, Surface
 
 
 class Distances(NamedTuple):

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import igl
 import numpy as np
 
+from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, boundary
 from fem_reference.geometry.distance import Distances, distances
-from fem_reference.mesh import Floats, Ints, Surface, TetMesh, boundary
 
 # A point that round-off leaves between two tets is looked for again this far away, as a share of the mesh's diagonal.
 _NUDGE = 1e-9

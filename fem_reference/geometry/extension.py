@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fem_reference.foundations.mesh import Floats, Surface
 from fem_reference.geometry.distance import distances
-from fem_reference.mesh import Floats, Surface
 
 # Closer to the surface than this share of its diagonal a point counts as on it.
 _ON = 1e-10

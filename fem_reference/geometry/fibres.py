@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from skfem.models.poisson import laplace
 
-from fem_reference.errors import InputError
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, Ints, Polylines, TetMesh, tet_volumes
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.embedding import Locator
-from fem_reference.mesh import Floats, Ints, Polylines, TetMesh, tet_volumes
 
 _POINTS = 40  # of each line
 _NEAR = 1e-3  # the field this close to 0 or 1 counts as having arrived

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.mesh import Floats, Ints, Surface
+from fem_reference.foundations.mesh import Floats, Ints, Surface
 
 
 def self_intersections(surface: Surface) -> Ints:

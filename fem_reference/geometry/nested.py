@@ -5,9 +5,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fem_reference.foundations.mesh import (
+    Floats,
+    Ints,
+    Surface,
+    TetMesh,
+    boundary,
+    enclosed_volume,
+    tet_qualities,
+    tet_volumes,
+)
 from fem_reference.geometry.coarsening import inflate
 from fem_reference.geometry.distance import distances
-from fem_reference.mesh import Floats, Ints, Surface, TetMesh, boundary, enclosed_volume, tet_qualities, tet_volumes
 
 EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 # The eight parts of a tet, of its corners 0 to 3 and the points 4 to 9 on its edges in the order above, by which of the three

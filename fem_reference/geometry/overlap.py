@@ -6,7 +6,7 @@ import igl
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.mesh import Floats, Surface
+from fem_reference.foundations.mesh import Floats, Surface
 
 # The first cubes are at most this long [mm], and one in so many of the longest extent of the surface.
 _FIRST_EDGE, _FIRST_CUBES = 10.0, 20

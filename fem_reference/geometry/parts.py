@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 
+from fem_reference.foundations.mesh import Floats, Ints, Surface, triangle_areas
 from fem_reference.geometry.coarsening import flip_edges, free_part, inflate, slide
 from fem_reference.geometry.distance import distances
-from fem_reference.mesh import Floats, Ints, Surface, triangle_areas
 
 Bools = NDArray[np.bool_]
 

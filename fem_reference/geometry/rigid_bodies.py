@@ -12,9 +12,8 @@ from typing import ClassVar, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.bones import CLOSED_FORMS, Bone
-from fem_reference.errors import InputError
-from fem_reference.mesh import Floats
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats
 
 Vector = tuple[float, float, float]
 
@@ -160,13 +159,14 @@ class Cylinder(Exact):
         return Sampled(distance, np.einsum("na,nai->ni", slope, frame), curvature)
 
 
-_KINDS = {"half_space": HalfSpace, "box": Box, "sphere": Sphere, "capsule": Capsule, "cylinder": Cylinder}
-
-
-def solid(bone: Bone) -> Obstacle | None:
-    """The body of closed form that a ``bone`` of a scene is; None where it is a surface in a file."""
-    given = ((way, getattr(bone, way)) for way in CLOSED_FORMS)
-    return next((_KINDS[way](**form.model_dump()) for way, form in given if form is not None), None)
+# By the names that scene files give them.
+CLOSED_FORMS: dict[str, type[HalfSpace | Box | Sphere | Capsule | Cylinder]] = {
+    "half_space": HalfSpace,
+    "box": Box,
+    "sphere": Sphere,
+    "capsule": Capsule,
+    "cylinder": Cylinder,
+}
 
 
 def _orthant(beyond: Floats) -> Sampled:

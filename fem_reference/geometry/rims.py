@@ -9,11 +9,11 @@ from scipy.sparse import coo_array, diags_array
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
+from fem_reference.foundations.mesh import Floats, Ints, Surface, enclosed_volume, triangle_areas
 from fem_reference.geometry.coarsening import flip_edges, free_part
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.parts import Parts, between, relaxed, widened
 from fem_reference.geometry.sectors import held_area, sectors, shares_at
-from fem_reference.mesh import Floats, Ints, Surface, enclosed_volume, triangle_areas
 
 Bools = NDArray[np.bool_]
 

@@ -4,8 +4,8 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from fem_reference.foundations.mesh import Floats, Ints, Surface, triangle_areas
 from fem_reference.geometry.distance import distances
-from fem_reference.mesh import Floats, Ints, Surface, triangle_areas
 
 # Two triangles meet in a sharp edge where their normals are more than this apart.
 _SHARP = np.cos(np.radians(45))

@@ -14,9 +14,17 @@ import igl
 import numpy as np
 from scipy.ndimage import gaussian_filter, spline_filter, zoom
 
+from fem_reference.foundations.mesh import (
+    Floats,
+    Surface,
+    check_closed,
+    check_finite,
+    fingerprint,
+    read_only,
+    triangle_areas,
+)
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.rigid_bodies import Sampled, Vector
-from fem_reference.mesh import Floats, Surface, check_closed, check_finite, fingerprint, read_only, triangle_areas
 
 # The distance [mm] to what lies outside a grid: far away from everything, and yet a number to calculate with.
 FAR = 1e6

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh
 from fem_reference.geometry.embedding import Locator
-from fem_reference.mesh import Floats, Ints, Surface, TetMesh
 
 _RULE = np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6
 # Points on a surface are so many to its diagonal, or more: on muscles of the hip, 3 mm apart.

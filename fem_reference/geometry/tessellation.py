@@ -5,9 +5,9 @@ Their vertices lie on the body. A ball, a capsule and a box are all one: the cor
 
 import numpy as np
 
+from fem_reference.foundations.mesh import Floats, Ints, Surface
 from fem_reference.geometry.block import lattice_skin
 from fem_reference.geometry.rigid_bodies import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere, Vector
-from fem_reference.mesh import Floats, Ints, Surface
 
 # Sides of a full turn, a multiple of eight: triangles then lie at most 0.36 % of the radius inside the body.
 TURN = 64

@@ -16,13 +16,9 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from fem_reference import children
-from fem_reference.errors import InputError
-from fem_reference.geometry.coarsening import coarsen
-from fem_reference.geometry.distance import distances
-from fem_reference.geometry.intersections import self_intersections
-from fem_reference.geometry.rims import with_rims
-from fem_reference.mesh import (
+from fem_reference.foundations import subprocesses
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import (
     TET_FACES,
     Floats,
     Ints,
@@ -32,6 +28,10 @@ from fem_reference.mesh import (
     tet_volumes,
     triangle_areas,
 )
+from fem_reference.geometry.coarsening import coarsen
+from fem_reference.geometry.distance import distances
+from fem_reference.geometry.intersections import self_intersections
+from fem_reference.geometry.rims import with_rims
 
 log = logging.getLogger(__name__)
 
@@ -162,9 +162,9 @@ def _run(mesher: str, surface: Surface, size: float) -> TetMesh:
         np.savez(job, mesher=mesher, points=surface.points, triangles=surface.triangles, size=size)
         try:
             done = subprocess.run(
-                children.command("-m", __spec__.name, str(job), str(result)),
+                subprocesses.command("-m", __spec__.name, str(job), str(result)),
                 cwd=folder,
-                env=children.environment(),
+                env=subprocesses.environment(),
                 stdin=subprocess.DEVNULL,
                 capture_output=True,
                 timeout=SECONDS_ALLOWED,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fem_reference.mesh import Floats, Ints, Surface, triangle_areas
+from fem_reference.foundations.mesh import Floats, Ints, Surface, triangle_areas
 
 # Directions along which planes leave a vertex free have less than this share of the greatest eigenvalue of their quadric.
 _FREE = 1e-2

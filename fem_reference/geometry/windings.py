@@ -3,7 +3,7 @@
 import igl
 import numpy as np
 
-from fem_reference.mesh import Floats, Surface
+from fem_reference.foundations.mesh import Floats, Surface
 
 # How far outside a triangle is looked, as a share of the surface's diagonal.
 _STEP = 1e-5

@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from fem_reference.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Floats, Ints
 
 Vector = tuple[float, float, float]
 

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fem_reference.foundations.mesh import Floats, Polylines, vertex_areas
 from fem_reference.geometry.extension import Extension
-from fem_reference.mesh import Floats, Polylines, vertex_areas
-from fem_reference.problem import Body
-from fem_reference.runs import Run
+from fem_reference.problems.muscle import Body
+from fem_reference.runs.store import Run
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,11 +5,11 @@ Against rest, the mean magnitude is the dihedral angle change of the report (eq.
 
 import numpy as np
 
+from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.edges import Edges
-from fem_reference.mesh import Floats
 from fem_reference.metrics import Measure, Yardstick, percentile, rms
 from fem_reference.metrics.edge_extension import worst_edges
-from fem_reference.runs import Run
+from fem_reference.runs.store import Run
 
 UNITS = dict.fromkeys(("mean", "mean_magnitude", "rms", "p95", "max", "mean_magnitude_of_edges"), "deg")
 

@@ -5,10 +5,10 @@ Against rest this is the edge extension of the report (l / L of Figs 6.15 to 6.1
 
 import numpy as np
 
+from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.edges import Edges
-from fem_reference.mesh import Floats
 from fem_reference.metrics import Measure, Yardstick, percentile, rms
-from fem_reference.runs import Run
+from fem_reference.runs.store import Run
 
 UNITS = dict.fromkeys(("mean", "rms", "p95", "max", "mean_of_edges"), "%")
 

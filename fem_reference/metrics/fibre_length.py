@@ -8,9 +8,9 @@ a straight line is shorter than the fibre. That is its error, and no change of l
 
 import numpy as np
 
-from fem_reference.mesh import Floats
+from fem_reference.foundations.mesh import Floats
 from fem_reference.metrics import Measure, Yardstick
-from fem_reference.runs import Run
+from fem_reference.runs.store import Run
 
 UNITS = {"mean": "mm", "rms": "mm", "max": "mm", "mean_percent": "%", "rms_percent": "%", "max_percent": "%"}
 # Fibre points of a run this close [mm] to the yardstick's are the same points, after a file of single precision.

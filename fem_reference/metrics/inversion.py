@@ -7,10 +7,10 @@ from functools import lru_cache
 
 import numpy as np
 
+from fem_reference.foundations.mesh import Floats, triangle_areas
 from fem_reference.geometry.windings import outer_windings
-from fem_reference.mesh import Floats, triangle_areas
 from fem_reference.metrics import Measure, Yardstick
-from fem_reference.runs import Run
+from fem_reference.runs.store import Run
 
 UNITS = {"inside_out": "%", "overlapping": "%"}
 

@@ -10,13 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fem_reference.errors import InputError
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, Surface, enclosed_volume
+from fem_reference.foundations.motion import apply
 from fem_reference.geometry.overlap import shared_volume
-from fem_reference.mesh import Floats, Surface, enclosed_volume
 from fem_reference.metrics import Measure, Yardstick
-from fem_reference.motion import apply
-from fem_reference.problem import Body
-from fem_reference.runs import Run
+from fem_reference.problems.muscle import Body
+from fem_reference.runs.store import Run
 
 UNITS = {"deepest": "mm", "volume": "mm3"}
 OF_ITSELF = True

@@ -6,10 +6,10 @@ around each vertex at rest.
 
 import numpy as np
 
+from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.distance import distances
-from fem_reference.mesh import Floats
 from fem_reference.metrics import Measure, Yardstick, percentile, rms
-from fem_reference.runs import Run
+from fem_reference.runs.store import Run
 
 _STATISTICS = ("rms", "p95", "max", "distance_mean", "distance_rms", "hausdorff")
 UNITS = dict.fromkeys(_STATISTICS, "mm") | {f"{name}_percent": "%" for name in _STATISTICS}

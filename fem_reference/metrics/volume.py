@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from fem_reference.mesh import enclosed_volume
+from fem_reference.foundations.mesh import enclosed_volume
 from fem_reference.metrics import Measure, Yardstick
-from fem_reference.runs import Run
+from fem_reference.runs.store import Run
 
 UNITS = {"deviation": "%", "deviation_volume": "mm3"}
 

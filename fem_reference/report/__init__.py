@@ -3,14 +3,14 @@
 import json
 from pathlib import Path
 
-from fem_reference import files
-from fem_reference.claims import Claims
-from fem_reference.comparison import Comparison
-from fem_reference.field.example import Example
+from fem_reference.assessment.claims import Claims
+from fem_reference.assessment.comparison import Comparison
+from fem_reference.assessment.scalar_example import Example
+from fem_reference.assessment.solver_table import Table
+from fem_reference.io import files
 from fem_reference.report import claims_page, field_page, page, standings_page, verify_page
 from fem_reference.report.tables import as_csv, summary
 from fem_reference.report.verify_page import Verification
-from fem_reference.standings import Table
 
 __all__ = ["summary", "write", "write_claims", "write_examples", "write_standings", "write_verification"]
 

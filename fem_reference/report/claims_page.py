@@ -7,7 +7,7 @@ import matplotlib as mpl
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from fem_reference.claims import CLAIMED, FINER, LEAST, Claim, Claims, Cover
+from fem_reference.assessment.claims import CLAIMED, FINER, LEAST, Claim, Claims, Cover
 from fem_reference.report.curves import LOOK, PALETTE, Curve, inline
 from fem_reference.report.tables import finite
 from fem_reference.report.templates import template

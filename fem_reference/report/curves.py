@@ -13,12 +13,12 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from fem_reference.comparison import Comparison
-from fem_reference.mesh import Floats
+from fem_reference.assessment.comparison import Comparison
+from fem_reference.assessment.error_bars import Of
+from fem_reference.foundations.mesh import Floats
 from fem_reference.metrics import Measure, find
 from fem_reference.report.tables import inversion, runs
 from fem_reference.report.words import words
-from fem_reference.study import Of
 
 REFERENCE = "#222222"
 # Okabe and Ito's palette for all kinds of colour vision, without its black and yellow.

@@ -18,12 +18,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
-from fem_reference.field.example import Example, Ladder
-from fem_reference.field.mesh import FieldMesh
-from fem_reference.field.problem import at
-from fem_reference.field.runs import FieldRun
-from fem_reference.mesh import Floats
+from fem_reference.assessment.scalar_example import Example, Ladder
+from fem_reference.foundations.mesh import Floats
+from fem_reference.geometry.field_mesh import FieldMesh
+from fem_reference.problems.scalar import at
 from fem_reference.report.curves import LOOK, PALETTE, REFERENCE, inline
+from fem_reference.runs.scalar import FieldRun
 
 VALUES, DIFFERENCES = "viridis", "RdBu_r"
 _DPI = 150

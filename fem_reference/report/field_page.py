@@ -6,13 +6,13 @@ from typing import cast
 
 import numpy as np
 
-from fem_reference.field.example import Example
-from fem_reference.field.runs import FieldRun
-from fem_reference.judge import Word, overall
-from fem_reference.records import Record, parse
+from fem_reference.assessment.judge import Word, overall
+from fem_reference.assessment.scalar_example import Example
+from fem_reference.foundations.records import Record, parse
 from fem_reference.report import field_figures
 from fem_reference.report.templates import template
 from fem_reference.report.words import number
+from fem_reference.runs.scalar import FieldRun
 
 # What the report's figures show, in words: its pictures are not distributed with it. By the name of a case: figure and caption.
 FIGURES = {

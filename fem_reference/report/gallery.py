@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.children import command, environment
-from fem_reference.comparison import Comparison
-from fem_reference.errors import MissingSoftware
-from fem_reference.mesh import Floats, Surface
+from fem_reference.assessment.comparison import Comparison
+from fem_reference.foundations.errors import MissingSoftware
+from fem_reference.foundations.mesh import Floats, Surface
+from fem_reference.foundations.subprocesses import command, environment
 from fem_reference.metrics import find
-from fem_reference.problem import Body, Setup
+from fem_reference.problems.muscle import Body, Setup
 from fem_reference.report import pictures
-from fem_reference.runs import Run
+from fem_reference.runs.store import Run
 
 log = logging.getLogger(__name__)
 

@@ -13,9 +13,9 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.colors import to_hex
 
-from fem_reference import casefile
-from fem_reference.comparison import Comparison
-from fem_reference.errors import InputError, MissingSoftware
+from fem_reference.assessment.comparison import Comparison
+from fem_reference.assessment.error_bars import ErrorBar, Of
+from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.metrics import Measure, find
 from fem_reference.report import gallery, pictures
 from fem_reference.report.curves import curves, label_of
@@ -23,9 +23,9 @@ from fem_reference.report.tables import inversion, known, runs, seconds_per_fram
 from fem_reference.report.templates import template
 from fem_reference.report.viewer import view
 from fem_reference.report.words import listed, ratio, words
-from fem_reference.runs import Run
-from fem_reference.scene import Scene
-from fem_reference.study import ErrorBar, Of
+from fem_reference.runs.store import Run
+from fem_reference.scenes import casefile
+from fem_reference.scenes.muscle import Scene
 
 # The columns of the first table: metric, statistic, the words above a group and above the column, unit.
 COLUMNS = (

@@ -11,12 +11,12 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from fem_reference import ranking
+from fem_reference.assessment import ranking
+from fem_reference.assessment.solver_table import Standing, Table, report_speeds
 from fem_reference.report.curves import LOOK, PALETTE, REFERENCE, Curve, inline
 from fem_reference.report.tables import finite
 from fem_reference.report.templates import template
 from fem_reference.report.words import number
-from fem_reference.standings import Standing, Table, report_speeds
 
 # What is measured: metric, statistic, words above the column, unit.
 COLUMNS = (

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference import ranking
-from fem_reference.comparison import Comparison
-from fem_reference.judge import Verdict
+from fem_reference.assessment import ranking
+from fem_reference.assessment.comparison import Comparison
+from fem_reference.assessment.error_bars import ErrorBar
+from fem_reference.assessment.judge import Verdict
 from fem_reference.metrics import Measure
-from fem_reference.runs import Run
-from fem_reference.study import ErrorBar
+from fem_reference.runs.store import Run
 
 COLUMNS = ("candidate", "metric", "statistic", "frame", "value", "unit")
 

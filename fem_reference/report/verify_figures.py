@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, LogLocator, NullFormatter, NullLocator
 
-from fem_reference.catalogue import Result
-from fem_reference.mesh import Floats
+from fem_reference.assessment.catalogue import Result
+from fem_reference.foundations.mesh import Floats
 from fem_reference.report.curves import LOOK, PALETTE, Curve, inline
 from fem_reference.report.words import number, words
 

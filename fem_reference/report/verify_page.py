@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from fem_reference.catalogue import Result
+from fem_reference.assessment.catalogue import Result
 from fem_reference.report import verify_figures
 from fem_reference.report.tables import finite
 from fem_reference.report.templates import template

@@ -27,12 +27,12 @@ import numpy as np
 from matplotlib.colors import to_hex
 from numpy.typing import NDArray
 
-from fem_reference.comparison import Comparison
+from fem_reference.assessment.comparison import Comparison
+from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.thinning import thin
-from fem_reference.mesh import Floats
-from fem_reference.problem import Body
+from fem_reference.problems.muscle import Body
 from fem_reference.report import gallery, pictures
-from fem_reference.runs import Run
+from fem_reference.runs.store import Run
 
 THREE = Path(__file__).parent / "three"
 # How many bytes the positions of all frames may have before they are compressed: about as many as base64 needs for what is left.

@@ -12,9 +12,9 @@ import pkgutil
 from typing import Any, Literal
 
 from fem_reference.effects import Effect
-from fem_reference.errors import InputError
-from fem_reference.records import Record, join, parse
-from fem_reference.scene import SolverChoice
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.records import Record, join, parse
+from fem_reference.scenes.muscle import SolverChoice
 
 Task = Literal["solve", "solve_field", "solve_body"]
 _TASKS: dict[Task, tuple[str, str]] = {
@@ -26,8 +26,13 @@ _TASKS: dict[Task, tuple[str, str]] = {
 
 def names(task: Task | None = None) -> list[str]:
     """The solvers there are, as scene files name them: all, or those for a ``task``."""
-    found = sorted(module.name for module in pkgutil.iter_modules(__path__) if not module.name.endswith("_kernels"))
+    found = sorted(module.name for module in pkgutil.iter_modules(__path__) if not _is_shared(module.name))
     return [name for name in found if task is None or hasattr(_module(name), task)]
+
+
+def _is_shared(module: str) -> bool:
+    """Whether a ``module`` of this folder is no solver but serves some."""
+    return module == "common" or module.endswith("_kernels")
 
 
 def _module(name: str) -> Any:

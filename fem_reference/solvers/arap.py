@@ -18,14 +18,14 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
-from fem_reference.mesh import TET_FACES, Floats, Ints, Surface, enclosed_volume
-from fem_reference.problem import Setup
-from fem_reference.records import Record
-from fem_reference.runs import Frame, Outcome, Sink
+from fem_reference.foundations.mesh import TET_FACES, Floats, Ints, Surface, enclosed_volume
+from fem_reference.foundations.records import Record
+from fem_reference.foundations.units import PositiveLength
+from fem_reference.problems.muscle import Setup
+from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers import arap_kernels
+from fem_reference.solvers.common.state_checks import Trouble, trouble
 from fem_reference.solvers.pbd import carry
-from fem_reference.soundness import Trouble, trouble
-from fem_reference.units import PositiveLength
 
 Symmetric = Literal["cotangent", "clamped cotangent", "kirchhoff"]
 Weights = Literal[Symmetric, "tutte"]

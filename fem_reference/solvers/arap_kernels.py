@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from fem_reference.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.solvers.compiled_kernels import compiled
 
 # Sweeps over a symmetric 4 x 4 matrix; it is diagonal to rounding after about five, as convergence is quadratic.

@@ -14,15 +14,15 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from fem_reference.mesh import TET_FACES, Floats
-from fem_reference.problem import Setup
-from fem_reference.records import Record
-from fem_reference.runs import Outcome, Sink
+from fem_reference.foundations.mesh import TET_FACES, Floats
+from fem_reference.foundations.records import Record
+from fem_reference.foundations.units import PositiveLength
+from fem_reference.problems.muscle import Setup
+from fem_reference.runs.store import Outcome, Sink
 from fem_reference.solvers.arap import Cells, Relaxed, Symmetric, System, compile_kernels, farthest, march
+from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.pbd import Constraints, Stiffness
 from fem_reference.solvers.pbd_kernels import project_dihedrals, project_distances, project_volume, volume
-from fem_reference.soundness import Trouble
-from fem_reference.units import PositiveLength
 
 # The volume counts as reached when it is off by this share, and as out of reach after this many steps of Newton's method.
 _REACHED, _STEPS = 1e-12, 20

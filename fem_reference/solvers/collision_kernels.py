@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.signed_distance import FAR, Grid
-from fem_reference.mesh import Floats, Ints
-from fem_reference.problem import Body
+from fem_reference.problems.muscle import Body
 from fem_reference.solvers.compiled_kernels import compiled
 from fem_reference.solvers.pbd_kernels import Vector
 

@@ -13,14 +13,14 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from fem_reference import bones
-from fem_reference.errors import InputError
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, Ints, Polylines
+from fem_reference.foundations.motion import apply
+from fem_reference.foundations.records import Record
 from fem_reference.geometry.wrapping import Cylinder, Obstacle, Paths, Sphere, straight
-from fem_reference.mesh import Floats, Ints, Polylines
-from fem_reference.motion import apply
-from fem_reference.problem import Body, Problem
-from fem_reference.records import Record
-from fem_reference.runs import Frame, Outcome, Sink
+from fem_reference.problems.muscle import Body, Problem
+from fem_reference.runs.store import Frame, Outcome, Sink
+from fem_reference.scenes import bones
 
 # An end this deep [mm] in an obstacle is on its surface, but for rounding.
 _TOUCHES = 1e-6

@@ -5,11 +5,11 @@ import time
 import numpy as np
 from pydantic import Field
 
-from fem_reference.errors import InputError
-from fem_reference.field.problem import FieldProblem, at
-from fem_reference.field.runs import Solution
-from fem_reference.records import Record
-from fem_reference.runs import Outcome
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.records import Record
+from fem_reference.problems.scalar import FieldProblem, at
+from fem_reference.runs.scalar import Solution
+from fem_reference.runs.store import Outcome
 from fem_reference.solvers import listing_kernels
 
 

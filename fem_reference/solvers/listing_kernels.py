@@ -11,8 +11,8 @@ import numpy as np
 from scipy import sparse, spatial
 from scipy.sparse.linalg import spsolve
 
-from fem_reference.errors import InputError
-from fem_reference.mesh import Floats, Ints
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, Ints
 
 # Listing 4.5, line 18: the factors of A A, A and 1.
 SQUARE, LINEAR, CONSTANT = 26.0, 2.0, 0.05

@@ -15,19 +15,19 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BeforeValidator
 
+from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, boundary, tet_volumes
+from fem_reference.foundations.motion import apply
+from fem_reference.foundations.records import Record
+from fem_reference.foundations.units import AccelerationVector, Density, Stiffness, Time, positive
 from fem_reference.geometry.embedding import Embedding, Locator
-from fem_reference.mesh import Floats, Ints, Surface, TetMesh, boundary, tet_volumes
-from fem_reference.motion import apply
-from fem_reference.problem import Problem
-from fem_reference.records import Record
-from fem_reference.runs import Frame, Outcome, Sink
+from fem_reference.problems.muscle import Problem
+from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers import collision_kernels
 from fem_reference.solvers.collision_kernels import Obstacle, push_out
+from fem_reference.solvers.common.state_checks import trouble
 from fem_reference.solvers.pbd import Collision
 from fem_reference.solvers.spring_kernels import Course, Network, advance, forces
 from fem_reference.solvers.xpbd import other_clock
-from fem_reference.soundness import trouble
-from fem_reference.units import AccelerationVector, Density, Stiffness, Time, positive
 
 # Where no time step is asked for, it is this share of the greatest that is stable.
 SHARE_OF_STABLE = 0.9

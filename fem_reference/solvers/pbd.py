@@ -15,13 +15,15 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from fem_reference.mesh import TET_FACES, Floats, Ints, Polylines
-from fem_reference.motion import apply
-from fem_reference.problem import Problem, Setup
-from fem_reference.records import Record
-from fem_reference.runs import Frame, Outcome, Sink
+from fem_reference.foundations.mesh import TET_FACES, Floats, Ints, Polylines
+from fem_reference.foundations.motion import apply
+from fem_reference.foundations.records import Record
+from fem_reference.foundations.units import Length
+from fem_reference.problems.muscle import Problem, Setup
+from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers import collision_kernels
 from fem_reference.solvers.collision_kernels import Obstacle, push_out
+from fem_reference.solvers.common.state_checks import trouble
 from fem_reference.solvers.pbd_kernels import (
     dihedrals,
     distances,
@@ -31,8 +33,6 @@ from fem_reference.solvers.pbd_kernels import (
     project_volume,
     volume,
 )
-from fem_reference.soundness import trouble
-from fem_reference.units import Length
 
 Stiffness = Annotated[float, Field(ge=0, le=1)]
 # Positions (n, 3) [mm], what is kept of their velocities (n, 3), and the frame number -> both after its iteration.

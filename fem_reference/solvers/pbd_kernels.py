@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from fem_reference.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.solvers.compiled_kernels import compiled
 
 Vector = tuple[float, float, float]

@@ -41,11 +41,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from fem_reference.mesh import TET_FACES, Floats, Ints, Surface
-from fem_reference.motion import apply
-from fem_reference.problem import Body, Problem, Setup
-from fem_reference.records import Record
-from fem_reference.runs import Outcome, Sink
+from fem_reference.foundations.mesh import TET_FACES, Floats, Ints, Surface
+from fem_reference.foundations.motion import apply
+from fem_reference.foundations.records import Record
+from fem_reference.problems.muscle import Body, Problem, Setup
+from fem_reference.runs.store import Outcome, Sink
 from fem_reference.solvers.pbd import Constraints, along_fibres, carry, follow
 from fem_reference.solvers.pbd_kernels import distances, nearest_segments
 from fem_reference.solvers.program_kernels import (

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
-from fem_reference import files
-from fem_reference.errors import InputError
-from fem_reference.mesh import Floats, Ints, Surface, check_finite
-from fem_reference.problem import Setup
-from fem_reference.records import Record, parse
-from fem_reference.runs import Frame, Outcome, Sink
-from fem_reference.units import LengthUnit, length_unit
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, Ints, Surface, check_finite
+from fem_reference.foundations.records import Record, parse
+from fem_reference.foundations.units import LengthUnit, length_unit
+from fem_reference.io import files
+from fem_reference.problems.muscle import Setup
+from fem_reference.runs.store import Frame, Outcome, Sink
 
 log = logging.getLogger(__name__)
 

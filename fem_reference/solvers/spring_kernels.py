@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fem_reference.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.solvers.compiled_kernels import compiled
 
 

@@ -20,16 +20,9 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from fem_reference.mesh import TET_FACES, Floats, Ints, Surface, enclosed_volume, triangle_areas
-from fem_reference.problem import Setup
-from fem_reference.records import Record
-from fem_reference.runs import Outcome, Sink
-from fem_reference.solvers import collision_kernels
-from fem_reference.solvers.collision_kernels import Obstacle
-from fem_reference.solvers.pbd import carry, follow, hinges_of, obstacles_of
-from fem_reference.solvers.pbd_kernels import dihedrals, distances, volume
-from fem_reference.solvers.xpbd_kernels import pull_dihedrals, pull_distances, pull_volume
-from fem_reference.units import (
+from fem_reference.foundations.mesh import TET_FACES, Floats, Ints, Surface, enclosed_volume, triangle_areas
+from fem_reference.foundations.records import Record
+from fem_reference.foundations.units import (
     AreaStiffness,
     BendingStiffness,
     Density,
@@ -39,6 +32,13 @@ from fem_reference.units import (
     Stiffness,
     Time,
 )
+from fem_reference.problems.muscle import Setup
+from fem_reference.runs.store import Outcome, Sink
+from fem_reference.solvers import collision_kernels
+from fem_reference.solvers.collision_kernels import Obstacle
+from fem_reference.solvers.pbd import carry, follow, hinges_of, obstacles_of
+from fem_reference.solvers.pbd_kernels import dihedrals, distances, volume
+from fem_reference.solvers.xpbd_kernels import pull_dihedrals, pull_distances, pull_volume
 
 
 class Collision(Record):

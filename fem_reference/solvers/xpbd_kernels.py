@@ -9,7 +9,7 @@ their order and the solution does not.
 
 import math
 
-from fem_reference.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.solvers.compiled_kernels import compiled
 from fem_reference.solvers.pbd_kernels import LARGEST_TURN, at, dihedral, distance, dot, move, volume
 

@@ -10,12 +10,14 @@ from functools import partial
 
 import numpy as np
 
-from fem_reference.catalogue import Entry, Finding, Lab
-from fem_reference.continuum import ELEMENTS, Continuum, Prescribed, Solved
-from fem_reference.truths import find
-from fem_reference.verification import shapes
-from fem_reference.verification.courses import Affine
-from fem_reference.verification.parts import SYMMETRY, effect, resistance
+from fem_reference.assessment.catalogue import Entry, Finding, Lab
+from fem_reference.effects import make
+from fem_reference.problems import shapes
+from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
+from fem_reference.problems.courses import Affine
+from fem_reference.runs.solved import Solved
+from fem_reference.verification.parts import SYMMETRY, resistance
+from fem_reference.verification.truths import find
 
 MU = 0.01  # [MPa]
 POISSON, NEARLY_INCOMPRESSIBLE = 0.3, 0.499
@@ -36,7 +38,7 @@ def squeezed(lab: Lab, element: str, poisson: float, stretches: tuple[float, ...
     """The states of an eighth of a cube, free at its sides, at ``stretches`` of its height, the first of which is 1."""
     mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), ELEMENTS[element][0])
     plate = Prescribed("plate", "z1", (2,), Affine(_STILL, (0.0, 0.0, -1.0)))
-    acting = effect("neo_hooke", mu=f"{MU} MPa"), resistance(element, bulk_modulus(poisson))
+    acting = make("neo_hooke", mu=f"{MU} MPa"), resistance(element, bulk_modulus(poisson))
     frames = tuple(1 - stretch for stretch in stretches)
     body = Continuum(mesh, acting, (*SYMMETRY, plate), frames)
     return lab.solve(body, element, first_step=0.1, smallest_step=1e-3, residual=1e-11)

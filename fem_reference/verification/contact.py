@@ -8,15 +8,16 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from fem_reference.catalogue import Entry, Finding, Lab
-from fem_reference.contact import Contact, Obstruction
-from fem_reference.continuum import ELEMENTS, Continuum, Prescribed, Reached
+from fem_reference.assessment.catalogue import Entry, Finding, Lab
+from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere, Vector
-from fem_reference.mesh import Floats
-from fem_reference.truths import find
-from fem_reference.verification import shapes
-from fem_reference.verification.courses import Rest
+from fem_reference.problems import shapes
+from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
+from fem_reference.problems.contact import Contact, Obstruction
+from fem_reference.problems.courses import Rest
+from fem_reference.runs.solved import Reached
 from fem_reference.verification.parts import SYMMETRY, neo_hooke
+from fem_reference.verification.truths import find
 
 MU = 0.01  # [MPa]
 PLATE_BULK, PLATE_STIFFNESS, PLATE_WAY = 10.0, 1.0, 0.5  # [MPa], [MPa/mm] and [mm], on a cube of 1 mm

@@ -11,13 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.catalogue import Entry, Finding, Lab
-from fem_reference.continuum import ELEMENTS, Continuum, Prescribed
-from fem_reference.mesh import Floats
-from fem_reference.truths import find
-from fem_reference.verification import shapes
-from fem_reference.verification.courses import Rest
-from fem_reference.verification.parts import course, effect, ladder, once, resistance
+from fem_reference.assessment.catalogue import Entry, Finding, Lab
+from fem_reference.effects import make
+from fem_reference.foundations.mesh import Floats
+from fem_reference.problems import shapes
+from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
+from fem_reference.problems.courses import Rest
+from fem_reference.verification.parts import course, ladder, once, resistance
+from fem_reference.verification.truths import find
 
 FAMILY = "Cook's membrane"
 THICKNESS, HEIGHT = 2.0, 44.0  # of the panel, and of its clamped side [mm]
@@ -65,9 +66,9 @@ class Panel:
         mesh = shapes.mapped([shapes.Block(_place, (n, n, 1), faces)], ELEMENTS[self.element][0], 1)
         pull = f"0, {self.membrane.traction * self.share}, 0 MPa"
         acting = (
-            effect("neo_hooke", mu=f"{self.membrane.shear * self.shear} MPa"),
+            make("neo_hooke", mu=f"{self.membrane.shear * self.shear} MPa"),
             resistance(self.element, self.membrane.bulk * self.bulk),
-            effect("traction", on="x1", force=pull, course=course()),
+            make("traction", on="x1", force=pull, course=course()),
         )
         return Continuum(mesh, acting, HELD, (0.0, 1.0))
 

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference import truths
-from fem_reference.catalogue import Entry
+from fem_reference.assessment.catalogue import Entry
+from fem_reference.effects import make
+from fem_reference.verification import truths
 from fem_reference.verification.homogeneous import (
     NEO,
     Material,
@@ -17,7 +18,7 @@ from fem_reference.verification.homogeneous import (
     force_entry,
     stretch_entry,
 )
-from fem_reference.verification.parts import course, effect
+from fem_reference.verification.parts import course
 
 FAMILY = "fibres"
 STRESS, OPTIMUM = 0.3, 1.05  # the peak active stress [MPa] and the fibre stretch at which it is reached
@@ -34,39 +35,39 @@ def _law(name: str, *parameters: Any) -> Callable[[], Any]:
 def passive(stress: float = STRESS, linear_from: float = 1.4) -> Material:
     """Blemker's passive fibres, ``stress`` [MPa]; slack up to ``OPTIMUM``."""
     numbers = {"p1": 0.05, "p2": 6.6, "optimal_stretch": OPTIMUM, "linear_from": linear_from}
-    acting = effect("fibre_passive", stress=f"{stress} MPa", **numbers)
+    acting = make("fibre_passive", stress=f"{stress} MPa", **numbers)
     return Material((acting,), _fibre_law("FibrePassive", stress, *numbers.values()))
 
 
 def passive_febio(c4: float = 6.0, c5: float = 0.3) -> Material:
     """FEBio's passive fibres, slack up to 1; ``c5`` [MPa]."""
-    acting = effect("fibre_passive_febio", c3="0.01 MPa", c4=c4, c5=f"{c5} MPa", linear_from=1.4)
+    acting = make("fibre_passive_febio", c3="0.01 MPa", c4=c4, c5=f"{c5} MPa", linear_from=1.4)
     return Material((acting,), _fibre_law("FibrePassiveFebio", 0.01, c4, c5, 1.4))
 
 
 def active(activation: float = 1.0, stress: float = STRESS) -> Material:
     """Blemker's active fibres at an ``activation`` that grows to its full from frame 0 to 1; ``stress`` [MPa]."""
     numbers = {"stress": f"{stress} MPa", "optimal_stretch": OPTIMUM}
-    acting = effect("fibre_active", course=course(activation), **numbers)
+    acting = make("fibre_active", course=course(activation), **numbers)
     return Material((acting,), _fibre_law("FibreActive", stress, OPTIMUM, activation))
 
 
 def two_families(degrees: float) -> Material:
     """Two families at plus and minus ``degrees`` from the fibre, in the plane across z."""
     normal = (0.0, 0.0, 1.0)
-    acting = effect("holzapfel_ogden", k1="0.01 MPa", k2=1.0, angle=f"{degrees} deg", normal=normal)
+    acting = make("holzapfel_ogden", k1="0.01 MPa", k2=1.0, angle=f"{degrees} deg", normal=normal)
     return Material((acting,), _law("HolzapfelOgden", 0.01, 1.0, np.radians(degrees), normal))
 
 
 def tension(activation: float = 1.0) -> Material:
     """A constant active tension of 0.06 MPa, times ``activation``."""
-    acting = effect("active_tension", tension="0.06 MPa", course=course(activation))
+    acting = make("active_tension", tension="0.06 MPa", course=course(activation))
     return Material((acting,), _law("ActiveTension", 0.06 * activation))
 
 
 def taut(material: Material, stretch: float) -> Material:
     """``material`` whose fibres are stretched at rest by ``stretch``."""
-    acting = effect("prestretch", stretch=stretch, course=course())
+    acting = make("prestretch", stretch=stretch, course=course())
     return Material((*material.effects, acting), lambda: truths.find("laws").Prestretched(material.law(), stretch))
 
 

@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference import truths
-from fem_reference.catalogue import Entry, Finding, Lab
-from fem_reference.continuum import ELEMENTS, Continuum, Prescribed, Reached
-from fem_reference.mesh import Floats
-from fem_reference.verification import shapes
-from fem_reference.verification.courses import Rest
+from fem_reference.assessment.catalogue import Entry, Finding, Lab
+from fem_reference.foundations.mesh import Floats
+from fem_reference.problems import shapes
+from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
+from fem_reference.problems.courses import Rest
+from fem_reference.runs.solved import Reached
+from fem_reference.verification import truths
 from fem_reference.verification.parts import ladder, neo_hooke, once
 
 MU, BULK = 0.01, 1e4  # [MPa]; the truth is of incompressible matter

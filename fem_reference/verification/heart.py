@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.catalogue import Entry, Finding, Lab
-from fem_reference.continuum import ELEMENTS, Cells, Continuum, Prescribed
-from fem_reference.effects import Effect
-from fem_reference.mesh import Floats, Ints
-from fem_reference.truths import find
-from fem_reference.verification import shapes
-from fem_reference.verification.courses import Along, Rest
-from fem_reference.verification.parts import Value, course, effect, once, resistance
+from fem_reference.assessment.catalogue import Entry, Finding, Lab
+from fem_reference.effects import Effect, make
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.problems import shapes
+from fem_reference.problems.body import ELEMENTS, Cells, Continuum, Prescribed
+from fem_reference.problems.courses import Along, Rest
+from fem_reference.verification.parts import Value, course, once, resistance
+from fem_reference.verification.truths import find
 
 FAMILY = "heart benchmark"
 BULK = 100.0  # [MPa], some 1e4 times the stresses: J is 1 within 1e-4 on average
@@ -40,13 +40,13 @@ def matter(problem: Any, element: str, on: str, bulk: float) -> tuple[Effect, ..
     """What acts in a ``problem`` of ``validation.land``, its pressure ``on`` a part of the surface; ``bulk``: K [MPa]."""
     law = problem.law
     acting = (
-        effect("guccione", c=f"{law.c} MPa", bf=law.bf, bt=law.bt, bfs=law.bfs),
+        make("guccione", c=f"{law.c} MPa", bf=law.bf, bt=law.bt, bfs=law.bfs),
         resistance(element, bulk),
-        effect("pressure", on=on, pressure=f"{problem.pressure} MPa", course=course()),
+        make("pressure", on=on, pressure=f"{problem.pressure} MPa", course=course()),
     )
     if problem.tension == 0:
         return acting
-    return (*acting, effect("active_tension", tension=f"{problem.tension} MPa", course=course()))
+    return (*acting, make("active_tension", tension=f"{problem.tension} MPa", course=course()))
 
 
 @dataclass(frozen=True)

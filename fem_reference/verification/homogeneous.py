@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference import truths
-from fem_reference.catalogue import Entry, Finding, Lab
-from fem_reference.continuum import ELEMENTS, Continuum, Prescribed, Solved
-from fem_reference.effects import Effect
-from fem_reference.verification import shapes
-from fem_reference.verification.courses import Affine, Along, Matrix, Radial
-from fem_reference.verification.parts import SYMMETRY, effect, resistance
+from fem_reference.assessment.catalogue import Entry, Finding, Lab
+from fem_reference.effects import Effect, make
+from fem_reference.problems import shapes
+from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
+from fem_reference.problems.courses import Affine, Along, Matrix, Radial
+from fem_reference.runs.solved import Solved
+from fem_reference.verification import truths
+from fem_reference.verification.parts import SYMMETRY, resistance
 
 Vector = tuple[float, float, float]
 X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
@@ -40,18 +41,18 @@ class Material:
 
 def neo_hooke(mu: float = MU) -> Material:
     """``mu`` [MPa]."""
-    return Material((effect("neo_hooke", mu=f"{mu} MPa"),), lambda: truths.find("laws").neo_hooke(mu))
+    return Material((make("neo_hooke", mu=f"{mu} MPa"),), lambda: truths.find("laws").neo_hooke(mu))
 
 
 def mooney_rivlin(c1: float, c2: float) -> Material:
     """``c1``, ``c2`` [MPa]."""
-    acting = effect("mooney_rivlin", c1=f"{c1} MPa", c2=f"{c2} MPa")
+    acting = make("mooney_rivlin", c1=f"{c1} MPa", c2=f"{c2} MPa")
     return Material((acting,), lambda: truths.find("laws").MooneyRivlin(c1, c2))
 
 
 def guccione(c: float) -> Material:
     """``c`` [MPa], with the exponents of Land et al. 2015, problem 1."""
-    acting = effect("guccione", c=f"{c} MPa", bf=8.0, bt=2.0, bfs=4.0)
+    acting = make("guccione", c=f"{c} MPa", bf=8.0, bt=2.0, bfs=4.0)
     return Material((acting,), lambda: truths.find("laws").Guccione(c, 8.0, 2.0, 4.0))
 
 

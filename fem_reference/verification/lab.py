@@ -4,7 +4,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from fem_reference.continuum import Continuum, Solved
+from fem_reference.problems.body import Continuum
+from fem_reference.runs.solved import Solved
 from fem_reference.solvers import fenicsx, scikit_fem
 from fem_reference.solvers.fenicsx.session import Session
 

@@ -5,19 +5,20 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.catalogue import Entry, Finding, Lab
-from fem_reference.continuum import Continuum, Prescribed
-from fem_reference.mesh import Floats
-from fem_reference.verification import shapes
-from fem_reference.verification.courses import Along, Rest, Turn
-from fem_reference.verification.parts import effect, neo_hooke, zero
+from fem_reference.assessment.catalogue import Entry, Finding, Lab
+from fem_reference.effects import make
+from fem_reference.foundations.mesh import Floats
+from fem_reference.problems import shapes
+from fem_reference.problems.body import Continuum, Prescribed
+from fem_reference.problems.courses import Along, Rest, Turn
+from fem_reference.verification.parts import neo_hooke, zero
 
 ELEMENT = "P2/P1"
 # [N, mm3] that ends Newton's method; the softest motion of the bar has a stiffness of about mu w^4 / l^3 = 0.006 N/mm.
 RESIDUAL = 1e-11
 MUSCLE = (
     *neo_hooke(0.01, 10.0),
-    effect("fibre_passive", stress="300 kPa", p1=0.05, p2=6.6, optimal_stretch=1.0, linear_from=1.4),
+    make("fibre_passive", stress="300 kPa", p1=0.05, p2=6.6, optimal_stretch=1.0, linear_from=1.4),
 )
 
 

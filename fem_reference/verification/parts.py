@@ -1,26 +1,17 @@
 """What entries are made of: effects as scene files write them, planes of symmetry, values on ladders of meshes."""
 
 from collections.abc import Callable
-from typing import Any
 
-from fem_reference import catalogue, effects
-from fem_reference.catalogue import Finding, Lab
-from fem_reference.continuum import ELEMENTS, Prescribed
-from fem_reference.effects import Effect
-from fem_reference.records import parse
-from fem_reference.verification.courses import Rest
+from fem_reference.assessment import catalogue
+from fem_reference.assessment.catalogue import Finding, Lab
+from fem_reference.effects import Effect, make
+from fem_reference.problems.body import ELEMENTS, Prescribed
+from fem_reference.problems.courses import Rest
 
 Value = Callable[[Lab, int], float]  # of so many cells
 
 # Along the axes the planes through the origin are those of mirrors.
 SYMMETRY = tuple(Prescribed(face, face, (axis,), Rest()) for axis, face in enumerate(("x0", "y0", "z0")))
-
-
-def effect(name: str, **parameters: Any) -> Effect:
-    """The effect ``name`` with its parameters as scene files write them."""
-    found = parse(effects.find(name), parameters, name)
-    assert isinstance(found, Effect)
-    return found
 
 
 def course(full: float = 1.0) -> list[dict[str, float]]:
@@ -31,17 +22,17 @@ def course(full: float = 1.0) -> list[dict[str, float]]:
 def resistance(element: str, bulk: float) -> Effect:
     """The effect that resists volume change with the modulus ``bulk`` [MPa], for an ``element``."""
     name = "incompressible_penalty" if ELEMENTS[element][2] is None else "incompressible"
-    return effect(name, bulk=f"{bulk} MPa")
+    return make(name, bulk=f"{bulk} MPa")
 
 
 def neo_hooke(mu: float, bulk: float) -> tuple[Effect, ...]:
     """Matter of the moduli ``mu`` and ``bulk`` [MPa], the latter in mixed form."""
-    return effect("neo_hooke", mu=f"{mu} MPa"), effect("incompressible", bulk=f"{bulk} MPa")
+    return make("neo_hooke", mu=f"{mu} MPa"), make("incompressible", bulk=f"{bulk} MPa")
 
 
 def mooney_rivlin(c1: float, c2: float, bulk: float) -> tuple[Effect, ...]:
     """Matter of ``c1``, ``c2`` and the modulus ``bulk`` [MPa], the latter in mixed form."""
-    return effect("mooney_rivlin", c1=f"{c1} MPa", c2=f"{c2} MPa"), effect("incompressible", bulk=f"{bulk} MPa")
+    return make("mooney_rivlin", c1=f"{c1} MPa", c2=f"{c2} MPa"), make("incompressible", bulk=f"{bulk} MPa")
 
 
 def zero() -> float:

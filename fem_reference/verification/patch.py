@@ -4,10 +4,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fem_reference.catalogue import Entry, Finding, Lab
-from fem_reference.continuum import ELEMENTS, Continuum, Prescribed, Reached
-from fem_reference.verification import shapes
-from fem_reference.verification.courses import Along, Matrix, Turn
+from fem_reference.assessment.catalogue import Entry, Finding, Lab
+from fem_reference.problems import shapes
+from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
+from fem_reference.problems.courses import Along, Matrix, Turn
+from fem_reference.runs.solved import Reached
 from fem_reference.verification.fibres import active
 from fem_reference.verification.homogeneous import BULK, NEO, SIZE, STEPS, Material, X, everywhere
 from fem_reference.verification.parts import resistance, zero

@@ -9,13 +9,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fem_reference.catalogue import Entry, Finding, Lab
-from fem_reference.continuum import ELEMENTS, Cells, Continuum, Prescribed
-from fem_reference.mesh import Floats
-from fem_reference.truths import find
-from fem_reference.verification import shapes
-from fem_reference.verification.courses import Rest
-from fem_reference.verification.parts import course, effect, neo_hooke
+from fem_reference.assessment.catalogue import Entry, Finding, Lab
+from fem_reference.effects import make
+from fem_reference.foundations.mesh import Floats
+from fem_reference.problems import shapes
+from fem_reference.problems.body import ELEMENTS, Cells, Continuum, Prescribed
+from fem_reference.problems.courses import Rest
+from fem_reference.verification.parts import course, neo_hooke
+from fem_reference.verification.truths import find
 
 FAMILY = "rims of attachments"
 ELEMENT = "Q2/Q1"
@@ -65,7 +66,7 @@ def _block(level: int, grading: float) -> Continuum:
 
 
 def _pulled(mesh: Cells, slides: tuple[Prescribed, ...]) -> Continuum:
-    acting = (*neo_hooke(MU, BULK), effect("traction", on="pulled", force=f"{LOAD}, 0, 0 MPa", course=course()))
+    acting = (*neo_hooke(MU, BULK), make("traction", on="pulled", force=f"{LOAD}, 0, 0 MPa", course=course()))
     held = Prescribed("clamped", "clamped", (0, 1, 2), Rest()), Prescribed("x0", "x0", (0,), Rest())
     return Continuum(mesh, acting, (*held, *slides), (0.0, 1.0))
 

@@ -17,8 +17,8 @@ from fnmatch import fnmatchcase
 from types import ModuleType
 
 from fem_reference import verification
-from fem_reference.catalogue import Entry, Finding, Lab, Result, result
-from fem_reference.errors import InputError
+from fem_reference.assessment.catalogue import Entry, Finding, Lab, Result, result
+from fem_reference.foundations.errors import InputError
 
 log = logging.getLogger(__name__)
 

@@ -11,15 +11,18 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.catalogue import Entry, Finding, Lab
-from fem_reference.continuum import ELEMENTS, Cells, Continuum, Prescribed, Reached
-from fem_reference.mesh import Floats
-from fem_reference.verification import fibres, shapes
+from fem_reference.assessment.catalogue import Entry, Finding, Lab
+from fem_reference.effects import make
+from fem_reference.foundations.mesh import Floats
+from fem_reference.problems import shapes
+from fem_reference.problems.body import ELEMENTS, Cells, Continuum, Prescribed
+from fem_reference.problems.courses import Affine, Along, Rest, Turn
+from fem_reference.runs.solved import Reached
+from fem_reference.verification import fibres
 from fem_reference.verification.cook import Panel
-from fem_reference.verification.courses import Affine, Along, Rest, Turn
 from fem_reference.verification.homogeneous import HEART, MOONEY, MU, NEO, Specimen
 from fem_reference.verification.loads import dead
-from fem_reference.verification.parts import course, effect, zero
+from fem_reference.verification.parts import course, zero
 from fem_reference.verification.patch import Patch
 
 RESIDUAL = 1e-14  # [N, mm3]
@@ -62,7 +65,7 @@ class Sample:
 
     def body(self) -> Continuum:
         """The body."""
-        acting = tuple(effect(name, **parameters) for name, parameters in self.acting)
+        acting = tuple(make(name, **parameters) for name, parameters in self.acting)
         return Continuum(self.mesh(kind=ELEMENTS[self.element][0]), acting, self.prescribed, (0.0, 1.0), FIBRE)
 
 

@@ -9,12 +9,13 @@ from functools import partial
 
 import numpy as np
 
-from fem_reference.catalogue import Entry, Finding, Lab
-from fem_reference.continuum import ELEMENTS, Continuum, Prescribed, Reached, Solved
-from fem_reference.truths import find
-from fem_reference.verification import shapes
-from fem_reference.verification.courses import Affine, Rest
+from fem_reference.assessment.catalogue import Entry, Finding, Lab
+from fem_reference.problems import shapes
+from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
+from fem_reference.problems.courses import Affine, Rest
+from fem_reference.runs.solved import Reached, Solved
 from fem_reference.verification.parts import neo_hooke, zero
+from fem_reference.verification.truths import find
 
 MU = 0.01  # [MPa]
 HEIGHT = 0.1  # of the squeezed block over that at rest

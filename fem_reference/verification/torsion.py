@@ -3,12 +3,13 @@
 from collections.abc import Callable
 from functools import partial
 
-from fem_reference import truths
-from fem_reference.catalogue import Entry, Lab
-from fem_reference.continuum import ELEMENTS, Continuum, Prescribed, Reached
+from fem_reference.assessment.catalogue import Entry, Lab
 from fem_reference.effects import Effect
-from fem_reference.verification import shapes
-from fem_reference.verification.courses import Rest, Turn
+from fem_reference.problems import shapes
+from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
+from fem_reference.problems.courses import Rest, Turn
+from fem_reference.runs.solved import Reached
+from fem_reference.verification import truths
 from fem_reference.verification.parts import ladder, mooney_rivlin, neo_hooke, once
 
 Matter = Callable[[], tuple[Effect, ...]]

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from fem_reference import truths
-from fem_reference.catalogue import Entry, Finding, Lab, order
-from fem_reference.continuum import Continuum, Prescribed
-from fem_reference.effects import Effect
-from fem_reference.verification import shapes
-from fem_reference.verification.courses import Affine
+from fem_reference.assessment.catalogue import Entry, Finding, Lab, order
+from fem_reference.effects import Effect, make
+from fem_reference.problems import shapes
+from fem_reference.problems.body import Continuum, Prescribed
+from fem_reference.problems.courses import Affine
+from fem_reference.verification import truths
 from fem_reference.verification.homogeneous import MU, NEO
-from fem_reference.verification.parts import SYMMETRY, effect, resistance
+from fem_reference.verification.parts import SYMMETRY, resistance
 
 FAMILY = "viscosity"
 _ETA, _SECONDS = 0.02, 1.5  # MPa s; s from a frame number to the next
@@ -20,7 +20,7 @@ _SOURCE = "validation/viscosity.py"
 
 def viscosity(eta: float) -> Effect:
     """Of the matrix [MPa s]."""
-    return effect("viscosity", eta=f"{eta} MPa s")
+    return make("viscosity", eta=f"{eta} MPa s")
 
 
 def _squeezed(lab: Lab, step: float, eta: float) -> float:
@@ -72,7 +72,7 @@ _GONE = [{"frame": 0.0, "amount": 0.0}, {"frame": 1.0, "amount": 1.0}, {"frame":
 def _decay(lab: Lab, step: float, eta: float) -> float:
     """The rate [1/s] at which the block creeps back from frame ``_FROM`` to ``_TO``, in load steps of ``step`` frames."""
     mesh = shapes.box((1, 1, 1), (1.0, 2.0, 3.0), "tetrahedron")
-    weight = effect("traction", on="z1", force=f"0, 0, {-_STRESS} MPa", course=_GONE)
+    weight = make("traction", on="z1", force=f"0, 0, {-_STRESS} MPa", course=_GONE)
     frames = tuple(np.linspace(0, _TO, round(_TO / step) + 1).tolist())
     acting = (*NEO.effects, resistance("P2/P1", _BULK), weight, viscosity(eta))
     body = Continuum(mesh, acting, SYMMETRY, frames, interval=_SECONDS)

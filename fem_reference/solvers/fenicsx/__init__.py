@@ -14,17 +14,17 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.children import command
-from fem_reference.continuum import Continuum, check_element
-from fem_reference.deformable import as_continuum
 from fem_reference.effects import Effect
-from fem_reference.errors import InputError, MissingSoftware
+from fem_reference.foundations.errors import InputError, MissingSoftware
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.foundations.motion import apply
+from fem_reference.foundations.records import join
+from fem_reference.foundations.subprocesses import command
 from fem_reference.geometry.embedding import Locator
-from fem_reference.mesh import Floats, Ints
-from fem_reference.motion import apply
-from fem_reference.problem import Problem
-from fem_reference.records import join
-from fem_reference.runs import Frame, Outcome, Sink
+from fem_reference.problems.body import Continuum, check_element
+from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle_body import as_continuum
+from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers.fenicsx import resources
 from fem_reference.solvers.fenicsx.field import FieldSettings, solve_field
 from fem_reference.solvers.fenicsx.jobs import Job, stored_state

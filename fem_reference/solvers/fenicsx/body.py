@@ -13,8 +13,9 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fem_reference.continuum import ELEMENTS, Continuum, Prescribed
-from fem_reference.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
+from fem_reference.solvers.common.load_steps import Attempt
 from fem_reference.solvers.fenicsx import choice, compiling, forms, meshes, pushed_points
 from fem_reference.solvers.fenicsx.clock import Clock
 from fem_reference.solvers.fenicsx.contact import Pushes
@@ -29,7 +30,6 @@ from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.stability import Stability, has_energy
 from fem_reference.solvers.fenicsx.system import System
 from fem_reference.solvers.fenicsx.validity import Validity
-from fem_reference.stepping import Attempt
 
 
 class Body:

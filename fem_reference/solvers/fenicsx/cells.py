@@ -11,8 +11,8 @@ from dolfinx import fem
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from fem_reference.continuum import ELEMENTS
-from fem_reference.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.problems.body import ELEMENTS
 from fem_reference.solvers.fenicsx import compiling
 from fem_reference.solvers.fenicsx.forms import Form
 

@@ -6,8 +6,8 @@ from contextlib import contextmanager
 import numpy as np
 from dolfinx import fem
 
-from fem_reference.continuum import Continuum
-from fem_reference.mesh import Floats
+from fem_reference.foundations.mesh import Floats
+from fem_reference.problems.body import Continuum
 
 
 class Clock:

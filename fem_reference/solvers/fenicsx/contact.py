@@ -11,9 +11,9 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
-from fem_reference.contact import Contact, Nearby, Obstruction, nearest_on_way
-from fem_reference.mesh import Floats, Ints
-from fem_reference.motion import apply
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.foundations.motion import apply
+from fem_reference.problems.contact import Contact, Nearby, Obstruction, nearest_on_way
 from fem_reference.solvers.fenicsx.pushed_points import PushedPoints
 
 

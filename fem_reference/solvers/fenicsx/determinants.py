@@ -8,8 +8,8 @@ from dolfinx import mesh
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem_reference.continuum import Kind, reference_nodes
-from fem_reference.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.problems.body import Kind, reference_nodes
 from fem_reference.solvers.fenicsx import compiling, meshes
 
 

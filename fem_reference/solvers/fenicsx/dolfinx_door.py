@@ -8,7 +8,7 @@ with contextlib.suppress(ImportError):
 import dolfinx
 from petsc4py import PETSc
 
-from fem_reference.errors import MissingSoftware
+from fem_reference.foundations.errors import MissingSoftware
 
 __all__ = ["PETSc", "dolfinx"]
 

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from fem_reference.children import command
-from fem_reference.field.problem import FieldProblem
-from fem_reference.field.runs import Solution
-from fem_reference.records import Record
-from fem_reference.runs import Outcome
+from fem_reference.foundations.records import Record
+from fem_reference.foundations.subprocesses import command
+from fem_reference.foundations.units import Time
+from fem_reference.problems.scalar import FieldProblem
+from fem_reference.runs.scalar import Solution
+from fem_reference.runs.store import Outcome
 from fem_reference.solvers.fenicsx.processes import require_installed, running
-from fem_reference.units import Time
 
 
 class FieldSettings(Record):

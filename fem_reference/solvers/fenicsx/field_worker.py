@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from fem_reference.effects import FieldState, Place
-from fem_reference.field.problem import FieldProblem
-from fem_reference.formula import FUNCTIONS, evaluate
-from fem_reference.mesh import Floats, Ints
+from fem_reference.foundations.formula import FUNCTIONS, evaluate
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.problems.scalar import FieldProblem
 from fem_reference.solvers.fenicsx.dolfinx_door import PETSc
 from fem_reference.solvers.fenicsx.processes import MARK
 

@@ -10,9 +10,9 @@ from dolfinx import fem, mesh
 from ufl.algorithms import expand_derivatives
 from ufl.constantvalue import Zero
 
-from fem_reference.continuum import Continuum
 from fem_reference.effects import Effect, Energy, Load, State, elastic_state, total_energy
-from fem_reference.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.problems.body import Continuum
 from fem_reference.solvers.fenicsx import compiling, meshes, quadrature
 from fem_reference.solvers.fenicsx.settings import BodySettings
 

@@ -8,8 +8,8 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from fem_reference.continuum import Prescribed
-from fem_reference.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.problems.body import Prescribed
 from fem_reference.solvers.fenicsx.forms import Form
 from fem_reference.solvers.fenicsx.pushed_points import PushedPoints
 

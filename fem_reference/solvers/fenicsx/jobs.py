@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fem_reference.continuum import Continuum
-from fem_reference.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.problems.body import Continuum
+from fem_reference.runs.states import NodalState
 from fem_reference.solvers.fenicsx.settings import BodySettings
-from fem_reference.states import NodalState
 
 
 @dataclass(frozen=True, eq=False)

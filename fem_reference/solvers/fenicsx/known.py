@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from fem_reference.mesh import Floats
+from fem_reference.foundations.mesh import Floats
 
 # What acts is as it was where none of it differs by more (mm, and entries of a pose): rounding of a motion that comes back.
 _SAME = 1e-9

@@ -9,8 +9,8 @@ import ufl
 from dolfinx import mesh
 from mpi4py import MPI
 
-from fem_reference.continuum import Cells, reference_nodes
-from fem_reference.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.problems.body import Cells, reference_nodes
 from fem_reference.solvers.fenicsx import compiling
 
 

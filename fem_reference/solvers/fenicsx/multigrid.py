@@ -12,8 +12,8 @@ import numpy as np
 from petsc4py import PETSc
 from scipy.sparse import coo_array, csr_array
 
-from fem_reference.continuum import ELEMENTS
-from fem_reference.mesh import Ints
+from fem_reference.foundations.mesh import Ints
+from fem_reference.problems.body import ELEMENTS
 from fem_reference.solvers.fenicsx.linear import LinearSolveError
 from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.system import System

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fem_reference.mesh import Floats
+from fem_reference.foundations.mesh import Floats
 from fem_reference.solvers.fenicsx.determinants import Determinants
 from fem_reference.solvers.fenicsx.linear import LinearSolveError, LinearSolver
 from fem_reference.solvers.fenicsx.settings import BodySettings

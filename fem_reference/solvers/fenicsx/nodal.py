@@ -6,11 +6,11 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from fem_reference.continuum import ELEMENTS, reference_nodes
-from fem_reference.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.problems.body import ELEMENTS, reference_nodes
+from fem_reference.runs.states import NodalState
 from fem_reference.solvers.fenicsx import compiling
 from fem_reference.solvers.fenicsx.clock import Clock
-from fem_reference.states import NodalState
 
 
 class Nodal:

@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from fem_reference.children import environment
-from fem_reference.errors import MissingSoftware
-from fem_reference.runs import Outcome
+from fem_reference.foundations.errors import MissingSoftware
+from fem_reference.foundations.subprocesses import environment
+from fem_reference.runs.store import Outcome
 
 # One thread a rank. Open MPI, where it is used, refuses root and more ranks than cores unless told otherwise.
 _SETTINGS = {

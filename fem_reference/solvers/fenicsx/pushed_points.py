@@ -9,9 +9,9 @@ import numpy as np
 from dolfinx import fem
 from scipy.sparse import csr_array
 
-from fem_reference.continuum import Cells
+from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.skins import Skin
-from fem_reference.mesh import Floats, Ints
+from fem_reference.problems.body import Cells
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,8 +3,8 @@
 import basix
 import numpy as np
 
-from fem_reference.continuum import ELEMENTS
-from fem_reference.mesh import Floats
+from fem_reference.foundations.mesh import Floats
+from fem_reference.problems.body import ELEMENTS
 
 # By element: the degree up to which polynomials are integrated exactly on a straight cell.
 DEGREE = {"P1": 2, "P2": 5, "P2/P0": 5, "P2/P1": 5, "Q1": 3, "Q2": 5, "Q1/P0": 3, "Q2/Q1": 5}

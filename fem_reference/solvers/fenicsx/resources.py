@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from fem_reference.continuum import ELEMENTS, Cells
-from fem_reference.errors import InputError
+from fem_reference.foundations.errors import InputError
+from fem_reference.problems.body import ELEMENTS, Cells
 from fem_reference.solvers.fenicsx.settings import BodySettings
 
 # Unknowns below which a factorisation costs no more than a few iterations of anything else.

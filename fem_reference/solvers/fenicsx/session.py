@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.children import command
-from fem_reference.continuum import Continuum, Reached, Solved, check
-from fem_reference.runs import Outcome
+from fem_reference.foundations.subprocesses import command
+from fem_reference.problems.body import Continuum, check
+from fem_reference.runs.solved import Reached, Solved
+from fem_reference.runs.store import Outcome
 from fem_reference.solvers.fenicsx.jobs import Job, stored_state
 from fem_reference.solvers.fenicsx.processes import Process, installed, require_installed, running
 from fem_reference.solvers.fenicsx.settings import BodySettings

@@ -4,8 +4,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from fem_reference.records import Record
-from fem_reference.units import Time
+from fem_reference.foundations.records import Record
+from fem_reference.foundations.units import Time
 
 
 class BodySettings(Record):

@@ -3,8 +3,8 @@
 import numpy as np
 from dolfinx import fem
 
-from fem_reference.continuum import Continuum
 from fem_reference.effects import Load
+from fem_reference.problems.body import Continuum
 from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolveError
 from fem_reference.solvers.fenicsx.system import System
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_array
 
-from fem_reference.mesh import Floats
+from fem_reference.foundations.mesh import Floats
 from fem_reference.solvers.fenicsx import compiling
 from fem_reference.solvers.fenicsx.cells import CellSums, Structure, Tangent
 from fem_reference.solvers.fenicsx.contact import Pushes

@@ -13,9 +13,9 @@ import numpy as np
 from dolfinx import mesh
 from mpi4py import MPI
 
-from fem_reference.continuum import Continuum
-from fem_reference.limits import Limit
-from fem_reference.mesh import Floats, Ints
+from fem_reference.foundations.limits import Limit
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.problems.body import Continuum
 from fem_reference.solvers.fenicsx import compiling
 from fem_reference.solvers.fenicsx.forms import Form, Rule
 

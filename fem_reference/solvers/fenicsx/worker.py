@@ -19,7 +19,7 @@ from fem_reference.solvers.fenicsx.processes import MARK
 from fem_reference.solvers.fenicsx import compiling  # isort: skip - after the door
 from fem_reference.solvers.fenicsx.body import Body  # isort: skip
 from fem_reference.solvers.fenicsx.validity import Ranges  # isort: skip
-from fem_reference.stepping import Attempt, Step, Steps, march  # isort: skip
+from fem_reference.solvers.common.load_steps import Attempt, Step, Steps, march  # isort: skip
 
 
 class Worker:

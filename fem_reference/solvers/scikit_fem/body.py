@@ -9,13 +9,14 @@ import numpy as np
 from pydantic import Field
 from scipy.sparse.linalg import splu
 
-from fem_reference.continuum import Continuum, Prescribed, Reached, Solved, check
-from fem_reference.errors import InputError
-from fem_reference.mesh import Floats, Ints
-from fem_reference.records import Record
-from fem_reference.runs import Outcome
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.foundations.records import Record
+from fem_reference.problems.body import Continuum, Prescribed, check
+from fem_reference.runs.solved import Reached, Solved
+from fem_reference.runs.store import Outcome
+from fem_reference.solvers.common.load_steps import Attempt, Step, Steps, march
 from fem_reference.solvers.scikit_fem.equations import Equations
-from fem_reference.stepping import Attempt, Step, Steps, march
 
 log = logging.getLogger(__name__)
 

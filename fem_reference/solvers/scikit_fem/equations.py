@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from scipy.sparse import coo_array
 
-from fem_reference.continuum import Continuum, Prescribed
 from fem_reference.effects import Effect, Load, State, total_energy
-from fem_reference.jets import Jet, JetFunctions, constant, variables
-from fem_reference.mesh import Floats
+from fem_reference.foundations.jets import Jet, JetFunctions, constant, variables
+from fem_reference.foundations.mesh import Floats
+from fem_reference.problems.body import Continuum, Prescribed
 from fem_reference.solvers.scikit_fem.spaces import DISPLACEMENT, PRESSURE, VARIABLES, Points, Space
 
 # By element: exact for what its displacement gives on a straight cell with a law of second degree in the strain.

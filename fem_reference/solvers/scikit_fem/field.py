@@ -15,12 +15,12 @@ from skfem.helpers import grad
 from skfem.mesh import MeshTri1DG
 
 from fem_reference.effects import FieldState, Place
-from fem_reference.field.mesh import FieldMesh
-from fem_reference.field.problem import FieldProblem, at
-from fem_reference.field.runs import Solution
-from fem_reference.mesh import Floats, Ints
-from fem_reference.records import Record
-from fem_reference.runs import Outcome
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.foundations.records import Record
+from fem_reference.geometry.field_mesh import FieldMesh
+from fem_reference.problems.scalar import FieldProblem, at
+from fem_reference.runs.scalar import Solution
+from fem_reference.runs.store import Outcome
 
 QUADRATURE_DEGREE = 8
 _SINGULAR = 1e15  # condition numbers above leave no correct digit

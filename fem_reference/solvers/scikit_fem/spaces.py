@@ -13,10 +13,10 @@ import skfem
 from scipy.spatial.distance import cdist
 from skfem.quadrature import get_quadrature
 
-from fem_reference.continuum import ELEMENTS, Cells, reference_nodes
-from fem_reference.errors import InputError
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.fibres import Directions
-from fem_reference.mesh import Floats, Ints
+from fem_reference.problems.body import ELEMENTS, Cells, reference_nodes
 
 VARIABLES = 13
 DISPLACEMENT = slice(9, 12)

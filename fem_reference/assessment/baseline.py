@@ -1,0 +1,254 @@
+"""The baseline of a candidate: a JSON file with its measures and positions at one time, and how far later ones may differ."""
+
+import json
+import logging
+import math
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from fem_reference import __version__, metrics
+from fem_reference.assessment.measured import Today, sample
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.records import Record, parse
+from fem_reference.io import files
+from fem_reference.metrics import Measure
+from fem_reference.scenes.muscle import Scene
+
+log = logging.getLogger(__name__)
+
+FORMAT = 1
+# Decimal places that a statistic is stored with, by its unit, and a coordinate [mm].
+PLACES = {"mm": 4, "%": 4, "deg": 4, "mm3": 1}
+POSITION_PLACES = 2
+# How far [mm] a rounded position may be from the one that it was.
+POSITION_ROUNDING = math.sqrt(3) * 0.5 * 10**-POSITION_PLACES
+# How many vertices are sampled, in about 1.3 kB a frame. What moves between them shows in the statistics alone.
+SAMPLED = 64
+# The tolerances of a new baseline. Positions [mm]: far below what can be seen; a solver whose results differ by more from one
+# machine to another needs more.
+MOVED = 0.1
+# Of a statistic, at most this share of its greatest value over the frames.
+SHARE = 0.02
+# judge() says nothing where an error bar is more than a third of what is allowed; a little more, for rounding.
+_BARS = 3.001
+README = (
+    "tolerance: how far a value may be from the one stored here; within: how far from the reference it may be at most, in the "
+    "same unit (null: not known). Both may be edited; 'check --update' writes the values anew and keeps them. A statistic whose "
+    "entry is removed is not judged."
+)
+
+
+class Stored(Record):
+    """One statistic: ``values`` per frame, the ``tolerance`` of a change of each, and the greatest magnitude allowed, ``within``,
+    all in ``unit``.
+    """
+
+    tolerance: float = Field(ge=0)
+    unit: str
+    values: tuple[float | None, ...]
+    within: float | None = Field(ge=0)
+
+
+class Positions(Record):
+    """Where the sampled ``vertices`` (s,) of ``Today.points`` are in each frame, ``values`` (f, s, 3) [mm], and how far [mm] from
+    there they may be, ``tolerance``.
+    """
+
+    tolerance: float = Field(ge=0)
+    values: tuple[tuple[tuple[float, float, float] | None, ...], ...]
+    vertices: tuple[Annotated[int, Field(ge=0)], ...] = Field(min_length=1)
+
+
+class Baseline(Record):
+    """What the file holds: whose it is (``case``, ``scene`` key, ``candidate``), what it was made with (``reference`` run and
+    version of ``fem_reference``), the ``frames`` (f,), and the measures by ``metric.statistic``.
+    """
+
+    candidate: str
+    case: str
+    fem_reference: str
+    format: Literal[1]
+    frames: tuple[int, ...]
+    measures: dict[str, Stored]
+    positions: Positions
+    readme: str
+    reference: str
+    scene: str
+
+
+def check(path: Path, scene: Scene, candidate: str) -> None:
+    """InputError where an update of ``path`` would write over what is damaged, or of another case or candidate."""
+    if path.exists():
+        _check_whose(path, _read(path), scene, candidate)
+
+
+def read(path: Path, scene: Scene, candidate: str) -> Baseline:
+    """The baseline in ``path``; InputError where there is none, or it is damaged, or of another case, scene or candidate."""
+    baseline = _read(path)
+    _check_whose(path, baseline, scene, candidate)
+    if baseline.scene != scene.key:
+        got = f"{baseline.scene[:16]}..., while {scene.place} is {scene.key[:16]}..."
+        want = "the key of this scene (it was changed since; --update takes today's measures)"
+        raise InputError(f"{path}: scene", got, want)
+    if baseline.frames != scene.frames.numbers:
+        raise InputError(f"{path}: frames", f"{len(baseline.frames)} others", "the frame numbers of the scene")
+    return baseline
+
+
+def update(path: Path, today: Today) -> Baseline:
+    """Write today's values into ``path``. Every tolerance, and every ``within`` that has a number, stays as the file has it, so
+    that accuracy cannot be lost in small steps; statistics removed from the file stay out of it.
+    """
+    check(path, today.scene, today.candidate.name)
+    before = _read(path) if path.exists() else None
+    baseline = _made(today, before)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    files.write_text(path, text(baseline.model_dump(mode="json")) + "\n")
+    log.info("baseline: %s, %d statistics of %d frames", path, len(baseline.measures), len(baseline.frames))
+    return baseline
+
+
+def _read(path: Path) -> Baseline:
+    place, want = f"{path}", "the baseline of a candidate (--update writes it)"
+    if not path.is_file():
+        raise InputError(place, "no file", want)
+    try:
+        table = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(place, str(error), want) from error
+    if not isinstance(table, dict) or table.get("format") != FORMAT:
+        got = table.get("format", "nothing") if isinstance(table, dict) else "no table"
+        raise InputError(f"{place}: format", got, f"{FORMAT}, {want}")
+    baseline = parse(Baseline, table, f"{place}: baseline")
+    _check_shape(place, baseline)
+    return baseline
+
+
+def _check_shape(place: str, baseline: Baseline) -> None:
+    """InputError unless every list is as long as those that it goes with, and every statistic is one of ours."""
+    known, frames = metrics.units(), len(baseline.frames)
+    for name, stored in baseline.measures.items():
+        if known.get(name) != stored.unit:
+            want = f"a statistic that there is, in {known[name]}" if name in known else "a statistic that there is"
+            raise InputError(f"{place}: measures.{name}", f'one in "{stored.unit}"', want)
+        if len(stored.values) != frames:
+            raise InputError(
+                f"{place}: measures.{name}.values", f"{len(stored.values)} values", f"{frames}, one a frame"
+            )
+    positions = baseline.positions
+    if len(positions.values) != frames or {len(row) for row in positions.values} != {len(positions.vertices)}:
+        want = f"{len(positions.vertices)} vertices in each of {frames} frames"
+        raise InputError(f"{place}: positions.values", "another number of them", want)
+
+
+def _check_whose(path: Path, baseline: Baseline, scene: Scene, candidate: str) -> None:
+    """InputError where a baseline is of another case or candidate."""
+    for key, got, want in (("case", baseline.case, scene.name), ("candidate", baseline.candidate, candidate)):
+        if got != want:
+            raise InputError(f"{path}: {key}", f'"{got}"', f'"{want}", which is what is checked')
+
+
+def _made(today: Today, before: Baseline | None) -> Baseline:
+    kept = {} if before is None else before.measures
+    vertices = sample(today.rest, SAMPLED)
+    positions = Positions(
+        tolerance=MOVED if before is None else before.positions.tolerance,
+        values=tuple(tuple(_rounded(point) for point in frame[vertices]) for frame in today.points),
+        vertices=tuple(int(vertex) for vertex in vertices),
+    )
+    return Baseline(
+        candidate=today.candidate.name,
+        case=today.scene.name,
+        fem_reference=__version__,
+        format=1,
+        frames=today.candidate.numbers,
+        measures={
+            name: _stored(one, today.bars(one.metric, one.statistic), kept.get(name))
+            for name, one in today.by_name.items()
+            if before is None or name in kept
+        },
+        positions=positions,
+        readme=README,
+        reference=today.reference_name,
+        scene=today.scene.key,
+    )
+
+
+def _stored(one: Measure, bars: Floats, before: Stored | None) -> Stored:
+    """A statistic with the limits that it had ``before``, else those that its error bars make."""
+    limits = Limits.of(one, bars)
+    if before is not None:
+        limits = Limits(before.tolerance, limits.within if before.within is None else before.within)
+    values = tuple(
+        round(value, PLACES[one.unit]) + 0.0 if math.isfinite(value) else None for value in one.values.tolist()
+    )
+    return Stored(tolerance=limits.tolerance, unit=one.unit, values=values, within=limits.within)
+
+
+class Limits(NamedTuple):
+    """How far a statistic may be from what it was (``tolerance``) and from the reference (``within``, None if not known)."""
+
+    tolerance: float
+    within: float | None
+
+    @classmethod
+    def of(cls, one: Measure, bars: Floats) -> "Limits":
+        """Those of a new baseline, from the error bars (f,) of a deviation.
+
+        ``tolerance``: the greatest bar, for less is no change of accuracy, but at most ``SHARE`` of the greatest value: where the
+        reference is hardly known, the past still is. ``within``: the greatest of a value and its bar, and at least the three bars
+        below which the judge says nothing; of a run itself, which has no bar, the greatest value and its tolerance.
+        """
+        least = 10.0 * 10.0 ** -PLACES[one.unit]
+        values, bar, itself = np.abs(one.values), _greatest(bars), metrics.of_itself(one.metric)
+        share = SHARE * _greatest(values)
+        tolerance = _up(np.nanmax([least, share if itself else np.fmin(share, bar)]))
+        if math.isnan(bar) or math.isnan(share):
+            return cls(tolerance, None)
+        known = _greatest(values + (tolerance if itself else bars))
+        return cls(tolerance, _up(max(least, known, _BARS * bar)))
+
+
+def _greatest(values: Floats) -> float:
+    """The greatest of the finite ``values`` (f,), NaN without one."""
+    finite = values[np.isfinite(values)]
+    return float(finite.max()) if len(finite) else math.nan
+
+
+def _up(value: float) -> float:
+    """Three significant digits, rounded up.
+
+    >>> _up(0.123456), _up(20.0), _up(0.0)
+    (0.124, 20.0, 0.0)
+    """
+    if value == 0:
+        return 0.0
+    step = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return float(f"{math.ceil(value / step) * step:.6g}")
+
+
+def _rounded(point: Floats) -> tuple[float, float, float] | None:
+    if not np.isfinite(point).all():
+        return None
+    x, y, z = (round(float(value), POSITION_PLACES) + 0.0 for value in point)
+    return x, y, z
+
+
+def text(value: Any, indent: str = "") -> str:
+    """JSON with sorted keys, a line for each key and for each entry of a list of lists, so that a change is a few lines."""
+    inside = f"{indent} "
+    if isinstance(value, dict):
+        rows: Iterable[str] = (f"{json.dumps(key)}: {text(value[key], inside)}" for key in sorted(value))
+        return _block("{}", rows, indent)
+    if isinstance(value, list) and value and isinstance(value[0], list):
+        return _block("[]", (json.dumps(row, separators=(",", ":"), allow_nan=False) for row in value), indent)
+    return json.dumps(value, allow_nan=False)
+
+
+def _block(brackets: str, rows: Iterable[str], indent: str) -> str:
+    return f"{brackets[0]}\n{indent} " + f",\n{indent} ".join(rows) + f"\n{indent}{brackets[1]}"

@@ -1,0 +1,105 @@
+"""Problems whose answers are known: what an entry of the verification catalogue is, and what came of one."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+from fem_reference.assessment.judge import judge
+from fem_reference.problems.body import Continuum
+from fem_reference.runs.solved import Solved
+
+Kind = Literal["closed form", "published", "second solver", "property"]
+
+
+class Lab(Protocol):
+    """Where entries are measured."""
+
+    def solve(self, body: Continuum, element: str, **settings: float) -> Solved:
+        """The states of ``body`` by the reference, FEniCSx, with an element of ``continuum.ELEMENTS``; settings as in
+        ``BodySettings`` (first_step, smallest_step, newton_iterations, residual [N, mm3]).
+        """
+
+    def second(self, body: Continuum, element: str, **settings: float) -> Solved:
+        """The same by the second opinion, scikit-fem."""
+
+
+@dataclass(frozen=True, eq=False)
+class Finding:
+    """What was measured: the ``value``; on a ladder of meshes the ``order`` at which its error falls, with the ``ladder`` of
+    (mesh size [mm], value) from coarse to fine; ``note``: what else a reader should know.
+    """
+
+    value: float
+    order: float | None = None
+    ladder: tuple[tuple[float, float], ...] = ()
+    note: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Entry:
+    """A problem whose answer is known.
+
+    ``measure`` finds the number that ``truth`` gives, both in ``unit``; it must come within ``within`` (of the truth's size where
+    ``relative``, else in ``unit``), ``because`` says why so far and no further. ``source`` is where the truth is from, ``kind``
+    what it is. ``spoiled`` measures the same with one thing wrong, which ``spoil`` names: it must fail.
+    """
+
+    name: str
+    family: str
+    title: str
+    unit: str
+    truth: Callable[[], float]
+    within: float
+    relative: bool
+    because: str
+    kind: Kind
+    source: str
+    measure: Callable[[Lab], Finding]
+    spoil: str
+    spoiled: Callable[[Lab], Finding]
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What came of an entry: ``word`` is pass or fail, or cannot say where there is no truth; ``error`` the absolute error and
+    ``within`` its bound, both in the unit of the entry; NaN where nothing was measured or there is no truth, and then the
+    finding's note says why.
+    """
+
+    entry: Entry
+    finding: Finding
+    truth: float
+    within: float
+    seconds: float
+    spoiled: bool = False
+
+    @property
+    def error(self) -> float:
+        """The absolute error, in the unit of the entry."""
+        return abs(self.finding.value - self.truth)
+
+    @property
+    def word(self) -> str:
+        """Pass, fail or cannot say."""
+        return judge(self.finding.value, self.truth, self.within)
+
+
+def result(entry: Entry, finding: Finding, seconds: float, *, spoiled: bool) -> Result:
+    """The finding of an entry beside its truth."""
+    truth = entry.truth()
+    within = entry.within * (abs(truth) if entry.relative else 1.0)
+    return Result(entry, finding, truth, within, seconds, spoiled)
+
+
+def order(ladder: tuple[tuple[float, float], ...], truth: float) -> float | None:
+    """The order at which the error falls over the last two meshes of a ``ladder`` of (size, value), None where one is exact.
+
+    >>> round(order(((2.0, 1.04), (1.0, 1.01)), 1.0), 6)
+    2.0
+    """
+    (coarse, first), (fine, last) = ladder[-2:]
+    errors = abs(first - truth), abs(last - truth)
+    if min(errors) == 0:
+        return None
+    return math.log(errors[0] / errors[1]) / math.log(coarse / fine)

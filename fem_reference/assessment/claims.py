@@ -1,0 +1,83 @@
+"""Claimed against true: every error bar of a reference beside what a finer solution, which the bar does not know, differs by."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from fem_reference.assessment.error_bars import ErrorBars, Of
+from fem_reference.metrics import Measure, find
+
+# The finer solution has a mesh of its own, of tetrahedra so much smaller.
+FINER = 0.8
+# Of what is claimed: metric and statistic.
+CLAIMED = (
+    ("surface_deviation", "rms"),
+    ("surface_deviation", "p95"),
+    ("surface_deviation", "max"),
+    ("fibre_length", "mean_percent"),
+    ("fibre_length", "rms_percent"),
+    ("fibre_length", "max_percent"),
+    ("volume", "deviation"),
+)
+# Differences below are rounding, in mm or %.
+LEAST = 1e-6
+
+
+@dataclass(frozen=True)
+class Claim:
+    """The ``bar`` of a statistic at a ``frame`` of a ``case``, and by how much the finer solution has it otherwise, ``error``."""
+
+    case: str
+    of: Of
+    metric: str
+    statistic: str
+    frame: int
+    bar: float
+    error: float
+
+
+@dataclass(frozen=True)
+class Cover:
+    """Of so many claims, the ``share`` whose error is within the bar, and the ``median`` ratio of bar to error."""
+
+    count: int
+    share: float
+    median: float
+
+    @classmethod
+    def of(cls, claims: Iterable[Claim]) -> "Cover":
+        """What the claims come to; NaN without any."""
+        known = [claim for claim in claims if claim.error > LEAST]
+        if not known:
+            return cls(0, np.nan, np.nan)
+        ratios = np.array([claim.bar / claim.error for claim in known])
+        return cls(len(known), float((ratios >= 1).mean()), float(np.median(ratios)))
+
+
+@dataclass(frozen=True, eq=False)
+class Claims:
+    """All claims, the ``sizes`` [mm] of tetrahedra by case (the reference's, the finer ones), and by case why it was left out."""
+
+    claims: tuple[Claim, ...]
+    sizes: dict[str, tuple[float, float]]
+    missing: dict[str, str]
+
+
+def claimed(
+    case: str, of: Of, bars: ErrorBars, reference: tuple[Measure, ...], finer: tuple[Measure, ...]
+) -> list[Claim]:
+    """The claims of ``bars`` about changes or deviations, whose measures a ``finer`` solution has otherwise than the reference."""
+    found = []
+    for metric, statistic in CLAIMED:
+        bar = bars.find(of, metric, statistic)
+        one, other = (find(measures, metric, statistic) for measures in (reference, finer))
+        assert bar is not None  # every statistic of every metric has its bar
+        assert one is not None
+        assert other is not None
+        errors = np.abs(one.values - other.values)
+        found += [
+            Claim(case, of, metric, statistic, number, float(value), float(error))
+            for number, value, error in zip(bars.numbers, bar.values, errors, strict=True)
+        ]
+    return found

@@ -1,0 +1,96 @@
+"""A reference and its candidates, measured and judged: what reports are written from."""
+
+from dataclasses import dataclass
+
+from fem_reference.assessment.error_bars import ErrorBars, Of
+from fem_reference.assessment.judge import Verdict, Word, overall, verdict
+from fem_reference.assessment.ranking import Ranking, rankings
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.records import join
+from fem_reference.metrics import Measure, Yardstick, at_rest, find, measure
+from fem_reference.metrics.fibre_length import extension_error
+from fem_reference.problems.muscle import Setup
+from fem_reference.runs.store import Run
+from fem_reference.scenes.muscle import Expectation, Scene
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """``deviations``: by candidate name, its measures against the reference. ``changes``: by run name (``"reference"`` among
+    them), its measures against the rest state. ``extension_error`` [mm]: by frame, the greatest error over the fibres that the
+    extension makes on the reference's own surface. ``error_bars``: how well the reference is known, None without any.
+    """
+
+    scene: Scene
+    setup: Setup
+    reference: Run
+    candidates: tuple[Run, ...]
+    yardstick: Yardstick
+    deviations: dict[str, tuple[Measure, ...]]
+    changes: dict[str, tuple[Measure, ...]]
+    extension_error: Measure
+    verdicts: tuple[Verdict, ...]
+    error_bars: ErrorBars | None = None
+
+    @property
+    def rankings(self) -> tuple[Ranking, ...]:
+        """Which candidates are nearer, as far as the error bars tell them apart; nothing without these."""
+        return rankings(self.deviations, self.error_bars.of_deviations) if self.error_bars else ()
+
+    @property
+    def word(self) -> Word:
+        """The verdict of the case."""
+        return overall(verdict.word for verdict in self.verdicts)
+
+
+def compare(
+    scene: Scene, setup: Setup, reference: Run, candidates: tuple[Run, ...], error_bars: ErrorBars | None = None
+) -> Comparison:
+    """Measure and judge runs that all have the frames of the scene (``not a number`` where a run did not reach one); with
+    ``error_bars`` nothing is judged that they are too wide for. Of a run without a surface only what needs none is judged.
+    """
+    if not reference.has_surface:
+        raise InputError(f"{reference.name}: surface", "a run of lines alone", "a reference that moves the surface")
+    if reference.fibres is None:
+        raise InputError(
+            f"{reference.name}: fibres", "a run without an interior", "a reference that carries the fibres"
+        )
+    yardstick = Yardstick.of(reference, reference.fibres, setup.bones, setup.free)
+    deviations = {run.name: measure(run, reference, yardstick) for run in candidates}
+    changes = {run.name: measure(run, at_rest(run), yardstick) for run in (reference, *candidates)}
+    measured = {"reference": changes["reference"]} | deviations
+    _check_expected(scene, measured)
+    verdicts = tuple(
+        verdict(
+            expectation.model_copy(update={"of": name}),
+            measured[name],
+            reference.numbers,
+            _bars(error_bars, expectation),
+        )
+        for expectation in scene.expect
+        for name in (deviations if expectation.of == "candidates" else [expectation.of])
+        if _is_measured(expectation, measured.get(name, ()))
+    )
+    error = extension_error(reference, yardstick)
+    return Comparison(scene, setup, reference, candidates, yardstick, deviations, changes, error, verdicts, error_bars)
+
+
+def _check_expected(scene: Scene, measured: dict[str, tuple[Measure, ...]]) -> None:
+    """InputError where a scene expects of a run by its name what is not measured of it, as it has no surface."""
+    for i, one in enumerate(scene.expect):
+        if one.of in measured and not _is_measured(one, measured[one.of]):
+            got = f"{one.metric}.{one.statistic} of {one.of}, which has no surface"
+            raise InputError(join(scene.place, f"expect[{i}]"), got, "a measure of lines")
+
+
+def _is_measured(expectation: Expectation, measures: tuple[Measure, ...]) -> bool:
+    """Whether what is expected is among ``measures``: of a run without a surface much is not."""
+    return find(measures, expectation.metric, expectation.statistic) is not None
+
+
+def _bars(error_bars: ErrorBars | None, expectation: Expectation) -> Floats | None:
+    """The error bars (f,) of what is expected; None without any of it."""
+    of: Of = "change" if expectation.of == "reference" else "deviation"
+    found = None if error_bars is None else error_bars.find(of, expectation.metric, expectation.statistic)
+    return None if found is None else found.values

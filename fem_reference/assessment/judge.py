@@ -1,0 +1,105 @@
+"""measure + truth + tolerance -> pass, fail or cannot say."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.records import join
+from fem_reference.foundations.units import quantity
+from fem_reference.metrics import Measure, units
+from fem_reference.scenes.muscle import Expectation, Scene
+
+Word = Literal["pass", "fail", "cannot say", "not judged"]
+_KINDS = {
+    "mm": ("a length", 1.0),
+    "%": ("a fraction", 100.0),
+    "mm3": ("a volume", 1.0),
+    "deg": ("an angle", 180 / math.pi),
+}
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How an expectation came out: the ``word``, and the ``value`` in ``unit`` at ``frame`` that decided it; ``error_bar``, how
+    well the reference is known there, NaN where nobody knows and None without any.
+    """
+
+    word: Word
+    expectation: Expectation
+    value: float
+    truth: float
+    within: float
+    unit: str
+    frame: int
+    error_bar: float | None = None
+
+
+def judge(value: float, truth: float, within: float, error_bar: float = 0.0) -> Word:
+    """Pass only if ``abs(value - truth) <= within``, so NaN never passes; *cannot say* where the truth's own ``error_bar`` is
+    above a third of ``within`` (all four in one unit).
+
+    >>> judge(1.02, 1.0, 0.05), judge(float("nan"), 1.0, 0.05), judge(1.02, 1.0, 0.05, error_bar=0.02)
+    ('pass', 'fail', 'cannot say')
+    """
+    if not error_bar <= within / 3:
+        return "cannot say"
+    return "pass" if abs(value - truth) <= within else "fail"
+
+
+def overall(words: Iterable[Word]) -> Word:
+    """Fail if one fails, else cannot say if one cannot, else pass; not judged where there is none."""
+    found = set(words)
+    order: tuple[Word, ...] = ("fail", "cannot say", "pass")
+    return next((word for word in order if word in found), "not judged")
+
+
+def check(scene: Scene) -> None:
+    """InputError unless every expectation of the scene is of a measure and a frame that there will be, in its unit."""
+    known, numbers = units(), scene.frames.numbers
+    for i, expectation in enumerate(scene.expect):
+        place, name = join(scene.place, f"expect[{i}]"), f"{expectation.metric}.{expectation.statistic}"
+        if name not in known:
+            raise InputError(f"{place}: metric and statistic", f'"{name}"', f"one of {', '.join(sorted(known))}")
+        for key in ("truth", "within"):
+            text = getattr(expectation, key)
+            try:
+                value = _number(text, known[name])
+            except ValueError as error:
+                raise InputError(f"{place}.{key}", f'"{text}"', str(error)) from error
+            if key == "within" and value < 0:
+                raise InputError(f"{place}.{key}", f'"{text}"', "a tolerance of at least zero")
+        if expectation.frame != "any" and expectation.frame not in numbers:
+            want = f'"any" or one of {numbers[0]}, {numbers[1]}, ..., {numbers[-1]}'
+            raise InputError(f"{place}.frame", expectation.frame, want)
+
+
+def verdict(
+    expectation: Expectation, measures: Iterable[Measure], numbers: tuple[int, ...], bars: Floats | None = None
+) -> Verdict:
+    """The verdict on a checked ``expectation`` from the measures of the run that it is of, over frame ``numbers``; ``bars`` (f,)
+    are the reference's error bars of what it expects, None without any.
+    """
+    name = (expectation.metric, expectation.statistic)
+    found = next(measure for measure in measures if (measure.metric, measure.statistic) == name)
+    truth, within = (_number(text, found.unit) for text in (expectation.truth, expectation.within))
+    frames = range(len(numbers)) if expectation.frame == "any" else [numbers.index(expectation.frame)]
+    values = [float(found.values[frame]) for frame in frames]
+    known = [0.0 if bars is None else float(bars[frame]) for frame in frames]
+    words = [judge(value, truth, within, bar) for value, bar in zip(values, known, strict=True)]
+    word = overall(words)
+    # The frame that decides: the first that fails, else that with the greatest bar of those that cannot be told, else the one
+    # furthest from the truth.
+    furthest = max(range(len(values)), key=lambda k: abs(values[k] - truth))
+    widest = max(range(len(values)), key=lambda k: math.inf if math.isnan(known[k]) else known[k])
+    decides = words.index("fail") if word == "fail" else widest if word == "cannot say" else furthest
+    bar = None if bars is None else known[decides]
+    frame = numbers[frames[decides]]
+    return Verdict(word, expectation, values[decides], truth, within, found.unit, frame, bar)
+
+
+def _number(text: str, unit: str) -> float:
+    kind, factor = _KINDS[unit]
+    return quantity(text, kind) * factor

@@ -1,0 +1,85 @@
+"""A candidate as it is now: measured against its reference, and where a sample of its vertices are."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fem_reference import metrics
+from fem_reference.assessment.error_bars import ErrorBars
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.metrics import Measure, Yardstick
+from fem_reference.problems.muscle import Setup
+from fem_reference.runs.store import Run
+from fem_reference.scenes.muscle import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class Today:
+    """A candidate, measured now against the ``reference``; ``error_bars``: how well that is known, None without any."""
+
+    scene: Scene
+    candidate: Run
+    reference: Run
+    measures: tuple[Measure, ...]
+    error_bars: ErrorBars | None
+
+    @classmethod
+    def of(
+        cls, scene: Scene, setup: Setup, candidate: Run, reference: Run, error_bars: ErrorBars | None = None
+    ) -> "Today":
+        """Measure a candidate and its reference, which both have the frames of the scene."""
+        if reference.fibres is None:
+            got, want = "a run without an interior", "a reference that carries the fibres"
+            raise InputError(f"{reference.name}: fibres", got, want)
+        yardstick = Yardstick.of(reference, reference.fibres, setup.bones, setup.free)
+        return cls(scene, candidate, reference, metrics.measure(candidate, reference, yardstick), error_bars)
+
+    @property
+    def points(self) -> Floats:
+        """Where the candidate's vertices are (f, n, 3) [mm]; of one without a surface, its fibre points."""
+        inside = self.candidate.fibre_positions
+        return self.candidate.positions if self.candidate.has_surface or inside is None else inside
+
+    @property
+    def rest(self) -> Floats:
+        """Where :attr:`points` are at rest (n, 3) [mm]."""
+        fibres = self.candidate.fibres
+        return self.candidate.surface.points if self.candidate.has_surface or fibres is None else fibres.points
+
+    @property
+    def reference_name(self) -> str:
+        """The folder of the reference in the store, which names its scene, settings and code; its solver where it has none."""
+        folder = self.reference.folder
+        return self.reference.solver if folder is None else folder.name
+
+    @property
+    def by_name(self) -> dict[str, Measure]:
+        """The measures by ``metric.statistic``, without those that say another in per cent."""
+        found = {f"{one.metric}.{one.statistic}": one for one in self.measures}
+        return {name: one for name, one in found.items() if name.removesuffix("_percent") not in found.keys() - {name}}
+
+    def values(self, metric: str, statistic: str) -> Floats:
+        """The values (f,) of a statistic, NaN where it is no finite number or is not measured of this candidate."""
+        found = (one.values for one in self.measures if (one.metric, one.statistic) == (metric, statistic))
+        values = next(found, np.full(len(self.reference.numbers), np.nan))
+        return np.where(np.isfinite(values), values, np.nan)
+
+    def bars(self, metric: str, statistic: str) -> Floats:
+        """The error bars (f,) of a deviation, NaN where nobody knows; what is said of a run itself is known."""
+        if metrics.of_itself(metric):
+            return np.zeros(len(self.reference.numbers))
+        found = None if self.error_bars is None else self.error_bars.find("deviation", metric, statistic)
+        return np.full(len(self.reference.numbers), np.nan) if found is None else found.values
+
+
+def sample(points: Floats, count: int) -> Ints:
+    """At most ``count`` of the vertices ``points`` (n, 3), each as far as can be from those before it; the first is the one
+    furthest from the middle of all.
+    """
+    chosen = [int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
+    away = np.linalg.norm(points - points[chosen[0]], axis=1)
+    while len(chosen) < min(count, len(points)):
+        chosen.append(int(np.argmax(away)))
+        away = np.minimum(away, np.linalg.norm(points - points[chosen[-1]], axis=1))
+    return np.array(chosen)

@@ -1,0 +1,181 @@
+"""Today's measures against a baseline and against the reference: a verdict on every statistic, from the frame that decides it."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from fem_reference import __version__
+from fem_reference.assessment import judge
+from fem_reference.assessment.baseline import PLACES, POSITION_ROUNDING, Baseline, Positions, Stored
+from fem_reference.assessment.judge import Word
+from fem_reference.assessment.measured import Today
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats
+
+Question = Literal["unchanged", "within"]
+MOVED = "positions.moved"
+WORST_FIRST: tuple[Word, ...] = ("fail", "cannot say", "pass")
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What came of one ``question`` on the statistic ``name``, all numbers in ``unit`` and of the ``frame`` that decides.
+
+    ``was`` and ``today`` are its values, NaN where there is none; ``allowed`` how far it may be from what it was (``unchanged``) or
+    from the reference (``within``), NaN where that is not known; ``known`` how well what it is compared with is known.
+    """
+
+    question: Question
+    name: str
+    unit: str
+    word: Word
+    frame: int
+    was: float
+    today: float
+    allowed: float
+    known: float
+
+    @property
+    def away(self) -> float:
+        """How far today's value is from what it is compared with."""
+        return abs(self.today - self.was if self.question == "unchanged" else self.today)
+
+    @property
+    def used(self) -> float:
+        """Which part of what is allowed is used up; infinite where that is no number."""
+        part = self.away / self.allowed if self.allowed else math.inf
+        return 0.0 if self.away == 0 else math.inf if math.isnan(part) else part
+
+    @property
+    def why(self) -> str:
+        """The reason in words."""
+        if math.isnan(self.was) and math.isnan(self.today):
+            return "there is no number, and there was none"
+        if math.isnan(self.today):
+            return "there is no number today"
+        if self.question == "unchanged" and math.isnan(self.was):
+            return "there is a number today, and there was none"
+        if self.word == "cannot say":
+            return self._why_silent
+        much = f"{self.away:.4g} {self.unit}"
+        told = f"{much} from what it was" if self.question == "unchanged" else f"{much} from the reference"
+        return f"{told}, {self.allowed:.4g} {self.unit} allowed"
+
+    @property
+    def _why_silent(self) -> str:
+        if math.isnan(self.known):
+            return "nobody knows how well the reference is known; --error-bar tells"
+        if math.isnan(self.allowed):
+            return "the baseline does not say how far from the reference is allowed; --update does, now that the error bar is known"
+        known = "the reference" if self.question == "within" else "the baseline"
+        told = f"{known} is known to {self.known:.4g} {self.unit}"
+        return f"{told}, more than a third of the {self.allowed:.4g} {self.unit} allowed"
+
+
+@dataclass(frozen=True)
+class Check:
+    """All judgements on a ``candidate``, the worst first, and ``notes`` on how to read them."""
+
+    case: str
+    candidate: str
+    judgements: tuple[Judgement, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def word(self) -> Word:
+        """Fail if one fails, else cannot say if one cannot, else pass."""
+        return judge.overall(one.word for one in self.judgements)
+
+    def answer(self, question: Question) -> Word:
+        """The verdict on one question."""
+        return judge.overall(one.word for one in self.judgements if one.question == question)
+
+    def count(self, word: Word) -> int:
+        """How many judgements came out as ``word``."""
+        return sum(one.word == word for one in self.judgements)
+
+
+def check(baseline: Baseline, today: Today) -> Check:
+    """Judge ``today`` by a baseline of the same case, scene and candidate."""
+    found = [_moved(baseline.positions, today)]
+    for name, stored in baseline.measures.items():
+        now = today.values(*name.split("."))
+        found += [_unchanged(name, stored, now, today), _within(name, stored, now, today)]
+    found.sort(key=lambda one: (WORST_FIRST.index(one.word), one.name != MOVED, -one.used, one.name, one.question))
+    return Check(today.scene.name, today.candidate.name, tuple(found), tuple(_notes(baseline, today, found)))
+
+
+class _Frames(NamedTuple):
+    """Of each frame (f,): its value in the baseline and today, what is right today, and how well that is known."""
+
+    was: Floats
+    today: Floats
+    truth: Floats
+    bars: Floats
+
+
+def _moved(positions: Positions, today: Today) -> Judgement:
+    """Whether the sampled vertices are where they were: the greatest distance [mm] of each frame."""
+    was = np.array([[(math.nan,) * 3 if point is None else point for point in frame] for frame in positions.values])
+    if max(positions.vertices) >= len(today.rest):
+        raise InputError("baseline: positions.vertices", max(positions.vertices), f"0 to {len(today.rest) - 1}")
+    away = np.linalg.norm(today.points[:, list(positions.vertices)] - was, axis=2).max(axis=1)
+    still = np.where(np.isnan(was).any(axis=(1, 2)), np.nan, 0.0)
+    frames = _Frames(still, away, still, np.full(len(away), POSITION_ROUNDING))
+    return _judged("unchanged", (MOVED, "mm"), frames, positions.tolerance, today)
+
+
+def _unchanged(name: str, stored: Stored, now: Floats, today: Today) -> Judgement:
+    """Whether a statistic is what it was: the baseline is known but for rounding."""
+    was = _numbers(stored)
+    known = np.full(len(was), 0.5 * 10.0 ** -PLACES[stored.unit])
+    return _judged("unchanged", (name, stored.unit), _Frames(was, now, was, known), stored.tolerance, today)
+
+
+def _within(name: str, stored: Stored, now: Floats, today: Today) -> Judgement:
+    """Whether a statistic is as near to the reference as it should be: that is known to its error bar."""
+    was, within = _numbers(stored), math.nan if stored.within is None else stored.within
+    frames = _Frames(was, now, np.zeros(len(was)), today.bars(*name.split(".")))
+    return _judged("within", (name, stored.unit), frames, within, today)
+
+
+def _judged(question: Question, what: tuple[str, str], frames: _Frames, allowed: float, today: Today) -> Judgement:
+    """The judgement by the frame that decides: of those with the word that counts, the one furthest off, or known worst."""
+    words = [_word(*map(float, row), allowed=allowed) for row in zip(*frames, strict=True)]
+    word = judge.overall(words)
+    deciding = frames.bars if word == "cannot say" else np.abs(frames.today - frames.truth)
+    furthest = np.where(np.isnan(deciding), np.inf, deciding)
+    k = int(np.argmax(np.where([each == word for each in words], furthest, -1.0)))
+    was, value, _, bar = (float(column[k]) for column in frames)
+    return Judgement(question, *what, word, today.candidate.numbers[k], was, value, allowed, bar)
+
+
+def _word(was: float, value: float, truth: float, bar: float, *, allowed: float) -> Word:
+    """The verdict on one frame; where there was no number and is none, nothing can be said."""
+    if math.isnan(was) and math.isnan(value):
+        return "cannot say"
+    return judge.judge(value, truth, allowed, bar)
+
+
+def _numbers(stored: Stored) -> Floats:
+    return np.array([math.nan if value is None else value for value in stored.values])
+
+
+def _notes(baseline: Baseline, today: Today, found: list[Judgement]) -> Iterator[str]:
+    """What explains the judgements, and what was not judged."""
+    if baseline.fem_reference != __version__:
+        yield f"measured by fem_reference {__version__}, the baseline by {baseline.fem_reference}"
+    if baseline.reference != today.reference_name:
+        yield f"the reference is {today.reference_name}, that of the baseline was {baseline.reference}"
+    changed = any(one.word == "fail" and one.question == "unchanged" for one in found if one.name != MOVED)
+    if changed and all(one.word == "pass" for one in found if one.name == MOVED):
+        yield (
+            "no sampled vertex moved and yet measures changed: either the reference is another, or the candidate moved "
+            "between the sampled vertices"
+        )
+    left = sorted(today.by_name.keys() - baseline.measures.keys())
+    if left:
+        yield f"not in the baseline and not judged: {', '.join(left)}"

@@ -1,0 +1,159 @@
+"""The families of solvers in Table 5.1 of the report, and how a solver of each stands on scenes, in numbers."""
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from pydantic import Field
+
+from fem_reference.assessment.ranking import Ranking, rankings
+from fem_reference.foundations.records import Record, parse
+from fem_reference.metrics import Measure, find
+from fem_reference.runs.store import Outcome
+from fem_reference.scenes.muscle import Candidate
+
+FILE = Path(__file__).with_suffix(".toml")
+
+
+class Family(Record):
+    """A row of the report's table: its ``name``, the ``form`` of its model, the report's ``speed`` and ``precision`` in pluses and
+    minuses, the numbers of its ``literature`` there; and who stands for it: ``candidates`` with the same settings on every scene,
+    and those that cases bring themselves under a name like one of ``of_case``.
+    """
+
+    name: str
+    form: str
+    speed: str
+    precision: str
+    literature: str
+    of_case: tuple[str, ...] = ()
+    candidate: tuple[Candidate, ...] = ()
+
+
+class ReportSpeed(Record):
+    """How many iterations a second the report's program makes on a case, and who says so."""
+
+    case: str
+    per_second: float = Field(gt=0)
+    source: str
+
+
+class _File(Record):
+    family: tuple[Family, ...]
+    report_speed: tuple[ReportSpeed, ...]
+
+
+def families() -> tuple[Family, ...]:
+    """The rows of the report's table, in its order."""
+    return _file().family
+
+
+def report_speeds() -> dict[str, ReportSpeed]:
+    """By case, how many iterations a second the report's program makes."""
+    return {one.case: one for one in _file().report_speed}
+
+
+def _file() -> _File:
+    return parse(_File, tomllib.loads(FILE.read_text(encoding="utf-8")), FILE.name)
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """How ``solver`` (``family``, ``name``) did on a ``case``: its outcome, its time for a frame [s] where that is known, and its
+    ``measures`` against the reference; those of the reference itself are its error bars, none where nobody asked.
+    """
+
+    family: str
+    name: str
+    solver: str
+    case: str
+    outcome: Outcome
+    seconds_per_frame: float | None
+    measures: tuple[Measure, ...]
+    numbers: tuple[int, ...]
+    machine: str
+    of_reference: bool = False
+
+    def worst(self, metric: str, statistic: str) -> tuple[float, int] | None:
+        """The value of the greatest magnitude over the frames, not-a-number where one frame is, and its frame; None without."""
+        found = find(self.measures, metric, statistic)
+        return None if found is None else (float(found.values[found.worst]), self.numbers[found.worst])
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """A scene that solvers stood on: its ``title``, ``triangles`` of the muscle, the reference's greatest displacement ``travel``
+    [mm], and how the reference ended.
+    """
+
+    case: str
+    title: str
+    triangles: int
+    travel: float
+    reference: Outcome
+
+
+@dataclass(frozen=True)
+class Overall:
+    """A solver's worst frames over scenarios: the ``median`` of magnitudes over the ``count`` where every frame has a number, the
+    ``worst`` of these and its ``case``, and the cases on which it was ``lost``.
+    """
+
+    median: float
+    worst: float
+    case: str
+    count: int
+    lost: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """What was measured: ``standings`` of all on every of the ``scenarios``; ``missing``, by case, why it was left out; the
+    ``machines`` that runs were made on.
+    """
+
+    families: tuple[Family, ...]
+    scenarios: tuple[Scenario, ...]
+    standings: tuple[Standing, ...]
+    missing: dict[str, str]
+    versions: dict[str, str]
+    machines: tuple[str, ...]
+
+    def of(self, family: str, case: str) -> list[Standing]:
+        """The standings of a family on a case."""
+        return [one for one in self.standings if (one.family, one.case) == (family, case)]
+
+    def names(self, family: str) -> list[str]:
+        """Who stands for a family, in order."""
+        return list(dict.fromkeys(one.name for one in self.standings if one.family == family))
+
+    def over(self, family: str, name: str, metric: str, statistic: str) -> "Overall | None":
+        """The worst frames of ``name`` over all scenarios; None where it was measured on none."""
+        found = [
+            (value[0], one.case)
+            for one in self.standings
+            if (one.family, one.name) == (family, name) and (value := one.worst(metric, statistic)) is not None
+        ]
+        told = [(value, case) for value, case in found if not np.isnan(value)]
+        lost = tuple(case for value, case in found if np.isnan(value))
+        if not told:
+            return Overall(np.nan, np.nan, "", 0, lost) if lost else None
+        worst, case = max(told, key=lambda entry: abs(entry[0]))
+        return Overall(float(np.median([abs(value) for value, _ in told])), worst, case, len(told), lost)
+
+    def rankings(self, case: str) -> tuple[Ranking, ...]:
+        """Who is nearer on a case, as far as the reference's error bars tell them apart; nothing without these."""
+        here = [one for one in self.standings if one.case == case]
+        bars = [measure for one in here if one.of_reference for measure in one.measures]
+        return rankings({one.name: one.measures for one in here if not one.of_reference}, bars)
+
+    def speed(self, family: str, name: str) -> tuple[Scenario, float] | None:
+        """The scenario of the most triangles on which the time for a frame [s] of ``name`` is known, and that time."""
+        times = {
+            one.case: one.seconds_per_frame
+            for one in self.standings
+            if (one.family, one.name) == (family, name) and one.seconds_per_frame is not None
+        }
+        largest = max((one for one in self.scenarios if one.case in times), key=lambda one: one.triangles, default=None)
+        return None if largest is None else (largest, times[largest.case])

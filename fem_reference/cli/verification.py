@@ -1,0 +1,51 @@
+"""What the verb ``verify`` does; the command line prints it."""
+
+import time
+
+from fem_reference import __version__
+from fem_reference.assessment.catalogue import Result
+from fem_reference.cli.scalar import Told
+from fem_reference.report.verify_page import Verification, facts
+from fem_reference.runs.key import versions
+from fem_reference.verification import runner
+
+_HEADS = ("entry", "value", "truth", "unit", "error", "within", "order", "seconds", "verdict")
+
+
+def verify(names: list[str], spoiled: list[str]) -> Verification:
+    """What came of the entries that ``names`` and ``spoiled`` mean (all where there are none), the latter with their spoils."""
+    from fem_reference.verification.lab import lab  # loads the solvers
+
+    catalogue = runner.entries()
+    wrong = frozenset(runner.choose(catalogue, spoiled, "--spoil"))
+    meant = {*runner.choose(catalogue, names, "NAME"), *wrong}
+    wanted = [entry for name, entry in catalogue.items() if name in meant or not meant]
+    begin = time.perf_counter()
+    results = runner.run(wanted, lab, wrong)
+    made_with = {"fem_reference": __version__, **versions()}
+    return Verification(results, time.perf_counter() - begin, made_with)
+
+
+def told(verification: Verification) -> Told:
+    """What to tell of a verification."""
+    text = [*_lines(verification.results), verification.summary]
+    return Told(facts(verification), "\n".join(text), verification.word)
+
+
+def _lines(results: tuple[Result, ...]) -> list[str]:
+    """One line for each result, in columns below their heads."""
+    rows = [_HEADS, *map(_cells, results)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    left = [head in ("entry", "unit", "verdict") for head in _HEADS]
+    return [
+        "  ".join(
+            f"{cell:{'<' if first else '>'}{width}}" for cell, first, width in zip(row, left, widths, strict=True)
+        ).rstrip()
+        for row in rows
+    ]
+
+
+def _cells(one: Result) -> tuple[str, ...]:
+    order = "" if one.finding.order is None else f"{one.finding.order:.2f}"
+    numbers = (f"{one.finding.value:.6g}", f"{one.truth:.6g}", one.entry.unit, f"{one.error:.2g}", f"{one.within:.2g}")
+    return (one.entry.name, *numbers, order, f"{one.seconds:.1f}", one.word + (" (spoiled)" if one.spoiled else ""))

@@ -1,0 +1,197 @@
+"""A problem as FEBio's input file (febio_spec 4.0): quadratic tetrahedra, rigid bones moved by load curves, sliding contact.
+
+Written from FEBio's feature manual (febiosoftware/febio-feature-manual) and the sources of FEBio and FEBio Studio that read and
+write such files; FEBio 4.11 was run with exported files. FEBIO.md says what is the same, what was seen and what has not been run.
+Time is the frame number minus the first.
+"""
+
+from math import ceil
+from pathlib import Path
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
+
+import numpy as np
+
+from fem_reference.effects.contact import Contact
+from fem_reference.effects.fibre_passive import FibrePassive
+from fem_reference.effects.fibre_passive_febio import FibrePassiveFebio
+from fem_reference.effects.incompressible import Incompressible
+from fem_reference.effects.incompressible_penalty import IncompressiblePenalty
+from fem_reference.effects.mooney_rivlin import MooneyRivlin
+from fem_reference.effects.neo_hooke import NeoHooke
+from fem_reference.export.febio_contact import add_contact, has_contact
+from fem_reference.export.febio_material import add_fibres, add_materials
+from fem_reference.export.febio_mesh import Mesh, bone_id, by_springs, exactly, leaf, quadratic, springs_id, vector
+from fem_reference.export.open_formats import effect_name
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.motion import Rotation
+from fem_reference.foundations.records import join
+from fem_reference.io import files
+from fem_reference.problems.muscle import Body, Problem
+from fem_reference.scenes.muscle import Scene
+
+# What FEBio has in the same form.
+SAME = (NeoHooke, MooneyRivlin, Incompressible, IncompressiblePenalty, FibrePassive, FibrePassiveFebio, Contact)
+LONGEST_STEP = 2.0  # [frame numbers], that of the runs whose results FEBIO.md compares
+# Newton's method stops at these shares of displacement and energy of the step's first correction.
+TOLERANCES = {"dtol": 1e-3, "etol": 1e-5}
+
+
+def check(scene: Scene) -> None:
+    """InputError where a scene has an effect that FEBio has not, or not in the same form."""
+    for i, effect in enumerate(scene.effects):
+        if not isinstance(effect, SAME):
+            same = ", ".join(kind.__module__.rpartition(".")[2] for kind in SAME)
+            raise InputError(
+                join(scene.place, f"effect[{i}]"),
+                f'"{effect_name(effect)}"',
+                f"what FEBio has in the same form: {same}",
+            )
+    for kinds, got in (
+        ((NeoHooke, MooneyRivlin), "no matrix: neither neo_hooke nor mooney_rivlin"),
+        ((Incompressible, IncompressiblePenalty), "neither incompressible nor incompressible_penalty"),
+    ):
+        if not any(isinstance(effect, kinds) for effect in scene.effects):
+            raise InputError(join(scene.place, "effect"), got, "one of them, which FEBio's uncoupled materials need")
+
+
+def write(problem: Problem, folder: Path) -> None:
+    """``scene.feb`` and, for whoever reads FEBio's nodes, ``tet10.csv`` into ``folder``."""
+    _, tets = quadratic(problem.mesh)
+    rows = "".join(",".join(map(str, row)) + "\n" for row in tets.tolist())
+    files.write_text(folder / "tet10.csv", ",".join(f"n{i}" for i in range(10)) + "\n" + rows)
+    root = model(problem)
+    ElementTree.indent(root, " ")
+    text = ElementTree.tostring(root, encoding="unicode")
+    files.write_text(folder / "scene.feb", f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n')
+
+
+def model(problem: Problem) -> Element:
+    """The whole input file."""
+    root = Element("febio_spec", version="4.0")
+    root.append(ElementTree.Comment(f" mm, N, MPa; time is the frame number minus {problem.frames[0]} "))
+    SubElement(root, "Module", type="solid")
+    _control(root, problem)
+    add_materials(root, problem)
+    Mesh(problem).add_to(root)
+    _domains(root, problem)
+    add_fibres(root, problem)
+    _motions(root, problem)
+    add_contact(root, problem)
+    _curves(root, problem)
+    _output(root)
+    return root
+
+
+def _control(root: Element, problem: Problem) -> None:
+    """Steps from frame to frame, at most ``LONGEST_STEP`` long, shorter where FEBio needs it."""
+    control, step = SubElement(root, "Control"), _step(problem)
+    steps = round((problem.frames[-1] - problem.frames[0]) / step)
+    settings = {"analysis": "STATIC", "time_steps": steps, "step_size": step}
+    settings |= {"plot_level": "PLOT_MUST_POINTS", "output_level": "OUTPUT_MUST_POINTS"}
+    for tag, value in settings.items():
+        leaf(control, tag, value)
+    stepper = SubElement(control, "time_stepper", type="default")
+    retries = {"max_retries": 20, "aggressiveness": 1, "cutback": 0.5}  # half the step at each
+    for tag, value in (retries | {"opt_iter": 15, "dtmin": step / 200}).items():
+        leaf(stepper, tag, value)
+    leaf(stepper, "dtmax", step, lc="1")
+    solver = SubElement(control, "solver", type="solid")
+    if has_contact(problem):
+        leaf(solver, "symmetric_stiffness", "non-symmetric")
+    leaf(solver, "max_refs", 30)
+    for tag, value in TOLERANCES.items():
+        leaf(solver, tag, value)
+    leaf(SubElement(solver, "qn_method", type="BFGS"), "max_ups", 0)
+
+
+def _step(problem: Problem) -> float:
+    """The initial and longest step [frame numbers]: as many of one length as reach from a frame wanted to the next."""
+    apart = problem.frames[1] - problem.frames[0]
+    return apart / ceil(apart / LONGEST_STEP)
+
+
+def _domains(root: Element, problem: Problem) -> None:
+    """How FEBio computes the muscle's elements; bones, and what springs hang from, are rigid."""
+    domains = SubElement(root, "MeshDomains")
+    mixed = any(isinstance(effect, Incompressible) for effect in problem.effects)
+    kind = "three-field-solid" if mixed else "elastic-solid"
+    SubElement(domains, "SolidDomain", name="muscle", mat="muscle", type=kind)
+    shells = {bone_id(bone): bone for bone in problem.bones}
+    shells |= {springs_id(held): held.bone for held in by_springs(problem)}
+    for name, bone in shells.items():
+        shell = SubElement(domains, "ShellDomain", name=name, mat=bone_id(bone))
+        leaf(shell, "shell_thickness", "0.01")
+
+
+def _motions(root: Element, problem: Problem) -> None:
+    if exactly(problem):
+        boundaries = SubElement(root, "Boundary")
+        for held in exactly(problem):
+            name = f"held_{held.attachment}"
+            leaf(SubElement(boundaries, "bc", name=name, type="rigid", node_set=name), "rb", bone_id(held.bone))
+    rigid = SubElement(root, "Rigid")
+    curves = _curve_numbers(problem)
+    for bone in problem.bones:
+        turns = isinstance(bone.motion, Rotation)
+        places, angles = ("Rx", "Ry", "Rz"), ("Ru", "Rv", "Rw")
+        fixed = (*places, *angles) if bone.motion is None else places if turns else angles
+        moved = angles if turns else ("x", "y", "z")
+        entry = SubElement(rigid, "rigid_bc", name=f"{bone_id(bone)}_fixed", type="rigid_fixed")
+        leaf(entry, "rb", bone_id(bone))
+        for freedom in fixed:
+            leaf(entry, f"{freedom}_dof", 1)
+        for freedom, share in zip(moved, axis(bone), strict=False):
+            kind = "rigid_rotation" if turns else "rigid_displacement"
+            entry = SubElement(rigid, "rigid_bc", name=f"{bone_id(bone)}_{freedom}", type=kind)
+            leaf(entry, "rb", bone_id(bone))
+            leaf(entry, "dof", freedom)
+            leaf(entry, "value", repr(share), lc=str(curves[bone.name]))
+
+
+def axis(bone: Body) -> list[float]:
+    """The unit vector that a bone turns about or slides along; none where it rests."""
+    if bone.motion is None:
+        return []
+    along = np.asarray(bone.motion.axis if isinstance(bone.motion, Rotation) else bone.motion.direction, float)
+    return [float(share) for share in along / np.linalg.norm(along)]
+
+
+def _curve_numbers(problem: Problem) -> dict[str, int]:
+    """The load curve of each bone that moves: from 2, without gaps, for FEBio takes an id for a place in their list."""
+    moving = [bone.name for bone in problem.bones if bone.motion is not None]
+    return {name: number for number, name in enumerate(moving, start=2)}
+
+
+def _curves(root: Element, problem: Problem) -> None:
+    """The times that FEBio must pass, curve 1; then for each bone that moves, how far [rad, mm]."""
+    data, (first, *_, last) = SubElement(root, "LoadData"), problem.frames
+    _curve(data, 1, "STEP", [(frame - first, _step(problem)) for frame in problem.frames])
+    numbers = _curve_numbers(problem)
+    for bone in problem.bones:
+        if bone.motion is None:
+            continue
+        motion = bone.motion
+        far = motion.angles if isinstance(motion, Rotation) else motion.distances
+        times = sorted({*problem.frames, *(frame for frame in motion.frames if first < frame < last)})
+        points = [(time - first, float(np.interp(time, motion.frames, far))) for time in times]
+        _curve(data, numbers[bone.name], "LINEAR", points)
+
+
+def _curve(data: Element, number: int, kind: str, points: list[tuple[float, float]]) -> None:
+    curve = SubElement(data, "load_controller", id=str(number), type="loadcurve")
+    leaf(curve, "interpolate", kind)
+    leaf(curve, "extend", "CONSTANT")
+    rows = SubElement(curve, "points")
+    for time, value in points:
+        leaf(rows, "pt", vector((time, value)))
+
+
+def _output(root: Element) -> None:
+    """Displacements for FEBio's viewer, and the muscle's nodes as text."""
+    output = SubElement(root, "Output")
+    plot = SubElement(output, "plotfile", type="febio")
+    SubElement(plot, "var", type="displacement")
+    SubElement(plot, "var", type="stress")
+    log = SubElement(output, "logfile")
+    SubElement(log, "node_data", data="x;y;z", delim=",", file="nodes.txt", node_set="muscle_nodes")

@@ -1,0 +1,99 @@
+"""The materials of FEBio's input file: the muscle's sum of effects, the axes of its fibres, the rigid bones."""
+
+from collections.abc import Sequence
+from xml.etree.ElementTree import Element, SubElement
+
+import numpy as np
+
+from fem_reference.effects import Effect
+from fem_reference.effects.fibre_passive import FibrePassive
+from fem_reference.effects.fibre_passive_febio import FibrePassiveFebio
+from fem_reference.effects.incompressible import Incompressible
+from fem_reference.effects.incompressible_penalty import IncompressiblePenalty
+from fem_reference.effects.mooney_rivlin import MooneyRivlin
+from fem_reference.effects.neo_hooke import NeoHooke
+from fem_reference.export.febio_mesh import bone_id, leaf, vector
+from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.motion import Rotation
+from fem_reference.problems.muscle import Body, Problem
+
+VOLUME_LAW = 2  # FEBio's pressure_model whose energy is K/2 (J - 1)^2
+
+
+def add_materials(root: Element, problem: Problem) -> None:
+    """The muscle's material, number 1, and a rigid one for each bone."""
+    materials = SubElement(root, "Material")
+    _muscle(materials, problem.effects)
+    for number, bone in enumerate(problem.bones, start=2):
+        rigid = SubElement(materials, "material", id=str(number), name=bone_id(bone), type="rigid body")
+        leaf(rigid, "density", 1e-9)
+        leaf(rigid, "center_of_mass", vector(_centre(bone)))
+
+
+def _muscle(materials: Element, effects: Sequence[Effect]) -> None:
+    """One material where FEBio has one for all effects; with ``fibre_passive`` a mixture, whose stresses FEBio sums."""
+    matrix, volume = matrix_constants(effects), volume_constants(effects)
+    kind = "trans iso Mooney-Rivlin" if "c3" in matrix else "Mooney-Rivlin"
+    passive = next((effect for effect in effects if isinstance(effect, FibrePassive)), None)
+    outer = "uncoupled solid mixture" if passive else kind
+    muscle = SubElement(materials, "material", id="1", name="muscle", type=outer)
+    _leaves(muscle, volume)
+    if passive is None:
+        _leaves(muscle, matrix)
+        return
+    _leaves(SubElement(muscle, "solid", type=kind), matrix)
+    _leaves(SubElement(muscle, "solid", type="muscle material"), fibre_constants(passive))
+
+
+def _leaves(parent: Element, constants: dict[str, float]) -> None:
+    """The constants of a material; of one with fibres (``lam_max``) also their direction: the first axis of each element."""
+    for tag, value in constants.items():
+        leaf(parent, tag, value)
+    if "lam_max" in constants:
+        leaf(SubElement(parent, "fiber", type="vector"), "vector", "1,0,0")
+
+
+def volume_constants(effects: Sequence[Effect]) -> dict[str, float]:
+    """FEBio's law of the volume change and its bulk modulus [MPa]."""
+    bulk = sum(effect.bulk for effect in effects if isinstance(effect, Incompressible | IncompressiblePenalty))
+    return {"pressure_model": VOLUME_LAW, "k": bulk}
+
+
+def matrix_constants(effects: Sequence[Effect]) -> dict[str, float]:
+    """The constants [MPa, 1] of FEBio's ``Mooney-Rivlin``, with ``fibre_passive_febio`` of its ``trans iso Mooney-Rivlin``."""
+    found = {"c1": 0.0, "c2": 0.0}
+    for effect in effects:
+        if isinstance(effect, NeoHooke):
+            found["c1"] += effect.mu / 2
+        elif isinstance(effect, MooneyRivlin):
+            found["c1"] += effect.c1
+            found["c2"] += effect.c2
+        elif isinstance(effect, FibrePassiveFebio):
+            found |= {"c3": effect.c3, "c4": effect.c4, "c5": effect.c5, "lam_max": effect.linear_from}
+    return found
+
+
+def fibre_constants(effect: FibrePassive) -> dict[str, float]:
+    """The constants [MPa, 1] of FEBio's ``muscle material`` that leave its passive fibres alone: no shear moduli (``g1``, ``g2``,
+    ``g3``), no activation. Its ``lam_max`` is a stretch from rest, ``linear_from`` one from optimal length.
+    """
+    off = {"g1": 0.0, "g2": 0.0, "g3": 0.0, "activation": 0.0}
+    toe = {"p1": effect.p1, "p2": effect.p2, "Lofl": effect.optimal_stretch, "smax": effect.stress}
+    return off | toe | {"lam_max": effect.linear_from * effect.optimal_stretch}
+
+
+def _centre(bone: Body) -> Floats:
+    """The point [mm] that FEBio turns a bone about: that of its motion."""
+    return np.asarray(bone.motion.centre if isinstance(bone.motion, Rotation) else bone.surface.points.mean(axis=0))
+
+
+def add_fibres(root: Element, problem: Problem) -> None:
+    """The axes of each element: the first along the fibre, the second anywhere across it."""
+    if problem.directions is None:
+        return
+    data = SubElement(SubElement(root, "MeshData"), "ElementData", type="mat_axis", elem_set="muscle")
+    across = np.cross(problem.directions, np.eye(3)[np.abs(problem.directions).argmin(axis=1)])
+    for i, (a, d) in enumerate(zip(problem.directions, across, strict=True), start=1):
+        axes = SubElement(data, "e", lid=str(i))
+        leaf(axes, "a", vector(a))
+        leaf(axes, "d", vector(d / np.linalg.norm(d)))

@@ -1,0 +1,163 @@
+"""The nodes, elements, node sets and surfaces of FEBio's input file."""
+
+import itertools
+from collections.abc import Iterable
+from xml.etree.ElementTree import Element, SubElement
+
+import numpy as np
+
+from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, boundary, enclosed_volume
+from fem_reference.problems.muscle import Body, Held, Problem
+
+# Corners between which the last six nodes of a tet10 are; the first three pairs are those of a tri6 too.
+EDGES = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
+FACING = [0, 2, 1, 5, 4, 3]  # the nodes of a tri6 whose normal is turned round
+
+
+def leaf(parent: Element, tag: str, text: object, **attributes: str) -> None:
+    """An element with a text and nothing below it."""
+    SubElement(parent, tag, attributes).text = str(text)
+
+
+def vector(values: Iterable[float]) -> str:
+    """Numbers in full, as FEBio reads them."""
+    return ",".join(repr(float(value)) for value in values)
+
+
+def bone_id(bone: Body) -> str:
+    """What a bone is called in the file: its material, its elements."""
+    return f"bone_{bone.name}"
+
+
+def springs_id(held: Held) -> str:
+    """What the springs of an attachment are called in the file: their shells on the bone, their surfaces."""
+    return f"springs_{held.attachment}"
+
+
+def by_springs(problem: Problem) -> list[Held]:
+    """The attachments that springs hold."""
+    return [held for held in problem.held if held.stiffness is not None]
+
+
+def exactly(problem: Problem) -> list[Held]:
+    """The attachments whose nodes move with their bone."""
+    return [held for held in problem.held if held.stiffness is None]
+
+
+def quadratic(mesh: TetMesh) -> tuple[Floats, Ints]:
+    """Points (n, 3) [mm] and tets (k, 10) with a node in the middle of each edge, in FEBio's order; corners stay as they are."""
+    ends = np.sort(mesh.tets[:, EDGES].reshape(-1, 2), axis=1)
+    edges, number = np.unique(ends, axis=0, return_inverse=True)
+    middles = len(mesh.points) + number.reshape(-1, len(EDGES))
+    return np.vstack([mesh.points, mesh.points[edges].mean(axis=1)]), np.hstack([mesh.tets, middles])
+
+
+def pushing(problem: Problem) -> list[Body]:
+    """The bones that push on the muscle."""
+    contact = problem.contact
+    return [bone for bone in problem.bones if contact is not None and contact.is_by(bone.name)]
+
+
+def outward(surface: Surface) -> Surface:
+    """The surface with its normals pointing out of it."""
+    turned = enclosed_volume(surface.points, surface.triangles) < 0
+    return Surface(surface.points, surface.triangles[:, ::-1]) if turned else surface
+
+
+class Mesh:
+    """Nodes, elements, node sets and surfaces; node numbers of FEBio begin at 1, with those of the muscle."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.points, self.tets = quadratic(problem.mesh)
+        ends = np.sort(problem.mesh.tets[:, EDGES].reshape(-1, 2), axis=1)
+        self.middles = dict(zip(map(tuple, ends.tolist()), self.tets[:, 4:].ravel().tolist(), strict=True))
+        self.outer, _ = boundary(problem.mesh.tets)
+
+    def add_to(self, root: Element) -> None:
+        """The section ``Mesh``: sets and surfaces after all nodes and elements."""
+        mesh, groups = SubElement(root, "Mesh"), [("muscle", "tet10", self.points, self.tets)]
+        for bone in self.problem.bones:
+            surface = outward(bone.surface)
+            groups.append((bone_id(bone), "tri3", surface.points, surface.triangles))
+        groups += [(springs_id(held), "tri6", *self._copy(held)) for held in by_springs(self.problem)]
+        before = np.cumsum([0, *(len(points) for _, _, points, _ in groups[:-1])])
+        cells = {name: own + first for (name, _, _, own), first in zip(groups, before, strict=True)}
+        for (name, _, points, _), first in zip(groups, before.tolist(), strict=True):
+            self._nodes(mesh, f"{name}_nodes", points, first)
+        self._elements(mesh, {name: kind for name, kind, _, _ in groups}, cells)
+        self._held(mesh)
+        if self.problem.contact is not None:
+            self._pushed(mesh, cells)
+        for held in by_springs(self.problem):
+            self._tied(mesh, held, cells[springs_id(held)])
+
+    @staticmethod
+    def _nodes(mesh: Element, name: str, points: Floats, before: int) -> None:
+        group = SubElement(mesh, "Nodes", name=name)
+        for i, point in enumerate(points.tolist(), start=before + 1):
+            leaf(group, "node", vector(point), id=str(i))
+
+    @staticmethod
+    def _elements(mesh: Element, kinds: dict[str, str], cells: dict[str, Ints]) -> None:
+        """The elements of each group, numbered through from 1."""
+        numbers = itertools.count(1)
+        for name, kind in kinds.items():
+            group = SubElement(mesh, "Elements", name=name, type=kind)
+            for cell in (cells[name] + 1).tolist():
+                leaf(group, "elem", ",".join(map(str, cell)), id=str(next(numbers)))
+
+    def _curved(self, facets: Ints) -> Ints:
+        """Straight triangles (m, 3) of the tets with the middles of their edges, (m, 6)."""
+        ends = np.sort(facets[:, EDGES[:3]], axis=2).reshape(-1, 2).tolist()
+        middles = [self.middles[a, b] for a, b in ends]
+        return np.hstack([facets, np.reshape(np.array(middles, np.int64), (-1, 3))])
+
+    def _area(self, held: Held) -> Ints:
+        """The triangles (m, 6) that an attachment holds, outward."""
+        own = set(map(tuple, np.sort(self.problem.mesh.facets[held.attachment], axis=1).tolist()))
+        mine = [tuple(facet) in own for facet in np.sort(self.outer, axis=1).tolist()]
+        return self._curved(self.outer[mine])
+
+    def _copy(self, held: Held) -> tuple[Floats, Ints]:
+        """Points (n, 3) [mm] and triangles (m, 6) that coincide with the area held and face it, as FEBio's pairs must."""
+        used, triangles = np.unique(self._area(held)[:, FACING], return_inverse=True)
+        return self.points[used], triangles.reshape(-1, 6)
+
+    def _held(self, mesh: Element) -> None:
+        taken: set[int] = set()
+        for held in exactly(self.problem):
+            nodes = set(self._curved(self.problem.mesh.facets[held.attachment]).ravel().tolist()) - taken
+            taken |= nodes
+            name = f"held_{held.attachment}"
+            SubElement(mesh, "NodeSet", name=name).text = ",".join(str(node + 1) for node in sorted(nodes))
+
+    def _pushed(self, mesh: Element, cells: dict[str, Ints]) -> None:
+        """The surface that bones push on: none of what is held, nor its neighbours."""
+        held = np.concatenate([np.zeros((0, 3), np.int64), *self.problem.mesh.facets.values()])
+        free = self.outer[~np.isin(self.outer, held).any(axis=1)]
+        self._surface(mesh, "muscle_free", "tri6", self._curved(free))
+        names = [bone_id(bone) for bone in pushing(self.problem)]
+        for name in names:
+            self._surface(mesh, f"{name}_surface", "tri3", cells[name])
+        for name in names:
+            self._pair(mesh, f"{name}_pair", "muscle_free", f"{name}_surface")
+
+    def _tied(self, mesh: Element, held: Held, copy: Ints) -> None:
+        """The area held and its rigid copy, the primary one: FEBio integrates over that."""
+        name = springs_id(held)
+        self._surface(mesh, f"{name}_muscle", "tri6", self._area(held))
+        self._surface(mesh, f"{name}_bone", "tri6", copy)
+        self._pair(mesh, f"{name}_pair", f"{name}_bone", f"{name}_muscle")
+
+    @staticmethod
+    def _surface(mesh: Element, name: str, kind: str, facets: Ints) -> None:
+        group = SubElement(mesh, "Surface", name=name)
+        for i, facet in enumerate((facets + 1).tolist(), start=1):
+            leaf(group, kind, ",".join(map(str, facet)), id=str(i))
+
+    @staticmethod
+    def _pair(mesh: Element, name: str, primary: str, secondary: str) -> None:
+        pair = SubElement(mesh, "SurfacePair", name=name)
+        leaf(pair, "primary", primary)
+        leaf(pair, "secondary", secondary)

@@ -1,0 +1,143 @@
+"""A problem in formats that anybody reads: PLY, VTU, MSH, VTK, CSV, JSON. Lengths in mm, indices from 0."""
+
+import csv
+import io
+import json
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fem_reference import __version__
+from fem_reference.effects import Effect
+from fem_reference.foundations.mesh import Floats, Polylines, Surface
+from fem_reference.geometry.embedding import embed
+from fem_reference.io import files
+from fem_reference.problems.muscle import Problem
+from fem_reference.scenes.muscle import Scene
+
+UNITS = {"length": "mm", "force": "N", "pressure": "MPa", "time": "s", "mass": "tonne", "angle": "rad"}
+CONVENTIONS = {
+    "axes": "those of the surfaces of the case, right-handed",
+    "indices": "from 0",
+    "poses": "4 x 4, row by row: [x, y, z, 1] as a column at rest, times the matrix from its left, is where it is at the frame",
+}
+
+
+def write(scene: Scene, problem: Problem, folder: Path) -> None:
+    """Every file of the export of a ``problem`` but those that explain it, into ``folder``."""
+    (folder / "bones").mkdir()
+    write_ply(folder / "muscle.ply", problem.surface)
+    for bone, name in zip(problem.bones, bone_files(problem), strict=True):
+        write_ply(folder / name, bone.surface)
+    along = {} if problem.directions is None else {"fibre": problem.directions}
+    for name in ("tets.vtu", "tets.msh"):
+        files.write_field(folder / name, problem.mesh.points, problem.mesh.tets, {}, along)
+    write_lines(folder / "fibres.vtk", problem.fibres)
+    _write_tables(problem, folder)
+    files.write_text(folder / "scene.json", json.dumps(facts(scene, problem), indent=1, allow_nan=False))
+
+
+def bone_files(problem: Problem) -> list[str]:
+    """The file of each bone: numbered, as its name may be any text."""
+    return [f"bones/{i}.ply" for i in range(len(problem.bones))]
+
+
+def _write_tables(problem: Problem, folder: Path) -> None:
+    poses = [
+        (bone.name, frame, *map(repr, bone.pose(frame).ravel().tolist()))
+        for bone in problem.bones
+        for frame in problem.frames
+    ]
+    entries = [f"m{row}{column}" for row in range(4) for column in range(4)]
+    _write_csv(folder / "poses.csv", ("bone", "frame", *entries), poses)
+    held = [(one.attachment, one.bone.name, vertex) for one in problem.held for vertex in one.vertices.tolist()]
+    _write_csv(folder / "attachments.csv", ("attachment", "bone", "vertex"), held)
+    facets = [
+        (one.attachment, one.bone.name, *facet)
+        for one in problem.held
+        for facet in problem.mesh.facets[one.attachment].tolist()
+    ]
+    _write_csv(folder / "attachment_facets.csv", ("attachment", "bone", "a", "b", "c"), facets)
+    within = embed(problem.mesh, problem.surface.points)
+    rows = zip(within.tets.tolist(), within.barycentric.tolist(), strict=True)
+    inside = [(vertex, tet, *map(repr, shares)) for vertex, (tet, shares) in enumerate(rows)]
+    _write_csv(folder / "surface_in_tets.csv", ("vertex", "tet", "w0", "w1", "w2", "w3"), inside)
+
+
+def _write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(rows)
+    files.write_text(path, text.getvalue())
+
+
+def facts(scene: Scene, problem: Problem) -> dict[str, Any]:
+    """What no mesh file says: units, conventions, frames, bones, attachments, effects with the unit of every parameter."""
+    bones = [
+        entry.model_dump(mode="json", exclude_none=True, exclude={"surface", "unit"}) | {"file": name, "pushes": pushes}
+        for entry, name, pushes in zip(scene.bone, bone_files(problem), _pushes(problem), strict=True)
+    ]
+    return {
+        "case": scene.name,
+        "title": scene.title,
+        "written_by": f"fem_reference {__version__}",
+        "units": UNITS,
+        "conventions": CONVENTIONS,
+        "frames": list(problem.frames),
+        "interval": {"value": problem.interval, "unit": "s", "of": "a frame number to the next"},
+        "bones": bones,
+        "attachments": [
+            {"name": held.attachment, "bone": held.bone.name, "stiffness": held.stiffness, "unit": "MPa/mm"}
+            for held in problem.held
+        ],
+        "effects": [_effect(effect) for effect in problem.effects],
+        "mesh": problem.mesh_facts,
+    }
+
+
+def _pushes(problem: Problem) -> list[bool]:
+    contact = problem.contact
+    return [contact is not None and contact.is_by(bone.name) for bone in problem.bones]
+
+
+def effect_name(effect: Effect) -> str:
+    """What scene files call an effect."""
+    return type(effect).__module__.rpartition(".")[2]
+
+
+def _effect(effect: Effect) -> dict[str, Any]:
+    """The name of an effect, its law in words, and its parameters, each with its value and unit."""
+    values = effect.model_dump(mode="json")
+    parameters = {name: {"value": values[name], "unit": unit} for name, _, unit in effect.parameters}
+    return {"name": effect_name(effect), "law": type(effect).__doc__, "parameters": parameters}
+
+
+def write_ply(path: Path, surface: Surface) -> None:
+    """The triangles as PLY in text, coordinates in full."""
+    head = (
+        "ply\nformat ascii 1.0\ncomment unit mm\n"
+        f"element vertex {len(surface.points)}\nproperty double x\nproperty double y\nproperty double z\n"
+        f"element face {len(surface.triangles)}\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    faces = "".join(f"3 {a} {b} {c}\n" for a, b, c in surface.triangles.tolist())
+    files.write_text(path, head + _rows(surface.points) + faces)
+
+
+def write_lines(path: Path, lines: Polylines) -> None:
+    """The polylines as legacy VTK in text, coordinates in full."""
+    ends = lines.offsets.tolist()
+    cells = [" ".join(map(str, (b - a, *range(a, b)))) for a, b in pairwise(ends)]
+    head = (
+        f"# vtk DataFile Version 3.0\nfibres at rest, mm\nASCII\nDATASET POLYDATA\nPOINTS {len(lines.points)} double\n"
+    )
+    size = len(lines.points) + len(cells)
+    files.write_text(path, f"{head}{_rows(lines.points)}LINES {len(cells)} {size}\n" + "\n".join(cells) + "\n")
+
+
+def _rows(points: Floats) -> str:
+    """One point a line, in as many digits as bring the same float back."""
+    return "".join(f"{x!r} {y!r} {z!r}\n" for x, y, z in np.asarray(points).tolist())

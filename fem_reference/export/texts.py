@@ -1,0 +1,32 @@
+"""What stands beside exported data: how to read it, how to hand frames back. The texts are files of this folder."""
+
+from pathlib import Path
+from string import Template
+
+from fem_reference import __version__
+from fem_reference.scenes.muscle import Scene
+
+_FEBIO_FILES = """\
+| `scene.feb` | the same for FEBio (format 4.0); `FEBIO.md` says what is the same and what is not |
+| `tet10.csv` | the ten nodes of each of its elements, in the order of FEBio |
+"""
+
+
+def readme(scene: Scene, *, febio: bool) -> str:
+    """How to read the files of an export; with FEBio's among them or without."""
+    more = _FEBIO_FILES if febio else ""
+    return _filled("README.md", title=scene.title, name=scene.name, version=__version__, more=more)
+
+
+def febio_readme(scene: Scene) -> str:
+    """What of a scene is the same in FEBio and what is not."""
+    return _filled("FEBIO.md", title=scene.title, first=str(scene.frames.first))
+
+
+def candidate() -> str:
+    """An example of what to put beside frames."""
+    return _filled("candidate.toml")
+
+
+def _filled(file: str, **values: str) -> str:
+    return Template((Path(__file__).parent / file).read_text(encoding="utf-8")).substitute(values)

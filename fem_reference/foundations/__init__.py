@@ -1,0 +1,1 @@
+"""What everything stands on: errors, units, records, formulas, meshes as arrays, rigid motions, subprocesses."""

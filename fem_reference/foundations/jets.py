@@ -1,0 +1,120 @@
+"""Numbers that carry their first and second derivatives: what is computed with them is differentiated without rounding of steps."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fem_reference.foundations.mesh import Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Jet:
+    """``value`` (...,), ``slope`` (n, ...) and ``curvature`` (n, n, ...) with respect to n variables, over points (...,).
+
+    Along the points, a slope or curvature that is the same at all has length 1; what a jet is combined with has as many axes as
+    its points, or none.
+    """
+
+    value: Any
+    slope: Any
+    curvature: Any
+
+    __array_ufunc__ = None  # an array on the left leaves it to the jet
+
+    def chained(self, value: Any, first: Any, second: Any) -> "Jet":
+        """A function of the jet, whose ``value``, ``first`` and ``second`` derivative at ``self.value`` are given."""
+        outer = self.slope[:, None] * self.slope[None]
+        return Jet(value, first * self.slope, first * self.curvature + second * outer)
+
+    def __neg__(self) -> "Jet":
+        return Jet(-self.value, -self.slope, -self.curvature)
+
+    def __add__(self, other: Any) -> "Jet":
+        if isinstance(other, Jet):
+            return Jet(self.value + other.value, self.slope + other.slope, self.curvature + other.curvature)
+        return Jet(self.value + other, self.slope, self.curvature)
+
+    def __sub__(self, other: Any) -> "Jet":
+        return self.__add__(-other)
+
+    def __rsub__(self, other: Any) -> "Jet":
+        return (-self).__add__(other)
+
+    def __mul__(self, other: Any) -> "Jet":
+        if not isinstance(other, Jet):
+            return Jet(self.value * other, self.slope * other, self.curvature * other)
+        mixed = self.slope[:, None] * other.slope[None]
+        curvature = self.value * other.curvature + other.value * self.curvature + mixed + np.swapaxes(mixed, 0, 1)
+        return Jet(self.value * other.value, self.value * other.slope + other.value * self.slope, curvature)
+
+    def __pow__(self, exponent: float) -> "Jet":
+        first = exponent * self.value ** (exponent - 1) if exponent else 0.0
+        second = exponent * (exponent - 1) * self.value ** (exponent - 2) if exponent not in (0, 1) else 0.0
+        return self.chained(self.value**exponent, first, second)
+
+    def __truediv__(self, other: Any) -> "Jet":
+        return self.__mul__(other**-1.0)
+
+    def __rtruediv__(self, other: Any) -> "Jet":
+        return (self**-1.0).__mul__(other)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+
+def variables(values: Floats) -> list[Jet]:
+    """The n variables themselves, at points where they have ``values`` (n, ...)."""
+    count, along = len(values), (1,) * (values.ndim - 1)
+    slopes = np.eye(count).reshape(count, count, *along)
+    return [Jet(value, slope, np.zeros((count, count, *along))) for value, slope in zip(values, slopes, strict=True)]
+
+
+def constant(value: Any, like: Jet) -> Jet:
+    """A constant as a jet in the variables of ``like``."""
+    return Jet(value + np.zeros_like(like.value), np.zeros_like(like.slope), np.zeros_like(like.curvature))
+
+
+class JetFunctions:
+    """``effects.Functions`` of jets, numbers and arrays."""
+
+    def exp(self, x: Any) -> Any:
+        """The exponential of x."""
+        return _apply(x, lambda v: (e := np.exp(v), e, e))
+
+    def log(self, x: Any) -> Any:
+        """The natural logarithm of x > 0."""
+        return _apply(x, lambda v: (np.log(v), 1 / v, -1 / v**2))
+
+    def sqrt(self, x: Any) -> Any:
+        """The square root of x > 0."""
+        return _apply(x, lambda v: (root := np.sqrt(v), 0.5 / root, -0.25 / (v * root)))
+
+    def cos(self, x: Any) -> Any:
+        """The cosine of x [rad]."""
+        return _apply(x, lambda v: (cosine := np.cos(v), -np.sin(v), -cosine))
+
+    def sin(self, x: Any) -> Any:
+        """The sine of x [rad]."""
+        return _apply(x, lambda v: (sine := np.sin(v), np.cos(v), -sine))
+
+    def above(self, x: Any, limit: Any, then: Any, otherwise: Any) -> Any:
+        """``then`` where ``x > limit``, else ``otherwise``; the derivatives are those of the branch."""
+        chosen = _value(x) > _value(limit)
+        like = next((branch for branch in (then, otherwise) if isinstance(branch, Jet)), None)
+        if like is None:
+            return np.where(chosen, then, otherwise)
+        one, other = (branch if isinstance(branch, Jet) else constant(branch, like) for branch in (then, otherwise))
+        return Jet(*(np.where(chosen, getattr(one, part), getattr(other, part)) for part in _PARTS))
+
+
+_PARTS = ("value", "slope", "curvature")
+
+
+def _value(x: Any) -> Any:
+    return x.value if isinstance(x, Jet) else x
+
+
+def _apply(x: Any, function: Callable[[Any], tuple[Any, Any, Any]]) -> Any:
+    """A ``function`` that gives its value, first and second derivative, of a jet, a number or an array."""
+    return x.chained(*function(x.value)) if isinstance(x, Jet) else function(np.asarray(x, float))[0]

@@ -1,0 +1,87 @@
+"""Strict frozen records read from TOML: an unknown key, a missing key or a wrong value is one InputError that names it."""
+
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from fem_reference.foundations.errors import InputError
+
+
+class Record(BaseModel):
+    """A frozen record whose keys are all known, whose values have the type stated, and whose numbers are finite.
+
+    Text and truth values are no numbers; an integer where a float is wanted is one.
+    """
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, arbitrary_types_allowed=True
+    )
+
+
+def parse[R: Record](record: type[R], table: object, place: str) -> R:
+    """``table`` as a ``record``; ``place`` is what its keys are reported below, for example ``"case.toml: effect[0]"``."""
+    try:
+        return record.model_validate(_frozen(table))
+    except ValidationError as error:
+        # An unknown key first: where a key is mistyped, it says more than that the right one is missing.
+        first = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
+        raise _as_input_error(first, record, place, table) from None
+
+
+def _frozen(value: Any) -> Any:
+    """Lists as the tuples that records hold."""
+    if isinstance(value, dict):
+        return {key: _frozen(inside) for key, inside in value.items()}
+    return tuple(_frozen(inside) for inside in value) if isinstance(value, list) else value
+
+
+def _as_written(value: Any) -> Any:
+    """Tuples as the lists that files hold."""
+    if isinstance(value, dict):
+        return {key: _as_written(inside) for key, inside in value.items()}
+    return [_as_written(inside) for inside in value] if isinstance(value, tuple) else value
+
+
+def join(place: str, key: str) -> str:
+    """``place`` with ``key`` below it: a file takes a colon, a key takes a dot."""
+    return place if not key else f"{place}{': ' if place.endswith('.toml') else '.'}{key}"
+
+
+def _as_input_error(first: Any, record: type[Record], place: str, table: object) -> InputError:
+    keys = _keys(table, first["loc"])
+    path = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in keys).lstrip(".")
+    if first["type"] == "extra_forbidden":
+        return InputError(join(place, path), "an unknown key", f"one of {', '.join(_known(record, first['loc'][:-1]))}")
+    if first["type"] == "missing":
+        return InputError(join(place, path), "nothing", "this key")
+    got = _as_written(first["input"])
+    want = first["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+    return InputError(join(place, path), f'"{got}"' if isinstance(got, str) else repr(got), want)
+
+
+def _keys(table: object, path: tuple[int | str, ...]) -> tuple[int | str, ...]:
+    """``path`` without what follows a value that is no table or list: where several types are allowed, pydantic names those."""
+    inside: Any = table
+    for i, part in enumerate(path):
+        if not hasattr(inside, "__getitem__") or isinstance(inside, str):
+            return path[:i]
+        try:
+            inside = inside[part]
+        except (KeyError, IndexError, TypeError):  # what is missing is named too
+            return path
+    return path
+
+
+def _known(record: Any, path: tuple[int | str, ...]) -> list[str]:
+    """The keys of the record that ``path`` leads to (a list index stays in the same record)."""
+    for part in path:
+        if isinstance(part, str) and part in getattr(record, "model_fields", {}):
+            record = _record_inside(record.model_fields[part].annotation)
+    return sorted(getattr(record, "model_fields", {}))
+
+
+def _record_inside(annotation: Any) -> Any:
+    if isinstance(annotation, type) and issubclass(annotation, Record):
+        return annotation
+    inside = (_record_inside(argument) for argument in getattr(annotation, "__args__", ()))
+    return next((record for record in inside if record is not None), None)

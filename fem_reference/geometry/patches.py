@@ -1,0 +1,32 @@
+"""Patches of triangles that landmarks on a surface span, laid on it."""
+
+import igl
+import numpy as np
+
+from fem_reference.foundations.mesh import Floats, Surface
+from fem_reference.geometry.distance import distances
+
+# Sides of the triangles of a patch that is laid on a bone are at most this long [mm].
+_SIDE = 2.0
+
+
+def draped(patches: Surface, bone_surface: Surface) -> Surface:
+    """The patches laid on the bone: in triangles with sides of at most 2 mm, each corner moved to the nearest point of the bone.
+
+    Landmarks lie on the bone, but what they span over a hollow does not: over the iliac fossa it is 13 mm off, more than the muscle
+    is thick there.
+    """
+    points, triangles = patches.points, patches.triangles
+    while np.linalg.norm(points[triangles] - points[np.roll(triangles, 1, axis=1)], axis=2).max() > _SIDE:
+        points, triangles = igl.upsample(points, triangles)
+    return Surface(distances(points, bone_surface).closest, triangles, patches.place)
+
+
+def fan(points: Floats) -> Surface:
+    """Triangles from the centroid of ``points`` (n, 3) to each two that are next in angle in their best-fit plane."""
+    centre = points.mean(axis=0)
+    _, _, axes = np.linalg.svd(points - centre)
+    x, y, _ = axes @ (points - centre).T
+    ring = np.argsort(np.arctan2(y, x), kind="stable")
+    triangles = np.stack([np.full(len(ring), len(points)), ring, np.roll(ring, -1)], axis=1)
+    return Surface(np.concatenate([points, centre[None]]), triangles)

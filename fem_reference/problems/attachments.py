@@ -1,0 +1,123 @@
+"""Which part of a muscle a bone holds: vertices of its surface, and boundary triangles of its tetrahedra below."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, boundary
+from fem_reference.foundations.records import join
+from fem_reference.geometry.distance import distances
+from fem_reference.geometry.patches import draped, fan
+from fem_reference.geometry.sectors import shares_at
+from fem_reference.io import files
+from fem_reference.scenes.muscle import Outline, Scene, VertexList
+
+# Where a triangle is sampled: its middle, near its corners, near the middles of its sides.
+_SAMPLES = np.array(
+    [
+        [1 / 3, 1 / 3, 1 / 3],
+        [0.6, 0.2, 0.2],
+        [0.2, 0.6, 0.2],
+        [0.2, 0.2, 0.6],
+        [0.45, 0.45, 0.1],
+        [0.45, 0.1, 0.45],
+        [0.1, 0.45, 0.45],
+    ]
+)
+
+
+def pick(scene: Scene, i: int, surface: Surface, bone_surface: Surface) -> Ints:
+    """The vertices (k,) of the muscle ``surface`` that ``scene.attachment[i]`` selects, sorted.
+
+    ``bone_surface`` is the surface of the attachment's bone. InputError names the key of the scene, or the file and
+    row (comment lines not counted), that is not usable.
+    """
+    attachment = scene.attachment[i]
+    key = f"attachment[{i}]"
+    if attachment.vertices is not None:
+        path = scene.file(attachment.vertices.file, f"{key}.vertices.file")
+        return _listed(path, attachment.vertices, len(surface.points))
+    if attachment.within is not None:
+        return np.flatnonzero(distances(surface.points, bone_surface).distance <= attachment.within)
+    outline = attachment.outline
+    assert outline is not None  # an Attachment record has one of the three
+    path = scene.file(outline.file, f"{key}.outline.file")
+    patches = draped(_patches(path, outline, join(scene.place, f"{key}.outline.clouds")), bone_surface)
+    return np.flatnonzero(distances(surface.points, patches).distance <= outline.reach)
+
+
+def facets_under(mesh: TetMesh, surface: Surface, shares: Floats) -> Ints:
+    """The boundary triangles (m, 3) of ``mesh``, outward, that lie under the held part of ``surface``, where the tets do not follow
+    its rim.
+
+    A triangle does where the held share at the closest point of the surface, averaged over seven samples, is above a half;
+    ``shares`` (k, 3) are those of the corners of the triangles of ``surface``.
+    """
+    triangles, _ = boundary(mesh.tets)
+    samples = np.einsum("qk,mkd->mqd", _SAMPLES, mesh.points[triangles]).reshape(-1, 3)
+    at = shares_at(samples, surface, shares).reshape(len(triangles), -1)
+    return triangles[at.mean(axis=1) > 1 / 2]
+
+
+def _listed(path: Path, chosen: VertexList, count: int) -> Ints:
+    """The vertices of a file of ``vertex[,value]`` rows, of which there are ``count`` on the surface."""
+    vertices = []
+    for number, row in enumerate(files.read_rows(path), start=1):
+        if number == 1 and _is_header(row[0]):
+            continue
+        place = f"{path}: row {number}"
+        vertex = _integer(row[0])
+        if vertex is None or not 0 <= vertex < count:
+            raise InputError(place, _quoted(row[0]), f"a vertex from 0 to {count - 1}")
+        value = _integer(row[1]) if chosen.value is not None and len(row) > 1 else None
+        if chosen.value is not None and value is None:
+            raise InputError(place, _quoted(",".join(row)), "a vertex and its value, an integer")
+        if value == chosen.value:
+            vertices.append(vertex)
+    return np.unique(np.array(vertices, np.int64))
+
+
+def _is_header(cell: str) -> bool:
+    """Whether the first cell of a list is a word: it has a letter, and does not begin as a number does (``1e5``)."""
+    return any(character.isalpha() for character in cell) and re.match(r"[-+.]?\d", cell) is None
+
+
+def _integer(text: str) -> int | None:
+    """The integer, of at most 18 digits, that a cell is."""
+    return int(text) if re.fullmatch(r"-?\d{1,18}", text) else None
+
+
+def _quoted(text: str) -> str:
+    return f'"{text}"' if len(text) <= 40 else f'"{text[:40]}..."'
+
+
+def _patches(path: Path, outline: Outline, place: str) -> Surface:
+    """The patches that the clouds of an outline span, as one surface [mm]; ``place`` is the key of the clouds."""
+    clouds = _clouds(path, outline.unit)
+    points, triangles = np.zeros((0, 3)), np.zeros((0, 3), np.int64)
+    for name in outline.clouds:
+        if name not in clouds:
+            raise InputError(place, f'"{name}", which {path} does not have', f"some of {', '.join(sorted(clouds))}")
+        if len(clouds[name]) < 3:
+            raise InputError(f'{path}: cloud "{name}"', f"{len(clouds[name])} landmarks", "at least three")
+        spanned = fan(np.array(clouds[name]))
+        triangles = np.concatenate([triangles, spanned.triangles + len(points)])
+        points = np.concatenate([points, spanned.points])
+    return Surface(points, triangles, str(path))
+
+
+def _clouds(path: Path, unit: float) -> dict[str, list[list[float]]]:
+    """Landmarks [mm] by cloud from rows ``cloud,landmark,x,y,z`` below a header row."""
+    clouds: dict[str, list[list[float]]] = {}
+    for number, row in enumerate(files.read_rows(path)[1:], start=2):
+        try:
+            cloud, _, *coordinates = row
+            x, y, z = (float(text) * unit for text in coordinates)
+        except ValueError:
+            x = y = z = np.nan
+        if not np.isfinite([x, y, z]).all():
+            raise InputError(f"{path}: row {number}", f'"{",".join(row)}"', "cloud, landmark and three coordinates")
+        clouds.setdefault(cloud, []).append([x, y, z])
+    return clouds

@@ -1,0 +1,182 @@
+"""A deformable body as finite elements see it: cells straight or curved, what is prescribed where, and what acts.
+
+It knows no solver.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from fem_reference.effects import Effect, Load
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.geometry.fibres import Directions
+from fem_reference.geometry.skins import Skin
+from fem_reference.problems.contact import Contact, Obstruction
+
+Kind = Literal["tetrahedron", "hexahedron"]
+# By element: kind of cell, degree of the displacement, and of the pressure (None: no such unknown; 0: constant in each cell).
+ELEMENTS: dict[str, tuple[Kind, int, int | None]] = {
+    "P1": ("tetrahedron", 1, None),
+    "P2": ("tetrahedron", 2, None),
+    "P2/P0": ("tetrahedron", 2, 0),
+    "P2/P1": ("tetrahedron", 2, 1),
+    "Q1": ("hexahedron", 1, None),
+    "Q2": ("hexahedron", 2, None),
+    "Q1/P0": ("hexahedron", 1, 0),
+    "Q2/Q1": ("hexahedron", 2, 1),
+}
+
+
+def check(body: "Continuum", element: str) -> None:
+    """InputError unless ``element`` suits the cells and effects of ``body``, which has every region and fibre direction that it
+    speaks of, and prescribes what can be told apart and be solved.
+    """
+    check_element(element, body.mesh.kind, body.mesh.degree, body.effects, "element")
+    _check_prescribed(body.prescribed)
+    held = [entry.on for entry in body.prescribed if isinstance(entry.on, str)]
+    pushed = [body.contact.on] if body.contact and isinstance(body.contact.on, str) else []
+    used = dict.fromkeys([*held, *pushed, *(effect.on for effect in body.effects if isinstance(effect, Load))])
+    for on in used:
+        if on not in body.mesh.facets:
+            raise InputError("on", f'"{on}"', f"a region of the body: {', '.join(body.mesh.facets)}")
+    _check_regions(body.mesh, tuple(used))
+    if body.fibre is None and any("fibre" in effect.needs for effect in body.effects):
+        raise InputError("fibre", "nothing", "fibre directions, which an effect needs")
+    if body.interval is None and any("interval" in effect.needs for effect in body.effects):
+        raise InputError("interval", "nothing", "the time from a frame number to the next, which an effect needs")
+
+
+def _check_prescribed(prescribed: tuple["Prescribed", ...]) -> None:
+    """InputError where two share a name, by which their forces are told, or springs would push away."""
+    names = [entry.name for entry in prescribed]
+    for entry in prescribed:
+        if names.count(entry.name) > 1:
+            raise InputError("prescribed", f'"{entry.name}" twice', "a name for each")
+        if entry.stiffness is not None and not entry.stiffness > 0:
+            raise InputError(
+                f"prescribed.{entry.name}.stiffness", f"{entry.stiffness:g}", "more than 0, or None: exact"
+            )
+        if entry.stiffness is None and not isinstance(entry.on, str):
+            raise InputError(f"prescribed.{entry.name}.stiffness", "none on a skin", "springs")
+
+
+def _check_regions(mesh: "Cells", names: tuple[str, ...]) -> None:
+    """InputError unless each of the regions ``names`` has facets, all of them on the boundary of the cells."""
+    boundary = set(map(tuple, boundary_facets(mesh).tolist()))
+    for name in names:
+        facets = set(map(tuple, np.sort(mesh.facets[name], axis=1).tolist()))
+        lost = sorted(facets - boundary)
+        if not facets:
+            raise InputError(f"facets.{name}", "none", "facets of one cell each")
+        if lost:
+            got = (
+                f"facets that are not of one cell each ({len(lost)} of {len(facets)}, the first with corners {lost[0]})"
+            )
+            raise InputError(f"facets.{name}", got, "facets on the boundary of the cells")
+
+
+def boundary_facets(mesh: "Cells") -> Ints:
+    """The facets that one cell alone has, as their corners (f, 3 or 4) in ascending order."""
+    if mesh.kind == "tetrahedron":
+        sides = [np.delete(np.arange(4), i) for i in range(4)]
+    else:
+        corners = reference_nodes(mesh.kind, 1)
+        sides = [np.flatnonzero(corners[:, axis] == end) for axis in range(3) for end in (0, 1)]
+    facets = np.sort(mesh.cells[:, np.stack(sides)].reshape(-1, len(sides[0])), axis=1)
+    unique, counts = np.unique(facets, axis=0, return_counts=True)
+    return np.asarray(unique[counts == 1])
+
+
+def check_element(element: str, kind: Kind, degree: int, effects: tuple[Effect, ...], place: str) -> None:
+    """InputError at ``place`` unless ``element`` is one for cells of a ``kind`` and ``degree``, and has a pressure if and only if
+    the effects bring one.
+    """
+    if element not in ELEMENTS:
+        raise InputError(place, f'"{element}"', f"one of {', '.join(ELEMENTS)}")
+    brings = any("pressure" in effect.unknowns for effect in effects)
+    fitting = [
+        name
+        for name, (other, order, pressure) in ELEMENTS.items()
+        if other == kind and order >= degree and (pressure is not None) == brings
+    ]
+    if element not in fitting:
+        cells = f"{'curved ' if degree > 1 else ''}{kind} cells"
+        pressure = "with a pressure, which an effect brings" if brings else "without a pressure, which no effect brings"
+        raise InputError(place, f'"{element}"', f"one for {cells} {pressure}: {', '.join(fitting)}")
+
+
+def reference_nodes(kind: Kind, degree: int) -> Floats:
+    """Where the nodes of a cell are in its reference cell (the unit tetrahedron or the unit cube), (k, 3): the order that
+    ``Cells.cells`` has. Corners first, in the order of (z, y, x); then for degree 2 the other nodes in the same order.
+    """
+    ticks = np.arange(3) / 2
+    x, y, z = (axis.ravel() for axis in np.meshgrid(ticks, ticks, ticks, indexing="ij"))
+    nodes = np.stack([z, y, x], axis=1)
+    if kind == "tetrahedron":
+        nodes = nodes[nodes.sum(axis=1) <= 1]
+    corner = np.isin(nodes, (0, 1)).all(axis=1)
+    return nodes[corner] if degree == 1 else np.concatenate([nodes[corner], nodes[~corner]])
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """``points`` (n, 3) [mm] and ``cells`` (m, k) of their indices, each in the order of :func:`reference_nodes` of its ``kind``
+    and ``degree`` (1 straight, 2 curved); ``facets``: by name of a region of the surface, the corners (f, 3 or 4) of its facets.
+    """
+
+    points: Floats
+    cells: Ints
+    kind: Kind
+    degree: int
+    facets: dict[str, Ints]
+
+
+@dataclass(frozen=True, eq=False)
+class Prescribed:
+    """What is prescribed on the facets ``on``, or on a skin: along each of ``components`` (0, 1, 2 for x, y, z) the displacement
+    that ``course`` gives for rest points (n, 3) [mm] at a frame number, (n, 3) [mm]; a picklable callable. With a ``stiffness``
+    [MPa/mm] it is not exact: springs over the area pull towards it; a skin has no unknowns that could be prescribed exactly.
+    """
+
+    name: str
+    on: str | Skin
+    components: tuple[int, ...]
+    course: Callable[[Floats, float], Floats]
+    stiffness: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class ByCell:
+    """Fibre directions that are constant in each cell: unit vectors (m, 3)."""
+
+    vectors: Floats
+
+    def __call__(self, cells: Ints, points: Floats) -> Floats:  # noqa: ARG002
+        """The directions (n, 3) in ``cells`` (n,)."""
+        return np.asarray(self.vectors[cells])
+
+
+@dataclass(frozen=True, eq=False)
+class Continuum:
+    """A body of ``mesh`` with its ``effects``; at ``frames[0]`` it rests. A load acts on the facets that its ``on`` names; by
+    ``contact``, where there is one, every obstruction pushes. ``interval`` [s]: from a frame number to the next, where time
+    matters.
+    """
+
+    mesh: Cells
+    effects: tuple[Effect, ...]
+    prescribed: tuple[Prescribed, ...]
+    frames: tuple[float, ...]
+    fibre: Directions | None = None
+    contact: Contact | None = None
+    obstructions: tuple[Obstruction, ...] = ()
+    interval: float | None = None
+
+    @property
+    def first(self) -> float:
+        """The first frame that is wanted: what overlaps at rest is relaxed before it."""
+        relaxed = self.contact.relaxed if self.contact else None
+        return self.frames[0] if relaxed is None else relaxed[1]

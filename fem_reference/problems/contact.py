@@ -1,0 +1,91 @@
+"""Rigid bodies that push: what is in the way of a deformable body, and the law of the pressure between them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.geometry.rigid_bodies import Obstacle
+from fem_reference.geometry.signed_distance import FAR
+from fem_reference.geometry.skins import Skin
+
+
+@dataclass(frozen=True, eq=False)
+class Obstruction:
+    """A rigid body in the way: its ``shape`` in its own rest frame, and the 4 x 4 matrix ``pose`` of a frame number that takes it
+    to where it is; both picklable.
+    """
+
+    name: str
+    shape: Obstacle
+    pose: Callable[[float], Floats]
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Obstructions push without friction, with any sliding, on ``on``: the facets of a region, by name, or a skin. They push by a
+    pressure of the gap g, the signed distance (negative inside), that is zero beyond ``smoothing`` d [mm], ``k (d - g)^2 / (4 d)``
+    from d to -d, and ``-k g`` deeper: the slope of an energy per rest area, twice differentiable. ``stiffness``: k [MPa/mm];
+    pressed by p, a surface gets p / k deep.
+
+    With ``relaxed``, two frame numbers, a point that is too near at the first of them for no pressure feels as much less depth
+    there, and all of its depth from the second on: what overlaps at rest is pushed out gradually.
+    """
+
+    on: str | Skin
+    stiffness: float
+    smoothing: float
+    relaxed: tuple[float, float] | None = None
+
+    def pressure(self, gap: Floats) -> tuple[Floats, Floats]:
+        """The pressure (n,) [MPa] at gaps (n,) [mm], and its slope in the gap [MPa/mm]; NaN for NaN."""
+        k, d = self.stiffness, self.smoothing
+        near = np.where(gap > d, 0.0, d - gap)
+        pressure = np.where(gap < -d, -k * gap, k * near**2 / (4 * d))
+        return pressure, np.where(gap < -d, -k, -k * near / (2 * d))
+
+    def allowance(self, frame: float) -> float:
+        """The share of what overlaps at rest that is not felt at ``frame``."""
+        if self.relaxed is None:
+            return 0.0
+        first, last = self.relaxed
+        return float(np.clip((last - frame) / (last - first), 0, 1))
+
+
+class Nearby:
+    """Which of the points may be within ``law.smoothing`` of an ``obstruction``: by the ``gap`` (n,) that each had at least where
+    it was ``asked`` last (n, 3), in the obstruction's frame.
+    """
+
+    def __init__(self, law: Contact, obstruction: Obstruction, count: int) -> None:
+        self.law, self.shape = law, obstruction.shape
+        self.gap, self.asked = np.full(count, -np.inf), np.zeros((count, 3))
+        self.touched = np.ones(count, bool)  # asked since the last settled state
+
+    def ask(self, local: Floats) -> Ints:
+        """The points that may be near, at ``local`` (n, 3)."""
+        moved = np.linalg.norm(local - self.asked, axis=1)
+        return np.flatnonzero(~(self.gap - self.shape.steepest * moved > self.law.smoothing))
+
+    def note(self, near: Ints, local: Floats, gap: Floats) -> None:
+        """What the points that were asked answered."""
+        self.gap[near], self.asked[near], self.touched[near] = np.minimum(gap, self.shape.reach), local[near], True
+
+
+def nearest_on_way(obstruction: Obstruction, starts: Floats, ways: Floats, least: float) -> Floats:
+    """The smallest gap (n,) [mm] on straight ``ways`` (n, 3) from ``starts`` (n, 3): each is walked in strides as long as the gap
+    allows without missing anything, at least ``least`` [mm].
+    """
+    smallest = np.full(len(starts), np.inf)
+    lengths = np.linalg.norm(ways, axis=1)
+    walked = np.zeros(len(starts))
+    going = np.arange(len(starts))
+    while len(going):
+        shares = walked[going] / np.maximum(lengths[going], least)
+        gaps = obstruction.shape.sample(starts[going] + shares[:, None] * ways[going]).distance
+        smallest[going] = np.minimum(smallest[going], gaps)
+        # The gradient of a sampled distance is a unit vector but for a tenth; beyond its grid strides are short.
+        walked[going] += np.where(gaps < FAR, np.maximum(0.9 * np.abs(gaps), least), 1.0)
+        going = going[walked[going] < lengths[going]]
+    return smallest

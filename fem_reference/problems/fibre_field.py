@@ -1,0 +1,46 @@
+"""The fibres of a scene: lines whose lengths are measured, and a direction at every point; the same in all meshes."""
+
+import logging
+from collections.abc import Callable
+
+import numpy as np
+
+from fem_reference.foundations.mesh import Polylines, Surface, TetMesh, enclosed_volume
+from fem_reference.geometry.distance import distances
+from fem_reference.geometry.fibres import Directions, NearestLine, fibre_field, trace
+from fem_reference.geometry.signed_distance import signed_distances
+from fem_reference.io import files
+from fem_reference.scenes.muscle import Scene
+
+log = logging.getLogger(__name__)
+
+# Fibres are traced in a mesh of their own, of about so many tets.
+TETS = 8000
+
+
+def of(scene: Scene, surface: Surface, fill: Callable[[float], TetMesh]) -> tuple[Polylines, Directions]:
+    """The fibres of a muscle ``surface``, and their direction anywhere: traced in tets that ``fill`` makes of a size [mm]; or
+    given, with the direction of the nearest.
+    """
+    if scene.fibres.polylines is not None:
+        given = scene.fibres.polylines
+        lines = files.read_polylines(scene.file(given.file, "fibres.polylines.file"), given.unit)
+        return inside(surface, lines), NearestLine(lines)
+    traced = scene.fibres.traced
+    assert traced is not None  # a Fibres record has one of the two
+    volume = enclosed_volume(surface.points, surface.triangles)
+    mesh = fill(float(np.cbrt(6 * np.sqrt(2) * volume / TETS)))
+    field = fibre_field(mesh, traced.start, traced.end)
+    return trace(field, traced.count), field
+
+
+def inside(surface: Surface, fibres: Polylines) -> Polylines:
+    """The fibres with every point outside the ``surface`` moved to its nearest point: outside, a solution says nothing."""
+    away = signed_distances(fibres.points, surface)
+    points = np.array(fibres.points)
+    points[away > 0] = distances(points[away > 0], surface).closest
+    if away.max() > 0:
+        log.info(
+            "fibres: %d of %d points moved into the muscle, by up to %.1f mm", (away > 0).sum(), len(points), away.max()
+        )
+    return Polylines(points, fibres.offsets)

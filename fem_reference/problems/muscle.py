@@ -1,0 +1,290 @@
+"""Scene -> everything a solver needs, as arrays: bodies, what is held, effects, fibres, frames. It knows no solver."""
+
+import logging
+import os
+import time
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_reference.effects import Effect
+from fem_reference.effects.contact import Contact as ContactEffect
+from fem_reference.effects.contact import among
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import (
+    Floats,
+    Ints,
+    Polylines,
+    Surface,
+    TetMesh,
+    check_closed,
+    check_finite,
+    fingerprint,
+    tet_qualities,
+    tet_volumes,
+    triangle_areas,
+)
+from fem_reference.foundations.motion import RigidMotion
+from fem_reference.foundations.records import join
+from fem_reference.geometry import block
+from fem_reference.geometry.distance import distances
+from fem_reference.geometry.fibres import Directions
+from fem_reference.geometry.intersections import self_intersections
+from fem_reference.geometry.nested import refined
+from fem_reference.geometry.rigid_bodies import CLOSED_FORMS, Obstacle
+from fem_reference.geometry.sectors import held_area, held_shares
+from fem_reference.geometry.signed_distance import Grid, cached, signed_distances
+from fem_reference.geometry.skins import Skin, free_skin, held_skin, spacing
+from fem_reference.geometry.tessellation import tessellated
+from fem_reference.geometry.tetrahedra import tetrahedralise
+from fem_reference.io import files
+from fem_reference.problems import fibre_field
+from fem_reference.problems.attachments import facets_under, pick
+from fem_reference.scenes.bones import Bone
+from fem_reference.scenes.muscle import Scene
+
+log = logging.getLogger(__name__)
+
+# Up to here [mm] from a bone the distance to it is meant.
+DISTANCE_MARGIN = 12.0
+
+
+def kept_distances() -> Path:
+    """The folder where grids of distances are kept; it may be deleted."""
+    cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111 - Path.home() may raise
+    return Path(cache) / "fem_reference" / "distances"
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A rigid bone: its ``surface`` at rest, its ``motion``, None where it rests, and how its distance shall be known, as
+    ``scene.Bone`` has it [mm]; or the ``solid`` of closed form whose vertices the surface has.
+    """
+
+    name: str
+    surface: Surface
+    motion: RigidMotion | None
+    distance_error: float = 0.05
+    distance_rounding: float = 1.0
+    solid: Obstacle | None = None
+
+    @cached_property
+    def shape(self) -> Obstacle:
+        """The signed distance to the surface, in the frame of rest; InputError where the surface of a file is not closed."""
+        named = replace(self.surface, place=f'bone "{self.name}": {self.surface.place}')
+        return self.solid or cached(
+            named, self.distance_error, DISTANCE_MARGIN, self.distance_rounding, kept_distances()
+        )
+
+    def pose(self, frame: float) -> Floats:
+        """The 4 x 4 matrix that takes rest positions to positions at ``frame``."""
+        return np.eye(4) if self.motion is None else self.motion.pose(frame)
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """An attachment: the ``vertices`` (k,) of the muscle surface that ``bone`` holds, by springs of ``stiffness`` [MPa/mm] or
+    (None) exactly.
+    """
+
+    attachment: str
+    bone: Body
+    vertices: Ints
+    stiffness: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """What a surface solver needs: the muscle ``surface`` at rest, the bones, what they hold, and the frames wanted;
+    ``interval`` [s] from a frame number to the next where the scene says it.
+    """
+
+    surface: Surface
+    bones: tuple[Body, ...]
+    held: tuple[Held, ...]
+    frames: tuple[int, ...]
+    interval: float | None
+
+    @cached_property
+    def held_vertices(self) -> Ints:
+        """The vertices (k,) of the surface that bones hold, attachment by attachment."""
+        return np.concatenate([np.zeros(0, np.int64), *(entry.vertices for entry in self.held)])
+
+    @cached_property
+    def free(self) -> NDArray[np.bool_]:
+        """Which vertices (n,) of the surface bones may push on: those that none holds, nor any of their neighbours."""
+        triangles = self.surface.triangles
+        held = np.zeros(len(self.surface.points), bool)
+        held[self.held_vertices] = True
+        free = ~held
+        free[triangles[held[triangles].any(axis=1)]] = False
+        return free
+
+
+@dataclass(frozen=True, eq=False)
+class Problem(Setup):
+    """A setup filled with tetrahedra (``mesh.facets`` by attachment), with its effects and fibres; ``fibre``, the direction of the
+    fibres at any point, where an effect needs it; ``skin``, what bones push on, where they do; ``held_skins``, by attachment that
+    holds by springs, what these pull at; ``mesh_facts`` are what the mesh is like, ``seconds`` how long it took to make.
+    """
+
+    mesh: TetMesh
+    effects: tuple[Effect, ...]
+    fibres: Polylines
+    mesh_facts: dict[str, float | str]
+    seconds: float
+    fibre: Directions | None = None
+    skin: Skin | None = None
+    held_skins: dict[str, Skin] = field(default_factory=dict)
+
+    @cached_property
+    def directions(self) -> Floats | None:
+        """Unit vectors (k, 3) along the fibres in the middle of each tet, where an effect needs them."""
+        middles = self.mesh.points[self.mesh.tets].mean(axis=1)
+        return None if self.fibre is None else self.fibre(np.arange(len(middles)), middles)
+
+    @property
+    def contact(self) -> ContactEffect | None:
+        """The effect by which bones push, None where they do not."""
+        return among(self.effects)
+
+
+def setup(scene: Scene) -> Setup:
+    """Read and check the surfaces of a scene and choose its attachments; InputError names what is not usable."""
+    place = join(scene.place, "muscle.surface")
+    surface = files.read_surface(scene.file(scene.muscle.surface, "muscle.surface"), scene.muscle.unit)
+    surface = check_closed(Surface(surface.points, surface.triangles, f"{place}: {surface.place}"))
+    bones = tuple(_body(scene, i, surface) for i in range(len(scene.bone)))
+    return Setup(surface, bones, _held(scene, surface, bones), scene.frames.numbers, scene.frames.interval)
+
+
+def build(scene: Scene, rest: Setup) -> Problem:
+    """The whole problem of a scene: its setup ``rest``, filled with tetrahedra and fibres."""
+    begin = time.perf_counter()
+    contact = among(scene.effects)
+    distances_known = {} if contact is None else _distance_facts(rest)
+    if contact is not None:
+        _check_outside(scene, rest, contact)
+    mesh = _filled(scene, rest, scene.muscle.tet_size)
+    exact = tuple(held.attachment for held in rest.held if held.stiffness is None)
+    for _ in range(scene.muscle.refinements):
+        mesh = refined(mesh, rest.surface, exact)
+    for i, held in enumerate(rest.held):
+        if len(mesh.facets[held.attachment]) == 0:
+            place = join(scene.place, f"attachment[{i}]")
+            raise InputError(place, "an area smaller than the tetrahedra resolve", "a smaller muscle.tet_size")
+    fibres, fibre = fibre_field.of(scene, rest.surface, partial(_filled, scene, rest))
+    apart = spacing(rest.surface)
+    return Problem(
+        rest.surface,
+        rest.bones,
+        rest.held,
+        rest.frames,
+        rest.interval,
+        mesh=mesh,
+        effects=scene.effects,
+        fibres=fibres,
+        mesh_facts=_mesh_facts(rest, mesh, scene.muscle.tet_size / 2) | distances_known,
+        seconds=time.perf_counter() - begin,
+        fibre=fibre if any("fibre" in effect.needs for effect in scene.effects) else None,
+        skin=None if contact is None else free_skin(rest.surface, rest.free, mesh, apart),
+        held_skins={
+            held.attachment: held_skin(rest.surface, held_shares(rest.surface, held.vertices), mesh, apart)
+            for held in rest.held
+            if held.stiffness is not None
+        },
+    )
+
+
+def _check_outside(scene: Scene, rest: Setup, contact: ContactEffect) -> None:
+    """InputError where a bone that pushes is wholly inside the muscle: there is no way out of it."""
+    for i, bone in enumerate(rest.bones):
+        if contact.is_by(bone.name) and signed_distances(bone.surface.points, rest.surface).max() < 0:
+            raise InputError(join(scene.place, f"bone[{i}]"), "a bone wholly inside the muscle", "one that is not")
+
+
+def _distance_facts(rest: Setup) -> dict[str, float | str]:
+    """How well the distance to each bone of a file is known: spacing of its grid, root mean square and greatest error [mm]."""
+    grids = {bone.name: bone.shape for bone in rest.bones}
+    return {
+        f"{name}_distance_{key}_mm": getattr(grid, key)
+        for name, grid in grids.items()
+        if isinstance(grid, Grid)
+        for key in ("spacing", "mean_error", "error")
+    }
+
+
+def _filled(scene: Scene, rest: Setup, size: float) -> TetMesh:
+    """Tets of a ``size`` [mm], with the facets that each attachment holds: up to its rim where the mesher keeps it, else those
+    under it.
+    """
+    shares = {held.attachment: held_shares(rest.surface, held.vertices) for held in rest.held}
+    blocks = scene.muscle.mesher == "block"
+    mesh = block.fill(rest.surface, size) if blocks else tetrahedralise(rest.surface, size, shares)
+    if set(mesh.facets) == set(shares):
+        return mesh
+    return replace(mesh, facets={name: facets_under(mesh, rest.surface, held) for name, held in shares.items()})
+
+
+def _body(scene: Scene, i: int, muscle: Surface) -> Body:
+    bone, form = scene.bone[i], solid(scene.bone[i])
+    motion = bone.motion.poses() if bone.motion else None
+    if form is not None:
+        surface = tessellated(form, muscle.points, join(scene.place, f"bone[{i}]"))
+        return Body(bone.name, surface, motion, solid=form)
+    assert bone.surface is not None  # a Bone record has a closed form or a surface with its unit
+    assert bone.unit is not None
+    surface = files.read_surface(scene.file(bone.surface, f"bone[{i}].surface"), bone.unit)
+    check_finite(surface)
+    return Body(bone.name, surface, motion, bone.distance_error, bone.distance_rounding)
+
+
+def _held(scene: Scene, surface: Surface, bones: tuple[Body, ...]) -> tuple[Held, ...]:
+    by_name = {bone.name: bone for bone in bones}
+    taken = np.zeros(len(surface.points), bool)
+    held = []
+    for i, attachment in enumerate(scene.attachment):
+        place = join(scene.place, f"attachment[{i}]")
+        vertices = pick(scene, i, surface, by_name[attachment.bone].surface)
+        if len(vertices) == 0:
+            raise InputError(place, "no vertex of the muscle", "an attachment that selects some")
+        if taken[vertices].any():
+            raise InputError(
+                place, f"vertex {vertices[taken[vertices]][0]}, which another attachment holds", "each vertex once"
+            )
+        taken[vertices] = True
+        held.append(Held(attachment.name, by_name[attachment.bone], vertices, attachment.stiffness))
+    return tuple(held)
+
+
+def _mesh_facts(rest: Setup, mesh: TetMesh, far: float) -> dict[str, float | str]:
+    """Who made the mesh, its size and quality, and for each attachment the area held on the surface and on the tets and how many
+    of its vertices are more than ``far`` [mm] from the facets held: islands that tets do not resolve.
+    """
+    qualities = tet_qualities(mesh.points, mesh.tets)
+    facts: dict[str, float | str] = {
+        "maker": mesh.maker,
+        "fingerprint": fingerprint(mesh.points, mesh.tets)[:16],
+        "self_intersections_of_surface": float(len(self_intersections(rest.surface))),
+        "tets": float(len(mesh.tets)),
+        "points": float(len(mesh.points)),
+        "quality_min": float(qualities.min()),
+        "quality_5_percent": float(np.percentile(qualities, 5)),
+        "volume_mm3": float(tet_volumes(mesh.points, mesh.tets).sum()),
+    }
+    for held in rest.held:
+        name, facets = held.attachment, mesh.facets[held.attachment]
+        off = distances(rest.surface.points[held.vertices], Surface(mesh.points, facets)).distance
+        facts[f"{name}_area_mm2"] = held_area(rest.surface, held_shares(rest.surface, held.vertices))
+        facts[f"{name}_area_on_tets_mm2"] = float(triangle_areas(mesh.points, facets).sum())
+        facts[f"{name}_vertices_beside_facets"] = float((off > far).sum())
+    return facts
+
+
+def solid(bone: Bone) -> Obstacle | None:
+    """The body of closed form that a ``bone`` of a scene is; None where it is a surface in a file."""
+    given = ((name, getattr(bone, name)) for name in CLOSED_FORMS)
+    return next((CLOSED_FORMS[name](**form.model_dump()) for name, form in given if form is not None), None)

@@ -1,0 +1,79 @@
+"""The muscle of a problem as a body that finite elements deform: held by bones, and pushed by them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fem_reference.effects import Interaction
+from fem_reference.effects.contact import Contact as ContactEffect
+from fem_reference.foundations.mesh import Floats, boundary
+from fem_reference.foundations.motion import apply
+from fem_reference.problems.body import Cells, Continuum, Prescribed
+from fem_reference.problems.contact import Contact, Obstruction
+from fem_reference.problems.muscle import Problem
+
+# Frame numbers before the first one over which what overlaps at rest is pushed out of the bones.
+RELAXING = 10.0
+
+
+@dataclass(frozen=True)
+class From:
+    """A ``pose`` by frame number that begins at the ``first``, whatever motion it has before."""
+
+    first: float
+    pose: Callable[[float], Floats]
+
+    def __call__(self, frame: float) -> Floats:
+        """The 4 x 4 matrix at ``frame``."""
+        return self.pose(max(frame, self.first))
+
+
+@dataclass(frozen=True)
+class Follows:
+    """The displacement of what a bone holds that has a ``pose`` by frame number."""
+
+    pose: Callable[[float], Floats]
+
+    def __call__(self, points: Floats, frame: float) -> Floats:
+        """The displacement (n, 3) [mm] of rest points (n, 3) at a frame number."""
+        return apply(self.pose(frame), points) - points
+
+
+def as_continuum(problem: Problem) -> Continuum:
+    """The muscle as a body: its bones prescribe where the facets that they hold exactly are, or pull at what they hold by springs;
+    the rest of its skin is ``"free"``.
+    """
+    mesh = problem.mesh
+    held = np.concatenate([np.zeros((0, 3), int), *(mesh.facets[entry.attachment] for entry in problem.held)])
+    skin, _ = boundary(mesh.tets)
+    taken = {tuple(facet) for facet in np.sort(held, axis=1).tolist()}
+    free = skin[[tuple(facet) not in taken for facet in np.sort(skin, axis=1).tolist()]]
+    cells = Cells(mesh.points, mesh.tets, "tetrahedron", 1, {**mesh.facets, "free": free})
+    first = problem.frames[0]
+    prescribed = tuple(
+        Prescribed(
+            entry.attachment,
+            problem.held_skins.get(entry.attachment, entry.attachment),
+            (0, 1, 2),
+            Follows(From(first, entry.bone.pose)),
+            entry.stiffness,
+        )
+        for entry in problem.held
+    )
+    acting = tuple(effect for effect in problem.effects if not isinstance(effect, Interaction))
+    body = Continuum(cells, acting, prescribed, problem.frames, problem.fibre, interval=problem.interval)
+    return body if problem.contact is None else _among_bones(body, problem, problem.contact)
+
+
+def _among_bones(body: Continuum, problem: Problem, effect: ContactEffect) -> Continuum:
+    """The body with the bones that push on it; where they overlap it at rest, it is relaxed before the first frame."""
+    assert problem.skin is not None  # built with the effect
+    bones = [bone for bone in problem.bones if effect.is_by(bone.name)]
+    first, points = body.frames[0], problem.skin.points
+    nearest = min((bone.shape.sample(points).distance.min(initial=np.inf) for bone in bones), default=np.inf)
+    before = first - RELAXING if nearest < effect.smoothing else None
+    law = Contact(problem.skin, effect.stiffness, effect.smoothing, None if before is None else (before, first))
+    frames = body.frames if before is None else (before, *body.frames)
+    obstructions = tuple(Obstruction(bone.name, bone.shape, From(first, bone.pose)) for bone in bones)
+    return replace(body, frames=frames, contact=law, obstructions=obstructions)

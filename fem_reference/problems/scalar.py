@@ -1,0 +1,298 @@
+"""Scalar scene -> everything a solver needs, as arrays: mesh, effects, what is held, what flows in. It knows no solver."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import Delaunay, QhullError
+
+from fem_reference.effects import FieldEffect
+from fem_reference.effects.advection import Advection
+from fem_reference.effects.diffusion import Diffusion
+from fem_reference.effects.reaction import Reaction
+from fem_reference.effects.source import Source
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.formula import evaluate
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.foundations.records import join
+from fem_reference.geometry.field_mesh import FieldMesh, check, refined, share_above, stabilisation
+from fem_reference.io import files
+from fem_reference.scenes.scalar import Boundary, FieldScene, Interval, MeshFiles
+
+
+@dataclass(frozen=True, eq=False)
+class Flux:
+    """Facets (f, 1 or 2) by their vertices, and the formula of the field's ``slope`` along their outward normal."""
+
+    facets: Ints
+    slope: str
+
+
+@dataclass(frozen=True, eq=False)
+class FieldProblem:
+    """What a solver of scalar fields needs.
+
+    ``order`` of the Lagrange elements; ``held`` (N,) the value at each node of them (the vertices, then for order 2 the middles of
+    ``mesh.edges``), NaN where it is free; ``upper`` (m,) the share of each cell above the mean y; ``tau`` (m,) of the stabilised
+    form, None for the plain one; ``peclet`` the greatest mesh Peclet number; ``exact`` the formula of the solution where known.
+    """
+
+    mesh: FieldMesh
+    order: int
+    effects: tuple[FieldEffect, ...]
+    held: Floats
+    fluxes: tuple[Flux, ...]
+    upper: Floats
+    tau: Floats | None
+    peclet: float
+    exact: str | None = None
+
+    @property
+    def diffusion(self) -> float:
+        """The diffusion coefficient."""
+        return next(effect.coefficient for effect in self.effects if isinstance(effect, Diffusion))
+
+    @property
+    def advection(self) -> Advection | None:
+        """The advection, None where nothing flows."""
+        return next((effect for effect in self.effects if isinstance(effect, Advection)), None)
+
+
+def build(scene: FieldScene, refinements: int = 0) -> FieldProblem:
+    """The problem of a scene, its mesh refined so many times; InputError names what is not usable."""
+    mesh = check(_mesh(scene))
+    _check_effects(scene, mesh)
+    average = float(mesh.points[:, 1].mean()) if mesh.points.shape[1] > 1 else 0.0
+    given = _given(scene, mesh)
+    for _ in range(refinements):
+        given = np.concatenate([given, _between(mesh, given)])
+        mesh = refined(mesh)
+    velocity = next((effect.velocity for effect in scene.effects if isinstance(effect, Advection)), None)
+    diffusion = next(effect.coefficient for effect in scene.effects if isinstance(effect, Diffusion))
+    flow = np.zeros(mesh.points.shape[1]) if velocity is None else np.array(velocity)
+    peclet, tau = stabilisation(mesh, diffusion, flow, scene.element.order)
+    form = scene.element.form
+    held = _held(scene, mesh, given)
+    _check_unique(scene, held)
+    return FieldProblem(
+        mesh,
+        scene.element.order,
+        scene.effects,
+        held,
+        tuple(_flux(entry, mesh) for entry in scene.boundary if entry.slope is not None),
+        share_above(mesh, average) if mesh.points.shape[1] > 1 else np.zeros(len(mesh.cells)),
+        tau if form == "supg" or (form == "auto" and peclet > 1) else None,
+        peclet,
+        scene.exact,
+    )
+
+
+def _mesh(scene: FieldScene) -> FieldMesh:
+    domain = scene.domain
+    if domain.mesh is not None:
+        return _mesh_files(scene, domain.mesh)
+    if domain.surface is not None:
+        surface = files.read_surface(scene.file(domain.surface.file, "domain.surface.file"), domain.surface.scale)
+        return FieldMesh(surface.points, surface.triangles, surface.place)
+    nodes = _nodes(domain.interval) if domain.interval is not None else np.array(domain.nodes)
+    vertices = np.arange(len(nodes))
+    return FieldMesh(nodes[:, None], np.column_stack([vertices[:-1], vertices[1:]]), join(scene.place, "domain"))
+
+
+def _nodes(interval: Interval) -> Floats:
+    if interval.seed is None:
+        return np.linspace(interval.start, interval.end, interval.count)
+    inside = np.random.default_rng(interval.seed).uniform(interval.start, interval.end, interval.count - 2)
+    return np.array([interval.start, *np.sort(inside), interval.end])
+
+
+def _mesh_files(scene: FieldScene, given: MeshFiles) -> FieldMesh:
+    path = scene.file(given.points, "domain.mesh.points")
+    points = _numbers(path)
+    if points.shape[1] not in (2, 3):
+        raise InputError(path, f"rows of {points.shape[1]} numbers", "2 or 3 coordinates a vertex")
+    if given.triangles == "delaunay":
+        if points.shape[1] == 3:
+            raise InputError(join(scene.place, "domain.mesh.triangles"), '"delaunay" of points in space', "a file")
+        try:
+            return FieldMesh(points, Delaunay(points).simplices, str(path))
+        except QhullError as error:
+            raise InputError(
+                path, "points that cannot be triangulated", "points in the plane, not on a line"
+            ) from error
+    path = scene.file(given.triangles, "domain.mesh.triangles")
+    triangles = _whole_numbers(path, _numbers(path))
+    if triangles.shape[1] != 3:
+        raise InputError(path, f"rows of {triangles.shape[1]} numbers", "3 vertices a triangle")
+    return FieldMesh(points, triangles - 1, str(path))
+
+
+def _numbers(path: Path) -> Floats:
+    """The comma separated numbers of a file as a table."""
+    rows = files.read_rows(path)
+    for i, row in enumerate(rows):
+        if len(row) != len(rows[0]):
+            raise InputError(path, f"{len(row)} numbers in row {i + 1}", f"{len(rows[0])} as in row 1")
+    try:
+        table = np.array([[float(cell) for cell in row] for row in rows])
+    except ValueError as error:
+        raise InputError(path, str(error), "numbers") from error
+    if table.ndim != 2 or not np.isfinite(table).all():
+        raise InputError(path, "an empty table or a number that is not finite", "rows of finite numbers")
+    return table
+
+
+def _whole_numbers(path: Path, values: Floats) -> Ints:
+    if (values != np.round(values)).any():
+        raise InputError(
+            str(path), f"the vertex {values[values != np.round(values)][0]:g}", "vertices, numbered from 1"
+        )
+    return np.asarray(values.astype(np.int64))
+
+
+def _check_effects(scene: FieldScene, mesh: FieldMesh) -> None:
+    dimension = mesh.points.shape[1]
+    if not any(isinstance(effect, Diffusion) for effect in scene.effects):
+        raise InputError(join(scene.place, "effect"), "no diffusion", "an effect with name diffusion")
+    for i, effect in enumerate(scene.effects):
+        place = join(scene.place, f"effect[{i}]")
+        if isinstance(effect, Advection) and len(effect.velocity) != dimension:
+            raise InputError(
+                f"{place}.velocity", f"{len(effect.velocity)} components", f"{dimension}, one a coordinate"
+            )
+        if isinstance(effect, Source):
+            _try(effect.strength, mesh.points[mesh.cells].mean(axis=1), f"{place}.strength")
+            if effect.where == "y above average" and dimension == 1:
+                raise InputError(f"{place}.where", f'"{effect.where}" on an interval', '"everywhere"')
+    if scene.exact is not None:
+        _try(scene.exact, mesh.points, join(scene.place, "exact"))
+
+
+def _try(formula: str, points: Floats, place: str) -> None:
+    """InputError at ``place`` where a formula names a coordinate that there is not, or has no finite value at one of ``points``."""
+    try:
+        values = at(formula, points)
+    except InputError as error:
+        raise InputError(place, error.got, error.want) from error
+    except ArithmeticError as error:
+        raise InputError(place, f'"{formula}" ({error})', "a formula with a value everywhere") from error
+    if not np.isfinite(values).all():
+        where = ", ".join(f"{x:g}" for x in points[np.flatnonzero(~np.isfinite(values))[0]])
+        raise InputError(
+            place, f'"{formula}", which has no finite value at ({where})', "a formula with a value everywhere"
+        )
+
+
+def at(formula: str, points: Floats) -> Floats:
+    """The values (n,) of a formula at ``points`` (n, d)."""
+    with np.errstate(all="ignore"):
+        values = evaluate(formula, tuple(points.T), vars(np))
+    if np.iscomplexobj(values):
+        raise InputError("formula", f'"{formula}", which is complex', "a formula with real values")
+    return np.asarray(np.broadcast_to(values, len(points)), dtype=np.float64)
+
+
+def _given(scene: FieldScene, mesh: FieldMesh) -> Floats:
+    """The values (n,) that files of bounds hold vertices at, NaN where they hold none."""
+    values = np.full(len(mesh.points), np.nan)
+    for i, entry in enumerate(scene.boundary):
+        if entry.bounds is not None:
+            path = scene.file(entry.bounds, f"boundary[{i}].bounds")
+            table = _numbers(path)
+            if len(table) != 2:
+                raise InputError(path, f"{len(table)} rows", "2: vertices, and values")
+            vertices = _whole_numbers(path, table[0]) - 1
+            if vertices.min() < 0 or vertices.max() >= len(values):
+                raise InputError(path, f"vertices {vertices.min() + 1} to {vertices.max() + 1}", f"1 to {len(values)}")
+            if len(np.unique(vertices)) < len(vertices):
+                raise InputError(path, "a vertex named twice", "one value for each vertex")
+            if (np.abs(values[vertices] - table[1]) > 0).any():
+                raise InputError(path, "other values than another file of bounds has", "one value for each vertex")
+            values[vertices] = table[1]
+    return values
+
+
+def _between(mesh: FieldMesh, values: Floats) -> Floats:
+    """The values (e,) at the middles of the edges of the rim whose two ends have one: their mean; NaN at all others."""
+    edges = mesh.edges
+    middles = np.full(len(edges), np.nan)
+    if mesh.cells.shape[1] == 3:
+        on_rim = mesh.edge_numbers(mesh.facets)
+        middles[on_rim] = values[edges[on_rim]].mean(axis=1)
+    return middles
+
+
+def _held(scene: FieldScene, mesh: FieldMesh, given: Floats) -> Floats:
+    """The value at each node, NaN where it is free; InputError where two conditions disagree on one."""
+    held = given if scene.element.order == 1 else np.concatenate([given, _between(mesh, given)])
+    nodes, sloped = mesh.nodes[scene.element.order], np.empty(0, np.int64)
+    for i, entry in enumerate(scene.boundary):
+        place = join(scene.place, f"boundary[{i}]")
+        if entry.on is not None:
+            if entry.where is not None:
+                _try(entry.where, mesh.points, f"{place}.where")
+            facets = _facets(entry, mesh)
+            if entry.slope is not None:
+                if np.isin(_keys(facets, mesh), sloped).any():
+                    raise InputError(f"{place}.slope", "a facet that has a slope already", "one slope for each facet")
+                sloped = np.concatenate([sloped, _keys(facets, mesh)])
+            if len(facets) == 0:
+                raise InputError(
+                    f"{place}.on", f'"{entry.on}", where there is nothing', "an end or a rim of the domain"
+                )
+            key = "slope" if entry.value is None else "value"
+            _try(str(getattr(entry, key)), mesh.points[np.unique(facets)], f"{place}.{key}")
+        if entry.value is not None:
+            which = _nodes_of(facets, mesh, scene.element.order)
+            values = at(entry.value, nodes[which])
+            clash = np.flatnonzero(np.abs(held[which] - values) > 1e-12 * (1 + np.abs(values)))
+            if len(clash):
+                got = f"{values[clash[0]]:g} where another condition has {held[which][clash[0]]:g}"
+                raise InputError(f"{place}.value", got, "one value for each node")
+            held = held.copy()
+            held[which] = values
+    return held
+
+
+def _facets(entry: Boundary, mesh: FieldMesh) -> Ints:
+    """The facets that a condition is on."""
+    facets, interval = mesh.facets, mesh.cells.shape[1] == 2
+    chosen: dict[str, Callable[[], NDArray[np.bool_]]] = {
+        "left": lambda: mesh.points[facets[:, 0], 0] == mesh.points[:, 0].min(),
+        "right": lambda: mesh.points[facets[:, 0], 0] == mesh.points[:, 0].max(),
+        "rim": lambda: np.ones(len(facets), bool),
+    }
+    if interval == (entry.on == "rim"):
+        return facets[:0]
+    facets = facets[chosen[str(entry.on)]()]
+    if entry.where is not None:
+        facets = facets[(at(entry.where, mesh.points) > 0)[facets].all(axis=1)]
+    return facets
+
+
+def _keys(facets: Ints, mesh: FieldMesh) -> Ints:
+    """A number for each facet, the same for no two."""
+    return np.asarray(facets @ [len(mesh.points), 1][-facets.shape[1] :])
+
+
+def _nodes_of(facets: Ints, mesh: FieldMesh, order: int) -> Ints:
+    """The nodes on facets: their vertices, and for order 2 the middles of those that are edges."""
+    vertices = np.unique(facets)
+    if order == 1 or facets.shape[1] == 1:
+        return vertices
+    return np.concatenate([vertices, len(mesh.points) + mesh.edge_numbers(facets)])
+
+
+def _flux(entry: Boundary, mesh: FieldMesh) -> Flux:
+    assert entry.slope is not None
+    return Flux(_facets(entry, mesh), entry.slope)
+
+
+def _check_unique(scene: FieldScene, held: Floats) -> None:
+    """InputError where a constant can be added to the solution."""
+    if np.isnan(held).all() and not any(isinstance(effect, Reaction) and effect.rate for effect in scene.effects):
+        raise InputError(
+            join(scene.place, "boundary"), "no value anywhere and no reaction", "a value somewhere, or a reaction"
+        )

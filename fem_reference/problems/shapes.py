@@ -1,0 +1,272 @@
+"""Structured bodies of the catalogue: smooth maps of unit cubes, cut into cells, straight or curved.
+
+All lengths in mm. A region of the surface lists the corners of its facets in the order of their lattice: of a quadrilateral, 0 and
+3 are opposite.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations, permutations
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.problems.body import Cells, Kind, reference_nodes
+
+Map = Callable[[Floats], Floats]
+Counts = tuple[int, int, int]
+
+# Nodes nearer than this share of the body's size are one node.
+_SAME = 1e-9
+# How far the sides of the square in a disc bulge, so that three blocks meet at its corners with 120 degrees each.
+_BULGE = np.tan(np.pi / 12) / 2
+# Half the square's side over the radius of its disc.
+_SQUARE_IN_CYLINDER = 0.45
+_SQUARE_IN_VENTRICLE = 0.22
+# The ventricle of Land et al. 2015 (doi 10.1098/rspa.2015.0641): semi-axes inside, wall thickness, and z of its base [mm].
+_SHORT, _LONG, _WALL, _BASE = 7.0, 17.0, 3.0, 5.0
+# How much faster than on average the angle from the apex grows there, so that arc length grows evenly.
+_APEX = 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """A part of a body: ``place`` takes points (n, 3) of the unit cube smoothly to points (n, 3) [mm], ``counts`` are the cells
+    along its axes, ``faces`` names the region of the surface that a face of the cube, x0 to z1, is in.
+
+    Where two blocks meet, the axes along their common face point the same ways: so the tetrahedra fit.
+    """
+
+    place: Map
+    counts: Counts
+    faces: dict[str, str] = field(default_factory=dict)
+
+
+def mapped(blocks: Sequence[Block], kind: Kind, degree: int) -> Cells:
+    """The body that ``blocks`` make up: nodes at the same place are one, every cell has a positive Jacobian."""
+    grids = [tuple(degree * count + 1 for count in block.counts) for block in blocks]
+    units = [np.indices(grid).reshape(3, -1).T / np.subtract(grid, 1) for grid in grids]
+    points, name = _merged(np.concatenate([block.place(unit) for block, unit in zip(blocks, units, strict=True)]))
+    cells, start = [], 0
+    facets: dict[str, list[Ints]] = {}
+    for block, grid in zip(blocks, grids, strict=True):
+        lattice = _lattice(block.counts, kind, degree)
+        cells.append(name[start + np.ravel_multi_index(tuple(np.moveaxis(lattice, -1, 0)), grid)])
+        start += int(np.prod(grid))
+        for face, region in block.faces.items():
+            facets.setdefault(region, []).append(_facets(cells[-1], lattice, grid, face, kind))
+    upright = _upright(points, np.concatenate(cells), kind, degree)
+    return Cells(points, upright, kind, degree, {region: np.concatenate(parts) for region, parts in facets.items()})
+
+
+def _lattice(counts: Counts, kind: Kind, degree: int) -> Ints:
+    """Where in the lattice of nodes the nodes of each cell are, (m, k, 3); tetrahedra are Kuhn's six of each cube."""
+    nodes = reference_nodes(kind, degree)
+    if kind == "hexahedron":
+        patterns = [nodes]
+    else:
+        paths = [np.cumsum(np.eye(3)[list(order)], axis=0) for order in permutations(range(3))]
+        patterns = [nodes @ path for path in paths]
+    corners = degree * np.indices(counts).reshape(3, -1).T
+    pattern = np.rint(degree * np.stack(patterns)).astype(np.int64)
+    return np.asarray((corners[:, None, None] + pattern).reshape(-1, len(nodes), 3))
+
+
+def _merged(points: Floats) -> tuple[Floats, Ints]:
+    """The different points (n, 3) among ``points``, and which of them each is."""
+    tolerance = _SAME * float(np.ptp(points, axis=0).max())
+    first, second = cKDTree(points).query_pairs(tolerance, output_type="ndarray").T
+    links = coo_array((np.ones(len(first), bool), (first, second)), shape=(len(points), len(points)))
+    name = np.asarray(connected_components(links, directed=False)[1], np.int64)
+    return points[np.unique(name, return_index=True)[1]], name
+
+
+def _facets(cells: Ints, lattice: Ints, grid: tuple[int, ...], face: str, kind: Kind) -> Ints:
+    """The corners (f, 3 or 4) of the facets of ``cells`` that lie on a face of the ``lattice`` of ``grid`` nodes."""
+    axis = "xyz".index(face[0])
+    there = lattice[..., axis] == int(face[1]) * (grid[axis] - 1)
+    sides = [there[:, list(corners)].all(axis=1) for corners in facet_corners(kind)]
+    return np.concatenate([cells[on][:, list(corners)] for on, corners in zip(sides, facet_corners(kind), strict=True)])
+
+
+def facet_corners(kind: Kind) -> list[tuple[int, ...]]:
+    """Which corners of a cell are those of its facets: the order in a facet is that in the cell."""
+    if kind == "tetrahedron":
+        return list(combinations(range(4), 3))
+    corners = reference_nodes(kind, 1)
+    return [tuple(np.flatnonzero(corners[:, axis] == end).tolist()) for axis in range(3) for end in (0, 1)]
+
+
+def _upright(points: Floats, cells: Ints, kind: Kind, degree: int) -> Ints:
+    """The ``cells``, those of negative volume mirrored: the first two axes of their reference cell exchanged."""
+    corners = points[cells[:, [0, 1, 2, 3 if kind == "tetrahedron" else 4]]]
+    wrong = np.linalg.det(corners[:, 1:] - corners[:, :1]) < 0
+    nodes = reference_nodes(kind, degree)
+    mirrored = (nodes[:, None] == nodes[:, [1, 0, 2]]).all(axis=2).argmax(axis=0)
+    return np.where(wrong[:, None], cells[:, mirrored], cells)
+
+
+_SIX = {face: face for face in ("x0", "x1", "y0", "y1", "z0", "z1")}
+
+
+def box(counts: Counts, size: tuple[float, float, float], kind: Kind, degree: int = 1) -> Cells:
+    """A box from the origin of ``size`` [mm], with its faces x0, x1, y0, y1, z0, z1."""
+    return mapped([Block(lambda unit: unit * size, counts, _SIX)], kind, degree)
+
+
+def warped_box(
+    counts: Counts, size: tuple[float, float, float], kind: Kind, degree: int = 1, bump: float = 0.1
+) -> Cells:
+    """A :func:`box` whose inner nodes are moved, by up to ``bump`` of its size: its faces stay where they are.
+
+    From 0.15 on cells may turn over: curved tetrahedra first, where there is one cell only along an axis.
+    """
+
+    def place(unit: Floats) -> Floats:
+        height = bump * np.sin(np.pi * unit).prod(axis=1)
+        return np.asarray((unit + height[:, None] * [1.0, -0.7, 0.5]) * size)
+
+    return mapped([Block(place, counts, _SIX)], kind, degree)
+
+
+def tube_quarter(inner: float, outer: float, length: float, counts: Counts, kind: Kind, degree: int) -> Cells:
+    """The quarter x, y >= 0 of a tube along z; ``counts`` of cells through its wall, around the quarter and along it.
+
+    Faces: inner, outer, x0, y0, bottom, top.
+    """
+
+    def place(unit: Floats) -> Floats:
+        radius, angle = inner + (outer - inner) * unit[:, 0], np.pi / 2 * unit[:, 1]
+        return np.stack([radius * np.cos(angle), radius * np.sin(angle), length * unit[:, 2]], axis=1)
+
+    faces = {"x0": "inner", "x1": "outer", "y0": "y0", "y1": "x0", "z0": "bottom", "z1": "top"}
+    return mapped([Block(place, counts, faces)], kind, degree)
+
+
+def sphere_octant(inner: float, outer: float, n: int, layers: int, kind: Kind, degree: int) -> Cells:
+    """The octant x, y, z >= 0 of a hollow sphere: three patches of n by n cells, ``layers`` of them through the wall.
+
+    A patch is equiangular: great circles at equal angles. Faces: inner, outer, x0, y0, z0.
+    """
+
+    def patch(axis: int) -> Block:
+        one, other = (other for other in range(3) if other != axis)
+
+        def place(unit: Floats) -> Floats:
+            way = np.ones_like(unit)
+            way[:, [one, other]] = np.tan(np.pi / 4 * unit[:, :2])
+            radius = inner + (outer - inner) * unit[:, 2]
+            return np.asarray(way * (radius / np.linalg.norm(way, axis=1))[:, None])
+
+        faces = {"x0": f"{'xyz'[one]}0", "y0": f"{'xyz'[other]}0", "z0": "inner", "z1": "outer"}
+        return Block(place, (n, n, layers), faces)
+
+    return mapped([patch(axis) for axis in range(3)], kind, degree)
+
+
+def _square(flat: Floats, half: float) -> Floats:
+    """Points (n, 2) of the rounded square of ``half`` the side in the unit disc, from ``flat`` (n, 2) in [-1, 1]."""
+    return np.asarray(half * flat * (1 + _BULGE * (1 - flat[:, ::-1] ** 2)))
+
+
+def _fan(unit: Floats, half: float, low: float, side: tuple[int, int]) -> Floats:
+    """Points (n, 2) between a side of the square, (axis, sign) of its normal, and the circle: x outward, y along the side."""
+    axis, sign = side
+    along = low + (1 - low) * unit[:, 1]
+    square = _square(np.stack([np.ones_like(along), along], axis=1), half)
+    circle = np.stack([np.cos(np.pi / 4 * along), np.sin(np.pi / 4 * along)], axis=1)
+    points = square + unit[:, :1] * (circle - square)
+    return points * [sign, 1] if axis == 0 else points[:, ::-1] * [1, sign]
+
+
+def _disc(place: Map, half: float, counts: Counts, faces: dict[str, str], *, quarter: bool) -> list[Block]:
+    """Blocks of a body over the unit disc, or its quarter x, y >= 0: ``place`` takes (x, y, third in [0, 1]) to points [mm].
+
+    A square of ``half`` the side is in the middle; ``counts``: cells along half its side, from it to the circle and along the
+    third; ``faces`` of the blocks: x1 is the rim, z0 and z1 the ends.
+    """
+    side, rings, layers = counts
+    low, along = (0.0, side) if quarter else (-1.0, 2 * side)
+    ends = {face: faces[face] for face in ("z0", "z1")}
+    cuts = ({"x0": "x0", "y0": "y0"}, {"y0": "y0"}, {"y0": "x0"}) if quarter else ({}, {}, {})
+
+    def middle(unit: Floats) -> Floats:
+        return place(np.column_stack([_square(low + (1 - low) * unit[:, :2], half), unit[:, 2]]))
+
+    def fan(axis: int, sign: int) -> Block:
+        def outside(unit: Floats) -> Floats:
+            return place(np.column_stack([_fan(unit, half, low, (axis, sign)), unit[:, 2]]))
+
+        return Block(outside, (rings, along, layers), faces | cuts[1 + axis])
+
+    fans = [fan(axis, sign) for axis in range(2) for sign in ((1,) if quarter else (1, -1))]
+    return [Block(middle, (along, along, layers), ends | cuts[0]), *fans]
+
+
+def cylinder(radius: float, length: float, rings: int, slices: int, kind: Kind, degree: int) -> Cells:
+    """A solid cylinder along z from the origin: ``rings`` of cells around a rounded square of twice as many a side.
+
+    Faces: bottom, top, side.
+    """
+    faces = {"z0": "bottom", "z1": "top", "x1": "side"}
+    blocks = _disc(
+        lambda disc: disc * [radius, radius, length], _SQUARE_IN_CYLINDER, (rings, rings, slices), faces, quarter=False
+    )
+    return mapped(blocks, kind, degree)
+
+
+def _in_ventricle(disc: Floats) -> Floats:
+    """Points (n, 3) [mm] of the ventricle's wall, from x and y in the unit disc, whose rim is the base, and depth in the wall."""
+    depth = _WALL * disc[:, 2]
+    short, long = _SHORT + depth, _LONG + depth
+    radius = np.hypot(disc[:, 0], disc[:, 1])
+    share = radius + _APEX * np.sin(np.pi * radius) / np.pi
+    angle = share * np.arccos(-_BASE / long)
+    reach = short * np.sin(angle) / np.where(radius > 0, radius, 1.0)
+    return np.stack([reach * disc[:, 0], reach * disc[:, 1], -long * np.cos(angle)], axis=1)
+
+
+_VENTRICLE = {"z0": "endo", "z1": "epi", "x1": "base"}
+
+
+def ventricle(counts: Counts, kind: Kind, degree: int) -> Cells:
+    """The truncated ellipsoid of Land et al. 2015: along z, its apex at z = -17 inside and -20 outside, cut at z = 5 [mm].
+
+    ``counts`` of cells around an eighth of a turn, from the square at the apex to the base, and through the wall; their sizes are
+    alike for (2 n, 7 n, 2 n). Faces: endo, epi, base.
+    """
+    return mapped(_disc(_in_ventricle, _SQUARE_IN_VENTRICLE, counts, _VENTRICLE, quarter=False), kind, degree)
+
+
+def ventricle_quarter(counts: Counts, kind: Kind, degree: int) -> Cells:
+    """The quarter x, y >= 0 of :func:`ventricle`, with the faces x0 and y0 too."""
+    return mapped(_disc(_in_ventricle, _SQUARE_IN_VENTRICLE, counts, _VENTRICLE, quarter=True), kind, degree)
+
+
+def ball_octant(core: float, outer: float, n: int, layers: int, kind: Kind, degree: int) -> Cells:
+    """The octant x, y, z >= 0 of a ball: a cube of n cells a side of length ``core`` at its centre, and around it layers of cells
+    that grow evenly from those of the cube to the sphere of radius ``outer``. Faces: outer, x0, y0, z0.
+    """
+    size, far = core / n, outer - core
+    growth = brentq(lambda q: size * (q**layers - 1) / (q - 1) - far, 1 + 1e-9, 1 + far / size)
+
+    def patch(axis: int) -> Block:
+        one, other = (other for other in range(3) if other != axis)
+
+        def place(unit: Floats) -> Floats:
+            face = np.ones_like(unit)
+            face[:, [one, other]] = unit[:, :2]
+            way = np.ones_like(unit)
+            way[:, [one, other]] = np.tan(np.pi / 4 * unit[:, :2])
+            sphere = outer * way / np.linalg.norm(way, axis=1)[:, None]
+            share = (growth ** (layers * unit[:, 2:]) - 1) / (growth**layers - 1)
+            return np.asarray(core * face + share * (sphere - core * face))
+
+        return Block(place, (n, n, layers), {"x0": f"{'xyz'[one]}0", "y0": f"{'xyz'[other]}0", "z1": "outer"})
+
+    middle = Block(lambda unit: core * unit, (n, n, n), {face: face for face in ("x0", "y0", "z0")})
+    return mapped([middle, *(patch(axis) for axis in range(3))], kind, degree)

@@ -1,0 +1,160 @@
+"""A check in words: as text, as JSON, as Markdown for a pull request, and as JUnit XML for what shows the tests of a pipeline."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+from xml.etree import ElementTree
+
+from fem_reference.assessment.regression import WORST_FIRST, Check, Judgement, Question
+
+# A pull request is read by people: the worst judgements, and how many there are.
+MOST_ROWS = 15
+_COLUMNS = ("verdict", "question", "statistic", "frame", "was", "today", "allowed", "known to")
+
+
+def facts(check: Check) -> dict[str, Any]:
+    """What ``--json`` writes: the verdict and every judgement; a number that does not exist is None."""
+    return {
+        "case": check.case,
+        "candidate": check.candidate,
+        "verdict": check.word,
+        "unchanged": check.answer("unchanged"),
+        "within": check.answer("within"),
+        "notes": list(check.notes),
+        "judgements": [
+            {
+                "verdict": one.word,
+                "question": one.question,
+                "statistic": one.name,
+                "unit": one.unit,
+                "frame": one.frame,
+                "was": _null(one.was),
+                "today": _null(one.today),
+                "allowed": _null(one.allowed),
+                "known_to": _null(one.known),
+                "why": one.why,
+            }
+            for one in check.judgements
+        ],
+    }
+
+
+def text(check: Check) -> str:
+    """What is printed: the worst failures, why nothing can be said of others, and the verdict."""
+    lines = _most([f"fail: {_named(one)} at frame {one.frame}: {one.why}" for one in _of(check, "fail")])
+    silent: dict[str, list[str]] = {}
+    for one in _of(check, "cannot say"):
+        silent.setdefault(one.why, []).append(_named(one))
+    lines += _most([f"cannot say: {why} ({_few(names)})" for why, names in silent.items()])
+    lines += [f"note: {note}" for note in check.notes]
+    lines += [f"{check.candidate} on {check.case}:", *(f"  {line}" for line in _answers(check))]
+    return "\n".join([*lines, f"verdict: {check.word}"])
+
+
+def markdown(check: Check) -> str:
+    """A heading with the verdict, both answers, a table of at most ``MOST_ROWS`` judgements, the worst first, and the notes."""
+    shown = check.judgements[:MOST_ROWS]
+    lines = [f"### {check.word}: {_escaped(check.candidate)} on {_escaped(check.case)}", ""]
+    lines += [
+        *(f"- {answer}" for answer in _answers(check)),
+        *(f"- note: {_escaped(note)}" for note in check.notes),
+        "",
+    ]
+    lines += [f"| {' | '.join(_COLUMNS)} |", f"|{'---|' * len(_COLUMNS)}"]
+    lines += [f"| {' | '.join(map(_escaped, _cells(one)))} |" for one in shown]
+    more = len(check.judgements) - len(shown)
+    return "\n".join([*lines, *(["", f"and {more} more, none of them worse."] if more else [])]) + "\n"
+
+
+def junit(check: Check, seconds: float) -> str:
+    """One suite for the candidate, one case for each judgement; where nothing can be said, the case is skipped. ``seconds`` is
+    what the whole check took.
+    """
+    counts = {"tests": len(check.judgements), "failures": check.count("fail"), "errors": 0}
+    counts |= {"skipped": check.count("cannot say")}
+    told = {name: str(count) for name, count in counts.items()} | {"time": f"{seconds:.3f}"}
+    root = ElementTree.Element("testsuites", told)
+    suite = ElementTree.SubElement(root, "testsuite", {"name": f"{check.case}.{check.candidate}"} | told)
+    for one in check.judgements:
+        case = {"classname": f"{check.case}.{check.candidate}", "name": _named(one), "time": "0"}
+        element = ElementTree.SubElement(suite, "testcase", case)
+        if one.word != "pass":
+            kind = "failure" if one.word == "fail" else "skipped"
+            message = {"message": f"frame {one.frame}: {one.why}"}
+            ElementTree.SubElement(element, kind, message).text = "\n".join(
+                f"{column}: {cell}" for column, cell in zip(_COLUMNS, _cells(one), strict=True)
+            )
+    if check.notes:
+        ElementTree.SubElement(suite, "system-out").text = "\n".join(check.notes)
+    ElementTree.indent(root, " ")
+    return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+
+
+@dataclass(frozen=True)
+class Lost:
+    """What ``junit`` and ``markdown`` say where nothing could be judged."""
+
+    junit: str
+    markdown: str
+
+
+def lost(case: str, candidate: str, why: list[str]) -> Lost:
+    """A suite with one error, and a headline, with ``why`` nothing could be judged: what an earlier check left would mislead."""
+    name, reasons = f"{case}.{candidate}", "\n".join(why)
+    counts = {"tests": "1", "failures": "0", "errors": "1", "skipped": "0"}
+    root = ElementTree.Element("testsuites", counts)
+    suite = ElementTree.SubElement(root, "testsuite", {"name": name} | counts)
+    element = ElementTree.SubElement(suite, "testcase", {"classname": name, "name": "solvers", "time": "0"})
+    ElementTree.SubElement(element, "error", {"message": why[0]}).text = reasons
+    ElementTree.indent(root, " ")
+    lines = [f"### failed: {_escaped(candidate)} on {_escaped(case)}", "", *(f"- {reason}" for reason in why)]
+    return Lost(ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n", "\n".join(lines) + "\n")
+
+
+def _of(check: Check, word: str) -> list[Judgement]:
+    return [one for one in check.judgements if one.word == word]
+
+
+def _named(one: Judgement) -> str:
+    return f"{one.name} {one.question}"
+
+
+def _most(lines: list[str]) -> list[str]:
+    """The first ``MOST_ROWS`` of ``lines``, and how many there are besides."""
+    more = len(lines) - MOST_ROWS
+    return [*lines[:MOST_ROWS], f"and {more} more like the last, which --json and --junit name"] if more > 0 else lines
+
+
+def _few(names: list[str]) -> str:
+    return f"{', '.join(names[:3])} and {len(names) - 3} more" if len(names) > 4 else ", ".join(names)
+
+
+def _answers(check: Check) -> list[str]:
+    """Each question with its answer and how many statistics came out how."""
+    asked: tuple[tuple[Question, str], ...] = (
+        ("unchanged", "as it was"),
+        ("within", "as near to the reference as allowed"),
+    )
+    lines = []
+    for question, told in asked:
+        words = [one.word for one in check.judgements if one.question == question]
+        counts = ", ".join(f"{words.count(word)} {word}" for word in WORST_FIRST if word in words)
+        lines.append(f"{told} ({question}): {check.answer(question)}" + (f" ({counts})" if counts else ""))
+    return lines
+
+
+def _cells(one: Judgement) -> tuple[str, ...]:
+    numbers = (_told(value, one.unit) for value in (one.was, one.today, one.allowed, one.known))
+    return (one.word, one.question, one.name, str(one.frame), *numbers)
+
+
+def _told(value: float, unit: str) -> str:
+    return f"{value:.4g} {unit}" if math.isfinite(value) else "none"
+
+
+def _escaped(cell: str) -> str:
+    return cell.replace("|", "\\|")
+
+
+def _null(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,1 @@
+"""Runs: frames, status, cost and origin, and their store on disk."""

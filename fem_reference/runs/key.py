@@ -1,0 +1,107 @@
+"""What a run is known by: a hash over the scene, the settings, and the source code that its solver reaches."""
+
+import ast
+import hashlib
+import importlib.metadata
+import json
+import platform
+from collections.abc import Iterator, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+PACKAGE = Path(__file__).parent.parent
+# What makes problems of scenes determines every run; some of it is found by name as it runs, which no import shows.
+_BEFORE = ("foundations", "io", "effects", "geometry", "scenes", "problems")
+_MADE_WITH = (
+    "numpy",
+    "scipy",
+    "gmsh",
+    "libigl",
+    "pytetwild",
+    "scikit-fem",
+    "numba",
+    "dolfinx-solver-real",
+    "fenics-dolfinx",
+)
+
+
+def key(scene: str, solver: str, settings: Mapping[str, Any]) -> str:
+    """A hash of 16 digits over all that determines a run: the key of its ``scene``, the ``solver`` with the ``settings`` that its
+    answer depends on, and :func:`code_hash`.
+    """
+    parts = [scene, solver, json.dumps(settings, sort_keys=True), code_hash(solver)]
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
+
+
+@cache
+def code_hash(solver: str, package: Path = PACKAGE) -> str:
+    """A hash of 16 digits over the source files that determine the runs of ``solver`` in ``package``."""
+    digest = hashlib.sha256()
+    for path in sorted(sources(solver, package)):
+        digest.update(str(path.relative_to(package)).encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def sources(solver: str, package: Path = PACKAGE) -> set[Path]:
+    """The files of ``package`` that determine the runs of ``solver``: the packages that make problems of scenes, and its own
+    modules with all that they import, from wherever they do.
+    """
+    found = {path for name in _BEFORE for path in _files(package / name)}
+    waiting = _module(package, ["solvers", solver]) | {path for path in found if path.suffix == ".py"}
+    while waiting:
+        found |= waiting
+        modules = {module for path in waiting if path.suffix == ".py" for module in _imported(path, package)}
+        waiting = {path for module in modules for path in _module(package, module.split("."))} - found
+    return found
+
+
+def versions() -> dict[str, str]:
+    """The versions of the packages that a run may depend on, and of Python."""
+    found = {"python": platform.python_version()}
+    for package in _MADE_WITH:
+        try:
+            found[package] = importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return found
+
+
+def _files(folder: Path) -> set[Path]:
+    return {path for path in folder.rglob("*") if path.is_file() and "__pycache__" not in path.parts}
+
+
+def _module(package: Path, parts: list[str]) -> set[Path]:
+    """The files of the module that is ``parts`` below ``package``, and of what it is in; of a solver that is a folder, all of it.
+    Nothing where there is no such module.
+    """
+    place = package.joinpath(*parts)
+    if place.is_dir():
+        solver = len(parts) == 2 and parts[0] == "solvers"
+        own = _files(place) if solver else {place / "__init__.py"}
+    else:
+        own = {place.with_suffix(".py")} if parts else set()
+    above = {package.joinpath(*parts[:n], "__init__.py") for n in range(len(parts))}
+    return {path for path in own | above if path.is_file()}
+
+
+@cache
+def _imported(path: Path, package: Path) -> tuple[str, ...]:
+    """What the file at ``path`` imports of ``package``, anywhere in it: modules and what may be modules, without its name."""
+    return tuple(_names(ast.parse(path.read_bytes()), path, package))
+
+
+def _names(tree: ast.AST, path: Path, package: Path) -> Iterator[str]:
+    start = f"{package.name}."
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name.removeprefix(start) for alias in node.names if alias.name.startswith(start))
+        elif isinstance(node, ast.ImportFrom):
+            here = [package.name, *path.parent.relative_to(package).parts]
+            base = here[: len(here) + 1 - node.level] if node.level else []
+            whole = ".".join([*base, *([node.module] if node.module else [])])
+            if f"{whole}.".startswith(start):
+                inside = whole.removeprefix(package.name).removeprefix(".")
+                yield inside
+                yield from (f"{inside}.{alias.name}".lstrip(".") for alias in node.names)

@@ -1,0 +1,106 @@
+"""The states of a run as finite elements have them: the unknowns of every tetrahedron, written and read with numpy alone.
+
+<run>/state/rest.npz          points (n, 3) [mm], tets (m, 4), fibre (m, 3): the unit vector along the fibres, (0, 3) if none
+            /frame_0010.npz   the arrays of ``NodalState``
+"""
+
+import zipfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, TetMesh
+from fem_reference.io.files import whole
+
+FOLDER = "state"
+_ARRAYS = ("displacement", "pressure", "before", "rate")
+
+
+@dataclass(frozen=True, eq=False)
+class NodalState:
+    """The unknowns of m cells: ``displacement`` (m, k, 3) [mm] at the k nodes of the element in the order of
+    ``continuum.reference_nodes``; ``pressure`` (m, l) [MPa] at the corners (l = 4 of a tetrahedron), constant in the cell (l = 1),
+    or none (l = 0).
+
+    Where an effect feels how fast time passes, also the displacement ``before`` (m, k, 3) [mm] that the last load step started
+    from, and ``rate`` [1/s], one over the time that it took; else (0, 0, 3) and 0.
+    """
+
+    displacement: Floats
+    pressure: Floats
+    before: Floats
+    rate: float = 0.0
+
+    @property
+    def arrays(self) -> dict[str, Any]:
+        """What is written of it, by name."""
+        return {name: getattr(self, name) for name in _ARRAYS}
+
+    @classmethod
+    def of(cls, arrays: Mapping[str, Any]) -> "NodalState":
+        """The state of ``arrays`` by name; KeyError where one is missing."""
+        displacement, pressure, before, rate = (np.asarray(arrays[name], float) for name in _ARRAYS)
+        return cls(displacement, pressure, before, float(rate))
+
+
+def write_rest(folder: Path, mesh: TetMesh, fibre: Floats | None) -> None:
+    """What the states of the run in ``folder`` are states of: the mesh and the ``fibre`` directions (m, 3) of its tets."""
+    directions = np.zeros((0, 3)) if fibre is None else fibre
+    _write(folder / FOLDER / "rest.npz", {"points": mesh.points, "tets": mesh.tets, "fibre": directions})
+
+
+def write(folder: Path, frame: int, state: NodalState) -> None:
+    """A state of the run in ``folder``."""
+    _write(_place(folder, frame), state.arrays)
+
+
+def read_rest(folder: Path) -> tuple[TetMesh, Floats | None]:
+    """The mesh and the fibre directions (m, 3) of the states in a run's ``folder``; InputError where there are none."""
+    place = folder / FOLDER / "rest.npz"
+    if not place.is_file():
+        raise InputError(folder, "a run without states", "one of the reference, solved with store_state = true")
+    arrays = _read(place, ("points", "tets", "fibre"))
+    return TetMesh(arrays["points"], arrays["tets"]), arrays["fibre"] if len(arrays["fibre"]) else None
+
+
+class Stored(Mapping[float, NodalState]):
+    """The states of the run in ``folder`` by frame number, read as they are asked for; the last one is kept."""
+
+    def __init__(self, folder: Path, frames: tuple[int, ...]) -> None:
+        self.folder, self.frames = folder, frames
+        self.last: tuple[float, NodalState] | None = None
+
+    def __getitem__(self, frame: float) -> NodalState:
+        if frame not in self.frames:
+            raise KeyError(frame)
+        if self.last is None or self.last[0] != frame:
+            self.last = (frame, NodalState.of(_read(_place(self.folder, int(frame)), _ARRAYS)))
+        return self.last[1]
+
+    def __iter__(self) -> Iterator[float]:
+        return iter(self.frames)
+
+    def __len__(self) -> int:
+        return len(self.frames)
+
+
+def _place(folder: Path, frame: int) -> Path:
+    return folder / FOLDER / f"frame_{frame:04d}.npz"
+
+
+def _write(path: Path, arrays: dict[str, Any]) -> None:
+    path.parent.mkdir(exist_ok=True)
+    with whole(path) as part:
+        np.savez(part, allow_pickle=False, **arrays)
+
+
+def _read(path: Path, names: tuple[str, ...]) -> dict[str, Any]:
+    try:
+        with path.open("rb") as file, np.load(file) as arrays:
+            return {name: arrays[name] for name in names}
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        raise InputError(path, repr(error), f"the arrays {', '.join(names)} of a stored state") from error

@@ -1,0 +1,240 @@
+"""Run and the run store: what a solver produced, one folder a run, written as it goes.
+
+    <store>/<case>/<solver>-<key>/run.json        status, cost, origin, numbers per frame
+                                 /surface.pvd     the user's surface over the frames, for ParaView; surface/frame_0010.vtp
+                                 /rest/           surface.vtp and fibres.vtp at rest, of a solver that moves no surface
+                                 /fibres.pvd      fibre polylines, where the solver has an interior
+                                 /tets.pvd        tetrahedra, where the solver has them
+                                 /state/          the unknowns of the tetrahedra, where they were asked for (``states``)
+
+A file appears whole or not at all; ``run.json`` is written after the frame files that it names. A run whose status is
+``running`` was cut off; it is not read as a result.
+"""
+
+import json
+import logging
+import math
+import shutil
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh
+from fem_reference.io import files
+from fem_reference.runs import states
+
+log = logging.getLogger(__name__)
+
+Status = Literal["converged", "diverged", "inverted", "collapsed", "out of steps", "timed out", "crashed"]
+FORMAT = 1
+# Between the first and the last frame, progress is told no more often than this [s].
+QUIET = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One requested frame: positions [mm] of the surface (n, 3), None of a solver of lines alone, and where the solver has them
+    of the fibre points (m, 3) and tet points (k, 3); ``scalars`` by name; ``note`` is what progress says of it; ``state`` the
+    unknowns of the tets, where they were asked for.
+    """
+
+    number: int
+    surface: Floats | None
+    fibres: Floats | None = None
+    tets: Floats | None = None
+    scalars: dict[str, float] = field(default_factory=dict)
+    note: str = ""
+    state: states.NodalState | None = None
+
+
+Sink = Callable[[Frame], None]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a solve ended: a status, a sentence for people, and what it cost (seconds by phase ``seconds_...``, counts)."""
+
+    status: Status
+    message: str
+    cost: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Frames that somebody's solver produced for a scene.
+
+    ``numbers`` (f,), ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (its rest state), ``fibre_positions``
+    (f, m, 3) [mm] of the points of ``fibres`` or None for a surface-only solver, ``scalars`` by name (f,). A solver of lines
+    alone moves no surface: ``has_surface`` is False, and every entry of ``positions`` NaN.
+    """
+
+    name: str
+    solver: str
+    outcome: Outcome
+    numbers: tuple[int, ...]
+    surface: Surface
+    positions: Floats
+    fibres: Polylines | None = None
+    fibre_positions: Floats | None = None
+    scalars: dict[str, Floats] = field(default_factory=dict)
+    origin: dict[str, Any] = field(default_factory=dict)
+    folder: Path | None = None
+    has_surface: bool = True
+
+
+class Writer:
+    """Writes one run into ``folder``, which it empties first; ``add`` each frame, then ``close``."""
+
+    def __init__(
+        self,
+        folder: Path,
+        identity: dict[str, Any],
+        surface: Surface,
+        fibres: Polylines | None,
+        mesh: TetMesh | None,
+        directions: Floats | None = None,
+    ) -> None:
+        """``identity``: ``name``, ``solver``, ``origin`` and ``frames`` (the numbers wanted), as they go into run.json;
+        ``directions`` (k, 3): the unit vector along the fibres in each tet of ``mesh``, which states are stored with.
+        """
+        self.folder, self.surface, self.fibres, self.mesh, self.directions = folder, surface, fibres, mesh, directions
+        self.state: dict[str, Any] = {"format": FORMAT, **identity, "status": "running", "message": "", "numbers": []}
+        self.state |= {"scalars": {}, "cost": {}, "parts": []}
+        self.begin, self.told = time.perf_counter(), 0.0
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        self._write_state()
+
+    @property
+    def frames(self) -> tuple[int, ...]:
+        """The numbers of the frames stored so far."""
+        return tuple(self.state["numbers"])
+
+    def add(self, frame: Frame) -> None:
+        """Store a frame: its files first, then the index files and run.json."""
+        parts: dict[str, Callable[[Path], None]] = {}
+        if (surface := frame.surface) is not None:
+            parts["surface"] = lambda path: files.write_surface(path, self.surface, surface)
+        elif not self.frames:
+            self._write_rest()
+        if self.fibres is not None and (fibres := frame.fibres) is not None:
+            lines = self.fibres
+            parts["fibres"] = lambda path: files.write_polylines(path, lines, fibres)
+        if self.mesh is not None and (tets := frame.tets) is not None:
+            mesh = self.mesh
+            parts["tets"] = lambda path: files.write_tets(path, mesh, tets)
+        stored = ["state"] if self._write_unknowns(frame) else []
+        self.state["numbers"].append(frame.number)
+        self.state["parts"] = sorted([*parts, *stored])
+        for part, write in parts.items():
+            suffix = ".vtu" if part == "tets" else ".vtp"
+            (self.folder / part).mkdir(exist_ok=True)
+            write(self.folder / part / f"frame_{frame.number:04d}{suffix}")
+            names = [(number, f"{part}/frame_{number:04d}{suffix}") for number in self.state["numbers"]]
+            files.write_pvd(self.folder / f"{part}.pvd", names)
+        for name, value in frame.scalars.items():
+            self.state["scalars"].setdefault(name, []).append(value if math.isfinite(value) else None)
+        self._write_state()
+        self._log_progress(frame)
+
+    def close(self, outcome: Outcome) -> None:
+        """Store how it ended."""
+        cost = {"seconds": time.perf_counter() - self.begin} | outcome.cost
+        self.state |= {"status": outcome.status, "message": outcome.message, "cost": cost}
+        self._write_state()
+
+    def _write_unknowns(self, frame: Frame) -> bool:
+        """The unknowns of the tets, if the frame has them."""
+        if self.mesh is None or frame.state is None:
+            return False
+        if not self.frames:
+            states.write_rest(self.folder, self.mesh, self.directions)
+        states.write(self.folder, frame.number, frame.state)
+        return True
+
+    def _write_rest(self) -> None:
+        """The rest state, which the first frame of a solver without a surface is not."""
+        (self.folder / "rest").mkdir()
+        files.write_surface(self.folder / "rest" / "surface.vtp", self.surface, self.surface.points)
+        if self.fibres is not None:
+            files.write_polylines(self.folder / "rest" / "fibres.vtp", self.fibres, self.fibres.points)
+
+    def _write_state(self) -> None:
+        files.write_text(self.folder / "run.json", json.dumps(self.state, indent=1, allow_nan=False))
+
+    def _log_progress(self, frame: Frame) -> None:
+        done, wanted = len(self.state["numbers"]), len(self.state["frames"])
+        passed = time.perf_counter() - self.begin
+        left = f", about {passed / (done - 1) * (wanted - done):.0f} s left" if 1 < done < wanted else ""
+        note = f", {frame.note}" if frame.note else ""
+        if 1 < done < wanted and passed - self.told < QUIET:
+            return
+        self.told, name = passed, self.state["name"]
+        log.info("%s: frame %d (%d of %d)%s, %.0f s%s", name, frame.number, done, wanted, note, passed, left)
+
+
+def load(folder: Path) -> Run:
+    """The run in ``folder``; InputError where there is none, it was cut off, or one of its files is damaged."""
+    place = folder / "run.json"
+    try:
+        state = json.loads(place.read_text(encoding="utf-8"))
+        if state["format"] != FORMAT:
+            raise InputError(f"{place}: format", state["format"], str(FORMAT))
+        if state["status"] not in get_args(Status):
+            raise InputError(f"{place}: status", f'"{state["status"]}"', "a run that came to its end")
+        outcome = Outcome(state["status"], state["message"], state["cost"])
+        numbers = tuple(state["numbers"])
+        scalars = {name: np.asarray(values, float) for name, values in state["scalars"].items()}
+        name, solver, origin, parts = state["name"], state["solver"], state["origin"], state["parts"]
+    except (OSError, json.JSONDecodeError, KeyError, TypeError) as error:
+        raise InputError(place, repr(error), "the run.json of a stored run") from error
+    if not numbers:
+        raise InputError(place, "a run without frames", "at least the rest frame")
+    names, has_surface = [f"frame_{number:04d}.vtp" for number in numbers], "surface" in parts
+    if has_surface:
+        surfaces = [files.read_surface(folder / "surface" / file, 1.0) for file in names]
+        surface, positions = surfaces[0], np.stack([moved.points for moved in surfaces])
+    else:
+        surface = files.read_surface(folder / "rest" / "surface.vtp", 1.0)
+        positions = np.full((len(numbers), *surface.points.shape), np.nan)
+    fibres, fibre_positions = None, None
+    if "fibres" in parts:
+        lines = [files.read_moved_polylines(folder / "fibres" / file, 1.0) for file in names]
+        fibres = lines[0] if has_surface else files.read_polylines(folder / "rest" / "fibres.vtp", 1.0)
+        fibre_positions = np.stack([line.points for line in lines])
+    return Run(
+        name=name,
+        solver=solver,
+        outcome=outcome,
+        numbers=numbers,
+        surface=surface,
+        positions=positions,
+        fibres=fibres,
+        fibre_positions=fibre_positions,
+        scalars=scalars,
+        origin=origin,
+        folder=folder,
+        has_surface=has_surface,
+    )
+
+
+def status(folder: Path) -> str:
+    """What ``run.json`` in ``folder`` says of the run: a status, ``"running"`` where it was cut off, or ``"damaged"``."""
+    try:
+        return str(json.loads((folder / "run.json").read_text(encoding="utf-8"))["status"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return "damaged"
+
+
+def finished(folder: Path) -> Run | None:
+    """The stored run in ``folder`` if it is there and converged, else None."""
+    try:
+        run = load(folder)
+    except InputError:
+        return None
+    return run if run.outcome.status == "converged" else None

@@ -1,0 +1,1 @@
+"""Cases as frozen records, and how their files are read."""

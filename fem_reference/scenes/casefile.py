@@ -1,0 +1,249 @@
+"""case.toml -> Scene: strict reading. An unknown, missing or wrong key is an InputError that names file and key."""
+
+import re
+import tomllib
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fem_reference.effects import Coursed, Effect, FieldEffect, Load
+from fem_reference.effects import find as find_effect
+from fem_reference.effects import names as effect_names
+from fem_reference.effects.contact import Contact, among
+from fem_reference.effects.damping import Damping
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.records import Record, join, parse
+from fem_reference.scenes.muscle import HOME, Scene, SceneFile, Spoil
+from fem_reference.scenes.scalar import FieldScene, FieldSceneFile
+
+# What a load acts on, where it is no attachment: the surface that no bone holds.
+FREE = "free"
+
+
+def cases() -> list[str]:
+    """The names of the shipped cases."""
+    return sorted(path.parent.name for path in (HOME / "cases").glob("*/case.toml"))
+
+
+def read(case: str | Path, *, spoiled: bool = False, changes: dict[str, Any] | None = None) -> Scene | FieldScene:
+    """The scene of a shipped case (by name), a folder with a ``case.toml``, or a scene file: with a ``domain`` that of a scalar
+    field, else that of a muscle.
+
+    ``changes`` maps keys such as ``"frames.last"`` or ``"effect[1].bulk"`` to other values; ``spoiled`` applies the case's spoil.
+    That the spoil can be applied is checked too, except after changes of other keys: they may take away what it spoils.
+    """
+    path = _scene_file(case)
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(path, str(error), "a TOML file") from error
+    for key, value in (changes or {}).items():
+        _change(table, key, value, str(path))
+    if spoiled:
+        return _spoiled(table, path)
+    scene = _scene(table, path)
+    if not changes or any(key.startswith("spoil") for key in changes):
+        _check_spoil(scene, _spoiled(table, path))
+    return scene
+
+
+def _scene_file(case: str | Path) -> Path:
+    for path in (HOME / "cases" / str(case) / "case.toml", Path(case) / "case.toml", Path(case)):
+        if path.is_file():
+            return path.resolve()
+    raise InputError("CASE", f'"{case}"', f"a scene file, a folder with a case.toml, or one of {', '.join(cases())}")
+
+
+def _change(table: dict[str, Any], key: str, value: Any, place: str) -> None:
+    parts = re.findall(r"[^.\[\]]+", key) or [""]
+    *way, last = [int(part) if part.isdecimal() else part for part in parts]
+    inside: Any = table
+    try:
+        for part in way:
+            inside = inside[part]
+        inside[last]  # a change replaces what is there
+        inside[last] = value
+    except (KeyError, IndexError, TypeError) as error:
+        raise InputError(
+            join(place, key), "nothing", "a key that this scene has; an optional one must stand in its file"
+        ) from error
+
+
+def setting(text: str) -> tuple[str, Any]:
+    """``KEY=VALUE`` of the command line as a key and a TOML value; what is no TOML value is text.
+
+    >>> setting("candidate[1].peclet=10"), setting("domain.mesh.triangles=delaunay")
+    (('candidate[1].peclet', 10), ('domain.mesh.triangles', 'delaunay'))
+    """
+    key, equals, value = text.partition("=")
+    if not equals or not key:
+        raise InputError("--set", f'"{text}"', "KEY=VALUE, such as candidate[1].peclet=10")
+    try:
+        return key, tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return key, value
+
+
+def read_muscle(case: str | Path) -> Scene:
+    """The scene of a case that has a muscle."""
+    scene = read(case)
+    if not isinstance(scene, Scene):
+        raise InputError(scene.place, "the scene of a scalar field", "the scene of a muscle")
+    return scene
+
+
+def _spoiled(table: dict[str, Any], path: Path) -> Scene | FieldScene:
+    """The scene with its spoil applied; ``table`` stays as it is."""
+    place = str(path)
+    spoil = parse(Spoil, table.get("spoil"), join(place, "spoil"))
+    table = deepcopy(table)
+    try:
+        _change(table, spoil.key, spoil.value, place)
+    except InputError as error:
+        raise InputError(join(place, "spoil.key"), f'"{spoil.key}"', "a key of this scene") from error
+    try:
+        return _scene(table, path)
+    except InputError as error:
+        why = str(error).removeprefix(f"{place}: ")
+        raise InputError(join(place, "spoil.value"), _told(spoil), f"a value that can be read ({why})") from error
+
+
+def _check_spoil(scene: Scene | FieldScene, spoiled: Scene | FieldScene) -> None:
+    if spoiled.model_copy(update={"spoil": scene.spoil}) == scene:
+        raise InputError(
+            join(scene.place, "spoil.value"), _told(scene.spoil), f"a value that changes {scene.spoil.key}"
+        )
+
+
+def _told(spoil: Spoil) -> str:
+    return f'"{spoil.value}"' if isinstance(spoil.value, str) else repr(spoil.value)
+
+
+def _scene(table: dict[str, Any], path: Path) -> Scene | FieldScene:
+    place = str(path)
+    scalar = "domain" in table
+    kind: type[Record] = FieldEffect if scalar else Effect
+    effects = table.get("effect", [])
+    if isinstance(effects, list):
+        read_effects = tuple(_effect(entry, f"{place}: effect[{i}]", kind) for i, entry in enumerate(effects))
+        table = table | {"effect": read_effects}
+    inside: Record
+    if scalar:
+        inside = parse(FieldSceneFile, {"candidate": (), "boundary": ()} | table, place)
+    else:
+        inside = parse(SceneFile, {"candidate": (), "attachment": ()} | table, place)
+    if isinstance(effects, list):
+        _check_effects([entry["name"] for entry in effects], read_effects, place)
+    if scalar:
+        field_scene = FieldScene(name=path.parent.name, folder=path.parent, **dict(inside))
+        _check_used(
+            [*_candidate_names(field_scene)],
+            [(f"expect[{i}].of", e.of) for i, e in enumerate(field_scene.expect)],
+            place,
+        )
+        return field_scene
+    scene = Scene(name=path.parent.name, folder=path.parent, **dict(inside))
+    _check_names(scene)
+    _check_rest(scene)
+    _check_time(scene)
+    return scene
+
+
+def _check_effects(names: list[str], effects: tuple[Record, ...], place: str) -> None:
+    """An effect acts once (two of a name would share the unknowns that it brings), a load once on each part of the surface."""
+    acting = [
+        (name, effect.on if isinstance(effect, Load) else "") for name, effect in zip(names, effects, strict=True)
+    ]
+    for i, (name, on) in enumerate(acting):
+        if (name, on) in acting[:i]:
+            again = f'"{name}" on "{on}" a second time' if on else f'"{name}" a second time'
+            raise InputError(join(place, f"effect[{i}].name"), again, "every effect once")
+
+
+def _effect(table: Any, place: str, kind: type[Record]) -> Record:
+    if not isinstance(table, dict) or table.get("name") not in effect_names(kind):
+        got = table.get("name") if isinstance(table, dict) else table
+        raise InputError(f"{place}.name", f'"{got}"', f"one of {', '.join(effect_names(kind))}")
+    return parse(find_effect(table["name"]), {key: value for key, value in table.items() if key != "name"}, place)
+
+
+def _check_names(scene: Scene) -> None:
+    """Names are used once and refer to something."""
+    bones = [bone.name for bone in scene.bone]
+    attachments = [attachment.name for attachment in scene.attachment]
+    _check_once(bones, join(scene.place, "bone"))
+    _check_once([*attachments, FREE], join(scene.place, "attachment"))
+    reference, *others = _candidate_names(scene)
+    candidates = [reference, "candidates", *others]
+    traced = scene.fibres.traced
+    ends = [(f"fibres.traced.{end}", getattr(traced, end)) for end in ("start", "end") if traced]
+    _check_used(bones, [(f"attachment[{i}].bone", entry.bone) for i, entry in enumerate(scene.attachment)], scene.place)
+    _check_used(attachments, ends, scene.place)
+    pushing = [
+        (f"effect[{i}].bones", name)
+        for i, effect in enumerate(scene.effects)
+        if isinstance(effect, Contact)
+        for name in effect.bones or ()
+    ]
+    _check_used(bones, pushing, scene.place)
+    _check_forces(scene)
+    loads = [(f"effect[{i}].on", effect.on) for i, effect in enumerate(scene.effects) if isinstance(effect, Load)]
+    _check_used([*attachments, FREE], loads, scene.place)
+    _check_used(candidates, [(f"expect[{i}].of", entry.of) for i, entry in enumerate(scene.expect)], scene.place)
+
+
+def _check_forces(scene: Scene) -> None:
+    """Forces are told by the name of who exerts them, and something keeps the muscle from drifting."""
+    bones = [bone.name for bone in scene.bone]
+    pushed = among(scene.effects) is not None
+    for i, attachment in enumerate(scene.attachment):
+        if pushed and attachment.name in bones:
+            place = join(scene.place, f"attachment[{i}].name")
+            raise InputError(place, f'"{attachment.name}", which a bone that pushes has too', "a name of its own")
+    if not scene.attachment and not any(isinstance(effect, Damping) for effect in scene.effects):
+        want = 'an attachment, soft as it may be, or the effect "damping": without either the muscle drifts'
+        raise InputError(join(scene.place, "attachment"), "none", want)
+
+
+def _candidate_names(scene: Scene | FieldScene) -> list[str]:
+    """What runs are called: the reference and each candidate, which have names of their own."""
+    names = ["reference", *(candidate.name for candidate in scene.candidate)]
+    _check_once([*names, "candidates"], join(scene.place, "candidate"))
+    return names
+
+
+def _check_once(names: list[str], place: str) -> None:
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise InputError(place, f'the name "{twice}" twice', "every name once")
+
+
+def _check_used(known: list[str], uses: list[tuple[str, str]], place: str) -> None:
+    for key, name in uses:
+        if name not in known:
+            want = f"one of {', '.join(known)}" if known else "a name that is there: there is none"
+            raise InputError(join(place, key), f'"{name}"', want)
+
+
+def _check_rest(scene: Scene) -> None:
+    """At the first frame every bone is where its surface is, and nothing acts that comes and goes: the muscle rests."""
+    for i, effect in enumerate(scene.effects):
+        if isinstance(effect, Coursed) and effect.amount(scene.frames.first) != 0:
+            got = f"an amount of {effect.amount(scene.frames.first):g} at frame {scene.frames.first}, the first"
+            raise InputError(join(scene.place, f"effect[{i}].course"), got, "0 there, where the muscle rests")
+    for i, bone in enumerate(scene.bone):
+        pose = bone.motion.poses().pose(scene.frames.first) if bone.motion else np.eye(4)
+        if not abs(pose - np.eye(4)).max() <= 1e-12:  # NaN is no rest
+            slid = np.array_equal(pose[:3, :3], np.eye(3))
+            what, want = ("moved", "distance 0 there") if slid else ("turned", "angle 0 there")
+            raise InputError(join(scene.place, f"bone[{i}].motion"), f"a bone {what} at the first frame", want)
+
+
+def _check_time(scene: Scene) -> None:
+    """Where time matters to an effect, the scene says how fast it passes."""
+    for i, effect in enumerate(scene.effects):
+        if "interval" in effect.needs and scene.frames.interval is None:
+            want = f"the time from a frame number to the next, which effect[{i}] ({effect.title}) needs"
+            raise InputError(join(scene.place, "frames.interval"), "nothing", want)

@@ -1,0 +1,150 @@
+"""A scalar case as frozen records: where a field lives, which effects act on it, what holds it, and what is expected."""
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from fem_reference.effects import FieldEffect
+from fem_reference.foundations.formula import Formula
+from fem_reference.foundations.records import Record
+from fem_reference.scenes.muscle import Candidate, SolverChoice, Spoil, locate
+
+
+class Interval(Record):
+    """``count`` nodes from ``start`` to ``end``, both among them; where ``seed`` is given those between are drawn at random."""
+
+    start: float
+    end: float
+    count: int = Field(ge=2, le=1_000_000)
+    seed: int | None = Field(default=None, ge=0)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.end <= self.start:
+            raise ValueError("an end beyond the start")
+        return self
+
+
+class MeshFiles(Record):
+    """Triangles as listing 4.5 loads them: comma separated files without a head.
+
+    ``points``: a row of 2 or 3 coordinates a vertex; ``triangles``: a row of three vertices a triangle, the first vertex of all
+    being 1, or the word ``delaunay`` for a triangulation of points in the plane.
+    """
+
+    points: str
+    triangles: str
+
+
+class SurfaceFile(Record):
+    """A triangle surface in a mesh file, its coordinates times ``scale``."""
+
+    file: str
+    scale: float = Field(gt=0)
+
+
+class Domain(Record):
+    """Where the field lives: exactly one of ``interval``, ``nodes`` (given, increasing), ``mesh`` and ``surface``."""
+
+    interval: Interval | None = None
+    nodes: tuple[float, ...] | None = Field(default=None, min_length=2)
+    mesh: MeshFiles | None = None
+    surface: SurfaceFile | None = None
+
+    @field_validator("nodes")
+    @classmethod
+    def _check_nodes(cls, nodes: tuple[float, ...] | None) -> tuple[float, ...] | None:
+        if nodes is not None and any(late <= early for early, late in pairwise(nodes)):
+            raise ValueError("nodes that increase")
+        return nodes
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if sum(way is not None for way in (self.interval, self.nodes, self.mesh, self.surface)) != 1:
+            raise ValueError('exactly one of "interval", "nodes", "mesh", "surface"')
+        return self
+
+
+class Boundary(Record):
+    """A condition, in one of two ways.
+
+    ``on`` an end of an interval or the ``rim`` of triangles, there only ``where`` a formula is above zero at every vertex of a
+    facet (an edge counts only with both its ends): the ``value`` of the field (Dirichlet) or its ``slope`` along the outward
+    normal (Neumann). Or ``bounds``, a file as listing 4.5 loads it: a row of vertices, the first of all being 1, and a row of the
+    values that they are held at. What no condition names has slope 0.
+    """
+
+    on: Literal["left", "right", "rim"] | None = None
+    where: Formula | None = None
+    value: Formula | None = None
+    slope: Formula | None = None
+    bounds: str | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if (self.on is None) == (self.bounds is None):
+            raise ValueError('exactly one of "on" and "bounds"')
+        if self.bounds is not None and (self.where, self.value, self.slope) != (None, None, None):
+            raise ValueError('"bounds" alone: its file says where and what')
+        if self.on is not None and (self.value is None) == (self.slope is None):
+            raise ValueError('exactly one of "value" and "slope"')
+        return self
+
+
+class Element(Record):
+    """Lagrange elements of ``order`` 1 or 2, and the ``form``: plain ``galerkin``; ``supg``, stabilised along the flow; or
+    ``auto``, which is supg where the mesh Peclet number is above 1 anywhere, else galerkin.
+    """
+
+    order: Literal[1, 2]
+    form: Literal["auto", "galerkin", "supg"]
+
+
+class FieldExpectation(Record):
+    """A number that a measure of this case must have; ``of`` is ``"reference"`` or a candidate."""
+
+    of: str
+    measure: str
+    truth: float
+    within: float = Field(ge=0)
+    kind: Literal["closed form", "manufactured", "published", "property", "reference run", "pinned"]
+    because: str
+
+
+class FieldSceneFile(Record):
+    """What the file of a scalar scene holds."""
+
+    title: str
+    proves: str
+    domain: Domain
+    effect: tuple[Any, ...] = Field(min_length=1)
+    boundary: tuple[Boundary, ...]
+    element: Element
+    exact: Formula | None = None
+    reference: SolverChoice
+    candidate: tuple[Candidate, ...]
+    expect: tuple[FieldExpectation, ...] = Field(min_length=1)
+    spoil: Spoil
+
+
+class FieldScene(FieldSceneFile):
+    """A scalar case, read and checked: what its file holds, and the name and place of its folder."""
+
+    name: str
+    folder: Path
+
+    @property
+    def place(self) -> str:
+        """The scene file, for messages."""
+        return str(self.folder / "case.toml")
+
+    @property
+    def effects(self) -> tuple[FieldEffect, ...]:
+        """The effects, in the order of the file."""
+        return self.effect
+
+    def file(self, text: str, key: str) -> Path:
+        """The file that ``key`` names; see :func:`fem_reference.scenes.muscle.locate`."""
+        return locate(self.folder, text, key)

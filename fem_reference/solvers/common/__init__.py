@@ -1,0 +1,1 @@
+"""What solvers share: load steps, checks of states."""

@@ -1,0 +1,78 @@
+"""Adaptive load steps from frame to frame: halve on failure, grow on easy steps, never skip a requested frame."""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from fem_reference.runs.store import Status
+
+EASY = 5  # Newton iterations up to which the next step may grow
+GROWTH = 1.5
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """How the solve at one load went: ``failure`` is None where it converged, else the status that it would end the run with."""
+
+    failure: Status | None
+    iterations: int
+    sentence: str = ""
+
+
+@dataclass(frozen=True)
+class Step:
+    """The way to a requested frame: load steps, Newton iterations and cut-backs since the last one. Where it could not be
+    reached, ``status`` and ``sentence`` are those of the last attempt, and the last good state is ``at`` a frame.
+    """
+
+    frame: float
+    steps: int
+    iterations: int
+    cutbacks: int
+    status: Status = "converged"
+    sentence: str = ""
+    at: float = 0.0
+
+
+@dataclass(frozen=True)
+class Steps:
+    """The ``first`` load step, and between which sizes they may be, in frame numbers."""
+
+    first: float
+    smallest: float
+    largest: float | None = None
+
+
+def march(
+    attempt: Callable[[float], Attempt],
+    frames: tuple[float, ...],
+    steps: Steps,
+    recall: Callable[[float], bool] = lambda _: False,
+) -> Iterator[Step]:
+    """Go from ``frames[0]`` (where the body rests) through every frame; ``attempt`` solves at a load, from the last state that
+    converged, and must leave that state untouched where it fails. A frame whose state ``recall`` can take up from before needs no
+    step. Ends after the first frame that cannot be reached.
+    """
+    largest = math.inf if steps.largest is None else steps.largest
+    at, step = float(frames[0]), min(steps.first, largest)
+    for frame in frames[1:]:
+        taken = iterations = cutbacks = 0
+        if recall(frame):
+            at = frame
+        while at < frame:
+            left = frame - at
+            count = max(1, round(left / step + 0.3), math.ceil(left / largest - 1e-9))
+            size = left / count  # equal steps to the frame, none a sliver
+            result = attempt(frame if size == left else at + size)
+            iterations += result.iterations
+            if result.failure is not None:
+                cutbacks += 1
+                step = size / 2
+                if step < steps.smallest:
+                    yield Step(frame, taken, iterations, cutbacks, result.failure, result.sentence, at)
+                    return
+                continue
+            at = frame if size == left else at + size
+            taken += 1
+            step = step * GROWTH if result.iterations <= EASY else size
+        yield Step(frame, taken, iterations, cutbacks, at=at)

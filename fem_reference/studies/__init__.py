@@ -1,0 +1,1 @@
+"""What solves many times: error bars, rankings of solvers, convergence, benchmarks."""

@@ -1,0 +1,57 @@
+"""The finer solutions that error bars are held against: on smaller tetrahedra, with finer contact."""
+
+import logging
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+from fem_reference.assessment.claims import CLAIMED, FINER, Claim, Claims, claimed
+from fem_reference.foundations.errors import InputError
+from fem_reference.metrics import Yardstick, at_rest, measure
+from fem_reference.scenes.muscle import Scene
+from fem_reference.studies import refinement
+from fem_reference.studies.execution import Bench, complete
+
+log = logging.getLogger(__name__)
+
+CASES = ("hip_flexion", "gluteus_maximus", "gluteus_medius", "adductor_brevis", "iliacus_anatomical")
+
+
+def stake(scenes: Iterable[Scene], store: Path) -> Claims:
+    """The claims of the references of ``scenes``, with runs in ``store``: solved where that was not done before."""
+    claims, sizes, missing = list[Claim](), dict[str, tuple[float, float]](), dict[str, str]()
+    for scene in scenes:
+        try:
+            found = _of(scene, store)
+        except InputError as error:
+            log.info("%s is left out: %s", scene.name, error)
+            missing[scene.name] = str(error)
+            continue
+        if not found:
+            missing[scene.name] = "its reference, or the finer solution, did not reach all frames"
+            continue
+        claims += found
+        size = scene.muscle.tet_size / 2**scene.muscle.refinements
+        sizes[scene.name] = (size, FINER * size)
+    return Claims(tuple(claims), sizes, missing)
+
+
+def _of(scene: Scene, store: Path) -> list[Claim]:
+    bench = Bench(scene, store)
+    reference = bench.obtain("reference", scene.reference, "reference")
+    bars = refinement.stored(reference) or refinement.obtain(bench, reference)
+    if bars is None:
+        return []
+    finer = Bench(refinement.finer(bench, reference, FINER), store)
+    run = complete(finer.obtain("finer", scene.reference, "reference"), reference.numbers)
+    if reference.fibres is None or run.outcome.status != "converged":
+        return []
+    yardstick = Yardstick.of(reference, reference.fibres, bench.setup().bones, bench.setup().free)
+    names = dict.fromkeys(metric for metric, _ in CLAIMED)
+    changes = [measure(one, at_rest(one), yardstick, names) for one in (reference, run)]
+    surfaces = [replace(one, fibres=None, fibre_positions=None) for one in (reference, run)]  # as candidates are
+    deviations = [measure(surfaces[0], one, yardstick, names) for one in surfaces]
+    return [
+        *claimed(scene.name, "change", bars, *changes),
+        *claimed(scene.name, "deviation", bars, *deviations),
+    ]
