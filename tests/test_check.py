@@ -133,7 +133,7 @@ def test_a_candidate_of_the_case_is_checked_by_its_name(work, monkeypatch) -> No
 @pytest.mark.parametrize("solver", [fenicsx, pbd])
 def test_a_solver_that_fails_is_status_three_and_writes_no_baseline(work, monkeypatch, capsys, solver) -> None:
     monkeypatch.setattr(solver, "solve", fail)
-    for stored in (work.root / "reports" / "runs" / "bar").glob(f"{solver.__name__.split('.')[-1]}-*"):
+    for stored in (work.root / "reports" / "runs").glob(f"{solver.__name__.split('.')[-1]}-*"):
         shutil.rmtree(stored)
     work.baseline = work.root / "pbd.json"
     told = work.root / "told.json"

@@ -110,7 +110,7 @@ def test_it_is_kept_with_its_run_until_the_metrics_change_or_the_file_is_damaged
     assert (first[1:] > 0).all()
     monkeypatch.setattr(refinement, "_measuring_hash", lambda: "others")
     assert call(case, "run")[1]["error_bars"] == []
-    (path,) = (case.parent / "out" / "runs" / "bar").glob(f"*/{error_bars.FILE}")
+    (path,) = (case.parent / "out" / "runs").glob(f"*/{error_bars.FILE}")
     path.write_text("{")
     capsys.readouterr()
     assert call(case, "run")[0] == cli.BAD_INPUT

@@ -33,6 +33,17 @@ class Comparison:
     verdicts: tuple[Verdict, ...]
     error_bars: ErrorBars | None = None
 
+    def __getitem__(self, key: tuple[str, str, str]) -> Measure:
+        """The measure of a candidate by its name, a metric and a statistic, such as ``"mine", "volume", "deviation"``; of
+        ``"reference"`` its change from rest. KeyError where there is none.
+        """
+        name, metric, statistic = key
+        measures = self.changes["reference"] if name == "reference" else self.deviations.get(name, ())
+        found = find(measures, metric, statistic)
+        if found is None:
+            raise KeyError(key)
+        return found
+
     @property
     def rankings(self) -> tuple[Ranking, ...]:
         """Which candidates are nearer, as far as the error bars tell them apart; nothing without these."""

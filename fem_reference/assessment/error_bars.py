@@ -28,8 +28,6 @@ FORMAT = 2
 SAFETY = 1.25
 # What is left of an error of first order, when halving its cause changes the result by 1.
 VARIATION = 2.0
-# The volume is nearly kept, and what is left of its change does not converge faster.
-VOLUME_ORDER = 1.0
 TETRAHEDRA = "tetrahedra"
 # The measures of a run against another or (None) its rest.
 _Measured = Callable[[Run, Run | None], tuple[Measure, ...]]
@@ -62,7 +60,7 @@ class ErrorBar:
 @dataclass(frozen=True, eq=False)
 class ErrorBars:
     """The error bars of a reference over frame ``numbers`` (f,), from tetrahedra of ``sizes`` [mm], the reference's own first; the
-    error is taken to be of the ``order`` in them.
+    error is taken to be of the ``order`` in them, in general.
     """
 
     numbers: tuple[int, ...]
@@ -83,27 +81,48 @@ class ErrorBars:
         )
 
 
+@dataclass(frozen=True)
+class Orders:
+    """Of which order in the size of tetrahedra the error of a statistic is at least: in ``general``; of the ``volume``, which is
+    nearly kept; of lengths of ``fibres``, which end where attachments do; and of those of the ``worst`` place alone: next to the
+    rim of an attachment displacement converges more slowly than elsewhere.
+    """
+
+    general: float
+    volume: float
+    fibres: float
+    worst: float
+
+    def of(self, of: Of, metric: str, statistic: str) -> float:
+        """The order for a statistic of changes or of deviations. What fibres lengthen by on average, surfaces that are near each
+        other agree on as they do on all else.
+        """
+        if is_local(statistic):
+            return self.worst
+        if metric == "volume":
+            return self.volume
+        mean_of_surfaces = of == "deviation" and statistic.startswith("mean")
+        return self.fibres if metric == "fibre_length" and not mean_of_surfaces else self.general
+
+
 @dataclass(frozen=True, eq=False)
 class Pair:
     """Runs of the reference over the same frames: ``fine``, itself, and ``coarse`` on larger tetrahedra; by name the ``varied``
     ones, each as ``coarse`` with one cause of error halved; and one with ``exact`` attachments, where they are springs.
 
-    ``sizes`` [mm] are those of the tetrahedra, and the error is of at least the ``order`` in them; of ``local_order`` where a
-    statistic is that of the worst place: next to the rim of an attachment displacement converges more slowly than elsewhere.
+    ``sizes`` [mm] are those of the tetrahedra, and the error is of the ``orders`` in them.
     """
 
     fine: Run
     coarse: Run
     sizes: tuple[float, float]
-    order: float
-    local_order: float
+    orders: Orders
     varied: dict[str, Run]
     exact: Run | None = None
 
-    def share(self, metric: str, statistic: str) -> float:
+    def share(self, of: Of, metric: str, statistic: str) -> float:
         """The error of the fine run over what the two differ by, with the safety of a grid convergence index."""
-        order = self.local_order if is_local(metric, statistic) else self.order
-        order = min(order, VOLUME_ORDER) if metric == "volume" else order
+        order = self.orders.of(of, metric, statistic)
         return float(SAFETY / ((self.sizes[1] / self.sizes[0]) ** order - 1))
 
 
@@ -143,19 +162,21 @@ def error_bars(pair: Pair, yardstick: Yardstick) -> ErrorBars:
     for of, differences in near.items():
         for i, one in enumerate(measured(fine, fine)):
             # The worst places of two runs may be others: by the triangle inequality, what the runs differ by bounds the change too.
-            differing = near["deviation"][i] if is_local(one.metric, one.statistic) else differences[i]
-            parts = {TETRAHEDRA: pair.share(one.metric, one.statistic) * typical(differing, apart(coarse, fine))}
-            parts |= {name: VARIATION * typical(found[i], gaps[name]) for name, found in varied[of].items()}
+            found = differences[i]
+            if is_local(one.statistic):
+                found = np.fmax(np.abs(found), np.abs(near["deviation"][i]))
+            parts = {TETRAHEDRA: pair.share(of, one.metric, one.statistic) * typical(found, apart(coarse, fine))}
+            parts |= {name: VARIATION * typical(other[i], gaps[name]) for name, other in varied[of].items()}
             greatest = {name: float(part.max()) for name, part in parts.items()}
             model = np.abs(exact[of][i]) if of in exact else None
             total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))  # of causes that are independent
             bars.append(ErrorBar(of, one.metric, one.statistic, one.unit, total, greatest, model))
-    return ErrorBars(pair.fine.numbers, pair.sizes, pair.order, tuple(bars))
+    return ErrorBars(pair.fine.numbers, pair.sizes, pair.orders.general, tuple(bars))
 
 
-def is_local(metric: str, statistic: str) -> bool:
-    """Whether a statistic is that of the worst place alone; the length of a fibre is that of many places."""
-    return statistic.startswith(("max", "hausdorff")) and metric != "fibre_length"
+def is_local(statistic: str) -> bool:
+    """Whether a ``statistic`` is that of the worst place, or of the worst fibre, alone."""
+    return statistic.startswith(("max", "hausdorff"))
 
 
 def typical(differences: Floats, apart: Floats) -> Floats:

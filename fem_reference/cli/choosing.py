@@ -1,13 +1,11 @@
 """What a command line chooses: a scene, candidates of it, and the bench that they are solved on."""
 
 import argparse
-import re
 from pathlib import Path
 
 from fem_reference.assessment import judge
 from fem_reference.cli.telling import out
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.records import parse
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import Candidate, Scene
 from fem_reference.scenes.scalar import FieldScene
@@ -36,19 +34,7 @@ def choose(scene: Scene, text: str, unit: str | None) -> tuple[Candidate, str]:
         return scene.candidate[names.index(text)], f"candidate[{names.index(text)}]"
     if not text or not Path(text).exists():
         raise InputError("--candidate", f'"{text}"', f"a folder of frames, or one of {', '.join(names)}")
-    return recorded_in(text, unit), "--candidate"
-
-
-def recorded_in(text: str, unit: str | None) -> Candidate:
-    """The recorded frames in the folder or file ``text``, with what their ``candidate.toml`` says."""
-    path = Path(text)
-    if not text or not path.exists():
-        raise InputError("--candidate", f'"{text}"', "a folder of frames")
-    folder = path.resolve()
-    said = recorded.about(folder)
-    name = said.name or re.sub(r"[^\w.-]+", "_", folder.stem if folder.is_file() else folder.name) or "candidate"
-    table = {"name": name, "solver": "recorded", "folder": str(folder), "unit": unit or said.unit or "mm"}
-    return parse(Candidate, table, "--candidate")
+    return recorded.choice(Path(text), unit, "--candidate"), "--candidate"
 
 
 def check_names(names: list[str]) -> None:

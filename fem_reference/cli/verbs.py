@@ -7,7 +7,7 @@ from fem_reference import metrics, report, solvers
 from fem_reference.assessment import comparison
 from fem_reference.assessment.claims import Cover
 from fem_reference.cli import scalar, verification
-from fem_reference.cli.choosing import check_names, checked_bench, choose, own_candidates, recorded_in, scene_of
+from fem_reference.cli.choosing import check_names, checked_bench, choose, own_candidates, scene_of
 from fem_reference.cli.scalar import Told
 from fem_reference.cli.telling import DONE, SOLVER_FAILED, VERDICT_FAIL, lines, out, tell
 from fem_reference.foundations.errors import InputError
@@ -26,6 +26,7 @@ from fem_reference.runs import store
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import Candidate, Scene, SolverChoice
 from fem_reference.scenes.scalar import FieldScene
+from fem_reference.solvers import recorded
 from fem_reference.studies import refinement, table_5_1, true_errors
 from fem_reference.studies.execution import Bench, complete
 from fem_reference.studies.scalar import FieldBench
@@ -131,9 +132,15 @@ def _foreign(options: argparse.Namespace, cases: list[str]) -> dict[str, list[Ca
         name = casefile.read_muscle(case).name
         if name not in cases:
             raise InputError("--candidate", f'"{case}"', f"one of {', '.join(cases)}")
-        found.setdefault(name, []).append(recorded_in(folder, options.unit))
+        found.setdefault(name, []).append(_recorded(folder, options.unit))
         check_names([candidate.name for candidate in found[name]])
     return found
+
+
+def _recorded(text: str, unit: str | None) -> Candidate:
+    if not text:
+        raise InputError("--candidate", '""', "a folder of frames")
+    return recorded.choice(Path(text), unit, "--candidate")
 
 
 def verify(options: argparse.Namespace) -> int:

@@ -86,9 +86,9 @@ def setting(text: str) -> tuple[str, Any]:
         return key, value
 
 
-def read_muscle(case: str | Path) -> Scene:
-    """The scene of a case that has a muscle."""
-    scene = read(case)
+def read_muscle(case: str | Path, changes: dict[str, Any] | None = None) -> Scene:
+    """The scene of a case that has a muscle, with ``changes`` of its keys."""
+    scene = read(case, changes=changes)
     if not isinstance(scene, Scene):
         raise InputError(scene.place, "the scene of a scalar field", "the scene of a muscle")
     return scene

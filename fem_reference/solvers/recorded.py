@@ -19,6 +19,7 @@ from fem_reference.foundations.units import LengthUnit, length_unit
 from fem_reference.io import files
 from fem_reference.problems.muscle import Setup
 from fem_reference.runs.store import Frame, Outcome, Sink
+from fem_reference.scenes.muscle import Candidate
 
 log = logging.getLogger(__name__)
 
@@ -78,6 +79,19 @@ def about(path: Path) -> About:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(file, str(error), "a TOML file") from error
     return parse(About, table, str(file))
+
+
+def choice(path: Path, unit: str | None = None, place: str = "folder") -> Candidate:
+    """The recorded frames in the folder or file at ``path`` as a candidate, with the name and, without a ``unit``, the unit that
+    their ``candidate.toml`` says; ``place`` is where it was asked for.
+    """
+    if not path.exists() or not path.parts:
+        raise InputError(place, f'"{path}"', "a folder of frames")
+    folder = path.resolve()
+    said = about(folder)
+    name = said.name or re.sub(r"[^\w.-]+", "_", folder.stem if folder.is_file() else folder.name) or "candidate"
+    table = {"name": name, "solver": "recorded", "folder": str(folder), "unit": unit or said.unit or "mm"}
+    return parse(Candidate, table, place)
 
 
 def _about_file(path: Path) -> Path:

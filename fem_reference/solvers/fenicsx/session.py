@@ -1,6 +1,5 @@
 """One process of FEniCSx that solves bodies one after the other: what it has compiled and loaded serves the next."""
 
-import pickle
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
@@ -8,6 +7,7 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
+import cloudpickle
 import numpy as np
 
 from fem_reference.foundations.subprocesses import command
@@ -36,7 +36,7 @@ class Session:
             raise RuntimeError("the session is closed")
         check(body, settings.element)
         job = self.folder / "job.pickle"
-        job.write_bytes(pickle.dumps(Job(body, settings, {})))
+        job.write_bytes(cloudpickle.dumps(Job(body, settings, {})))
         states: list[Reached] = []
         outcome = self.run(job, settings.time_limit, lambda event: states.append(_state(event)), "states")
         return Solved(tuple(states), outcome)

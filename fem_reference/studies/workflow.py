@@ -1,0 +1,180 @@
+"""The way from a case to a page, one call a step: what the package offers to Python."""
+
+import logging
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from fem_reference import export, report
+from fem_reference.assessment import comparison
+from fem_reference.assessment.comparison import Comparison
+from fem_reference.assessment.error_bars import ErrorBars
+from fem_reference.problems.body import Continuum
+from fem_reference.runs.solved import Solved
+from fem_reference.runs.store import Run
+from fem_reference.scenes import casefile
+from fem_reference.scenes.muscle import Scene, SolverChoice
+from fem_reference.solvers import fenicsx, recorded
+from fem_reference.studies import refinement
+from fem_reference.studies.execution import Bench, complete
+
+Progress = Callable[[str], object]
+STORE = Path("reports/runs")
+
+
+def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Scene:
+    """Read the case of a muscle.
+
+    Parameters
+    ----------
+    case
+        The name of a shipped case, a folder with a ``case.toml``, or a scene file.
+    changes
+        Keys such as ``"frames.last"`` or ``"effect[1].bulk"`` with other values, as scene files write them.
+
+    Raises
+    ------
+    InputError
+        Where a key is missing, unknown or wrong; it names file, key, what was got and what is wanted.
+
+    """
+    return casefile.read_muscle(case, changes=dict(changes or {}))
+
+
+def solve(
+    case: Scene, solver: str | None = None, *, store: Path = STORE, progress: Progress | None = None, **settings: Any
+) -> Run:
+    """Solve a case, or take up what was solved before: a run is stored by all that determines it.
+
+    Parameters
+    ----------
+    case
+        What :func:`load_case` read.
+    solver
+        The name of a solver, such as ``"pbd"``; without it the reference of the case, with the settings that the case has.
+    store
+        The folder that runs are stored in.
+    progress
+        Called with each line of progress.
+    settings
+        Of the ``solver``, as scene files write them; without any those that the case has for it.
+
+    Returns
+    -------
+    Run
+        ``positions`` (f, n, 3) [mm] of the surface's vertices by frame number, ``outcome`` (status, message, cost), ``folder``.
+        Where physics fails, the status says so and the frames that were reached are there.
+
+    """
+    choice: SolverChoice = case.reference
+    if solver is not None:
+        own = [entry for entry in case.candidate if entry.solver == solver] if not settings else []
+        choice = own[0] if own else SolverChoice(solver=solver, **settings)
+    name = "reference" if solver is None else solver
+    with _reported(progress):
+        return Bench(case, store).obtain(name, choice, f'solver "{choice.solver}"')
+
+
+def read_run(folder: str | Path, case: Scene, *, unit: str | None = None) -> Run:
+    """Read frames that another program wrote, and check them against the case.
+
+    Parameters
+    ----------
+    folder
+        A folder of meshes, one a frame, or a file of a sequence; a ``candidate.toml`` in it may say name and unit.
+    case
+        The case that they are frames of: the vertices are those of its muscle's surface, in its order.
+    unit
+        The unit of length of the frames, by default what ``candidate.toml`` says, else mm.
+
+    """
+    choice = recorded.choice(Path(folder), unit)
+    return Bench(case, STORE).read(choice.name, choice, "folder")
+
+
+def error_bars(
+    case: Scene, reference: Run, *, store: Path = STORE, progress: Progress | None = None
+) -> ErrorBars | None:
+    """Find out how far each statistic of the ``reference`` of a ``case`` may be from the truth, from runs on larger tetrahedra and
+    with finer contact; None where the reference did not converge.
+    """
+    with _reported(progress):
+        bench = Bench(case, store)
+        return refinement.stored(reference) or refinement.obtain(bench, reference)
+
+
+def compare(
+    case: Scene, reference: Run, candidates: Sequence[Run] = (), *, error_bars: ErrorBars | None = None
+) -> Comparison:
+    """Measure ``candidates`` against the ``reference`` of a ``case`` and judge what the case expects.
+
+    ``comparison["pbd", "surface_deviation", "rms"]`` is a measure: its ``values`` by frame, its ``unit``, its ``worst`` frame.
+    """
+    numbers = case.frames.numbers
+    runs = tuple(complete(run, numbers) for run in candidates)
+    return comparison.compare(case, Bench(case, STORE).setup(), complete(reference, numbers), runs, error_bars)
+
+
+def export_case(case: Scene, folder: str | Path, form: export.Format = "open") -> list[str]:
+    """Write all that a solver needs which is not ours into a new ``folder``, in open formats (``form`` ``"febio"``: FEBio's file
+    too); the names of the files.
+    """
+    return export.export(case, Bench(case, STORE).problem, Path(folder), form)
+
+
+def write_report(comparison: Comparison, folder: str | Path) -> Path:
+    """Write ``report.html``, ``measures.json`` and ``measures.csv`` into ``folder``; the path of the page."""
+    return report.write(comparison, Path(folder))
+
+
+def solve_body(body: Continuum, *, progress: Progress | None = None, **settings: Any) -> Solved:
+    """Solve a body of any shape with the reference, FEniCSx.
+
+    Parameters
+    ----------
+    body
+        Cells, effects, what is prescribed where, and the frames that are wanted. What is prescribed may be a function of the
+        caller's own.
+    progress
+        Called with each line of progress.
+    settings
+        As under ``[reference]`` in a scene file: ``element``, ``first_step``, ``residual``, ...
+
+    Returns
+    -------
+    Solved
+        ``states``, each with ``points`` (n, 3) [mm] of the nodes and ``forces`` (3,) [N] by name of what is prescribed; the
+        ``outcome``.
+
+    """
+    with _reported(progress):
+        return fenicsx.solve_body(body, fenicsx.BodySettings(**settings))
+
+
+@contextmanager
+def _reported(progress: Progress | None) -> Iterator[None]:
+    """Meanwhile each line of progress goes to ``progress``."""
+    if progress is None:
+        yield
+        return
+    log = logging.getLogger("fem_reference")
+    handler, level = _Calling(progress), log.level
+    log.addHandler(handler)
+    log.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        log.removeHandler(handler)
+        log.setLevel(level)
+
+
+class _Calling(logging.Handler):
+    """Calls a function with each line."""
+
+    def __init__(self, progress: Progress) -> None:
+        super().__init__()
+        self.progress = progress
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.progress(record.getMessage())
