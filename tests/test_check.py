@@ -106,8 +106,8 @@ def test_where_nothing_can_be_said_it_is_told_and_holds_nothing_up(work, capsys)
     work.baseline.write_text(json.dumps(table))
     assert work.check() == cli.DONE
     printed = capsys.readouterr().out
-    assert "cannot say: the reference is known to" in printed
-    assert "verdict: cannot say" in printed
+    assert "inconclusive: the reference is known to" in printed
+    assert "verdict: inconclusive" in printed
 
 
 def test_an_update_takes_todays_values(work) -> None:

@@ -83,7 +83,7 @@ def test_the_bar_covers_an_error_that_is_known(case, capsys, monkeypatch) -> Non
     page = case.parent / "out" / "bar" / "report.html"
     assert "With <code>--error-bar</code> the reference is solved" in page.read_text()
     status, facts = call(case, "run", "--error-bar")
-    assert (status, facts["verdict"]) == (cli.DONE, "cannot say")
+    assert (status, facts["verdict"]) == (cli.DONE, "inconclusive")
     scene = casefile.read_muscle(case)
     fine, coarse = (
         Bench(one, case.parent / "out" / "runs").problem() for one in (scene, refinement._coarser(scene)[0])
@@ -125,7 +125,7 @@ def test_the_judge_says_nothing_below_three_bars(case) -> None:
     for times, silent in ((2.99, True), (3.01, False)):
         other = f"{times * bar} %"
         path.write_text(path.read_text().replace(f'"{within}"', f'"{other}"'))
-        assert (call(case, "run")[1]["verdict"] == "cannot say") == silent
+        assert (call(case, "run")[1]["verdict"] == "inconclusive") == silent
         within = other
 
 
@@ -160,7 +160,7 @@ def test_a_coarser_run_that_fails_leaves_frames_without_a_bar(case, monkeypatch)
     _, facts = call(case, "run", "--error-bar")
     values = rows(facts, "change", "surface_deviation", "max")
     assert values.tolist()[1:] == [None] * 4
-    assert (facts["verdict"], facts["verdicts"][0]["error_bar"]) == ("cannot say", None)
+    assert (facts["verdict"], facts["verdicts"][0]["error_bar"]) == ("inconclusive", None)
 
 
 def test_sizes_that_make_no_other_mesh_are_refused(case, monkeypatch) -> None:

@@ -34,8 +34,8 @@ SAMPLED = 64
 MOVED = 0.1
 # Of a statistic, at most this share of its greatest value over the frames.
 SHARE = 0.02
-# judge() says nothing where an error bar is more than a third of what is allowed; a little more, for rounding.
-_BARS = 3.001
+# What is allowed is a little more than was measured, for rounding.
+_ROUNDING = 1 + 1e-6
 README = (
     "tolerance: how far a value may be from the one stored here; within: how far from the reference it may be at most, in the "
     "same unit (null: not known). Both may be edited; 'check --update' writes the values anew and keeps them. A statistic whose "
@@ -201,8 +201,8 @@ class Limits(NamedTuple):
         """Those of a new baseline, from the error bars (f,) of a deviation.
 
         ``tolerance``: the greatest bar, for less is no change of accuracy, but at most ``SHARE`` of the greatest value: where the
-        reference is hardly known, the past still is. ``within``: the greatest of a value and its bar, and at least the three bars
-        below which the judge says nothing; of a run itself, which has no bar, the greatest value and its tolerance.
+        reference is hardly known, the past still is. ``within``: the greatest of a value and its bar; of a run itself,
+        which has no bar, the greatest value and its tolerance.
         """
         least = 10.0 * 10.0 ** -PLACES[one.unit]
         values, bar, itself = np.abs(one.values), _greatest(bars), metrics.of_itself(one.metric)
@@ -211,7 +211,7 @@ class Limits(NamedTuple):
         if math.isnan(bar) or math.isnan(share):
             return cls(tolerance, None)
         known = _greatest(values + (tolerance if itself else bars))
-        return cls(tolerance, _up(max(least, known, _BARS * bar)))
+        return cls(tolerance, _up(max(least, _ROUNDING * known)))
 
 
 def _greatest(values: Floats) -> float:

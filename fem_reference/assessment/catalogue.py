@@ -62,7 +62,7 @@ class Entry:
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What came of an entry: ``word`` is pass or fail, or cannot say where there is no truth; ``error`` the absolute error and
+    """What came of an entry: ``word`` is pass or fail, or inconclusive where there is no truth; ``error`` the absolute error and
     ``within`` its bound, both in the unit of the entry; NaN where nothing was measured or there is no truth, and then the
     finding's note says why.
     """
@@ -81,7 +81,7 @@ class Result:
 
     @property
     def word(self) -> str:
-        """Pass, fail or cannot say."""
+        """Pass, fail or inconclusive."""
         return judge(self.finding.value, self.truth, self.within)
 
 

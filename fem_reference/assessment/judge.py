@@ -1,4 +1,4 @@
-"""measure + truth + tolerance -> pass, fail or cannot say."""
+"""measure + truth + tolerance -> pass, fail or inconclusive."""
 
 import math
 from collections.abc import Iterable
@@ -12,7 +12,7 @@ from fem_reference.foundations.units import quantity
 from fem_reference.metrics import Measure, units
 from fem_reference.scenes.muscle import Expectation, Scene
 
-Word = Literal["pass", "fail", "cannot say", "not judged"]
+Word = Literal["pass", "fail", "inconclusive", "not judged"]
 _KINDS = {
     "mm": ("a length", 1.0),
     "%": ("a fraction", 100.0),
@@ -38,21 +38,28 @@ class Verdict:
 
 
 def judge(value: float, truth: float, within: float, error_bar: float = 0.0) -> Word:
-    """Pass only if ``abs(value - truth) <= within``, so NaN never passes; *cannot say* where the truth's own ``error_bar`` is
-    above a third of ``within`` (all four in one unit).
+    """Pass where ``abs(value - truth) <= within`` wherever within its ``error_bar`` the truth is, fail where it is nowhere, else
+    inconclusive (all four in one unit). What is no number fails; without a bar, or anything that is allowed, nothing is known.
 
-    >>> judge(1.02, 1.0, 0.05), judge(float("nan"), 1.0, 0.05), judge(1.02, 1.0, 0.05, error_bar=0.02)
-    ('pass', 'fail', 'cannot say')
+    >>> judge(1.02, 1.0, 0.05), judge(float("nan"), 1.0, 0.05), judge(1.02, 1.0, 0.05, error_bar=0.04)
+    ('pass', 'fail', 'inconclusive')
+    >>> judge(3.0, 1.0, 0.05, error_bar=1.0)
+    'fail'
     """
-    if not error_bar <= within / 3:
-        return "cannot say"
-    return "pass" if abs(value - truth) <= within else "fail"
+    miss = abs(value - truth)
+    if math.isnan(miss):
+        return "fail"
+    if math.isnan(within) or math.isnan(error_bar):
+        return "inconclusive"
+    if miss - error_bar > within:
+        return "fail"
+    return "pass" if miss + error_bar <= within else "inconclusive"
 
 
 def overall(words: Iterable[Word]) -> Word:
-    """Fail if one fails, else cannot say if one cannot, else pass; not judged where there is none."""
+    """Fail if one fails, else inconclusive if one is, else pass; not judged where there is none."""
     found = set(words)
-    order: tuple[Word, ...] = ("fail", "cannot say", "pass")
+    order: tuple[Word, ...] = ("fail", "inconclusive", "pass")
     return next((word for word in order if word in found), "not judged")
 
 
@@ -90,11 +97,13 @@ def verdict(
     known = [0.0 if bars is None else float(bars[frame]) for frame in frames]
     words = [judge(value, truth, within, bar) for value, bar in zip(values, known, strict=True)]
     word = overall(words)
-    # The frame that decides: the first that fails, else that with the greatest bar of those that cannot be told, else the one
+    # The frame that decides: the first that fails, else that with the greatest bar of those that are inconclusive, else the one
     # furthest from the truth.
     furthest = max(range(len(values)), key=lambda k: abs(values[k] - truth))
-    widest = max(range(len(values)), key=lambda k: math.inf if math.isnan(known[k]) else known[k])
-    decides = words.index("fail") if word == "fail" else widest if word == "cannot say" else furthest
+    widest = max(
+        range(len(values)), key=lambda k: (words[k] == "inconclusive", math.inf if math.isnan(known[k]) else known[k])
+    )
+    decides = words.index("fail") if word == "fail" else widest if word == "inconclusive" else furthest
     bar = None if bars is None else known[decides]
     frame = numbers[frames[decides]]
     return Verdict(word, expectation, values[decides], truth, within, found.unit, frame, bar)

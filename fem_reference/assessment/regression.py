@@ -17,7 +17,7 @@ from fem_reference.foundations.mesh import Floats
 
 Question = Literal["unchanged", "within"]
 MOVED = "positions.moved"
-WORST_FIRST: tuple[Word, ...] = ("fail", "cannot say", "pass")
+WORST_FIRST: tuple[Word, ...] = ("fail", "inconclusive", "pass")
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Judgement:
             return "there is no number today"
         if self.question == "unchanged" and math.isnan(self.was):
             return "there is a number today, and there was none"
-        if self.word == "cannot say":
+        if self.word == "inconclusive":
             return self._why_silent
         much = f"{self.away:.4g} {self.unit}"
         told = f"{much} from what it was" if self.question == "unchanged" else f"{much} from the reference"
@@ -72,7 +72,7 @@ class Judgement:
             return "the baseline does not say how far from the reference is allowed; --update does, now that the error bar is known"
         known = "the reference" if self.question == "within" else "the baseline"
         told = f"{known} is known to {self.known:.4g} {self.unit}"
-        return f"{told}, more than a third of the {self.allowed:.4g} {self.unit} allowed"
+        return f"{told}, and {self.away:.4g} {self.unit} is that near to the {self.allowed:.4g} {self.unit} allowed"
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class Check:
 
     @property
     def word(self) -> Word:
-        """Fail if one fails, else cannot say if one cannot, else pass."""
+        """Fail if one fails, else inconclusive if one is, else pass."""
         return judge.overall(one.word for one in self.judgements)
 
     def answer(self, question: Question) -> Word:
@@ -146,7 +146,7 @@ def _judged(question: Question, what: tuple[str, str], frames: _Frames, allowed:
     """The judgement by the frame that decides: of those with the word that counts, the one furthest off, or known worst."""
     words = [_word(*map(float, row), allowed=allowed) for row in zip(*frames, strict=True)]
     word = judge.overall(words)
-    deciding = frames.bars if word == "cannot say" else np.abs(frames.today - frames.truth)
+    deciding = frames.bars if word == "inconclusive" else np.abs(frames.today - frames.truth)
     furthest = np.where(np.isnan(deciding), np.inf, deciding)
     k = int(np.argmax(np.where([each == word for each in words], furthest, -1.0)))
     was, value, _, bar = (float(column[k]) for column in frames)
@@ -156,7 +156,7 @@ def _judged(question: Question, what: tuple[str, str], frames: _Frames, allowed:
 def _word(was: float, value: float, truth: float, bar: float, *, allowed: float) -> Word:
     """The verdict on one frame; where there was no number and is none, nothing can be said."""
     if math.isnan(was) and math.isnan(value):
-        return "cannot say"
+        return "inconclusive"
     return judge.judge(value, truth, allowed, bar)
 
 

@@ -43,9 +43,9 @@ def text(check: Check) -> str:
     """What is printed: the worst failures, why nothing can be said of others, and the verdict."""
     lines = _most([f"fail: {_named(one)} at frame {one.frame}: {one.why}" for one in _of(check, "fail")])
     silent: dict[str, list[str]] = {}
-    for one in _of(check, "cannot say"):
+    for one in _of(check, "inconclusive"):
         silent.setdefault(one.why, []).append(_named(one))
-    lines += _most([f"cannot say: {why} ({_few(names)})" for why, names in silent.items()])
+    lines += _most([f"inconclusive: {why} ({_few(names)})" for why, names in silent.items()])
     lines += [f"note: {note}" for note in check.notes]
     lines += [f"{check.candidate} on {check.case}:", *(f"  {line}" for line in _answers(check))]
     return "\n".join([*lines, f"verdict: {check.word}"])
@@ -71,7 +71,7 @@ def junit(check: Check, seconds: float) -> str:
     what the whole check took.
     """
     counts = {"tests": len(check.judgements), "failures": check.count("fail"), "errors": 0}
-    counts |= {"skipped": check.count("cannot say")}
+    counts |= {"skipped": check.count("inconclusive")}
     told = {name: str(count) for name, count in counts.items()} | {"time": f"{seconds:.3f}"}
     root = ElementTree.Element("testsuites", told)
     suite = ElementTree.SubElement(root, "testsuite", {"name": f"{check.case}.{check.candidate}"} | told)
