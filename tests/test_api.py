@@ -43,6 +43,8 @@ def test_a_case_goes_from_its_file_to_a_page(tmp_path) -> None:
     count = len(lines)
     assert fr.solve(case, "pbd", store=tmp_path / "runs", progress=lines.append).folder == reference.folder
     assert "solved before" in lines[count]
+    assert case.title in case._repr_html_()
+    assert "converged: 20 iterations" in reference._repr_html_()
     mine = fr.read_run(reference.folder, case)
     assert np.abs(mine.positions - reference.positions).max() == 0
     with pytest.raises(fr.InputError, match="a reference that carries the fibres"):
@@ -56,6 +58,10 @@ def test_a_reference_is_compared_exported_and_written(tmp_path) -> None:
     result = fr.compare(case, reference, [pbd])
     assert result["pbd", "surface_deviation", "max"].values[-1] > 0
     assert result["reference", "volume", "deviation"].unit == "%"
+    shown = result._repr_html_()
+    assert shown.count("<tr>") == 1 + 4
+    volume = result["pbd", "volume", "deviation"]
+    assert f"{volume.values[volume.worst]:.4g} %" in shown
     with pytest.raises(KeyError):
         result["pbd", "surface_deviation", "deepest"]
     assert fr.write_report(result, tmp_path / "page").read_text().startswith("<!DOCTYPE html>")

@@ -6,6 +6,7 @@ from fem_reference.assessment.error_bars import ErrorBars, Of
 from fem_reference.assessment.judge import Verdict, Word, overall, verdict
 from fem_reference.assessment.ranking import Ranking, rankings
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.markup import table
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import join
 from fem_reference.metrics import Measure, Yardstick, at_rest, find, measure
@@ -13,6 +14,14 @@ from fem_reference.metrics.fibre_length import extension_error
 from fem_reference.problems.muscle import Setup
 from fem_reference.runs.store import Run
 from fem_reference.scenes.muscle import Expectation, Scene
+
+# What a notebook shows of a candidate; the page has it all.
+_SHOWN = (
+    ("volume", "deviation"),
+    ("fibre_length", "rms_percent"),
+    ("surface_deviation", "rms"),
+    ("surface_deviation", "max"),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +52,21 @@ class Comparison:
         if found is None:
             raise KeyError(key)
         return found
+
+    def _repr_html_(self) -> str:
+        """What notebooks show: the greatest deviation of each candidate, with its frame and how well it is known."""
+        rows = [
+            (name, f"{one.metric}.{one.statistic}", f"{one.values[one.worst]:.4g} {one.unit}", self._known(one), number)
+            for name, measures in self.deviations.items()
+            for one in measures
+            if (one.metric, one.statistic) in _SHOWN
+            for number in [self.reference.numbers[one.worst]]
+        ]
+        return table(f"{self.scene.name}: {self.word}", ("candidate", "measure", "greatest", "known to", "frame"), rows)
+
+    def _known(self, one: Measure) -> str:
+        bar = self.error_bars and self.error_bars.find("deviation", one.metric, one.statistic)
+        return f"± {bar.values[one.worst]:.2g} {one.unit}" if bar else ""
 
     @property
     def rankings(self) -> tuple[Ranking, ...]:

@@ -23,7 +23,7 @@ from pydantic import Field, field_validator
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.limits import Limit
 from fem_reference.foundations.records import Record, parse
-from fem_reference.foundations.units import unit_of
+from fem_reference.foundations.units import unit_of, written
 
 
 class Functions(Protocol):
@@ -297,22 +297,15 @@ def find(name: str) -> type[Record]:
 
 def make(name: str, **parameters: Any) -> "Effect":
     """The effect ``name`` with its parameters as scene files write them, or as numbers in mm, N, MPa, s, tonne; InputError where
-    they do not suit it.
+    there is none, or they do not suit it.
 
     >>> make("neo_hooke", mu="10 kPa").mu, make("neo_hooke", mu=0.01).mu
     (0.01, 0.01)
     """
+    if name not in names():
+        raise InputError("effect", f'"{name}"', f"one of {', '.join(names())}")
     record = find(name)
     units = {key: unit_of(field.metadata) for key, field in record.model_fields.items()}
-    made = parse(record, {key: _with_unit(value, units.get(key, "")) for key, value in parameters.items()}, name)
-    if not isinstance(made, Effect):
-        raise InputError(name, "an effect of scalar fields", f"one of {', '.join(names())}")
+    made = parse(record, {key: written(value, units.get(key, "")) for key, value in parameters.items()}, name)
+    assert isinstance(made, Effect)
     return made
-
-
-def _with_unit(value: Any, unit: str) -> Any:
-    """A number, or three, as text with the ``unit`` that it has inside; what has no unit, or is text, as it is."""
-    if not unit or isinstance(value, str | bool):
-        return value
-    numbers = value if isinstance(value, Sequence) else (value,)
-    return f"{', '.join(repr(float(number)) for number in numbers)} {unit}"

@@ -8,7 +8,7 @@ import re
 import sys
 from collections.abc import Sequence
 from functools import cache, partial
-from typing import Annotated
+from typing import Annotated, Any
 
 import pint
 from pydantic import BeforeValidator
@@ -154,3 +154,15 @@ def unit_of(metadata: Sequence[object]) -> str:
     """
     readers = [entry.func for entry in metadata if isinstance(entry, BeforeValidator)]
     return next((_INSIDE[reader.keywords["kind"]] for reader in readers if isinstance(reader, partial)), "")
+
+
+def written(value: Any, unit: str) -> Any:
+    """A number, or three, as text with the ``unit`` that it has inside; what has no unit, or is text, as it is.
+
+    >>> written(0.01, "MPa"), written((0, 0, -1), "mm"), written("2 cm", "mm"), written(3, "")
+    ('0.01 MPa', '0.0, 0.0, -1.0 mm', '2 cm', 3)
+    """
+    if not unit or isinstance(value, str | bool):
+        return value
+    numbers = value if isinstance(value, Sequence) else (value,)
+    return f"{', '.join(repr(float(number)) for number in numbers)} {unit}"

@@ -24,6 +24,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.markup import fact_table
 from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh
 from fem_reference.io import files
 from fem_reference.runs import states
@@ -85,6 +86,23 @@ class Run:
     origin: dict[str, Any] = field(default_factory=dict)
     folder: Path | None = None
     has_surface: bool = True
+
+    def _repr_html_(self) -> str:
+        """What notebooks show."""
+        cost = {
+            name: value
+            for name, value in self.outcome.cost.items()
+            if name in ("seconds", "newton_iterations", "unknowns")
+        }
+        facts = {
+            "solver": self.solver,
+            "status": f"{self.outcome.status}: {self.outcome.message}",
+            "frames": f"{len(self.numbers)}, from {self.numbers[0]} to {self.numbers[-1]}",
+            "vertices": len(self.surface.points),
+            "cost": ", ".join(f"{name} {value:.4g}" for name, value in cost.items()) or "not known",
+            "stored in": self.folder or "nowhere",
+        }
+        return fact_table(f"run {self.name}", facts)
 
 
 class Writer:

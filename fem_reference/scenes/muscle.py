@@ -13,6 +13,7 @@ from pydantic import ConfigDict, Field, model_validator
 
 from fem_reference.effects import Effect
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.markup import fact_table
 from fem_reference.foundations.records import Record, join
 from fem_reference.foundations.units import AreaStiffness, LengthUnit, PositiveLength, Time
 from fem_reference.scenes.bones import Bone
@@ -206,6 +207,19 @@ class Scene(SceneFile):
     def effects(self) -> tuple[Effect, ...]:
         """The effects, in the order of the file."""
         return self.effect
+
+    def _repr_html_(self) -> str:
+        """What notebooks show."""
+        facts = {
+            "muscle": f"{self.muscle.surface}, tetrahedra of {self.muscle.tet_size / 2**self.muscle.refinements:g} mm",
+            "bones": ", ".join(bone.name for bone in self.bone),
+            "attachments": ", ".join(attachment.name for attachment in self.attachment) or "none",
+            "effects": ", ".join(effect.title for effect in self.effects),
+            "frames": f"{self.frames.first} to {self.frames.last}, every {self.frames.every}",
+            "reference": self.reference.solver,
+            "candidates": ", ".join(candidate.name for candidate in self.candidate) or "none",
+        }
+        return fact_table(f"{self.name}: {self.title}", facts)
 
     def file(self, text: str, key: str) -> Path:
         """The file that ``key`` names; see :func:`locate`."""

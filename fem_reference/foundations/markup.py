@@ -1,0 +1,24 @@
+"""Small tables in HTML, by which records show themselves in a notebook."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+
+
+def fact_table(title: str, facts: Mapping[str, object]) -> str:
+    """A ``title`` over a table of names and values, all as plain text.
+
+    >>> fact_table("bar", {"status": "a < b"})
+    '<b>bar</b><table><tr><th style="text-align:left">status</th><td style="text-align:left">a &lt; b</td></tr></table>'
+    """
+    left = ' style="text-align:left"'
+    rows = (
+        f"<tr><th{left}>{escape(name)}</th><td{left}>{escape(str(value))}</td></tr>" for name, value in facts.items()
+    )
+    return f"<b>{escape(title)}</b><table>{''.join(rows)}</table>"
+
+
+def table(title: str, heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """A ``title`` over a table with ``heads`` and ``rows``, all as plain text."""
+    head = "".join(f"<th>{escape(name)}</th>" for name in heads)
+    body = "".join(f"<tr>{''.join(f'<td>{escape(str(cell))}</td>' for cell in row)}</tr>" for row in rows)
+    return f"<b>{escape(title)}</b><table><tr>{head}</tr>{body}</table>"
