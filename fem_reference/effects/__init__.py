@@ -296,8 +296,7 @@ def find(name: str) -> type[Record]:
 
 
 def make(name: str, **parameters: Any) -> "Effect":
-    """The effect ``name`` with its parameters as scene files write them, or as numbers in mm, N, MPa, s, tonne; InputError where
-    there is none, or they do not suit it.
+    """The effect ``name``, its parameters as in scene files or numbers in mm, N, MPa, s, tonne; InputError where one is wrong.
 
     >>> make("neo_hooke", mu="10 kPa").mu, make("neo_hooke", mu=0.01).mu
     (0.01, 0.01)
