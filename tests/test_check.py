@@ -102,7 +102,8 @@ def test_passes_on_the_same_run_and_fails_when_a_frame_is_moved(work, capsys) ->
 
 def test_where_nothing_can_be_said_it_is_told_and_holds_nothing_up(work, capsys) -> None:
     table = json.loads(work.baseline.read_text())
-    table["measures"]["surface_deviation.rms"]["within"] = 1e-3  # below any bar of this reference
+    rms = table["measures"]["surface_deviation.rms"]
+    rms["within"] = max(rms["values"])  # somewhere in the bar of this reference, which is more than nothing
     work.baseline.write_text(json.dumps(table))
     assert work.check() == cli.DONE
     printed = capsys.readouterr().out

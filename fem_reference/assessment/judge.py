@@ -39,17 +39,19 @@ class Verdict:
 
 def judge(value: float, truth: float, within: float, error_bar: float = 0.0) -> Word:
     """Pass where ``abs(value - truth) <= within`` wherever within its ``error_bar`` the truth is, fail where it is nowhere, else
-    inconclusive (all four in one unit). What is no number fails; without a bar, or anything that is allowed, nothing is known.
+    inconclusive (all four in one unit). A value that is no number fails; without a truth, a tolerance or a bar nothing is known.
 
     >>> judge(1.02, 1.0, 0.05), judge(float("nan"), 1.0, 0.05), judge(1.02, 1.0, 0.05, error_bar=0.04)
     ('pass', 'fail', 'inconclusive')
     >>> judge(3.0, 1.0, 0.05, error_bar=1.0)
     'fail'
     """
+    if math.isnan(truth) or math.isnan(within):
+        return "inconclusive"
     miss = abs(value - truth)
     if math.isnan(miss):
         return "fail"
-    if math.isnan(within) or math.isnan(error_bar):
+    if math.isnan(error_bar):
         return "inconclusive"
     if miss - error_bar > within:
         return "fail"

@@ -154,9 +154,11 @@ def _judged(question: Question, what: tuple[str, str], frames: _Frames, allowed:
 
 
 def _word(was: float, value: float, truth: float, bar: float, *, allowed: float) -> Word:
-    """The verdict on one frame; where there was no number and is none, nothing can be said."""
+    """The verdict on one frame; where there was no number and is none, it is inconclusive, and where there is one now, it fails."""
     if math.isnan(was) and math.isnan(value):
         return "inconclusive"
+    if math.isnan(truth):
+        return "fail"
     return judge.judge(value, truth, allowed, bar)
 
 

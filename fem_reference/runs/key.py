@@ -73,8 +73,8 @@ def _files(folder: Path) -> set[Path]:
 
 
 def _module(package: Path, parts: list[str]) -> set[Path]:
-    """The files of the module that is ``parts`` below ``package``, and of what it is in; of a solver that is a folder, all of it.
-    Nothing where there is no such module.
+    """The files of the module that is ``parts`` below ``package``, and of the packages that it is in but the first, which only
+    lists public names; of a solver that is a folder, all of it. Nothing where there is no such module.
     """
     place = package.joinpath(*parts)
     if place.is_dir():
@@ -82,7 +82,7 @@ def _module(package: Path, parts: list[str]) -> set[Path]:
         own = _files(place) if solver else {place / "__init__.py"}
     else:
         own = {place.with_suffix(".py")} if parts else set()
-    above = {package.joinpath(*parts[:n], "__init__.py") for n in range(len(parts))}
+    above = {package.joinpath(*parts[:n], "__init__.py") for n in range(1, len(parts))}
     return {path for path in own | above if path.is_file()}
 
 
