@@ -13,6 +13,8 @@ import fem_reference as fr
 from fem_reference.foundations.subprocesses import command, environment
 from fem_reference.solvers.fenicsx import processes
 
+pytestmark = pytest.mark.slow
+
 README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
 (STRETCHED_BLOCK,) = (block for block in re.findall(r"```python\n(.*?)```", README, re.DOTALL) if "Prescribed" in block)
 

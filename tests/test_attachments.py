@@ -198,6 +198,7 @@ def test_the_area_converges_as_the_tets_shrink() -> None:
         assert_allclose(area, wanted, rtol=within)
 
 
+@pytest.mark.slow
 def test_the_origins_of_gluteus_maximus(data: Path, tmp_path: Path) -> None:
     muscle = check_closed(files.read_surface(data / "hip/muscles/gluteus_maximus.vtk", 1.0))
     clouds = tuple(f"LC_SET_Ori_{i}_R_M081_Glut_Max" for i in (1, 2))

@@ -9,6 +9,8 @@ from scipy.optimize import brentq
 from fem_reference.scenes import casefile
 from fem_reference.studies.execution import Bench
 
+pytestmark = pytest.mark.slow
+
 MU, BULK, AREA = 0.01, 10.0, 1e4  # [MPa], [mm2]
 
 

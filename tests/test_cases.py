@@ -8,6 +8,8 @@ from fem_reference import cli
 from fem_reference.cli import scalar
 from fem_reference.scenes import casefile
 
+pytestmark = pytest.mark.slow
+
 # The way there and back in its two ends and a middle; the bulk of the time is the number of frames.
 FEW = {"frames.every": 100}
 # As its scene fills it, before tetrahedra are cut into eight.

@@ -18,6 +18,8 @@ from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
 from fem_reference.solvers import fenicsx, pbd
 
+pytestmark = pytest.mark.slow
+
 # What the README shows, in the repository of a user.
 README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
 EXAMPLE = next(block for block in re.findall(r"```python\n(.*?)```", README, re.DOTALL) if "write_frames" in block)

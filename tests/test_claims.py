@@ -16,6 +16,8 @@ from fem_reference.scenes import casefile
 from fem_reference.solvers import fenicsx
 from fem_reference.studies import refinement, true_errors
 
+pytestmark = pytest.mark.slow
+
 NAN = float("nan")
 
 

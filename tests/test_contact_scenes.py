@@ -18,6 +18,8 @@ from fem_reference.solvers import fenicsx
 from fem_reference.verification import parts
 from fem_reference.verification.contact import Slide
 
+pytestmark = pytest.mark.slow
+
 BALL = '[[bone]]\nname = "ball"\nsphere = {{ centre = "5, {y}, 30 mm", radius = "4 mm" }}\n\n[[attachment]]\nname = "origin"'
 CONTACT = '[[effect]]\nname = "contact"\nstiffness = "1 MPa/mm"\nsmoothing = "0.1 mm"\n\n[fibres]'
 

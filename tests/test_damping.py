@@ -15,6 +15,8 @@ from fem_reference.solvers.fenicsx import BodySettings
 from fem_reference.solvers.scikit_fem import BodySettings as OtherSettings
 from fem_reference.solvers.scikit_fem import solve_body
 
+pytestmark = pytest.mark.slow
+
 DRAG = effect("damping", coefficient="1 Pa s/mm^2")
 
 

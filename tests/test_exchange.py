@@ -31,6 +31,8 @@ from fem_reference.scenes.muscle import Scene
 from fem_reference.solvers import recorded
 from fem_reference.studies.execution import Bench
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:

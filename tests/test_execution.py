@@ -18,6 +18,8 @@ from fem_reference.scenes.muscle import SolverChoice
 from fem_reference.studies import execution
 from fem_reference.studies.execution import Bench, complete
 
+pytestmark = pytest.mark.slow
+
 
 def bench(folder: Path, **changes) -> Bench:
     return Bench(casefile.read(small.write(folder / "bar"), changes=changes or None), folder / "runs")

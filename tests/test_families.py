@@ -22,6 +22,8 @@ from fem_reference.studies import table_5_1
 from fem_reference.studies.benchmark import candidates
 from fem_reference.studies.execution import Bench
 
+pytestmark = pytest.mark.slow
+
 PBD = {"sub_iterations": 1, "solver_iterations": 1, "damping": 0.0, "stretch": 1.0, "volume": 1.0, "bending": 0.5}
 ROWS = (
     Family(name="FEM", form="Volumetric model", speed="---", precision="+++", literature="[59]"),

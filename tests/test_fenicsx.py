@@ -16,6 +16,8 @@ from fem_reference.solvers.fenicsx import Settings, processes
 from fem_reference.solvers.fenicsx.processes import MARK, running
 from validation.torsion import square_bar_stiffness
 
+pytestmark = pytest.mark.slow
+
 MU, BULK = 0.01, 10.0
 MUSCLE = (
     effects.find("neo_hooke").model_validate({"mu": f"{MU} MPa"}),

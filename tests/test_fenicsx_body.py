@@ -20,6 +20,8 @@ from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import BodySettings
 from fem_reference.solvers.fenicsx.jobs import Job
 
+pytestmark = pytest.mark.slow
+
 ALL = (0, 1, 2)
 ONCE = [{"frame": 0, "amount": 0.0}, {"frame": 1, "amount": 1.0}]
 BOTH = pytest.mark.parametrize("element", ["P2/P1", "Q1/P0"])

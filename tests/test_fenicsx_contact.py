@@ -13,6 +13,8 @@ from fem_reference.solvers import scikit_fem
 from fem_reference.verification import contact, parts
 from fem_reference.verification.contact import Slide
 
+pytestmark = pytest.mark.slow
+
 HELD = (Prescribed("ground", "z0", (0, 1, 2), Rest()),)
 LAW = Contact("z1", 1.0, 0.01)
 

@@ -14,9 +14,13 @@ from fem_reference.runs.scalar import Solution
 from fem_reference.solvers import fenicsx, scikit_fem
 from fem_reference.solvers.fenicsx import FieldSettings, field
 
-pytestmark = pytest.mark.skipif(
-    not any(importlib.util.find_spec(name) for name in ("dolfinx_solver", "dolfinx")), reason="FEniCSx is not installed"
-)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        not any(importlib.util.find_spec(name) for name in ("dolfinx_solver", "dolfinx")),
+        reason="FEniCSx is not installed",
+    ),
+]
 
 DIFFUSION = {"name": "diffusion", "coefficient": 0.7}
 

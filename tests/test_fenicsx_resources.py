@@ -16,6 +16,8 @@ from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import BodySettings, Settings, resources
 from fem_reference.verification.parts import resistance
 
+pytestmark = pytest.mark.slow
+
 
 def box(element: str, counts=(2, 3, 4)):
     return shapes.box(counts, (1.0, 1.0, 1.0), ELEMENTS[element][0])

@@ -22,6 +22,8 @@ from fem_reference.solvers.fenicsx import BodySettings, Settings
 from fem_reference.studies.execution import Bench
 from validation import homogeneous, laws
 
+pytestmark = pytest.mark.slow
+
 MU, BULK = 0.01, 10.0
 MATRIX = (make("neo_hooke"), make("incompressible"))
 PENALTY = (make("neo_hooke"), make("incompressible_penalty"))

@@ -15,6 +15,8 @@ from fem_reference.report import field_figures, field_page
 from fem_reference.runs.scalar import FieldRun, Solution
 from fem_reference.runs.store import Outcome
 
+pytestmark = pytest.mark.slow
+
 NAN = float("nan")
 DIFFUSION = {"name": "diffusion", "coefficient": 1.0}
 SOURCE = {"name": "source", "strength": "-1", "where": "everywhere"}

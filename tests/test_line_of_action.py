@@ -23,6 +23,8 @@ from fem_reference.report import gallery
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import line_of_action
 
+pytestmark = pytest.mark.slow
+
 SWING = Rotation((1, 0, 0), (5, 25, 15), (0.0, 10.0), (0.0, 1.2))
 
 

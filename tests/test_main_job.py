@@ -17,6 +17,8 @@ from fem_reference.io import files
 from fem_reference.runs import store
 from fem_reference.scenes import casefile
 
+pytestmark = pytest.mark.slow
+
 
 class Job:
     """The small scene, compared once: its folder, its outputs and its JSON."""

@@ -17,6 +17,8 @@ from fem_reference.geometry.intersections import self_intersections
 from fem_reference.io.files import read_polylines, read_surface
 from fem_reference.scenes.muscle import HOME
 
+pytestmark = pytest.mark.slow
+
 FOLDERS = sorted(path for path in (HOME / "meshes").iterdir() if path.is_dir())
 CARDS = {folder: tomllib.loads((folder / "card.toml").read_text(encoding="utf-8"))["file"] for folder in FOLDERS}
 FILES = [pytest.param(folder / entry["name"], entry, id=entry["name"]) for folder in FOLDERS for entry in CARDS[folder]]

@@ -2,10 +2,14 @@
 
 from pathlib import Path
 
+import pytest
+
 from fem_reference.metrics import Yardstick, find, measure
 from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
 from fem_reference.studies.execution import Bench
+
+pytestmark = pytest.mark.slow
 
 
 def test_unrelated_meshes_of_one_size_differ_by_less_than_two_sizes(data, tmp_path) -> None:

@@ -344,6 +344,7 @@ def pressed(pose, spacing):
     return apply(np.linalg.inv(pose), frames[16])
 
 
+@pytest.mark.slow
 def test_a_turned_grid_is_felt_by_less_than_a_tenth_of_its_spacing():
     # Two iterations after the first touch: what slides on the ball later doubles the difference every few iterations. The distance
     # is interpolated across the edges of the ball, so that half the spacing has at most half the error.

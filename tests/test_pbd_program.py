@@ -29,6 +29,8 @@ from fem_reference.solvers.program_kernels import (
     six_volumes,
 )
 
+pytestmark = pytest.mark.slow
+
 USUAL = {"sub_iterations": 3, "damping": 0.01, "bending": 0.9, "voxels": 64}
 SETTINGS = pbd_program.Settings(**USUAL)
 SWING = Rotation((1, 0, 0), (0, 20, -10), (0.0, 50.0), (0.0, 0.5))

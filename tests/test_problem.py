@@ -20,6 +20,8 @@ from fem_reference.runs.store import Frame
 from fem_reference.scenes import casefile
 from fem_reference.solvers import fenicsx
 
+pytestmark = pytest.mark.slow
+
 
 def build(case):
     return build_scene(casefile.read(case))

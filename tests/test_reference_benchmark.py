@@ -16,6 +16,8 @@ from fem_reference.studies.benchmark import checkout, reference, reference_table
 from fem_reference.studies.benchmark.checkout import Commit
 from fem_reference.studies.benchmark.reference import BEFORE, NOW, Taken, Timing
 
+pytestmark = pytest.mark.slow
+
 COMMIT = Commit("HEAD~3", "0" * 40, "0000000")
 TINY = ("Q1/P0", 1, 3)
 

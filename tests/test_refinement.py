@@ -23,6 +23,8 @@ from fem_reference.solvers.fenicsx import Settings
 from fem_reference.studies import refinement
 from fem_reference.studies.execution import Bench
 
+pytestmark = pytest.mark.slow
+
 CONTACT = '\n[[effect]]\nname = "contact"\nstiffness = "100 kPa/mm"\nsmoothing = "0.2 mm"\n'
 VISCOSITY = '\n[[effect]]\nname = "viscosity"\neta = "1 kPa s"\n'
 CONTACT_GIVES = 1e-5

@@ -315,6 +315,7 @@ def test_cameras_do_not_look_through_plates(comparison):
     np.testing.assert_allclose(gallery.directions(body, bones[1:])[0], [0, 0, -1], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_pictures_show_the_candidate_in_the_colours_of_the_bar(comparison, monkeypatch):
     from PIL import Image
 

@@ -85,6 +85,7 @@ def test_the_rim_of_a_face_is_its_sharp_edges(size: float) -> None:
     assert np.abs(np.minimum(np.abs(np.abs(rim[:, 0] - 40) - 40), np.abs(np.abs(rim[:, 1] - 30) - 30))).max() < 0.15
 
 
+@pytest.mark.slow
 def test_two_attachments_side_by_side_share_their_rim() -> None:
     x, y, z = BOX.points.T
     on_top = (z == 80) & (np.abs(x - 40) <= 25) & (np.abs(y - 30) <= 20)

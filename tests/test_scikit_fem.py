@@ -101,6 +101,7 @@ MIXED = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("order", "form"), [(1, "galerkin"), (2, "galerkin"), (1, "supg"), (2, "supg")])
 def test_manufactured_orders_in_the_plane(tmp_path, order, form) -> None:
     scene = fields.scene(

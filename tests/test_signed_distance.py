@@ -112,6 +112,7 @@ def test_everything_goes_on_across_the_faces_of_cells(ball: Grid, axis: int) -> 
         assert_allclose(one, other, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_coarse_far_field_leaves_the_margin_alone(monkeypatch) -> None:
     asked = []
 
@@ -178,6 +179,7 @@ def test_what_bounds_no_body() -> None:
         build(Surface(BALL.points[1:], BALL.triangles, "ball"), 1.0, 4.0)
 
 
+@pytest.mark.slow
 def test_resolve_halves_until_the_error_is_reached() -> None:
     body = shapes.sphere(3, RADIUS)
     first = np.ptp(body.points, axis=0).max() / 24
@@ -252,6 +254,7 @@ def test_grids_travel_between_processes(ball: Grid) -> None:
     assert_allclose(pickle.loads(pickle.dumps(ball)).sample(points).distance, ball.sample(points).distance, rtol=0)
 
 
+@pytest.mark.slow
 def test_a_real_bone_at_its_middle_and_beside_it(data: Path) -> None:
     bone = files.read_surface(data / "hip/bones/femur_report.vtk", 1.0)
     grid = build(bone, 4.0, 5.0)

@@ -13,6 +13,8 @@ from fem_reference.problems.muscle import Held, Problem
 from fem_reference.runs.store import Frame
 from fem_reference.scenes.muscle import SolverChoice
 
+pytestmark = pytest.mark.slow
+
 MUSCLE = (
     effects.find("neo_hooke").model_validate({"mu": "10 kPa"}),
     effects.find("incompressible").model_validate({"bulk": "10 MPa"}),

@@ -20,6 +20,8 @@ from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import BodySettings, Settings
 from fem_reference.verification.parts import SYMMETRY
 
+pytestmark = pytest.mark.slow
+
 STILL = ((0.0, 0.0, 0.0),) * 3
 THIN, WIDE, LENGTH = 1.0, 1.3, 20.0  # mm
 

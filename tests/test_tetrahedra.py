@@ -28,6 +28,8 @@ from fem_reference.geometry.sectors import held_area, held_shares
 from fem_reference.geometry.tetrahedra import tetrahedralise
 from fem_reference.io import files
 
+pytestmark = pytest.mark.slow
+
 HIP = np.array([146.0, 238.0, -431.0])  # [mm]
 
 

@@ -23,6 +23,8 @@ from fem_reference.verification.homogeneous import everywhere
 from fem_reference.verification.parts import resistance
 from validation.loads import squeezed_volume
 
+pytestmark = pytest.mark.slow
+
 ONCE = [{"frame": 0, "amount": 0.0}, {"frame": 1, "amount": 1.0}]
 COLLAPSED = 0.2  # V/V0 of a cell
 

@@ -12,6 +12,8 @@ from fem_reference.runs.solved import Reached, Solved
 from fem_reference.runs.store import Outcome
 from fem_reference.verification import runner
 
+pytestmark = pytest.mark.slow
+
 ENTRIES = runner.entries()
 # Above some 4 s, or like another one: left to the verb verify.
 SLOW = {

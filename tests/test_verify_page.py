@@ -82,7 +82,7 @@ def test_an_entry_without_a_truth_is_told() -> None:
     text = verify_page.render(verification(lost))
     read(text)
     assert "0 of 1 pass" in text
-    assert '<span class="badge cannot">inconclusive</span>' in text
+    assert '<span class="badge inconclusive">inconclusive</span>' in text
     assert text.count('<span class="bad">not a number</span>') == 3  # truth, error and bound
     assert "no truth, ValueError: no root" in text
     (row,) = verify_page.facts(verification(lost))["entries"]

@@ -18,6 +18,8 @@ from browser import PROGRAM, Browser
 from fem_reference.problems.muscle import Body
 from fem_reference.report import page, viewer
 
+pytestmark = pytest.mark.slow
+
 NAN = float("nan")
 comparison = test_report.comparison
 UP = "!document.getElementById('viewer').hidden"

@@ -18,6 +18,8 @@ from fem_reference.solvers.scikit_fem import BodySettings as OtherSettings
 from fem_reference.solvers.scikit_fem import solve_body
 from fem_reference.verification.parts import SYMMETRY
 
+pytestmark = pytest.mark.slow
+
 THICK = effect("viscosity", eta="20 kPa s")  # with mu = 10 kPa it creeps at 1/2 a second
 
 

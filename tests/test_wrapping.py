@@ -86,6 +86,7 @@ def test_sampled_paths_stay_outside_and_are_as_long_as_told(obstacle) -> None:
         assert_allclose(steps, steps.mean(), rtol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("obstacle", [BALL, ROLL])
 def test_no_path_over_visible_points_is_shorter(obstacle) -> None:
     """Independent of tangents: the least, by SLSQP, over any two points on the obstacle that the ends see."""
