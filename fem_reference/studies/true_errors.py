@@ -14,7 +14,14 @@ from fem_reference.studies.execution import Bench, complete
 
 log = logging.getLogger(__name__)
 
-CASES = ("hip_flexion", "gluteus_maximus", "gluteus_medius", "adductor_brevis", "iliacus_anatomical")
+CASES = (
+    "hip_flexion",
+    "gluteus_maximus",
+    "gluteus_medius",
+    "gluteus_medius_anatomical",
+    "adductor_brevis",
+    "iliacus_anatomical",
+)
 
 
 def stake(scenes: Iterable[Scene], store: Path) -> Claims:
