@@ -1,4 +1,4 @@
-"""Every shipped case: its expectations pass, and with its spoil applied the verdict turns to fail."""
+"""Every shipped case: its expectations pass, and with its negative control applied the verdict turns to fail."""
 
 import json
 
@@ -14,7 +14,7 @@ FEW = {"frames.every": 100}
 COARSE = {"muscle.refinements": 0}
 
 
-# The scalar cases, and the candidate that their spoil turns to fail.
+# The scalar cases, and the candidate that their negative control turns to fail.
 FIELDS = {
     "rod": "listing",
     "rod_advection": "reference",
@@ -38,8 +38,8 @@ UNSOLVED = "iliacus"
 
 
 @pytest.mark.parametrize("name", FIELDS)
-def test_spoiled_scalar_cases_fail(name, tmp_path) -> None:
-    told = scalar.run(casefile.read(name, spoiled=True), solver_of(name), tmp_path)
+def test_scalar_cases_with_negative_control_fail(name, tmp_path) -> None:
+    told = scalar.run(casefile.read(name, with_negative_control=True), solver_of(name), tmp_path)
     assert told.word == "fail"
     assert [v["of"] for v in told.facts["verdicts"] if v["word"] == "fail"] == [FIELDS[name]]
 
@@ -97,8 +97,10 @@ def test_every_case_is_run_here() -> None:
     assert casefile.cases() == sorted(["box_squeeze", "gluteus_maximus", "hip_flexion", UNSOLVED, *FIELDS, *MUSCLES])
 
 
-def test_hip_flexion_spoiled_fails(tmp_path, monkeypatch) -> None:
-    status, facts = run(casefile.read("hip_flexion", changes=FEW | COARSE, spoiled=True), tmp_path, monkeypatch)
+def test_hip_flexion_with_negative_control_fails(tmp_path, monkeypatch) -> None:
+    status, facts = run(
+        casefile.read("hip_flexion", changes=FEW | COARSE, with_negative_control=True), tmp_path, monkeypatch
+    )
     assert status == cli.VERDICT_FAIL
     assert max(map(abs, rows(facts, "volume", "deviation").values())) > 2  # percent, where 0.5 is allowed
 
@@ -172,24 +174,26 @@ def test_muscles_of_the_report(data, name, tmp_path, monkeypatch) -> None:
     assert scene.frames.numbers == (0, 100, 200, 300)
 
 
-# Those held anatomically have the effects, and the spoil, of those held as in the report.
+# Those held anatomically have the effects, and the negative control, of those held as in the report.
 @pytest.mark.parametrize("name", ["adductor_brevis", "box_squeeze_report", "gluteus_maximus", "gluteus_medius"])
-def test_muscles_of_the_report_spoiled_fail(data, name, tmp_path, monkeypatch) -> None:
+def test_muscles_of_the_report_with_negative_control_fails(data, name, tmp_path, monkeypatch) -> None:
     assert data.is_dir()
     last = 110 if name == "gluteus_maximus" else 100  # where it expects something of a recorded candidate
     changes = {"frames.last": last, "frames.every": last, "expect[1].frame": last}
-    status, facts = run(casefile.read(name, changes=changes | coarse(name), spoiled=True), tmp_path, monkeypatch)
+    status, facts = run(
+        casefile.read(name, changes=changes | coarse(name), with_negative_control=True), tmp_path, monkeypatch
+    )
     assert status == cli.VERDICT_FAIL
-    spoiled = "penetration" if name == "adductor_brevis" else "volume"
+    expected = "penetration" if name == "adductor_brevis" else "volume"
     others = {"surface_deviation", "penetration"} - {
-        spoiled
+        expected
     }  # not back at rest yet; coarse tets do not bend around bones
     failed = {verdict["metric"] for verdict in facts["verdicts"] if verdict["verdict"] == "fail"}
-    assert failed - others == {spoiled}
+    assert failed - others == {expected}
 
 
-def test_the_box_spoiled_fails(tmp_path, monkeypatch) -> None:
-    status, facts = run(casefile.read("box_squeeze", changes=FEW, spoiled=True), tmp_path, monkeypatch)
+def test_the_box_with_negative_control_fails(tmp_path, monkeypatch) -> None:
+    status, facts = run(casefile.read("box_squeeze", changes=FEW, with_negative_control=True), tmp_path, monkeypatch)
     assert status == cli.VERDICT_FAIL
     volume = rows(facts, "volume", "deviation")
     assert volume[100] == pytest.approx(2 * -0.267, abs=0.02)  # percent; half the bulk modulus

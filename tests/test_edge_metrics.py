@@ -238,9 +238,9 @@ def test_rigid_motion_and_the_order_of_vertices_change_nothing() -> None:
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e200])
 def test_what_is_not_a_number_never_passes(place: str, bad: float) -> None:
     ball = shapes.sphere(1, 10.0)
-    spoilt = ball.points.copy()
-    spoilt[5] = bad
-    runs = {"run": run_of(ball, ball.points), "reference": run_of(ball, ball.points)} | {place: run_of(ball, spoilt)}
+    damaged = ball.points.copy()
+    damaged[5] = bad
+    runs = {"run": run_of(ball, ball.points), "reference": run_of(ball, ball.points)} | {place: run_of(ball, damaged)}
     yardstick = Yardstick.of(run_of(ball, ball.points), FIBRE, ())
     measures = [
         one

@@ -251,7 +251,7 @@ truth = 0.0
 within = 1.0
 kind = "property"
 because = "it cannot be"
-[spoil]
+[negative_control]
 key = "title"
 value = "another"
 because = "none"

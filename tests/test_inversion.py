@@ -113,9 +113,9 @@ def test_rigid_motion_and_the_order_of_vertices_change_nothing() -> None:
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e200])
 def test_what_is_not_a_number_never_passes(bad: float) -> None:
-    spoilt = BALL.points.copy()
-    spoilt[5] = bad
-    for values in shares(run_of(BALL, BALL.points, spoilt)):
+    damaged = BALL.points.copy()
+    damaged[5] = bad
+    for values in shares(run_of(BALL, BALL.points, damaged)):
         assert np.isnan(values).tolist() == [False, True]
         assert judge(float(values[1]), 0.0, 1e6) == "fail"
 

@@ -222,7 +222,9 @@ def scene(folder: Path) -> Path:
     reference = 'solver = "mass_spring"\nstiffness = "1 N/mm"\ndensity = "1060 kg/m3"\nframe_time = "20 ms"\n'
     head = head.replace('solver = "fenicsx"\nfirst_step = 5\n', reference + 'damping = "0.01 N s/m"\n')
     expected = EXPECTED.format(metric="surface_deviation", within=5) + EXPECTED.format(metric="fibre_length", within=9)
-    rest = rest.replace('within = "0.5 %"', 'within = "50 %"').replace("[spoil]", expected + "\n[spoil]")
+    rest = rest.replace('within = "0.5 %"', 'within = "50 %"').replace(
+        "[negative_control]", expected + "\n[negative_control]"
+    )
     (folder / "case.toml").write_text(head + CANDIDATES + rest)
     return folder
 

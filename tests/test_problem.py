@@ -254,7 +254,7 @@ within = "90 %"
 kind = "property"
 because = "it is a body"
 
-[spoil]
+[negative_control]
 key = "effect[0].mu"
 value = "9 kPa"
 because = "it is softer"

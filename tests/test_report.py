@@ -68,7 +68,7 @@ truth = "0 %"
 within = "0.5 %"
 kind = "property"
 because = "It is <nearly> incompressible & closed."
-[spoil]
+[negative_control]
 key = "effect[0].mu"
 value = "1 kPa"
 because = "softer"
@@ -198,8 +198,8 @@ def test_what_is_not_finite_is_null(comparison):
     told = report.summary(comparison)
     assert value(told["measures"], "torn", "surface_deviation", "rms", 40) is None
     assert value(told["measures"], "torn", "surface_deviation", "rms", 30) == pytest.approx(1.5, abs=1e-12)
-    spoilt = replace(comparison.verdicts[0], word="fail", value=float("inf"))
-    assert report.summary(replace(comparison, verdicts=(spoilt,)))["verdicts"][0]["value"] is None
+    damaged = replace(comparison.verdicts[0], word="fail", value=float("inf"))
+    assert report.summary(replace(comparison, verdicts=(damaged,)))["verdicts"][0]["value"] is None
 
 
 def test_csv_holds_the_same_numbers(comparison, tmp_path):
@@ -394,9 +394,9 @@ def test_curves_have_a_band_as_wide_as_the_error_bar(comparison):
 
 
 def test_a_scene_that_differs_from_its_file_is_told(comparison):
-    spoilt = replace(comparison, scene=casefile.read(comparison.scene.place, spoiled=True))
+    damaged = replace(comparison, scene=casefile.read(comparison.scene.place, with_negative_control=True))
     assert "effect[0].mu" not in re.sub(r"<pre>.*</pre>", "", page.render(comparison), flags=re.DOTALL)
-    assert "<th>effect[0].mu</th><td>0.01 in the file, 0.001 here</td>" in page.render(spoilt)
+    assert "<th>effect[0].mu</th><td>0.01 in the file, 0.001 here</td>" in page.render(damaged)
 
 
 def test_a_reference_turned_inside_out_is_told(comparison):

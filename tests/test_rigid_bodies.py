@@ -109,7 +109,7 @@ def test_gradient_and_curvature_are_the_slopes_of_the_distance(body: Obstacle) -
     slopes = np.stack([(after.distance - before.distance) / (2 * step) for after, before in steps], axis=1)
     bends = np.stack([(after.gradient - before.gradient) / (2 * step) for after, before in steps], axis=2)
     # Central differences are wrong by step^2 / curvature radius^3; on 4000 points few radii are below 0.02: 1e-5.
-    # A ridge or an edge within a step of a point spoils that point alone: the chance is some 1e-5 per point.
+    # A ridge or an edge within a step of a point harms that point alone: the chance is some 1e-5 per point.
     smooth = np.abs(bends - found.curvature).max(axis=(1, 2)) < 1e-5 * (
         1 + np.abs(found.curvature).max(axis=(1, 2)) ** 3
     )

@@ -17,13 +17,19 @@ NAN = float("nan")
 LADDER = ((1.0, 2.16), (0.5, 2.04), (0.25, 2.01))
 
 
-def made(name="bar", value=2.01, *, spoiled=False, truth=2.0, family="long_blocks", **changes) -> Result:
+def made(name="bar", value=2.01, *, with_negative_control=False, truth=2.0, family="long_blocks", **changes) -> Result:
     """A result whose bound is 2 % of a truth of 2: 0.04."""
     given = {key: changes.pop(key) for key in ("order", "ladder", "note") if key in changes}
     told = {"title": f"The <{name}>", "unit": "N mm", "because": "because & so", "source": "Ogden 1984, section 5.2"}
-    numbers = {"truth": lambda: truth, "within": 0.02, "relative": True, "kind": "closed form", "spoil": "mu twice"}
-    entry = Entry(name=name, family=family, measure=None, spoiled=None, **(told | numbers | changes))
-    return result(entry, Finding(value, **given), 1.25, spoiled=spoiled)
+    numbers = {
+        "truth": lambda: truth,
+        "within": 0.02,
+        "relative": True,
+        "kind": "closed form",
+        "negative_control": "mu twice",
+    }
+    entry = Entry(name=name, family=family, measure=None, with_negative_control=None, **(told | numbers | changes))
+    return result(entry, Finding(value, **given), 1.25, with_negative_control=with_negative_control)
 
 
 def verification(*results: Result) -> Verification:
@@ -89,12 +95,12 @@ def test_an_entry_without_a_truth_is_told() -> None:
     assert (row["value"], row["truth"], row["error"], row["within"]) == (2.0, None, None, None)
 
 
-def test_spoiled_entries_are_marked() -> None:
-    text = verify_page.render(verification(made(value=4.0, spoiled=True), made("tip")))
-    assert "1 entry is spoiled on purpose" in text
-    assert text.count('<small class="bad">spoiled</small>') == 1
-    assert '<p class="alarm"><b>Spoiled:</b> mu twice</p>' in text
-    assert text.count("<b>Its spoil:</b>") == 1
+def test_negative_controls_are_marked() -> None:
+    text = verify_page.render(verification(made(value=4.0, with_negative_control=True), made("tip")))
+    assert "1 entry is measured with one thing wrong on purpose" in text
+    assert text.count('<small class="bad">negative control</small>') == 1
+    assert '<p class="alarm"><b>Negative control:</b> mu twice</p>' in text
+    assert text.count("<b>Its negative control:</b>") == 1
 
 
 def test_numbers_have_six_digits_where_value_and_truth_stand_beside_each_other() -> None:
@@ -132,7 +138,7 @@ def test_share_is_the_error_over_its_bound(value, within, expected) -> None:
 
 def test_the_overview_names_every_result_whatever_its_value() -> None:
     values = [2.0, 2.01, 2.0 + 1e-14, 3.0, 1e9, math.inf, NAN]
-    odd = [made(f"bar_{i}", value, spoiled=i % 2 == 1) for i, value in enumerate(values)]
+    odd = [made(f"bar_{i}", value, with_negative_control=i % 2 == 1) for i, value in enumerate(values)]
     svg = verify_figures.overview({"long_blocks": odd, "beams": [made("rod", 2.0)]}).svg
     assert all(name in svg for name in ("rod", "long blocks", "beams", *(one.entry.name for one in odd)))
     assert "nan" not in svg.lower()

@@ -145,9 +145,10 @@ def _recorded(text: str, unit: str | None) -> Candidate:
 
 def verify(options: argparse.Namespace) -> int:
     """Measure problems whose answers are known."""
-    measured = verification.verify(options.names, options.spoil)
+    measured = verification.verify(options.names, options.negative_control)
     status = _told(verification.told(measured), options)  # what took so long to measure is told whatever the page does
-    name = "verify_part" if options.names or options.spoil else "verify"  # a part does not stand in the whole's place
+    part = options.names or options.negative_control
+    name = "verify_part" if part else "verify"  # a part does not replace the whole
     print(f"page: {report.write_verification(measured, out(options), name)}")
     return status
 

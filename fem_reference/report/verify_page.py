@@ -36,8 +36,8 @@ class Verification:
     @property
     def summary(self) -> str:
         """The verdict in one line."""
-        passed, spoiled = len(self.results) - len(self.failed), sum(one.spoiled for one in self.results)
-        told = f", {spoiled} measured with their spoil" if spoiled else ""
+        passed, controls = len(self.results) - len(self.failed), sum(one.with_negative_control for one in self.results)
+        told = f", {controls} measured with their negative control" if controls else ""
         return f"verdict: {self.word}, {passed} of {len(self.results)} pass{told}, {self.seconds:.0f} s"
 
     @property
@@ -91,8 +91,8 @@ def rows(results: Iterable[Result]) -> list[dict[str, Any]]:
             "because": one.entry.because,
             "source": one.entry.source,
             "note": one.finding.note,
-            "spoil": one.entry.spoil,
-            "spoiled": one.spoiled,
+            "negative_control": one.entry.negative_control,
+            "with_negative_control": one.with_negative_control,
         }
         for one in results
     ]

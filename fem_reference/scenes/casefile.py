@@ -15,7 +15,7 @@ from fem_reference.effects.contact import Contact, among
 from fem_reference.effects.damping import Damping
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record, join, parse
-from fem_reference.scenes.muscle import HOME, Scene, SceneFile, Spoil
+from fem_reference.scenes.muscle import HOME, NegativeControl, Scene, SceneFile
 from fem_reference.scenes.scalar import FieldScene, FieldSceneFile
 
 # What a load acts on, where it is no attachment: the surface that no bone holds.
@@ -27,12 +27,15 @@ def cases() -> list[str]:
     return sorted(path.parent.name for path in (HOME / "cases").glob("*/case.toml"))
 
 
-def read(case: str | Path, *, spoiled: bool = False, changes: dict[str, Any] | None = None) -> Scene | FieldScene:
+def read(
+    case: str | Path, *, with_negative_control: bool = False, changes: dict[str, Any] | None = None
+) -> Scene | FieldScene:
     """The scene of a shipped case (by name), a folder with a ``case.toml``, or a scene file: with a ``domain`` that of a scalar
     field, else that of a muscle.
 
-    ``changes`` maps keys such as ``"frames.last"`` or ``"effect[1].bulk"`` to other values; ``spoiled`` applies the case's spoil.
-    That the spoil can be applied is checked too, except after changes of other keys: they may take away what it spoils.
+    ``changes`` maps keys such as ``"frames.last"`` or ``"effect[1].bulk"`` to other values; ``with_negative_control`` applies the
+    case's negative control. That the negative control can be applied is checked too, except after changes of other keys: they may
+    take away what it changes.
     """
     path = _scene_file(case)
     try:
@@ -41,11 +44,11 @@ def read(case: str | Path, *, spoiled: bool = False, changes: dict[str, Any] | N
         raise InputError(path, str(error), "a TOML file") from error
     for key, value in (changes or {}).items():
         _change(table, key, value, str(path))
-    if spoiled:
-        return _spoiled(table, path)
+    if with_negative_control:
+        return _with_negative_control(table, path)
     scene = _scene(table, path)
-    if not changes or any(key.startswith("spoil") for key in changes):
-        _check_spoil(scene, _spoiled(table, path))
+    if not changes or any(key.startswith("negative_control") for key in changes):
+        _check_negative_control(scene, _with_negative_control(table, path))
     return scene
 
 
@@ -94,31 +97,35 @@ def read_muscle(case: str | Path, changes: dict[str, Any] | None = None) -> Scen
     return scene
 
 
-def _spoiled(table: dict[str, Any], path: Path) -> Scene | FieldScene:
-    """The scene with its spoil applied; ``table`` stays as it is."""
+def _with_negative_control(table: dict[str, Any], path: Path) -> Scene | FieldScene:
+    """The scene with its negative control applied; ``table`` stays as it is."""
     place = str(path)
-    spoil = parse(Spoil, table.get("spoil"), join(place, "spoil"))
+    control = parse(NegativeControl, table.get("negative_control"), join(place, "negative_control"))
     table = deepcopy(table)
     try:
-        _change(table, spoil.key, spoil.value, place)
+        _change(table, control.key, control.value, place)
     except InputError as error:
-        raise InputError(join(place, "spoil.key"), f'"{spoil.key}"', "a key of this scene") from error
+        raise InputError(join(place, "negative_control.key"), f'"{control.key}"', "a key of this scene") from error
     try:
         return _scene(table, path)
     except InputError as error:
         why = str(error).removeprefix(f"{place}: ")
-        raise InputError(join(place, "spoil.value"), _told(spoil), f"a value that can be read ({why})") from error
-
-
-def _check_spoil(scene: Scene | FieldScene, spoiled: Scene | FieldScene) -> None:
-    if spoiled.model_copy(update={"spoil": scene.spoil}) == scene:
         raise InputError(
-            join(scene.place, "spoil.value"), _told(scene.spoil), f"a value that changes {scene.spoil.key}"
+            join(place, "negative_control.value"), _told(control), f"a value that can be read ({why})"
+        ) from error
+
+
+def _check_negative_control(scene: Scene | FieldScene, changed: Scene | FieldScene) -> None:
+    if changed.model_copy(update={"negative_control": scene.negative_control}) == scene:
+        raise InputError(
+            join(scene.place, "negative_control.value"),
+            _told(scene.negative_control),
+            f"a value that changes {scene.negative_control.key}",
         )
 
 
-def _told(spoil: Spoil) -> str:
-    return f'"{spoil.value}"' if isinstance(spoil.value, str) else repr(spoil.value)
+def _told(control: NegativeControl) -> str:
+    return f'"{control.value}"' if isinstance(control.value, str) else repr(control.value)
 
 
 def _scene(table: dict[str, Any], path: Path) -> Scene | FieldScene:

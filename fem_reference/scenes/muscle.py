@@ -166,7 +166,7 @@ class Expectation(Record):
     because: str
 
 
-class Spoil(Record):
+class NegativeControl(Record):
     """One change of this scene that must turn its verdict to fail: the ``key`` to change and its ``value``."""
 
     key: str
@@ -188,7 +188,7 @@ class SceneFile(Record):
     reference: SolverChoice
     candidate: tuple[Candidate, ...]
     expect: tuple[Expectation, ...] = Field(min_length=1)
-    spoil: Spoil
+    negative_control: NegativeControl
 
 
 class Scene(SceneFile):

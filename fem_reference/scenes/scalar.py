@@ -9,7 +9,7 @@ from pydantic import Field, field_validator, model_validator
 from fem_reference.effects import FieldEffect
 from fem_reference.foundations.formula import Formula
 from fem_reference.foundations.records import Record
-from fem_reference.scenes.muscle import Candidate, SolverChoice, Spoil, locate
+from fem_reference.scenes.muscle import Candidate, NegativeControl, SolverChoice, locate
 
 
 class Interval(Record):
@@ -126,7 +126,7 @@ class FieldSceneFile(Record):
     reference: SolverChoice
     candidate: tuple[Candidate, ...]
     expect: tuple[FieldExpectation, ...] = Field(min_length=1)
-    spoil: Spoil
+    negative_control: NegativeControl
 
 
 class FieldScene(FieldSceneFile):

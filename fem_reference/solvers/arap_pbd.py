@@ -124,7 +124,7 @@ def _least_root(points: Floats, way: Floats, rest: Constraints) -> float | None:
     """The lambda nearest to 0 at which ``points + lambda way`` (n, 3) have the volume of ``rest``, None where there is none.
 
     Six times the volume is a cubic form: its coefficients are values and slopes at ``points`` and at ``way``. The greatest
-    ``1 / lambda`` is asked for, which a cubic term that is next to nothing does not spoil.
+    ``1 / lambda`` is asked for, which a cubic term that is next to nothing does not harm.
     """
     (value, slope), (cubic, slope_of_way) = volume(points, rest.triangles), volume(way, rest.triangles)
     off = value - rest.six_volumes

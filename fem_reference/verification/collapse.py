@@ -87,8 +87,8 @@ ENTRIES = (
         kind="property",
         source="validation/loads.py: the only state in balance has a thousandth of the volume, which no flesh has",
         measure=partial(collapses, element="P2/P1", poisson=POISSON),
-        spoil="a Poisson ratio of 0.499, with which 0.993 of the volume are kept",
-        spoiled=partial(collapses, element="P2/P1", poisson=NEARLY_INCOMPRESSIBLE),
+        negative_control="a Poisson ratio of 0.499, with which 0.993 of the volume are kept",
+        with_negative_control=partial(collapses, element="P2/P1", poisson=NEARLY_INCOMPRESSIBLE),
     ),
     Entry(
         name="law_outside_its_range",
@@ -102,7 +102,7 @@ ENTRIES = (
         kind="closed form",
         source="validation/loads.py: one scalar equation for the volume, from the energy by hand (Holzapfel 2000, ch. 6.4)",
         measure=partial(outside, element="Q1/P0", poisson=POISSON),
-        spoil="a Poisson ratio of 0.32",
-        spoiled=partial(outside, element="Q1/P0", poisson=STIFFER),
+        negative_control="a Poisson ratio of 0.32",
+        with_negative_control=partial(outside, element="Q1/P0", poisson=STIFFER),
     ),
 )

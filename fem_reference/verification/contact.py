@@ -117,8 +117,8 @@ def _hertz_entry(name: str, title: str, unit: str, attribute: str, value: Any) -
         kind="closed form",
         source="Hertz 1882; validation/hertz.py",
         measure=partial(_measured, n=4, value=value),
-        spoil="a ball of twice the radius",
-        spoiled=partial(_measured, n=4, value=value, radius=2 * RADIUS),
+        negative_control="a ball of twice the radius",
+        with_negative_control=partial(_measured, n=4, value=value, radius=2 * RADIUS),
     )
 
 
@@ -136,8 +136,8 @@ ENTRIES = (
             kind="closed form",
             source="validation/loads.py: the squeeze of a block, in series with the spring",
             measure=partial(plate, element=element, stiffness=PLATE_STIFFNESS),
-            spoil="a plate 1 % stiffer",
-            spoiled=partial(plate, element=element, stiffness=1.01 * PLATE_STIFFNESS),
+            negative_control="a plate 1 % stiffer",
+            with_negative_control=partial(plate, element=element, stiffness=1.01 * PLATE_STIFFNESS),
         )
         for element in ("P2/P1", "Q2/Q1", "Q1/P0")
     ),

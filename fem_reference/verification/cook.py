@@ -89,7 +89,7 @@ class Panel:
 
 
 def _tip_entry(name: str, title: str, panel: Panel, counts: tuple[int, ...], within: float, **told: Any) -> Entry:
-    """An entry whose value is the tip; ``told`` has ``because``, ``spoil`` and ``spoiled``."""
+    """An entry whose value is the tip; ``told`` has ``because``, ``negative_control`` and ``with_negative_control``."""
     return Entry(
         name=name,
         family=FAMILY,
@@ -105,7 +105,7 @@ def _tip_entry(name: str, title: str, panel: Panel, counts: tuple[int, ...], wit
     )
 
 
-def _spoiled(panel: Panel, n: int) -> Callable[[Lab], Finding]:
+def _with_negative_control(panel: Panel, n: int) -> Callable[[Lab], Finding]:
     return partial(once, value=panel.tip, count=n)
 
 
@@ -129,8 +129,10 @@ ENTRIES = (
         (4, 8, 16),
         0.005,
         because="discretisation, held up by the singular clamped corners: 0.15 % too stiff",
-        spoil="Poisson's ratio is 0.4 instead of 1/3, at the same Young's modulus",
-        spoiled=_spoiled(Panel("COMPRESSIBLE", "P2", SMALL, shear=1.4**-1 * 4 / 3, bulk=5 / 3), 16),
+        negative_control="Poisson's ratio is 0.4 instead of 1/3, at the same Young's modulus",
+        with_negative_control=_with_negative_control(
+            Panel("COMPRESSIBLE", "P2", SMALL, shear=1.4**-1 * 4 / 3, bulk=5 / 3), 16
+        ),
     ),
     _tip_entry(
         "cook_compressible_linear",
@@ -139,8 +141,8 @@ ENTRIES = (
         (16, 32, 64),
         0.04,
         because="discretisation by linear cells",
-        spoil="Poisson's ratio is 0.4999, at the same Young's modulus: it locks",
-        spoiled=_spoiled(_NEARLY_LINEAR, 64),
+        negative_control="Poisson's ratio is 0.4999, at the same Young's modulus: it locks",
+        with_negative_control=_with_negative_control(_NEARLY_LINEAR, 64),
     ),
     _tip_entry(
         "cook_nearly_incompressible",
@@ -149,8 +151,8 @@ ENTRIES = (
         (4, 8, 16),
         0.005,
         because="discretisation, held up by the singular clamped corners: 0.16 % too stiff",
-        spoil="linear tetrahedra without a pressure",
-        spoiled=_spoiled(_NEARLY_LINEAR, 16),
+        negative_control="linear tetrahedra without a pressure",
+        with_negative_control=_with_negative_control(_NEARLY_LINEAR, 16),
     ),
     _tip_entry(
         "cook_hexahedra",
@@ -159,8 +161,8 @@ ENTRIES = (
         (4, 8, 16),
         0.001,
         because="discretisation: 0.02 % too stiff",
-        spoil=_STIFF,
-        spoiled=_spoiled(Panel("NEARLY_INCOMPRESSIBLE", "Q2/Q1", SMALL, shear=1.02), 16),
+        negative_control=_STIFF,
+        with_negative_control=_with_negative_control(Panel("NEARLY_INCOMPRESSIBLE", "Q2/Q1", SMALL, shear=1.02), 16),
     ),
     _tip_entry(
         "cook_constant_pressure",
@@ -169,8 +171,8 @@ ENTRIES = (
         (8, 16, 32),
         0.015,
         because="discretisation by linear cells: 0.5 % too stiff",
-        spoil="linear hexahedra without a pressure",
-        spoiled=_spoiled(Panel("NEARLY_INCOMPRESSIBLE", "Q1", SMALL), 32),
+        negative_control="linear hexahedra without a pressure",
+        with_negative_control=_with_negative_control(Panel("NEARLY_INCOMPRESSIBLE", "Q1", SMALL), 32),
     ),
     _tip_entry(
         "cook_quarter_load",
@@ -179,8 +181,8 @@ ENTRIES = (
         (4, 8, 16),
         0.005,
         because="discretisation, held up by the singular clamped corners: 0.17 % too stiff",
-        spoil="small strain, by linear extrapolation of a tiny load",
-        spoiled=_spoiled(Panel("FINITE_QUARTER", "P2/P1", SMALL), 16),
+        negative_control="small strain, by linear extrapolation of a tiny load",
+        with_negative_control=_with_negative_control(Panel("FINITE_QUARTER", "P2/P1", SMALL), 16),
     ),
     _tip_entry(
         "cook_quarter_load_hexahedra",
@@ -189,8 +191,8 @@ ENTRIES = (
         (4, 8, 16),
         0.001,
         because="discretisation: 0.02 % too stiff",
-        spoil=_STIFF,
-        spoiled=_spoiled(Panel("FINITE_QUARTER", "Q2/Q1", shear=1.02), 16),
+        negative_control=_STIFF,
+        with_negative_control=_with_negative_control(Panel("FINITE_QUARTER", "Q2/Q1", shear=1.02), 16),
     ),
     _tip_entry(
         "cook_full_load",
@@ -199,8 +201,8 @@ ENTRIES = (
         (4, 8),
         0.002,
         because="discretisation (0.06 % too stiff) and 0.02 % that the truth leaves open: a clamped corner folds on fine meshes",
-        spoil="small strain, by linear extrapolation of a tiny load",
-        spoiled=_spoiled(Panel("FINITE", "Q2/Q1", SMALL), 8),
+        negative_control="small strain, by linear extrapolation of a tiny load",
+        with_negative_control=_with_negative_control(Panel("FINITE", "Q2/Q1", SMALL), 8),
     ),
     Entry(
         name="cook_p1_locks",
@@ -214,8 +216,8 @@ ENTRIES = (
         kind="property",
         source="where the tip should be: " + SOURCE,
         measure=partial(_NEARLY_LINEAR.ratio, n=8),
-        spoil="quadratic tetrahedra with a pressure",
-        spoiled=partial(_NEARLY.ratio, n=8),
+        negative_control="quadratic tetrahedra with a pressure",
+        with_negative_control=partial(_NEARLY.ratio, n=8),
     ),
     Entry(
         name="cook_taylor_hood",
@@ -229,7 +231,7 @@ ENTRIES = (
         kind="second solver",
         source=SOURCE,
         measure=partial(_NEARLY.ratio, n=8),
-        spoil="linear tetrahedra without a pressure",
-        spoiled=partial(_NEARLY_LINEAR.ratio, n=8),
+        negative_control="linear tetrahedra without a pressure",
+        with_negative_control=partial(_NEARLY_LINEAR.ratio, n=8),
     ),
 )

@@ -50,8 +50,8 @@ _FALL = Entry(
     kind="closed form",
     source="validation/damping.py, terminal_velocity",
     measure=_velocity,
-    spoil="A time from frame to frame that is 1 % too long.",
-    spoiled=lambda lab: _velocity(lab, 1.01 * _SECONDS),
+    negative_control="A time from frame to frame that is 1 % too long.",
+    with_negative_control=lambda lab: _velocity(lab, 1.01 * _SECONDS),
 )
 
 # A bar in a smooth box that its weight stretched a little, and that creeps back when the weight is gone.
@@ -100,8 +100,8 @@ _RELAXATION = Entry(
     kind="closed form",
     source="validation/damping.py, relaxation_rate",
     measure=_creep,
-    spoil="A drag 1 % too small.",
-    spoiled=lambda lab: _creep(lab, 0.99 * _CREEP),
+    negative_control="A drag 1 % too small.",
+    with_negative_control=lambda lab: _creep(lab, 0.99 * _CREEP),
 )
 
 ENTRIES = (_FALL, _RELAXATION)

@@ -87,9 +87,9 @@ _force, _stretch = partial(force_entry, FAMILY), partial(stretch_entry, FAMILY)
 def _slack() -> Entry:
     """Shortened along its fibres, which carry nothing: the truth is that of the matrix alone."""
     muscle, matrix = _held(passive(), 0.8), Specimen(NEO, "P2/P1", "uniaxial", 0.8)
-    spoils = "Fibres across, where the block grows wider.", replace(muscle, fibre=Y)
+    control = "Fibres across, where the block grows wider.", replace(muscle, fibre=Y)
     title = "Passive fibres (Blemker) that are shortened carry nothing: force of the matrix alone"
-    return replace(_force("passive_slack", title, muscle, spoils), truth=matrix.known_force)
+    return replace(_force("passive_slack", title, muscle, control), truth=matrix.known_force)
 
 
 def _passive() -> tuple[Entry, ...]:
@@ -102,10 +102,10 @@ def _passive() -> tuple[Entry, ...]:
     }
     places = {"toe": (1.25, "into their toe"), "line": (1.6, "beyond their toe")}
     found = []
-    for name, (law, right, spoil, wrong) in plans.items():
+    for name, (law, right, control, wrong) in plans.items():
         stretch, words = places[name.rsplit("_", 1)[1]]
         title = f"Passive fibres ({law}) stretched {words}: force"
-        found.append(_force(name, title, _held(right, stretch), (spoil, _held(wrong, stretch))))
+        found.append(_force(name, title, _held(right, stretch), (control, _held(wrong, stretch))))
     return (*found, _slack())
 
 

@@ -121,8 +121,8 @@ ENTRIES: tuple[Entry, ...] = (
         within=5e-5,
         because="discretisation of order 4, 1e-5 with 8 cells through the thickness; the matter's K/mu of 1e6 adds 1e-6",
         measure=partial(_UP, value=partial(_moment, element="P2/P1"), counts=(1, 2, 4), truth=_true_moment),
-        spoil="one lateral face is free, so that the block may change its width",
-        spoiled=partial(once, value=partial(_moment, element="P2/P1", faces=_FREE), count=4),
+        negative_control="one lateral face is free, so that the block may change its width",
+        with_negative_control=partial(once, value=partial(_moment, element="P2/P1", faces=_FREE), count=4),
     ),
     _BLOCK(
         name="flexure_moment_hexahedra",
@@ -132,8 +132,8 @@ ENTRIES: tuple[Entry, ...] = (
         within=1e-5,
         because="discretisation of order 4, 3e-6 with 6 cells through the thickness; K/mu of 1e6 adds 1e-6",
         measure=partial(_UP, value=partial(_moment, element="Q2/Q1"), counts=(1, 2, 3), truth=_true_moment),
-        spoil="the shear modulus is 1 % too large",
-        spoiled=partial(once, value=partial(_moment, element="Q2/Q1", mu=1.01 * MU), count=3),
+        negative_control="the shear modulus is 1 % too large",
+        with_negative_control=partial(once, value=partial(_moment, element="Q2/Q1", mu=1.01 * MU), count=3),
     ),
     _BLOCK(
         name="flexure_inner_radius",
@@ -143,8 +143,8 @@ ENTRIES: tuple[Entry, ...] = (
         within=1e-4,
         because="discretisation, 3e-5 with 6 cells through the thickness (Q2/Q1)",
         measure=_up_to_radius,
-        spoil="one lateral face is free, so that the block may change its width",
-        spoiled=partial(once, value=partial(_inner_radius, faces=_FREE), count=3),
+        negative_control="one lateral face is free, so that the block may change its width",
+        with_negative_control=partial(once, value=partial(_inner_radius, faces=_FREE), count=3),
     ),
     _BLOCK(
         name="flexure_thickness",
@@ -154,7 +154,7 @@ ENTRIES: tuple[Entry, ...] = (
         within=3e-5,
         because="discretisation of order 4 or more, 7e-6 with 6 cells through the thickness (Q2/Q1)",
         measure=partial(_UP, value=_thickness, counts=(1, 2, 3), truth=_true_thickness),
-        spoil="one lateral face is free, so that the block may change its width",
-        spoiled=partial(once, value=partial(_thickness, faces=_FREE), count=3),
+        negative_control="one lateral face is free, so that the block may change its width",
+        with_negative_control=partial(once, value=partial(_thickness, faces=_FREE), count=3),
     ),
 )

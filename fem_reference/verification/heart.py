@@ -128,7 +128,9 @@ def _ladder(lab: Lab, value: Value, counts: tuple[int, ...], size: float) -> Fin
 
 
 def _entry(name: str, title: str, truth: Callable[[], float], within: float, **told: Any) -> Entry:
-    """An entry whose value is a z [mm]; ``told`` has ``because``, ``measure``, ``spoil`` and ``spoiled``."""
+    """An entry whose value is a z [mm]; ``told`` has ``because``, ``measure``, ``negative_control`` and
+    ``with_negative_control``.
+    """
     return Entry(
         name=name,
         family=FAMILY,
@@ -165,8 +167,10 @@ def _passive_entry(heart: Heart, place: int, because: str) -> Entry:
         0.005,
         because=f"0.5 %: {_BOUND}; {because}",
         measure=partial(_ladder, value=partial(heart.passive_apex, point=point), counts=(2, 3), size=AROUND),
-        spoil="20 % stiffer",
-        spoiled=partial(once, value=partial(replace(heart, stiff=1.2).passive_apex, point=point), count=3),
+        negative_control="20 % stiffer",
+        with_negative_control=partial(
+            once, value=partial(replace(heart, stiff=1.2).passive_apex, point=point), count=3
+        ),
     )
 
 
@@ -180,8 +184,10 @@ def _active_entry(place: int, because: str) -> Entry:
         0.005,
         because=f"0.5 %: {_BOUND}; {because}",
         measure=partial(_ladder, value=partial(_HEXAHEDRA.active_apex, point=point), counts=(2, 3), size=AROUND),
-        spoil="half the active tension",
-        spoiled=partial(once, value=partial(replace(_HEXAHEDRA, active=0.5).active_apex, point=point), count=3),
+        negative_control="half the active tension",
+        with_negative_control=partial(
+            once, value=partial(replace(_HEXAHEDRA, active=0.5).active_apex, point=point), count=3
+        ),
     )
 
 
@@ -193,8 +199,8 @@ ENTRIES = (
         0.003,
         because=f"0.3 %: {_BOUND}; the mesh leaves 0.2 %, as its clamped edges are singular",
         measure=partial(_ladder, value=_BEAM.beam_tip, counts=(2, 3), size=1.0),
-        spoil="5 % stiffer",
-        spoiled=partial(once, value=replace(_BEAM, stiff=1.05).beam_tip, count=3),
+        negative_control="5 % stiffer",
+        with_negative_control=partial(once, value=replace(_BEAM, stiff=1.05).beam_tip, count=3),
     ),
     *(_passive_entry(_TETRAHEDRA, place, "the mesh leaves 0.1 %") for place in (0, 1)),
     *(_passive_entry(_HEXAHEDRA, place, "the mesh leaves 0.1 %") for place in (0, 1)),

@@ -130,21 +130,25 @@ SOURCE = "validation/homogeneous.py: balance by root finding (Ogden 1984, ch. 4.
 EXACT = "The element holds the exact answer: what is left is rounding and the residual of 1e-13 N that ends Newton's method."
 
 
-def force_entry(family: str, name: str, title: str, specimen: Specimen, spoils: tuple[str, Specimen]) -> Entry:
-    """The force on a ``specimen`` against its truth; ``spoils``: what is wrong with the other specimen."""
-    spoil, wrong = spoils
+def force_entry(family: str, name: str, title: str, specimen: Specimen, control: tuple[str, Specimen]) -> Entry:
+    """The force on a ``specimen`` against its truth; ``control``: what is wrong with the other specimen."""
+    negative_control, wrong = control
     numbers = ("N", specimen.known_force, 1e-11, True)
-    return Entry(name, family, title, *numbers, EXACT, "closed form", SOURCE, specimen.force, spoil, wrong.force)
+    return Entry(
+        name, family, title, *numbers, EXACT, "closed form", SOURCE, specimen.force, negative_control, wrong.force
+    )
 
 
 def stretch_entry(
-    family: str, name: str, title: str, axis: int, specimen: Specimen, spoils: tuple[str, Specimen]
+    family: str, name: str, title: str, axis: int, specimen: Specimen, control: tuple[str, Specimen]
 ) -> Entry:
     """The stretch of a ``specimen`` along an axis against its truth."""
-    spoil, wrong = spoils
-    measure, spoiled = (lambda lab: specimen.stretch(axis, lab)), (lambda lab: wrong.stretch(axis, lab))
+    negative_control, wrong = control
+    measure, with_negative_control = (lambda lab: specimen.stretch(axis, lab)), (lambda lab: wrong.stretch(axis, lab))
     numbers = ("1", lambda: specimen.known_stretch(axis), 1e-11, True)
-    return Entry(name, family, title, *numbers, EXACT, "closed form", SOURCE, measure, spoil, spoiled)
+    return Entry(
+        name, family, title, *numbers, EXACT, "closed form", SOURCE, measure, negative_control, with_negative_control
+    )
 
 
 FAMILY = "homogeneous"
@@ -160,29 +164,29 @@ AMOUNTS = {
 }
 
 
-def _isotropic(word: str, material: Material, mode: str, element: str, spoils: tuple[str, Material]) -> Entry:
-    """A block of a law, which has a ``word``, in a mode; ``spoils``: the material that is wrong."""
+def _isotropic(word: str, material: Material, mode: str, element: str, control: tuple[str, Material]) -> Entry:
+    """A block of a law, which has a ``word``, in a mode; ``control``: the material that is wrong."""
     amount, words = AMOUNTS[mode]
     specimen = Specimen(material, element, mode, amount)
     name = f"{word}_{mode}_{element}".lower().replace("-", "_").replace("/", "_")
     title = f"{word} block {words}, by {element}: force"
-    return force_entry(FAMILY, name, title, specimen, (spoils[0], replace(specimen, material=spoils[1])))
+    return force_entry(FAMILY, name, title, specimen, (control[0], replace(specimen, material=control[1])))
 
 
 def _heart(name: str, words: str, fibre: Vector, other: Vector) -> Entry:
     """Stretched along x, with its fibres along ``fibre``; wrong: along the ``other``."""
     specimen = Specimen(HEART, "P2/P1", "uniaxial", 1.15, fibre)
     title = f"Heart muscle (Guccione) stretched {words} its fibres: force"
-    spoils = "Fibres turned by a right angle.", replace(specimen, fibre=other)
-    return force_entry(FAMILY, name, title, specimen, spoils)
+    control = "Fibres turned by a right angle.", replace(specimen, fibre=other)
+    return force_entry(FAMILY, name, title, specimen, control)
 
 
 def _lateral() -> Entry:
     """How much a rather compressible block thins."""
     specimen = Specimen(NEO, "P2", "uniaxial", 1.6, bulk=10 * MU)
-    spoils = "Bulk modulus 1 % too high.", replace(specimen, bulk=10.1 * MU)
+    control = "Bulk modulus 1 % too high.", replace(specimen, bulk=10.1 * MU)
     title = "Compressible neo-Hookean block stretched along one axis, by P2: how much it thins"
-    return stretch_entry(FAMILY, "neo_hookean_thinning_p2", title, 1, specimen, spoils)
+    return stretch_entry(FAMILY, "neo_hookean_thinning_p2", title, 1, specimen, control)
 
 
 ENTRIES = (

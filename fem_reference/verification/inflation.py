@@ -187,8 +187,10 @@ ENTRIES: tuple[Entry, ...] = (
         measure=partial(
             _UP, value=partial(_pressure, element="P2/P1", matter=_NEO_HOOKE), counts=(1, 2, 3), truth=_TRUE_PRESSURE
         ),
-        spoil="straight cells, whose surfaces have flat facets",
-        spoiled=partial(once, value=partial(_pressure, element="P2/P1", matter=_NEO_HOOKE, degree=1), count=3),
+        negative_control="straight cells, whose surfaces have flat facets",
+        with_negative_control=partial(
+            once, value=partial(_pressure, element="P2/P1", matter=_NEO_HOOKE, degree=1), count=3
+        ),
     ),
     _FINITE(
         name="inflation_sphere_pressure_hexahedra",
@@ -200,8 +202,10 @@ ENTRIES: tuple[Entry, ...] = (
         measure=partial(
             _UP, value=partial(_pressure, element="Q2/Q1", matter=_NEO_HOOKE), counts=(1, 2), truth=_TRUE_PRESSURE
         ),
-        spoil="straight cells, whose surfaces have flat facets",
-        spoiled=partial(once, value=partial(_pressure, element="Q2/Q1", matter=_NEO_HOOKE, degree=1), count=2),
+        negative_control="straight cells, whose surfaces have flat facets",
+        with_negative_control=partial(
+            once, value=partial(_pressure, element="Q2/Q1", matter=_NEO_HOOKE, degree=1), count=2
+        ),
     ),
     _FINITE(
         name="inflation_sphere_pressure_mooney_rivlin",
@@ -211,8 +215,8 @@ ENTRIES: tuple[Entry, ...] = (
         within=4e-4,
         because="discretisation of order 4, 1e-4 with 4 cells through the wall (Q2/Q1)",
         measure=partial(once, value=partial(_pressure, element="Q2/Q1", matter=_MOONEY_RIVLIN), count=2),
-        spoil="neo-Hookean matter of the same shear modulus",
-        spoiled=partial(once, value=partial(_pressure, element="Q2/Q1", matter=_NEO_HOOKE), count=2),
+        negative_control="neo-Hookean matter of the same shear modulus",
+        with_negative_control=partial(once, value=partial(_pressure, element="Q2/Q1", matter=_NEO_HOOKE), count=2),
     ),
     _FINITE(
         name="inflation_sphere_stretch",
@@ -222,8 +226,8 @@ ENTRIES: tuple[Entry, ...] = (
         within=4e-4,
         because="discretisation of order 4, 8e-5 with 4 cells through the wall (P2/P1)",
         measure=partial(_UP, value=partial(_pressed, mu=MU), counts=(1, 2), truth=_true_pressed),
-        spoil="the shear modulus is 1 % too large",
-        spoiled=partial(once, value=partial(_pressed, mu=1.01 * MU), count=2),
+        negative_control="the shear modulus is 1 % too large",
+        with_negative_control=partial(once, value=partial(_pressed, mu=1.01 * MU), count=2),
     ),
     _LIMIT(
         name="inflation_limit_pressure",
@@ -233,8 +237,10 @@ ENTRIES: tuple[Entry, ...] = (
         within=4e-4,
         because="discretisation of order 4, 1e-4 with 4 cells through the wall (Q2/Q1); the polynomial adds 1e-6",
         measure=partial(once, value=partial(_limit_pressure, matter=_NEARLY_INCOMPRESSIBLE), count=2),
-        spoil="straight cells, whose surfaces have flat facets",
-        spoiled=partial(once, value=partial(_limit_pressure, matter=_NEARLY_INCOMPRESSIBLE, degree=1), count=2),
+        negative_control="straight cells, whose surfaces have flat facets",
+        with_negative_control=partial(
+            once, value=partial(_limit_pressure, matter=_NEARLY_INCOMPRESSIBLE, degree=1), count=2
+        ),
     ),
     _LIMIT(
         name="inflation_limit_stretch",
@@ -244,8 +250,8 @@ ENTRIES: tuple[Entry, ...] = (
         within=1e-4,
         because="discretisation of order 4, 2e-5 with 4 cells through the wall (Q2/Q1)",
         measure=partial(once, value=partial(_limit_stretch, matter=_NEARLY_INCOMPRESSIBLE), count=2),
-        spoil="Mooney-Rivlin matter of the same shear modulus, whose pressure goes on rising",
-        spoiled=partial(once, value=partial(_limit_stretch, matter=_MOONEY_RIVLIN), count=2),
+        negative_control="Mooney-Rivlin matter of the same shear modulus, whose pressure goes on rising",
+        with_negative_control=partial(once, value=partial(_limit_stretch, matter=_MOONEY_RIVLIN), count=2),
     ),
     _LIMIT(
         name="inflation_fall_beyond_limit",
@@ -255,8 +261,8 @@ ENTRIES: tuple[Entry, ...] = (
         within=2e-3,
         because="4 % of a pressure that is found to 1e-4: of its error 2e-4 is left (Q2/Q1, 4 cells through the wall)",
         measure=partial(once, value=partial(_fall, matter=_NEARLY_INCOMPRESSIBLE), count=2),
-        spoil="Mooney-Rivlin matter of the same shear modulus, whose pressure goes on rising",
-        spoiled=partial(once, value=partial(_fall, matter=_MOONEY_RIVLIN), count=2),
+        negative_control="Mooney-Rivlin matter of the same shear modulus, whose pressure goes on rising",
+        with_negative_control=partial(once, value=partial(_fall, matter=_MOONEY_RIVLIN), count=2),
     ),
     _FINITE(
         name="inflation_tube_pressure",
@@ -268,8 +274,8 @@ ENTRIES: tuple[Entry, ...] = (
         measure=partial(
             _UP, value=partial(_tube_pressure, element="Q2/Q1"), counts=(1, 2, 3), truth=_TRUE_TUBE_PRESSURE
         ),
-        spoil="one end of the tube is free to move along it",
-        spoiled=partial(once, value=partial(_tube_pressure, element="Q2/Q1", ends=("bottom",)), count=3),
+        negative_control="one end of the tube is free to move along it",
+        with_negative_control=partial(once, value=partial(_tube_pressure, element="Q2/Q1", ends=("bottom",)), count=3),
     ),
     _FINITE(
         name="inflation_tube_axial_force",
@@ -279,7 +285,7 @@ ENTRIES: tuple[Entry, ...] = (
         within=5e-5,
         because="discretisation of order 4, 1e-5 with 6 cells through the wall (P2/P1)",
         measure=partial(_UP, value=partial(_tube_force, element="P2/P1"), counts=(1, 2, 3), truth=_TRUE_TUBE_FORCE),
-        spoil="straight cells, whose surfaces have flat facets",
-        spoiled=partial(once, value=partial(_tube_force, element="P2/P1", degree=1), count=3),
+        negative_control="straight cells, whose surfaces have flat facets",
+        with_negative_control=partial(once, value=partial(_tube_force, element="P2/P1", degree=1), count=3),
     ),
 )

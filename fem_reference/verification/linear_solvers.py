@@ -65,8 +65,8 @@ _LAGGED = Entry(
     kind="property",
     source="The solution of an equation does not depend on how it was found.",
     measure=Compared("lagged", "double").difference,
-    spoil="Newton's method ends at a residual of 1e-2 N.",
-    spoiled=Compared("lagged", "double", 1e-2).difference,
+    negative_control="Newton's method ends at a residual of 1e-2 N.",
+    with_negative_control=Compared("lagged", "double", 1e-2).difference,
 )
 _SINGLE = replace(
     _LAGGED,
@@ -74,7 +74,7 @@ _SINGLE = replace(
     title="Turned bar of muscle by lagged factorisations in single precision and by direct ones in double: largest difference of "
     "a node",
     measure=Compared("lagged", "single").difference,
-    spoiled=Compared("lagged", "single", 1e-2).difference,
+    with_negative_control=Compared("lagged", "single", 1e-2).difference,
 )
 _MULTIGRID = replace(
     _LAGGED,
@@ -82,7 +82,7 @@ _MULTIGRID = replace(
     title="Turned bar of muscle by multigrid between P2 and P1 and by direct factorisations: largest difference of a node",
     within=1e-8,
     measure=Compared("multigrid").difference,
-    spoiled=Compared("multigrid", residual=1e-2).difference,
+    with_negative_control=Compared("multigrid", residual=1e-2).difference,
 )
 
 ENTRIES = (_LAGGED, _SINGLE, _MULTIGRID)

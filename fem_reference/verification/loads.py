@@ -73,8 +73,8 @@ _STANDING = Entry(
     kind="closed form",
     source="Density times acceleration times volume.",
     measure=lambda lab: _reaction(MUSCLE, lab),
-    spoil="The density of fat instead of muscle.",
-    spoiled=lambda lab: _reaction(FAT, lab),
+    negative_control="The density of fat instead of muscle.",
+    with_negative_control=lambda lab: _reaction(FAT, lab),
 )
 
 # A soft column in a box that sinks under its own weight by a tenth of its height.
@@ -114,8 +114,8 @@ _COLUMN = Entry(
     kind="closed form",
     source="validation/loads.py, column_top: balance integrated by hand",
     measure=lambda lab: _column("Q2", lab),
-    spoil="Linear instead of quadratic elements (Q1).",
-    spoiled=lambda lab: _column("Q1", lab),
+    negative_control="Linear instead of quadratic elements (Q1).",
+    with_negative_control=lambda lab: _column("Q1", lab),
 )
 
 # A block in a fluid, free to shrink on its planes of symmetry.
@@ -142,8 +142,8 @@ _HYDROSTATIC = Entry(
     kind="closed form",
     source="validation/loads.py, pressed_volume",
     measure=lambda lab: _shrunk(pressed(_FLUID), lab),
-    spoil="The fluid's pressure 1 % too high.",
-    spoiled=lambda lab: _shrunk(pressed(1.01 * _FLUID), lab),
+    negative_control="The fluid's pressure 1 % too high.",
+    with_negative_control=lambda lab: _shrunk(pressed(1.01 * _FLUID), lab),
 )
 
 _ALL = ("x0", "x1", "y0", "y1", "z0", "z1")
@@ -171,8 +171,8 @@ _CLOSED = Entry(
     kind="property",
     source="The divergence of the cofactor of F vanishes (Piola; Holzapfel 2000, ch. 2.4).",
     measure=lambda lab: _left_over(_ALL, lab),
-    spoil="The top is dry.",
-    spoiled=lambda lab: _left_over(_ALL[:-1], lab),
+    negative_control="The top is dry.",
+    with_negative_control=lambda lab: _left_over(_ALL[:-1], lab),
 )
 
 _QUARTER = Turn((0.0, 1.0, 0.0), np.pi / 2, knots=((1.0, 0.0), (2.0, 1.0)))
@@ -201,16 +201,16 @@ _FOLLOWER = Entry(
     kind="property",
     source="Objectivity: Nanson's formula turns with F.",
     measure=lambda lab: _turned(pressed(0.2 * MU), lab),
-    spoil="A dead load of the same size.",
-    spoiled=lambda lab: _turned(dead(-0.2 * MU), lab),
+    negative_control="A dead load of the same size.",
+    with_negative_control=lambda lab: _turned(dead(-0.2 * MU), lab),
 )
 
 
 def _dead_pull() -> Entry:
     pulled = Specimen(NEO, "P2/P1", "pulled", MU, loads=(dead(MU),))
     follower = make("pressure", on="x1", pressure=f"{-MU} MPa", course=course())
-    spoils = "The force spread over the area as it is now.", replace(pulled, loads=(follower,))
-    return stretch_entry(FAMILY, "dead_pull", "Block pulled by a dead force: how far it stretches", 0, pulled, spoils)
+    control = "The force spread over the area as it is now.", replace(pulled, loads=(follower,))
+    return stretch_entry(FAMILY, "dead_pull", "Block pulled by a dead force: how far it stretches", 0, pulled, control)
 
 
 ENTRIES = (_STANDING, _COLUMN, _HYDROSTATIC, _CLOSED, _FOLLOWER, _dead_pull())

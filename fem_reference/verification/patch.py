@@ -106,8 +106,8 @@ def _patch(element: str, degree: int = 1) -> Entry:
         kind="property",
         source="The patch test: Irons and Razzaque 1972; Bathe 2014, Finite Element Procedures, ch. 4.2.4",
         measure=patch.error,
-        spoil="The surface is moved 1 % too far.",
-        spoiled=replace(patch, share=1.01).error,
+        negative_control="The surface is moved 1 % too far.",
+        with_negative_control=replace(patch, share=1.01).error,
     )
 
 
@@ -124,8 +124,8 @@ _BLOCK = Entry(
     kind="property",
     source="Objectivity: a law sees C = F^T F only.",
     measure=Turned(NEO, "Q2/Q1", SURFACE).error,
-    spoil="One face is turned 1 % further.",
-    spoiled=Turned(NEO, "Q2/Q1", SURFACE, 1.01).error,
+    negative_control="One face is turned 1 % further.",
+    with_negative_control=Turned(NEO, "Q2/Q1", SURFACE, 1.01).error,
 )
 _ENERGY = replace(
     _BLOCK,
@@ -136,8 +136,8 @@ _ENERGY = replace(
     because="A turn stores nothing. Of mu/2 (I1 - 3) rounding is left: mu/2 I1 of the whole block is 0.14 N mm, its last digit "
     "3e-17, and I1 and the sum over the block take some hundred operations.",
     measure=Turned(NEO, "P2/P1", ENDS).energy,
-    spoil="One end is turned 1 % further.",
-    spoiled=Turned(NEO, "P2/P1", ENDS, 1.01).energy,
+    negative_control="One end is turned 1 % further.",
+    with_negative_control=Turned(NEO, "P2/P1", ENDS, 1.01).energy,
 )
 _MUSCLE = replace(
     _BLOCK,
@@ -145,8 +145,8 @@ _MUSCLE = replace(
     title="Contracting block whose ends are turned by 1 rad: largest difference to itself turned",
     because=f"Fibres turn with the body: {LEFT}.",
     measure=Turned(NEO + active(0.03), "P2/P1", ENDS).error,
-    spoil="One end is turned 1 % further.",
-    spoiled=Turned(NEO + active(0.03), "P2/P1", ENDS, 1.01).error,
+    negative_control="One end is turned 1 % further.",
+    with_negative_control=Turned(NEO + active(0.03), "P2/P1", ENDS, 1.01).error,
 )
 
 ENTRIES = (*(_patch(element) for element in _STRAIGHT), _patch("Q2/Q1", 2), _BLOCK, _ENERGY, _MUSCLE)

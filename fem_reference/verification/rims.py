@@ -110,8 +110,8 @@ def _entry(name: str, title: str, rim: Rim, within: float, because: str) -> Entr
         kind="closed form",
         source="validation/rims.py: Williams 1952",
         measure=rim.order,
-        spoil="uniform meshes" if graded else "graded towards the rim",
-        spoiled=other.order,
+        negative_control="uniform meshes" if graded else "graded towards the rim",
+        with_negative_control=other.order,
     )
 
 

@@ -147,8 +147,8 @@ def _entry(name: str, title: str, sample: Sample | Borrowed, within: float, beca
         kind="second solver",
         source="scikit-fem's elements; derivatives by jets, own assembly and Newton's method, scipy's sparse LU",
         measure=partial(agreement, sample=sample),
-        spoil="in scikit-fem the first modulus is 1 % too large",
-        spoiled=partial(agreement, sample=sample, error=0.01),
+        negative_control="in scikit-fem the first modulus is 1 % too large",
+        with_negative_control=partial(agreement, sample=sample, error=0.01),
     )
 
 

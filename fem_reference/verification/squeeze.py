@@ -134,8 +134,8 @@ def _force_entry(name: str, element: str, bulk: float) -> Entry:
         kind="closed form",
         source=_SOURCE,
         measure=partial(force, element=element, bulk=bulk),
-        spoil="bulk modulus 1 % too small",
-        spoiled=partial(force, element=element, bulk=bulk, error=-0.01),
+        negative_control="bulk modulus 1 % too small",
+        with_negative_control=partial(force, element=element, bulk=bulk, error=-0.01),
     )
 
 
@@ -152,8 +152,8 @@ def _volume_entry(name: str, element: str, bulk: float) -> Entry:
         kind="closed form",
         source=_SOURCE,
         measure=partial(volume, element=element, bulk=bulk),
-        spoil="bulk modulus 1 % too small",
-        spoiled=partial(volume, element=element, bulk=bulk, error=-0.01),
+        negative_control="bulk modulus 1 % too small",
+        with_negative_control=partial(volume, element=element, bulk=bulk, error=-0.01),
     )
 
 
@@ -170,8 +170,8 @@ def _return_entry(name: str, element: str, bulk: float) -> Entry:
         kind="property",
         source="a hyperelastic body that nothing loads or moves is at rest",
         measure=partial(way_back, element=element, bulk=bulk),
-        spoil="load steps that may grow: they lead to the block turned by half a turn, with no energy and det F = 1",
-        spoiled=partial(way_back, element=element, bulk=bulk, growing=True),
+        negative_control="load steps that may grow: they lead to the block turned by half a turn, with no energy and det F = 1",
+        with_negative_control=partial(way_back, element=element, bulk=bulk, growing=True),
     )
 
 
@@ -193,8 +193,8 @@ ENTRIES = (
         kind="property",
         source="det F above zero everywhere, or matter would go through itself; Newton's method does not see it at a vertex",
         measure=partial(inverts, element="Q1/P0", count=4, height=GLUED_TO),
-        spoil="squeezed to 0.7 of its height only",
-        spoiled=partial(inverts, element="Q1/P0", count=4, height=0.7),
+        negative_control="squeezed to 0.7 of its height only",
+        with_negative_control=partial(inverts, element="Q1/P0", count=4, height=0.7),
     ),
     Entry(
         name="bonded_squeeze_stays_upright",
@@ -208,8 +208,8 @@ ENTRIES = (
         kind="property",
         source="det F above zero everywhere, or matter would go through itself",
         measure=partial(stays_upright, element="Q2/Q1", count=2, height=0.7),
-        spoil="squeezed to 0.4 of its height",
-        spoiled=partial(stays_upright, element="Q2/Q1", count=2, height=GLUED_TO),
+        negative_control="squeezed to 0.4 of its height",
+        with_negative_control=partial(stays_upright, element="Q2/Q1", count=2, height=GLUED_TO),
     ),
     Entry(
         name="bonded_squeeze_with_vertices",
@@ -223,7 +223,7 @@ ENTRIES = (
         kind="property",
         source="det F above zero everywhere, or matter would go through itself",
         measure=partial(stays_upright, element="P2/P1", count=2, height=GLUED_TO),
-        spoil="a rule of quadrature of degree 4, which has no points at the vertices",
-        spoiled=partial(stays_upright, element="P2/P1", count=2, height=GLUED_TO, quadrature_degree=4),
+        negative_control="a rule of quadrature of degree 4, which has no points at the vertices",
+        with_negative_control=partial(stays_upright, element="P2/P1", count=2, height=GLUED_TO, quadrature_degree=4),
     ),
 )

@@ -87,7 +87,7 @@ _SQUARE = partial(
     relative=True,
     kind="closed form",
     source="Timoshenko and Goodier 1970, art. 109; validation/torsion.py",
-    spoil="the ends are kept plane, as a round bar would keep them",
+    negative_control="the ends are kept plane, as a round bar would keep them",
 )
 _UP_THE_SQUARE = partial(ladder, counts=(2, 4, 8), size=SIDE / 2, truth=_true_square_bar)
 
@@ -105,8 +105,10 @@ ENTRIES: tuple[Entry, ...] = (
             size=RADIUS / 2,
             truth=partial(_true_moment, MU / 2, 0.0),
         ),
-        spoil="straight cells, whose surface has flat facets",
-        spoiled=partial(once, value=partial(_moment, element="P2/P1", matter=_NEO_HOOKE, degree=1), count=4),
+        negative_control="straight cells, whose surface has flat facets",
+        with_negative_control=partial(
+            once, value=partial(_moment, element="P2/P1", matter=_NEO_HOOKE, degree=1), count=4
+        ),
     ),
     _MOMENT(
         name="torsion_moment_hexahedra",
@@ -121,8 +123,10 @@ ENTRIES: tuple[Entry, ...] = (
             size=RADIUS / 2,
             truth=partial(_true_moment, MU / 2, 0.0),
         ),
-        spoil="straight cells, whose surface has flat facets",
-        spoiled=partial(once, value=partial(_moment, element="Q2/Q1", matter=_NEO_HOOKE, degree=1), count=3),
+        negative_control="straight cells, whose surface has flat facets",
+        with_negative_control=partial(
+            once, value=partial(_moment, element="Q2/Q1", matter=_NEO_HOOKE, degree=1), count=3
+        ),
     ),
     _FORCE(
         name="torsion_axial_force",
@@ -137,8 +141,10 @@ ENTRIES: tuple[Entry, ...] = (
             size=RADIUS / 2,
             truth=partial(_true_axial_force, MU / 2, 0.0),
         ),
-        spoil="Mooney-Rivlin matter of the same shear modulus, which turns with the same moment",
-        spoiled=partial(once, value=partial(_axial_force, element="Q2/Q1", matter=_MOONEY_RIVLIN), count=3),
+        negative_control="Mooney-Rivlin matter of the same shear modulus, which turns with the same moment",
+        with_negative_control=partial(
+            once, value=partial(_axial_force, element="Q2/Q1", matter=_MOONEY_RIVLIN), count=3
+        ),
     ),
     _MOMENT(
         name="torsion_moment_mooney_rivlin",
@@ -147,8 +153,8 @@ ENTRIES: tuple[Entry, ...] = (
         within=5e-4,
         because="discretisation of order 4, 8e-5 with 4 cells along the radius (Q2/Q1)",
         measure=partial(once, value=partial(_moment, element="Q2/Q1", matter=_MOONEY_RIVLIN), count=2),
-        spoil="c2 is 1 % too large",
-        spoiled=partial(
+        negative_control="c2 is 1 % too large",
+        with_negative_control=partial(
             once,
             value=partial(_moment, element="Q2/Q1", matter=partial(mooney_rivlin, C1, 1.01 * C2, BULK)),
             count=2,
@@ -161,8 +167,8 @@ ENTRIES: tuple[Entry, ...] = (
         within=2e-3,
         because="discretisation of order 4, 4e-4 with 4 cells along the radius (Q2/Q1)",
         measure=partial(once, value=partial(_axial_force, element="Q2/Q1", matter=_MOONEY_RIVLIN), count=2),
-        spoil="neo-Hookean matter of the same shear modulus, which turns with the same moment",
-        spoiled=partial(once, value=partial(_axial_force, element="Q2/Q1", matter=_NEO_HOOKE), count=2),
+        negative_control="neo-Hookean matter of the same shear modulus, which turns with the same moment",
+        with_negative_control=partial(once, value=partial(_axial_force, element="Q2/Q1", matter=_NEO_HOOKE), count=2),
     ),
     _SQUARE(
         name="torsion_square_bar_tetrahedra",
@@ -170,7 +176,7 @@ ENTRIES: tuple[Entry, ...] = (
         within=1e-4,
         because="discretisation of order 3.7, 1.9e-5 with 16 cells across; the finite twist adds 1e-6",
         measure=partial(_UP_THE_SQUARE, value=partial(_square_bar, element="P2/P1")),
-        spoiled=partial(once, value=partial(_square_bar, element="P2/P1", warps=False), count=8),
+        with_negative_control=partial(once, value=partial(_square_bar, element="P2/P1", warps=False), count=8),
     ),
     _SQUARE(
         name="torsion_square_bar_hexahedra",
@@ -178,6 +184,6 @@ ENTRIES: tuple[Entry, ...] = (
         within=5e-5,
         because="discretisation of order 3.7, 7e-6 with 16 cells across; the finite twist adds 1e-6",
         measure=partial(_UP_THE_SQUARE, value=partial(_square_bar, element="Q2/Q1")),
-        spoiled=partial(once, value=partial(_square_bar, element="Q2/Q1", warps=False), count=8),
+        with_negative_control=partial(once, value=partial(_square_bar, element="Q2/Q1", warps=False), count=8),
     ),
 )

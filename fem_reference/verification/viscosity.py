@@ -60,8 +60,8 @@ _SQUEEZE = Entry(
     kind="closed form",
     source=f"{_SOURCE}, squeeze_force",
     measure=_force,
-    spoil="A viscosity 1 % too small.",
-    spoiled=lambda lab: _force(lab, 0.99 * _ETA),
+    negative_control="A viscosity 1 % too small.",
+    with_negative_control=lambda lab: _force(lab, 0.99 * _ETA),
 )
 
 # A block under a small weight on its top until frame 1, which then creeps back.
@@ -105,8 +105,8 @@ _CREEP = Entry(
     kind="closed form",
     source=f"{_SOURCE}, creep_rate",
     measure=_creep,
-    spoil="A viscosity 1 % too small.",
-    spoiled=lambda lab: _creep(lab, 0.99 * _ETA),
+    negative_control="A viscosity 1 % too small.",
+    with_negative_control=lambda lab: _creep(lab, 0.99 * _ETA),
 )
 
 ENTRIES = (_SQUEEZE, _CREEP)
