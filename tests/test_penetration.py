@@ -14,7 +14,7 @@ from fem_reference.foundations.mesh import Polylines, Surface
 from fem_reference.foundations.motion import Rotation
 from fem_reference.geometry.rigid_bodies import Box, HalfSpace, Sphere
 from fem_reference.io.files import read_surface, write_surface
-from fem_reference.metrics import Measure, Yardstick, at_rest, measure, penetration
+from fem_reference.metrics import Measure, MeasurementContext, at_rest, measure, penetration
 from fem_reference.problems.muscle import Body, Held, Setup
 from fem_reference.runs.store import Outcome, Run
 
@@ -40,7 +40,7 @@ def run_of(*frames: np.ndarray, numbers: tuple[int, ...] | None = None, rest: Su
 
 def taken(run: Run, *bones: Body, free: np.ndarray | None = None) -> tuple[Measure, Measure]:
     """``deepest`` and ``volume``."""
-    deepest, volume = penetration.measure(run, run, Yardstick.of(at_rest(run), FIBRE, bones, free))
+    deepest, volume = penetration.measure(run, run, MeasurementContext.of(at_rest(run), FIBRE, bones, free))
     assert (deepest.statistic, deepest.unit, volume.statistic, volume.unit) == ("deepest", "mm", "volume", "mm3")
     return deepest, volume
 
@@ -178,7 +178,7 @@ def test_a_bone_that_is_not_closed_has_no_inside(tmp_path, caplog) -> None:
         assert np.isnan(one.values).all()
         assert one.where[0].startswith('not known: bone "femur": ')
     assert "penetration is not measured" in caplog.text
-    assert measure(run_of(BALL.points), run_of(BALL.points), Yardstick.of(run_of(BALL.points), FIBRE, (bone,)))
+    assert measure(run_of(BALL.points), run_of(BALL.points), MeasurementContext.of(run_of(BALL.points), FIBRE, (bone,)))
 
 
 def test_a_box_that_stands_out_on_both_sides_is_counted_whole() -> None:

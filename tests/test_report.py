@@ -18,7 +18,7 @@ from fem_reference.foundations.errors import MissingSoftware
 from fem_reference.foundations.mesh import Polylines, Surface
 from fem_reference.geometry.rigid_bodies import HalfSpace
 from fem_reference.geometry.tessellation import tessellated
-from fem_reference.metrics import Measure, Yardstick
+from fem_reference.metrics import Measure, MeasurementContext
 from fem_reference.problems.muscle import Body, Setup
 from fem_reference.report import gallery, page
 from fem_reference.report.curves import curves
@@ -140,7 +140,9 @@ def comparison(tmp_path, monkeypatch) -> Comparison:
         setup=Setup(rest, (plate,), (), NUMBERS, None),
         reference=reference,
         candidates=(quick, torn),
-        yardstick=Yardstick.of(reference, Polylines([[0, 0, 0], [5, 0, 0], [0, 1, 0], [5, 1, 0]], [0, 2, 4]), ()),
+        context=MeasurementContext.of(
+            reference, Polylines([[0, 0, 0], [5, 0, 0], [0, 1, 0], [5, 1, 0]], [0, 2, 4]), ()
+        ),
         deviations={run.name: measured(run, moved) for run in (quick, torn)},
         changes={run.name: measured(run, rest.points) for run in (reference, quick, torn)},
         extension_error=Measure("fibre_length", "extension_error", "mm", np.arange(5) / 8, ("fibre 1",) * 5),

@@ -36,7 +36,7 @@ class Measure:
 
 
 @dataclass(frozen=True, eq=False)
-class Yardstick:
+class MeasurementContext:
     """What every run of a scene is measured with, the same for all: ``areas`` (n,) [mm2] around the surface's vertices at rest,
     the ``fibres`` at rest and the ``extension`` that carries a surface's displacement to their points, ``travel`` [mm], the
     greatest displacement of the reference's surface over its frames, and the ``bones``, with the vertices that are ``free`` (n,)
@@ -53,8 +53,8 @@ class Yardstick:
     @classmethod
     def of(
         cls, reference: Run, fibres: Polylines, bones: tuple[Body, ...], free: NDArray[np.bool_] | None = None
-    ) -> "Yardstick":
-        """The yardstick of a reference run; without ``free`` (n,), nothing is held."""
+    ) -> "MeasurementContext":
+        """The measurement context of a reference run; without ``free`` (n,), every vertex is free."""
         rest = reference.surface
         return cls(
             areas=vertex_areas(rest.points, rest.triangles),
@@ -87,13 +87,15 @@ def of_lines(name: str) -> bool:
     return getattr(importlib.import_module(f"{__name__}.{name}"), "OF_LINES", False)
 
 
-def measure(run: Run, reference: Run, yardstick: Yardstick, wanted: Iterable[str] | None = None) -> tuple[Measure, ...]:
+def measure(
+    run: Run, reference: Run, context: MeasurementContext, wanted: Iterable[str] | None = None
+) -> tuple[Measure, ...]:
     """Every statistic of every metric (or of those ``wanted``) of ``run`` against ``reference``, frame by frame; both must have
     the same frames. Of a run without a surface only what needs none.
     """
     chosen = [name for name in (names() if wanted is None else wanted) if run.has_surface or of_lines(name)]
     modules = (importlib.import_module(f"{__name__}.{name}") for name in chosen)
-    return tuple(statistic for module in modules for statistic in module.measure(run, reference, yardstick))
+    return tuple(statistic for module in modules for statistic in module.measure(run, reference, context))
 
 
 def find(measures: Iterable[Measure], metric: str, statistic: str) -> Measure | None:

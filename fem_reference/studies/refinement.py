@@ -18,7 +18,7 @@ from fem_reference.assessment.error_bars import ErrorBars, Orders, Pair
 from fem_reference.effects import Effect
 from fem_reference.effects.contact import Contact, among
 from fem_reference.foundations.errors import InputError
-from fem_reference.metrics import Yardstick
+from fem_reference.metrics import MeasurementContext
 from fem_reference.runs.store import Run
 from fem_reference.scenes.bones import Bone
 from fem_reference.scenes.muscle import Scene
@@ -100,7 +100,7 @@ def obtain(bench: Bench, reference: Run, *, model: bool = True) -> ErrorBars | N
         pair = _pair(bench, reference, model)
     log.info("error bar: measuring the runs against each other")
     bars = error_bars.error_bars(
-        pair, Yardstick.of(reference, reference.fibres, bench.setup().bones, bench.setup().free)
+        pair, MeasurementContext.of(reference, reference.fibres, bench.setup().bones, bench.setup().free)
     )
     if reference.folder is not None:
         error_bars.save(bars, reference.folder, _of(reference))

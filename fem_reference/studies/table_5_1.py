@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fem_reference.assessment.solver_table import Family, Scenario, Standing, Table, families
 from fem_reference.foundations.errors import InputError
-from fem_reference.metrics import Measure, Yardstick, measure
+from fem_reference.metrics import Measure, MeasurementContext, measure
 from fem_reference.report.tables import seconds_per_frame
 from fem_reference.runs.key import versions
 from fem_reference.runs.store import Run
@@ -76,16 +76,16 @@ def _on(bench: Bench, rows: Iterable[Family], foreign: list[Run]) -> tuple[Scena
     reference = complete(bench.obtain("reference", scene.reference, "reference"), numbers)
     bars = refinement.stored(reference)
     assert reference.fibres is not None  # a reference has an interior
-    yardstick = Yardstick.of(reference, reference.fibres, bench.setup().bones, bench.setup().free)
+    context = MeasurementContext.of(reference, reference.fibres, bench.setup().bones, bench.setup().free)
     found = [_standing(scene, REFERENCE, reference, bars.of_deviations if bars else ())]
     meeting = [(row.name, *entry) for row in rows for entry in chosen(scene, row)]
     for i, (family, candidate, place) in enumerate(meeting):
         log.info("%s: %s, solver %d of %d", scene.name, candidate.name, i + 1, len(meeting))
         run = complete(bench.obtain(candidate.name, candidate, place), numbers)
-        found.append(_standing(scene, family, run, measure(run, reference, yardstick, METRICS)))
-    found += [_standing(scene, FOREIGN, run, measure(run, reference, yardstick, METRICS)) for run in foreign]
+        found.append(_standing(scene, family, run, measure(run, reference, context, METRICS)))
+    found += [_standing(scene, FOREIGN, run, measure(run, reference, context, METRICS)) for run in foreign]
     triangles = len(reference.surface.triangles)
-    return Scenario(scene.name, scene.title, triangles, yardstick.travel, reference.outcome), found
+    return Scenario(scene.name, scene.title, triangles, context.travel, reference.outcome), found
 
 
 def _standing(scene: Scene, family: str, run: Run, measures: tuple[Measure, ...]) -> Standing:
