@@ -6,7 +6,7 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh, boundary
 from fem_reference.foundations.motion import Rotation
-from fem_reference.problems.muscle import Body, Held, Problem
+from fem_reference.problems.muscle import Held, Problem, RigidBody
 
 
 def box(cells: tuple[int, int, int], size: tuple[float, float, float]) -> TetMesh:
@@ -83,7 +83,7 @@ def bar(
     held = []
     for name, z in (("bottom", 0.0), ("top", size[2])):
         vertices = np.flatnonzero(np.isclose(surface.points[:, 2], z))
-        held.append(Held(name, Body(name, bone, motions[name]), vertices))
+        held.append(Held(name, RigidBody(name, bone, motions[name]), vertices))
     middle = np.column_stack([np.full(5, size[0] / 2), np.full(5, size[1] / 2), np.linspace(0, size[2], 5)])
     return Problem(
         surface,

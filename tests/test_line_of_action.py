@@ -18,7 +18,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines
 from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
-from fem_reference.problems.muscle import Body, Problem
+from fem_reference.problems.muscle import Problem, RigidBody
 from fem_reference.report import gallery
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import line_of_action
@@ -299,6 +299,6 @@ def test_a_reference_of_lines_alone_is_refused(tmp_path, capsys) -> None:
 
 def test_the_ends_are_held_by_the_bones_of_the_nearest_attachments() -> None:
     given = bar()
-    spare = Body("spare", given.bones[0].surface, Translation((1, 0, 0), (0.0, 10.0), (0.0, 50.0)))
+    spare = RigidBody("spare", given.bones[0].surface, Translation((1, 0, 0), (0.0, 10.0), (0.0, 50.0)))
     _, frames = solved(replace(given, bones=(spare, *given.bones)))
     assert_allclose(frames[-1].fibres, solved(given)[1][-1].fibres, atol=1e-12)

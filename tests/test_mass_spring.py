@@ -16,7 +16,7 @@ from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
 from fem_reference.geometry.embedding import Locator
 from fem_reference.geometry.rigid_bodies import HalfSpace
-from fem_reference.problems.muscle import Body, Problem
+from fem_reference.problems.muscle import Problem, RigidBody
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import mass_spring
 from fem_reference.solvers.spring_kernels import Course, Network, advance, forces
@@ -280,7 +280,9 @@ def test_every_setting_is_felt(change) -> None:
 def test_bones_keep_masses_out() -> None:
     """A soft bar that hangs sideways between its ends sags onto a plane that comes up, in the end above where they are held."""
     lift = Translation((0, 1, 0), (0.0, 40.0), (0.0, 3.5))
-    floor = Body("floor", Surface(np.eye(3), np.array([[0, 1, 2]])), lift, solid=HalfSpace((5, -3.0, 5), (0, 1, 0)))
+    floor = RigidBody(
+        "floor", Surface(np.eye(3), np.array([[0, 1, 2]])), lift, solid=HalfSpace((5, -3.0, 5), (0, 1, 0))
+    )
     given = replace(bar(None, (0, 40)), bones=(floor,))
     soft = {"stiffness": "0.01 N/mm", "gravity": "0, -40, 0 m/s^2", "damping": "0.001 N s/m"}
     _, sagging = solved(given, **soft)

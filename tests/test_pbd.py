@@ -12,7 +12,7 @@ from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
 from fem_reference.geometry.rigid_bodies import Sphere
 from fem_reference.geometry.signed_distance import build
-from fem_reference.problems.muscle import Body, Held, Problem, Setup
+from fem_reference.problems.muscle import Held, Problem, RigidBody, Setup
 from fem_reference.solvers import pbd
 
 USUAL = {
@@ -56,7 +56,7 @@ def held_setup(low, high, last=10, every=1, pose=None):
     ends = np.flatnonzero(z < -24), np.flatnonzero(z > 24)
     if pose is not None:
         surface = surface.moved_to(apply(pose, surface.points))
-    bones = tuple(Body(name, surface, motion) for name, motion in (("low", low), ("high", high)))
+    bones = tuple(RigidBody(name, surface, motion) for name, motion in (("low", low), ("high", high)))
     held = tuple(Held(bone.name, bone, vertices) for bone, vertices in zip(bones, ends, strict=True))
     return Setup(surface, bones, held, tuple(range(0, last + 1, every)), interval=None)
 
@@ -161,7 +161,9 @@ def ball_against(last, back=None):
     """The spindle held at its ends, and a ball of 8 mm that gets 10 mm into its side by frame 40, and is gone by ``back``."""
     setup = held_setup(None, None, last=last)
     frames, ways = ((0.0, 40.0), (0.0, 12.0)) if back is None else ((0.0, 40.0, float(back)), (0.0, 12.0, 0.0))
-    ball = Body("ball", shapes.sphere(0, 8.0), Translation((-1, 0, 0), frames, ways), solid=Sphere((20, 0, 0), 8.0))
+    ball = RigidBody(
+        "ball", shapes.sphere(0, 8.0), Translation((-1, 0, 0), frames, ways), solid=Sphere((20, 0, 0), 8.0)
+    )
     return Setup(setup.surface, (ball,), setup.held, setup.frames, None)
 
 
@@ -205,7 +207,7 @@ def test_a_bone_that_is_gone_leaves_the_rest_state():
 
 def test_what_overlaps_at_rest_does_not_jump():
     setup = ball_against(10)
-    ball = Body("ball", shapes.sphere(0, 8.0), None, solid=Sphere((15, 0, 0), 8.0))
+    ball = RigidBody("ball", shapes.sphere(0, 8.0), None, solid=Sphere((15, 0, 0), 8.0))
     setup = Setup(setup.surface, (ball,), setup.held, setup.frames, None)
     assert deepest(setup, {0: setup.surface.points}) > 2
     _, frames = run(setup, collision=CONTACT)
@@ -214,7 +216,7 @@ def test_what_overlaps_at_rest_does_not_jump():
 
 def test_held_vertices_go_with_their_bone_whatever_pushes():
     setup = ball_against(5)
-    everywhere = Body("ball", shapes.sphere(0, 100.0), None, solid=Sphere((0, 0, 0), 100.0))
+    everywhere = RigidBody("ball", shapes.sphere(0, 100.0), None, solid=Sphere((0, 0, 0), 100.0))
     _, frames = run(Setup(setup.surface, (everywhere,), setup.held, setup.frames, None), collision=CONTACT)
     for held in setup.held:
         np.testing.assert_array_equal(frames[5][held.vertices], setup.surface.points[held.vertices])
@@ -338,7 +340,7 @@ def pressed(pose, spacing):
     surface = shapes.sphere(2, 8.0)
     surface = surface.moved_to(apply(pose, surface.points + [20, 0, 0]))
     x, y, z = -pose[:3, 0]
-    ball = Body("ball", surface, Translation((x, y, z), (0.0, 40.0), (0.0, 12.0)))
+    ball = RigidBody("ball", surface, Translation((x, y, z), (0.0, 40.0), (0.0, 12.0)))
     vars(ball)["shape"] = build(surface, spacing, 6.0)  # as if it had been read from the kept distances
     _, frames = run(Setup(setup.surface, (ball,), setup.held, setup.frames, None), collision=CONTACT)
     return apply(np.linalg.inv(pose), frames[16])

@@ -13,7 +13,7 @@ from fem_reference.effects import Effect
 from fem_reference.foundations.motion import Translation
 from fem_reference.foundations.records import parse
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.courses import Affine, Rest
 from fem_reference.runs.store import Frame
 from fem_reference.solvers import fenicsx
@@ -42,7 +42,7 @@ def flesh(element: str) -> tuple[Effect, ...]:
     return effect("neo_hooke", mu="10 kPa"), effect(resistance, bulk=bulk)
 
 
-def modes(session, body: Continuum, element: str, **changes) -> list[float]:
+def modes(session, body: Body, element: str, **changes) -> list[float]:
     settings = BodySettings(element=element, first_step=100.0, residual=1e-11, **changes)
     solved = session.solve(body, settings)
     assert solved.outcome.status == "converged", solved.outcome.message
@@ -57,13 +57,13 @@ def critical(width: float) -> float:
     return float(euler / (1 + 3 * 1.2 * euler))
 
 
-def column(element: str, cells: tuple[int, int, int], shortenings: list[float], size=(THIN, WIDE, LENGTH)) -> Continuum:
+def column(element: str, cells: tuple[int, int, int], shortenings: list[float], size=(THIN, WIDE, LENGTH)) -> Body:
     """Shortened at frame i by ``shortenings[i - 1]`` of its length."""
     mesh = shapes.box(cells, size, ELEMENTS[element][0])
     knots = tuple(enumerate([0.0, *shortenings]))
     push = Affine(STILL, (0.0, 0.0, -size[2]), knots)
     held = Prescribed("foot", "z0", (0, 1, 2), Rest()), Prescribed("head", "z1", (2,), push)
-    return Continuum(mesh, flesh(element), held, tuple(float(frame) for frame, _ in knots))
+    return Body(mesh, flesh(element), held, tuple(float(frame) for frame, _ in knots))
 
 
 def test_a_column_buckles_in_one_plane_and_then_in_the_other(session) -> None:
@@ -83,7 +83,7 @@ def test_tetrahedra_count_alike(session) -> None:
 def test_a_block_at_rest_or_stretched_is_stable(element, session) -> None:
     stretch = Affine(STILL, (0.0, 0.0, 0.5))
     mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), ELEMENTS[element][0])
-    body = Continuum(mesh, flesh(element), (*SYMMETRY, Prescribed("z1", "z1", (2,), stretch)), (0.0, 1.0))
+    body = Body(mesh, flesh(element), (*SYMMETRY, Prescribed("z1", "z1", (2,), stretch)), (0.0, 1.0))
     assert modes(session, body, element) == [0, 0]
 
 
@@ -113,7 +113,7 @@ def test_a_squeezed_slab_bends_when_it_should(element, session) -> None:
         Prescribed("z1", "z1", (2,), Affine(STILL, (0.0, 0.0, -HEIGHT), knots)),
         Prescribed("slides", "z0", (0,), Rest(), 1e-9),
     )
-    body = Continuum(mesh, flesh(element), held, tuple(frame for frame, _ in knots))
+    body = Body(mesh, flesh(element), held, tuple(frame for frame, _ in knots))
     assert modes(session, body, element) == [0, 0, 0, 0, 1]
 
 

@@ -13,7 +13,7 @@ from fem_reference.foundations.limits import Limit
 from fem_reference.foundations.motion import Translation
 from fem_reference.foundations.records import parse
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, ByCell, Continuum, Prescribed
+from fem_reference.problems.body import ELEMENTS, Body, ByCell, Prescribed
 from fem_reference.problems.courses import Affine, Along, Rest
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import BodySettings, Settings
@@ -128,7 +128,7 @@ def test_a_body_that_collapses_ends_as_collapsed(element, session) -> None:
     gradient = ((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0))
     flesh = (effect("neo_hooke", mu="10 kPa"), resistance(element, 1.0))
     mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), ELEMENTS[element][0])
-    body = Continuum(mesh, flesh, everywhere(gradient), (0.0, 0.2, 0.3, 0.4, 0.5))
+    body = Body(mesh, flesh, everywhere(gradient), (0.0, 0.2, 0.3, 0.4, 0.5))
     solved = session.solve(body, BodySettings(element=element, first_step=0.1, smallest_step=1e-3, residual=1e-11))
     message = solved.outcome.message
     assert solved.outcome.status == "collapsed"
@@ -165,7 +165,7 @@ def test_next_to_nothing_of_a_body_may_collapse(layer, status, session) -> None:
     flat = Affine(((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, -0.9)))
     held = Prescribed("low", "low", (0, 1, 2), flat), Prescribed("top", "z1", (0, 1, 2), Rest())
     flesh = (effect("neo_hooke", mu="10 kPa"), resistance("Q1/P0", 1.0))
-    body = Continuum(mesh, flesh, held, (0.0, 1.0))
+    body = Body(mesh, flesh, held, (0.0, 1.0))
     solved = session.solve(body, BodySettings(element="Q1/P0", first_step=0.1, smallest_step=1e-2, residual=1e-10))
     assert solved.outcome.status == status, solved.outcome.message
     assert "incompressible is outside the range that it is meant for" in solved.outcome.message
@@ -182,7 +182,7 @@ def drawn(session, acting: tuple[Effect, ...], stretch: float):
     gradient = ((stretch - 1, 0.0, 0.0), (0.0, across - 1, 0.0), (0.0, 0.0, across - 1))
     flesh = (effect("neo_hooke", mu="10 kPa"), resistance("Q1/P0", 1.0), *acting)
     mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), "hexahedron")
-    body = Continuum(mesh, flesh, everywhere(gradient), (0.0, 1.0), Along((1.0, 0.0, 0.0)))
+    body = Body(mesh, flesh, everywhere(gradient), (0.0, 1.0), Along((1.0, 0.0, 0.0)))
     return session.solve(body, BodySettings(element="Q1/P0", first_step=0.25, residual=1e-11))
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fem_reference.assessment.catalogue import Entry, Lab, result
-from fem_reference.problems.body import Continuum
+from fem_reference.problems.body import Body
 from fem_reference.runs.solved import Reached, Solved
 from fem_reference.runs.store import Outcome
 from fem_reference.verification import runner
@@ -93,7 +93,7 @@ class Reading:
     def __init__(self) -> None:
         self.cells = defaultdict[str, list[int]](list)
 
-    def solve(self, body: Continuum, element: str, **settings: float) -> Solved:  # noqa: ARG002
+    def solve(self, body: Body, element: str, **settings: float) -> Solved:  # noqa: ARG002
         self.cells[body.mesh.kind].append(len(body.mesh.cells))
         around = {entry.name: np.ones(3) for entry in (*body.prescribed, *body.obstructions)}
         points = body.mesh.points + 1.0

@@ -15,7 +15,7 @@ import shapes
 import test_report
 from browser import PROGRAM, Browser
 
-from fem_reference.problems.muscle import Body
+from fem_reference.problems.muscle import RigidBody
 from fem_reference.report import page, viewer
 
 NAN = float("nan")
@@ -75,7 +75,7 @@ def test_bones_have_a_pose_for_each_frame_and_few_triangles(comparison):
     np.testing.assert_allclose(bone["poses"], [body.pose(number).ravel() for number in test_report.NUMBERS], atol=0)
     points = positions(bone, bone, 1)[0]
     assert np.abs(points - body.surface.points).max() <= bone["step"] / 2 + 1e-12
-    fine = Body("fine", shapes.sphere(5, 20.0), None)
+    fine = RigidBody("fine", shapes.sphere(5, 20.0), None)
     assert len(fine.surface.triangles) > viewer.BONE_TRIANGLES
     changed = replace(comparison, setup=replace(comparison.setup, bones=(fine,)))
     (bone,) = json.loads(viewer.view(changed).data)["bones"]

@@ -10,7 +10,7 @@ from test_stability import STILL, THIN, column, critical, effect, flesh, session
 from fem_reference.effects import total_energy
 from fem_reference.foundations.errors import InputError
 from fem_reference.problems import shapes
-from fem_reference.problems.body import Continuum, Prescribed, check
+from fem_reference.problems.body import Body, Prescribed, check
 from fem_reference.problems.courses import Affine, Turn
 from fem_reference.scenes import casefile
 from fem_reference.solvers.fenicsx import BodySettings
@@ -86,7 +86,7 @@ def test_the_time_from_frame_to_frame_must_be_known() -> None:
         InputError, match=r"frames.interval: got nothing, want the time .* effect\[0\] \(Viscosity\) needs"
     ):
         casefile.read("hip_flexion", changes={"effect[0]": thick})
-    body = Continuum(shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron"), (*flesh("P2/P1"), THICK), (), (0.0, 1.0))
+    body = Body(shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron"), (*flesh("P2/P1"), THICK), (), (0.0, 1.0))
     with pytest.raises(InputError, match="interval: got nothing, want the time from a frame number to the next"):
         check(body, "P2/P1")
     with pytest.raises(
@@ -95,11 +95,11 @@ def test_the_time_from_frame_to_frame_must_be_known() -> None:
         solve_body(replace(body, interval=1.0), OtherSettings())
 
 
-def pulled(acting, interval: float | None = None) -> Continuum:
+def pulled(acting, interval: float | None = None) -> Body:
     """A block stretched by a half until frame 1, free to thin, and then held for 40 frames."""
     held = *SYMMETRY, Prescribed("z1", "z1", (2,), Affine(STILL, (0.0, 0.0, 0.5)))
     mesh = shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
-    return Continuum(mesh, acting, held, (0.0, 1.0, 41.0), interval=interval)
+    return Body(mesh, acting, held, (0.0, 1.0, 41.0), interval=interval)
 
 
 def test_speed_costs_force_and_what_is_held_long_enough_ends_where_it_would_without(session) -> None:  # noqa: F811
@@ -122,7 +122,7 @@ def test_turning_costs_nothing_however_fast(session) -> None:  # noqa: F811
     mesh = shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
     turn = Turn((1.0, 2.0, 3.0), 1.0)
     held = tuple(Prescribed(face, face, (0, 1, 2), turn) for face in ("x0", "x1", "y0", "y1", "z0", "z1"))
-    body = Continuum(mesh, (*flesh("P2/P1"), THICK), held, (0.0, 1.0), interval=1e-3)
+    body = Body(mesh, (*flesh("P2/P1"), THICK), held, (0.0, 1.0), interval=1e-3)
     solved = session.solve(body, BodySettings(first_step=0.5, residual=1e-11))
     assert solved.outcome.status == "converged", solved.outcome.message
     for force in solved.last.forces.values():

@@ -27,7 +27,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.motion import Rotation
 from fem_reference.foundations.records import join
 from fem_reference.io import files
-from fem_reference.problems.muscle import Body, Problem
+from fem_reference.problems.muscle import Problem, RigidBody
 from fem_reference.scenes.muscle import Scene
 
 # What FEBio has in the same form.
@@ -149,7 +149,7 @@ def _motions(root: Element, problem: Problem) -> None:
             leaf(entry, "value", repr(share), lc=str(curves[bone.name]))
 
 
-def axis(bone: Body) -> list[float]:
+def axis(bone: RigidBody) -> list[float]:
     """The unit vector that a bone turns about or slides along; none where it rests."""
     if bone.motion is None:
         return []

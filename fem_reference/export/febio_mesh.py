@@ -7,7 +7,7 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, boundary, enclosed_volume
-from fem_reference.problems.muscle import Body, Held, Problem
+from fem_reference.problems.muscle import Held, Problem, RigidBody
 
 # Corners between which the last six nodes of a tet10 are; the first three pairs are those of a tri6 too.
 EDGES = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
@@ -24,7 +24,7 @@ def vector(values: Iterable[float]) -> str:
     return ",".join(repr(float(value)) for value in values)
 
 
-def bone_id(bone: Body) -> str:
+def bone_id(bone: RigidBody) -> str:
     """What a bone is called in the file: its material, its elements."""
     return f"bone_{bone.name}"
 
@@ -52,7 +52,7 @@ def quadratic(mesh: TetMesh) -> tuple[Floats, Ints]:
     return np.vstack([mesh.points, mesh.points[edges].mean(axis=1)]), np.hstack([mesh.tets, middles])
 
 
-def pushing(problem: Problem) -> list[Body]:
+def pushing(problem: Problem) -> list[RigidBody]:
     """The bones that push on the muscle."""
     contact = problem.contact
     return [bone for bone in problem.bones if contact is not None and contact.is_by(bone.name)]

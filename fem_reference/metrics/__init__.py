@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Polylines, vertex_areas
 from fem_reference.geometry.extension import Extension
-from fem_reference.problems.muscle import Body
+from fem_reference.problems.muscle import RigidBody
 from fem_reference.runs.store import Run
 
 
@@ -47,12 +47,12 @@ class MeasurementContext:
     fibres: Polylines
     extension: Extension
     travel: float
-    bones: tuple[Body, ...]
+    bones: tuple[RigidBody, ...]
     free: NDArray[np.bool_]
 
     @classmethod
     def of(
-        cls, reference: Run, fibres: Polylines, bones: tuple[Body, ...], free: NDArray[np.bool_] | None = None
+        cls, reference: Run, fibres: Polylines, bones: tuple[RigidBody, ...], free: NDArray[np.bool_] | None = None
     ) -> "MeasurementContext":
         """The measurement context of a reference run; without ``free`` (n,), every vertex is free."""
         rest = reference.surface

@@ -15,7 +15,7 @@ from fem_reference.foundations.mesh import Floats, Surface, enclosed_volume
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.overlap import shared_volume
 from fem_reference.metrics import Measure, MeasurementContext
-from fem_reference.problems.muscle import Body
+from fem_reference.problems.muscle import RigidBody
 from fem_reference.runs.store import Run
 
 UNITS = {"deepest": "mm", "volume": "mm3"}
@@ -77,7 +77,7 @@ def _frame(surface: Surface, number: int, context: MeasurementContext) -> list[_
     return [deepest, _Worst(volume, largest.where)]
 
 
-def _distance(bone: Body, number: int, points: Floats) -> Floats:
+def _distance(bone: RigidBody, number: int, points: Floats) -> Floats:
     """Distance (n,) [mm] of ``points`` (n, 3) to ``bone`` where it is at frame ``number``, negative inside."""
     return bone.shape.sample(apply(np.linalg.inv(bone.pose(number)), points)).distance
 
@@ -87,7 +87,7 @@ def _is_body(surface: Surface) -> bool:
     return bool(np.isfinite(enclosed_volume(surface.points, surface.triangles)))
 
 
-def _without_inside(bones: tuple[Body, ...]) -> str:
+def _without_inside(bones: tuple[RigidBody, ...]) -> str:
     """Which bone has no inside, and why; nothing where all have."""
     for bone in bones:
         try:

@@ -1,4 +1,4 @@
-"""A deformable body as finite elements see it: cells straight or curved, what is prescribed where, and what acts.
+"""A body as finite elements see it: cells straight or curved, what is prescribed where, and what acts.
 
 It knows no solver.
 """
@@ -30,7 +30,7 @@ ELEMENTS: dict[str, tuple[Kind, int, int | None]] = {
 }
 
 
-def check(body: "Continuum", element: str) -> None:
+def check(body: "Body", element: str) -> None:
     """InputError unless ``element`` suits the cells and effects of ``body``, which has every region and fibre direction that it
     speaks of, and prescribes what can be told apart and be solved.
     """
@@ -160,7 +160,7 @@ class ByCell:
 
 
 @dataclass(frozen=True, eq=False)
-class Continuum:
+class Body:
     """A body of ``mesh`` with its ``effects``; at ``frames[0]`` it rests. A load acts on the facets that its ``on`` names; by
     ``contact``, where there is one, every obstruction pushes. ``interval`` [s]: from a frame number to the next, where time
     matters.

@@ -1,4 +1,4 @@
-"""Rigid bodies that push: what is in the way of a deformable body, and the law of the pressure between them."""
+"""Rigid bodies that push: what is in the way of a body, and the law of the pressure between them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -59,7 +59,7 @@ def kept_distances() -> Path:
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class RigidBody:
     """A rigid bone: its ``surface`` at rest, its ``motion``, None where it rests, and how its distance shall be known, as
     ``scene.Bone`` has it [mm]; or the ``solid`` of closed form whose vertices the surface has.
     """
@@ -91,7 +91,7 @@ class Held:
     """
 
     attachment: str
-    bone: Body
+    bone: RigidBody
     vertices: Ints
     stiffness: float | None = None
 
@@ -103,7 +103,7 @@ class Setup:
     """
 
     surface: Surface
-    bones: tuple[Body, ...]
+    bones: tuple[RigidBody, ...]
     held: tuple[Held, ...]
     frames: tuple[int, ...]
     interval: float | None
@@ -229,20 +229,20 @@ def _filled(scene: Scene, rest: Setup, size: float) -> TetMesh:
     return replace(mesh, facets={name: facets_under(mesh, rest.surface, held) for name, held in shares.items()})
 
 
-def _body(scene: Scene, i: int, muscle: Surface) -> Body:
+def _body(scene: Scene, i: int, muscle: Surface) -> RigidBody:
     bone, form = scene.bone[i], solid(scene.bone[i])
     motion = bone.motion.poses() if bone.motion else None
     if form is not None:
         surface = tessellated(form, muscle.points, join(scene.place, f"bone[{i}]"))
-        return Body(bone.name, surface, motion, solid=form)
+        return RigidBody(bone.name, surface, motion, solid=form)
     assert bone.surface is not None  # a Bone record has a closed form or a surface with its unit
     assert bone.unit is not None
     surface = files.read_surface(scene.file(bone.surface, f"bone[{i}].surface"), bone.unit)
     check_finite(surface)
-    return Body(bone.name, surface, motion, bone.distance_error, bone.distance_rounding)
+    return RigidBody(bone.name, surface, motion, bone.distance_error, bone.distance_rounding)
 
 
-def _held(scene: Scene, surface: Surface, bones: tuple[Body, ...]) -> tuple[Held, ...]:
+def _held(scene: Scene, surface: Surface, bones: tuple[RigidBody, ...]) -> tuple[Held, ...]:
     by_name = {bone.name: bone for bone in bones}
     taken = np.zeros(len(surface.points), bool)
     held = []

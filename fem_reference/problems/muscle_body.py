@@ -9,7 +9,7 @@ from fem_reference.effects import Interaction
 from fem_reference.effects.contact import Contact as ContactEffect
 from fem_reference.foundations.mesh import Floats, boundary
 from fem_reference.foundations.motion import apply
-from fem_reference.problems.body import Cells, Continuum, Prescribed
+from fem_reference.problems.body import Body, Cells, Prescribed
 from fem_reference.problems.contact import Contact, Obstruction
 from fem_reference.problems.muscle import Problem
 
@@ -40,7 +40,7 @@ class Follows:
         return apply(self.pose(frame), points) - points
 
 
-def as_continuum(problem: Problem) -> Continuum:
+def as_body(problem: Problem) -> Body:
     """The muscle as a body: its bones prescribe where the facets that they hold exactly are, or pull at what they hold by springs;
     the rest of its skin is ``"free"``.
     """
@@ -62,11 +62,11 @@ def as_continuum(problem: Problem) -> Continuum:
         for entry in problem.held
     )
     acting = tuple(effect for effect in problem.effects if not isinstance(effect, Interaction))
-    body = Continuum(cells, acting, prescribed, problem.frames, problem.fibre, interval=problem.interval)
+    body = Body(cells, acting, prescribed, problem.frames, problem.fibre, interval=problem.interval)
     return body if problem.contact is None else _among_bones(body, problem, problem.contact)
 
 
-def _among_bones(body: Continuum, problem: Problem, effect: ContactEffect) -> Continuum:
+def _among_bones(body: Body, problem: Problem, effect: ContactEffect) -> Body:
     """The body with the bones that push on it; where they overlap it at rest, it is relaxed before the first frame."""
     assert problem.skin is not None  # built with the effect
     bones = [bone for bone in problem.bones if effect.is_by(bone.name)]

@@ -15,7 +15,7 @@ from fem_reference.foundations.mesh import Surface, enclosed_volume
 from fem_reference.foundations.motion import RigidMotion, Translation
 from fem_reference.geometry.sectors import held_area, held_shares
 from fem_reference.metrics import find
-from fem_reference.problems.muscle import Body, Held, Setup
+from fem_reference.problems.muscle import Held, RigidBody, Setup
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.report.words import exact
 from fem_reference.runs.scalar import FieldRun
@@ -74,7 +74,7 @@ def _parameters(effect: Effect) -> dict[str, str]:
     return {name: f"{exact(value)} {unit}".rstrip() for name, value, unit in effect.parameters}
 
 
-def _shape(bone: Body) -> str:
+def _shape(bone: RigidBody) -> str:
     """How fine the surface of a bone is, or what its closed form is."""
     if bone.solid is None:
         return f"{len(bone.surface.triangles)} triangles"

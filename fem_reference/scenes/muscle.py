@@ -31,7 +31,7 @@ HOME = home(Path(__file__).resolve().parent.parent)
 
 
 class Muscle(Record):
-    """The deformable body: a closed triangle surface, the size of the tetrahedra it is filled with, how often each of them is then
+    """The muscle: a closed triangle surface, the size of the tetrahedra it is filled with, how often each of them is then
     cut into eight (``refinements``), and how it is filled: with good tetrahedra (``"quality"``), or an axis-aligned box with a
     grid of boxes, each cut into six (``"block"``).
     """

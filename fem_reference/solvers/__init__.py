@@ -20,7 +20,7 @@ Task = Literal["solve", "solve_field", "solve_body"]
 _TASKS: dict[Task, tuple[str, str]] = {
     "solve": ("Settings", "muscles"),
     "solve_field": ("FieldSettings", "scalar fields"),
-    "solve_body": ("BodySettings", "bodies of continuum mechanics"),
+    "solve_body": ("BodySettings", "finite element bodies"),
 }
 
 

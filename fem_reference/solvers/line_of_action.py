@@ -18,7 +18,7 @@ from fem_reference.foundations.mesh import Floats, Ints, Polylines
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record
 from fem_reference.geometry.wrapping import Cylinder, Obstacle, Paths, Sphere, straight
-from fem_reference.problems.muscle import Body, Problem
+from fem_reference.problems.muscle import Problem, RigidBody
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.scenes import bones
 
@@ -74,7 +74,7 @@ class Lines:
     the share ``share[j]`` of its length.
     """
 
-    bones: tuple[Body, ...]
+    bones: tuple[RigidBody, ...]
     fixed: Floats
     on: Ints
     part: Ints
@@ -93,7 +93,7 @@ class Wrap:
     """An ``obstacle``, told at rest, on a ``bone``; ``name`` is what messages call it."""
 
     obstacle: Obstacle
-    bone: Body
+    bone: RigidBody
     name: str
 
 
@@ -210,7 +210,7 @@ def _nearest(problem: Problem, points: Floats) -> Ints:
     return np.array(found)[np.argmin(away, axis=0)]
 
 
-def _index(bodies: tuple[Body, ...], name: str, key: str) -> int:
+def _index(bodies: tuple[RigidBody, ...], name: str, key: str) -> int:
     names = [body.name for body in bodies]
     if name not in names:
         raise InputError(f"line_of_action: {key}", f'"{name}"', f"one of {', '.join(names)}")

@@ -44,7 +44,7 @@ from pydantic import Field
 from fem_reference.foundations.mesh import TET_FACES, Floats, Ints, Surface
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record
-from fem_reference.problems.muscle import Body, Problem, Setup
+from fem_reference.problems.muscle import Problem, RigidBody, Setup
 from fem_reference.runs.store import Outcome, Sink
 from fem_reference.solvers.pbd import Constraints, along_fibres, carry, follow
 from fem_reference.solvers.pbd_kernels import distances, nearest_segments
@@ -115,7 +115,7 @@ class Bone:
     The pose is the product of all motions, as there, and not the one ``given``: they differ by rounding.
     """
 
-    def __init__(self, body: Body, count: int, frame: int) -> None:
+    def __init__(self, body: RigidBody, count: int, frame: int) -> None:
         self.body, self.voxels = body, Voxels.of(body.surface, count)
         self.given = self.pose = body.pose(frame)
         self.last = np.eye(4)

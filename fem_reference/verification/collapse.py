@@ -13,7 +13,7 @@ import numpy as np
 from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.effects import make
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.courses import Affine
 from fem_reference.runs.solved import Solved
 from fem_reference.verification.parts import SYMMETRY, resistance
@@ -40,7 +40,7 @@ def squeezed(lab: Lab, element: str, poisson: float, stretches: tuple[float, ...
     plate = Prescribed("plate", "z1", (2,), Affine(_STILL, (0.0, 0.0, -1.0)))
     acting = make("neo_hooke", mu=f"{MU} MPa"), resistance(element, bulk_modulus(poisson))
     frames = tuple(1 - stretch for stretch in stretches)
-    body = Continuum(mesh, acting, (*SYMMETRY, plate), frames)
+    body = Body(mesh, acting, (*SYMMETRY, plate), frames)
     return lab.solve(body, element, first_step=0.1, smallest_step=1e-3, residual=1e-11)
 
 

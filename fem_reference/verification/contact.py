@@ -12,7 +12,7 @@ from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere, Vector
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.contact import Contact, Obstruction
 from fem_reference.problems.courses import Rest
 from fem_reference.runs.solved import Reached
@@ -48,7 +48,7 @@ def plate(lab: Lab, element: str, stiffness: float) -> Finding:
     mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), ELEMENTS[element][0])
     law = Contact("z1", stiffness, 0.01)
     above = Obstruction("plate", HalfSpace((0.0, 0.0, 1.0), (0.0, 0.0, -1.0)), Slide((0.0, 0.0, -PLATE_WAY)))
-    body = Continuum(mesh, neo_hooke(MU, PLATE_BULK), SYMMETRY, (0.0, 1.0), contact=law, obstructions=(above,))
+    body = Body(mesh, neo_hooke(MU, PLATE_BULK), SYMMETRY, (0.0, 1.0), contact=law, obstructions=(above,))
     state = lab.solve(body, element, first_step=0.2, residual=1e-12).last
     return Finding(float(state.forces["plate"][2]), note=f"{state.scalars['contact_depth']:.4f} mm deep")
 
@@ -69,7 +69,7 @@ def pressed(lab: Lab, n: int, radius: float = RADIUS) -> Reached:
     law = Contact("z0", BALL_STIFFNESS, 5e-4)
     ball = Obstruction("ball", Sphere((0.0, 0.0, -radius), radius), Slide((0.0, 0.0, APPROACH)))
     held = (*SYMMETRY[:2], Prescribed("far", "outer", (0, 1, 2), Rest()))
-    body = Continuum(mesh, neo_hooke(MU, BULK), held, (0.0, 1.0), contact=law, obstructions=(ball,))
+    body = Body(mesh, neo_hooke(MU, BULK), held, (0.0, 1.0), contact=law, obstructions=(ball,))
     return lab.solve(body, "Q2/Q1", first_step=0.5, residual=1e-10, newton_iterations=25).last
 
 

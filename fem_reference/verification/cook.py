@@ -15,7 +15,7 @@ from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.effects import make
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.courses import Rest
 from fem_reference.verification.parts import course, ladder, once, resistance
 from fem_reference.verification.truths import find
@@ -60,7 +60,7 @@ class Panel:
         """How far the corner (48, 60) goes along y [mm]."""
         return float(self.membrane.tip)
 
-    def body(self, n: int) -> Continuum:
+    def body(self, n: int) -> Body:
         """The panel in n by n cells."""
         faces = {face: face for face in ("x0", "x1", "z0", "z1")}
         mesh = shapes.mapped([shapes.Block(_place, (n, n, 1), faces)], ELEMENTS[self.element][0], 1)
@@ -70,7 +70,7 @@ class Panel:
             resistance(self.element, self.membrane.bulk * self.bulk),
             make("traction", on="x1", force=pull, course=course()),
         )
-        return Continuum(mesh, acting, HELD, (0.0, 1.0))
+        return Body(mesh, acting, HELD, (0.0, 1.0))
 
     def tip(self, lab: Lab, n: int) -> float:
         """How far the corner goes in n by n cells [mm], over ``share``."""

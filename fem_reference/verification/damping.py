@@ -5,7 +5,7 @@ import numpy as np
 from fem_reference.assessment.catalogue import Entry, Finding, Lab, order
 from fem_reference.effects import Effect, make
 from fem_reference.problems import shapes
-from fem_reference.problems.body import Continuum, Prescribed
+from fem_reference.problems.body import Body, Prescribed
 from fem_reference.problems.courses import Rest
 from fem_reference.verification import truths
 from fem_reference.verification.homogeneous import MU, NEO
@@ -31,7 +31,7 @@ def _velocity(lab: Lab, seconds: float = _SECONDS) -> Finding:
     pull = f"0, 0, {-FREE_FALL} mm/s^2"
     weight = make("gravity", density=f"{MUSCLE} tonne/mm^3", acceleration=pull, course=course())
     acting = (*NEO.effects, resistance("P2/P1", 100 * MU), weight, drag(_DRAG))
-    body = Continuum(mesh, acting, (), (0, 1, 5), interval=seconds)
+    body = Body(mesh, acting, (), (0, 1, 5), interval=seconds)
     solved = lab.solve(body, "P2/P1", first_step=0.5, residual=1e-13)
     way = (solved.last.points - solved.states[1].points)[:, 2]
     return Finding(float(way[np.argmax(np.abs(way))]) / (4 * _SECONDS))
@@ -70,7 +70,7 @@ def _decay(lab: Lab, step: float, coefficient: float) -> float:
     walls = tuple(Prescribed(face, face, ("xyz".index(face[0]),), Rest()) for face in ("x0", "x1", "y0", "y1", "z0"))
     frames = tuple(np.linspace(0, _TO, round(_TO / step) + 1).tolist())
     acting = (*NEO.effects, resistance("Q2", _SOFT), weight, drag(coefficient))
-    body = Continuum(mesh, acting, walls, frames, interval=_SECONDS)
+    body = Body(mesh, acting, walls, frames, interval=_SECONDS)
     solved = lab.solve(body, "Q2", first_step=step, residual=1e-15)
     ends = [state.points[:, 2].max() - _LENGTH for state in (solved.states[round(_FROM / step)], solved.last)]
     return float(np.log(ends[0] / ends[1])) / ((_TO - _FROM) * _SECONDS)

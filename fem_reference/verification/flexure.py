@@ -9,7 +9,7 @@ import numpy as np
 from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.courses import Rest
 from fem_reference.runs.solved import Reached
 from fem_reference.verification import truths
@@ -48,7 +48,7 @@ def bent(
         Prescribed("end", "y1", (0, 1, 2), Bend(THICKNESS, LENGTH, ANGLE)),
         *(Prescribed(face, face, (2,), Rest()) for face in faces),
     )
-    body = Continuum(mesh, neo_hooke(mu, BULK), held, (0.0, 1.0))
+    body = Body(mesh, neo_hooke(mu, BULK), held, (0.0, 1.0))
     return mesh.points, lab.solve(body, element, first_step=0.5, residual=1e-9).last
 
 

@@ -11,7 +11,7 @@ from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.effects import Effect, make
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Cells, Continuum, Prescribed
+from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
 from fem_reference.problems.courses import Along, Rest
 from fem_reference.verification.parts import Value, course, once, resistance
 from fem_reference.verification.truths import find
@@ -67,13 +67,13 @@ class Heart:
         law = replace(right.law, c=right.law.c * self.stiff)
         return replace(right, law=law, tension=right.tension * self.active)
 
-    def beam(self, n: int) -> Continuum:
+    def beam(self, n: int) -> Body:
         """Half of the beam of problem 1, y <= 0.5, in 10n by n by 2n cells."""
         mesh = shapes.box((10 * n, n, 2 * n), (10.0, 0.5, 1.0), ELEMENTS[self.element][0], self.degree)
         held = (Prescribed("clamp", "x0", (0, 1, 2), Rest()), Prescribed("middle", "y1", (1,), Rest()))
-        return Continuum(mesh, matter(self.problem(1), self.element, "z0", self.bulk), held, (0.0, 1.0), Along(X))
+        return Body(mesh, matter(self.problem(1), self.element, "z0", self.bulk), held, (0.0, 1.0), Along(X))
 
-    def passive(self, counts: shapes.Counts) -> Continuum:
+    def passive(self, counts: shapes.Counts) -> Body:
         """A quarter of the ventricle of problem 2, whose matter is the same in all directions."""
         mesh = shapes.ventricle_quarter(counts, ELEMENTS[self.element][0], self.degree)
         held = (
@@ -81,15 +81,15 @@ class Heart:
             Prescribed("x0", "x0", (0,), Rest()),
             Prescribed("y0", "y0", (1,), Rest()),
         )
-        return Continuum(mesh, matter(self.problem(2), self.element, "endo", self.bulk), held, (0.0, 1.0), Along(X))
+        return Body(mesh, matter(self.problem(2), self.element, "endo", self.bulk), held, (0.0, 1.0), Along(X))
 
-    def contracting(self, n: int) -> Continuum:
+    def contracting(self, n: int) -> Body:
         """The ventricle of problem 3, whose pressure and tension grow together, with n cells around an eighth of a turn."""
         mesh = _crowded(shapes.ventricle((n, 7 * n // 2, n), ELEMENTS[self.element][0], self.degree))
         held = (Prescribed("base", "base", (0, 1, 2), Rest()),)
-        return Continuum(mesh, matter(self.problem(3), self.element, "endo", self.bulk), held, (0.0, 1.0), Helix())
+        return Body(mesh, matter(self.problem(3), self.element, "endo", self.bulk), held, (0.0, 1.0), Helix())
 
-    def height(self, lab: Lab, body: Continuum, point: Point) -> float:
+    def height(self, lab: Lab, body: Body, point: Point) -> float:
         """The z [mm] to which the node at ``point`` of one of the bodies goes."""
         state = lab.solve(body, self.element, first_step=0.2, residual=RESIDUAL).last
         return float(state.points[np.argmin(np.linalg.norm(body.mesh.points - point, axis=1)), 2])

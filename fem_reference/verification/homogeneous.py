@@ -12,7 +12,7 @@ import numpy as np
 from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.effects import Effect, make
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.courses import Affine, Along, Matrix, Radial
 from fem_reference.runs.solved import Solved
 from fem_reference.verification import truths
@@ -94,11 +94,11 @@ class Specimen:
     bulk: float = BULK
     loads: tuple[Effect, ...] = ()
 
-    def body(self) -> Continuum:
+    def body(self) -> Body:
         """The block in two cells a side."""
         acting = (*self.material.effects, resistance(self.element, self.bulk), *self.loads)
         mesh = shapes.box((2, 2, 2), SIZE, ELEMENTS[self.element][0])
-        return Continuum(mesh, acting, MODES[self.mode][0](self.amount), (0, 1), Along(self.fibre))
+        return Body(mesh, acting, MODES[self.mode][0](self.amount), (0, 1), Along(self.fibre))
 
     def solved(self, lab: Lab) -> Solved:
         """Its states."""

@@ -15,7 +15,7 @@ from scipy.optimize import brentq, minimize_scalar
 from fem_reference.assessment.catalogue import Entry, Lab
 from fem_reference.effects import make
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Cells, Continuum, Prescribed
+from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
 from fem_reference.problems.courses import Radial, Rest
 from fem_reference.runs.solved import Solved
 from fem_reference.verification import truths
@@ -56,7 +56,7 @@ def _blown(lab: Lab, n: int, element: str, matter: Matter, degree: int = 2, larg
     """The pressures of the sphere whose inner face is moved out up to the largest stretch: it encloses ``pi a^3 / 6``."""
     grown = Prescribed("inner", "inner", (0, 1, 2), Radial(1.0, knots=((1.0, 0.0), (2.0, 1.0), (3.0, 2.0))))
     frames = stretches(largest, 8 if largest < 2 else 10)
-    body = Continuum(sphere(element, n, degree), matter(), (*SYMMETRY, grown), frames)
+    body = Body(sphere(element, n, degree), matter(), (*SYMMETRY, grown), frames)
     curve = slope(lab.solve(body, element, first_step=0.2, residual=RESIDUAL))
     return lambda stretch: float(curve(stretch) / (np.pi / 2 * INNER**3 * stretch**2))
 
@@ -92,7 +92,7 @@ def _pressed(lab: Lab, n: int, mu: float) -> float:
     """The mean stretch of the sphere's inner face, over its nodes, where a fluid of the pressure PRESSED is in it."""
     mesh = sphere("P2/P1", n, 2)
     fluid = make("pressure", on="inner", pressure=f"{PRESSED} MPa", course=course())
-    body = Continuum(mesh, (*neo_hooke(mu, BULK), fluid), SYMMETRY, (0.0, 1.0))
+    body = Body(mesh, (*neo_hooke(mu, BULK), fluid), SYMMETRY, (0.0, 1.0))
     state = lab.solve(body, "P2/P1", first_step=0.25, residual=RESIDUAL).last
     inside = np.linalg.norm(mesh.points, axis=1) < INNER * (1 + 1e-9)
     return float(np.linalg.norm(state.points[inside], axis=1).mean() / INNER)
@@ -103,7 +103,7 @@ def _tube(lab: Lab, n: int, element: str, ends: tuple[str, ...] = ("bottom", "to
     mesh = shapes.tube_quarter(INNER, OUTER, LENGTH, (2 * n, 2 * n, 1), ELEMENTS[element][0], degree)
     held = [Prescribed(end, end, (2,), Rest()) for end in ends]
     grown = Prescribed("inner", "inner", (0, 1), Radial(1.0, (1.0, 1.0, 0.0), ((1.0, 0.0), (2.0, 1.0))))
-    body = Continuum(mesh, neo_hooke(MU, BULK), (*SYMMETRY[:2], *held, grown), stretches(STRETCH, 8))
+    body = Body(mesh, neo_hooke(MU, BULK), (*SYMMETRY[:2], *held, grown), stretches(STRETCH, 8))
     return lab.solve(body, element, first_step=0.2, residual=RESIDUAL)
 
 

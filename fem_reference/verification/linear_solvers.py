@@ -9,7 +9,7 @@ from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.effects import make
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import shapes
-from fem_reference.problems.body import Continuum, Prescribed
+from fem_reference.problems.body import Body, Prescribed
 from fem_reference.problems.courses import Along, Rest, Turn
 from fem_reference.verification.parts import neo_hooke, zero
 
@@ -42,7 +42,7 @@ class Compared:
         mesh = shapes.box((3, 3, 7), (10.0, 10.0, 25.0), "tetrahedron")
         turn = Turn((1.0, 0.0, 2.0), 1.0, (5.0, 5.0, 12.5))
         held = (Prescribed("z0", "z0", (0, 1, 2), Rest()), Prescribed("z1", "z1", (0, 1, 2), turn))
-        body = Continuum(mesh, MUSCLE, held, (0.0, 1.0), Along((0.0, 0.0, 1.0)))
+        body = Body(mesh, MUSCLE, held, (0.0, 1.0), Along((0.0, 0.0, 1.0)))
         settings: dict[str, Any] = {
             "linear_solver": solver,
             "precision": precision,

@@ -7,7 +7,7 @@ import numpy as np
 from fem_reference.assessment.catalogue import Entry, Finding, Lab, order
 from fem_reference.effects import Effect, make
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Cells, Continuum, Prescribed
+from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
 from fem_reference.problems.courses import Rest, Turn
 from fem_reference.verification import truths
 from fem_reference.verification.homogeneous import (
@@ -56,7 +56,7 @@ def _reaction(density: float, lab: Lab) -> Finding:
     """Of a block of muscle of 300 ml that stands, stuck to its base [N]."""
     mesh = shapes.box((3, 2, 2), _LARGE, "tetrahedron")
     acting = (*NEO.effects, resistance("P2/P1", BULK), weight(density))
-    last = lab.solve(Continuum(mesh, acting, HELD, (0, 1)), "P2/P1", first_step=0.25, residual=1e-10).last
+    last = lab.solve(Body(mesh, acting, HELD, (0, 1)), "P2/P1", first_step=0.25, residual=1e-10).last
     return Finding(float(last.forces["z0"][2]))
 
 
@@ -87,8 +87,7 @@ def _top(element: str, cells: int, lab: Lab) -> float:
     walls = (Prescribed(face, face, ("xyz".index(face[0]),), Rest()) for face in ("x0", "x1", "y0", "y1", "z0"))
     acting = (*NEO.effects, resistance(element, _SOFT), weight(MUSCLE, _WEIGHT / (MUSCLE * FREE_FALL)))
     return (
-        float(lab.solve(Continuum(mesh, acting, tuple(walls), (0, 1)), element, **STEPS).last.points[:, 2].max())
-        - _HEIGHT
+        float(lab.solve(Body(mesh, acting, tuple(walls), (0, 1)), element, **STEPS).last.points[:, 2].max()) - _HEIGHT
     )
 
 
@@ -126,7 +125,7 @@ def _shrunk(load: Effect, lab: Lab) -> Finding:
     """V/V0 of a block under a ``load`` on what is wet."""
     mesh = wet(shapes.box((2, 2, 2), SIZE, "tetrahedron"), ("x1", "y1", "z1"))
     acting = (*NEO.effects, resistance("P2/P1", _COMPRESSIBLE), load)
-    return Finding(lab.solve(Continuum(mesh, acting, SYMMETRY, (0, 1)), "P2/P1", **STEPS).last.scalars["volume_ratio"])
+    return Finding(lab.solve(Body(mesh, acting, SYMMETRY, (0, 1)), "P2/P1", **STEPS).last.scalars["volume_ratio"])
 
 
 _HYDROSTATIC = Entry(
@@ -154,7 +153,7 @@ def _left_over(faces: tuple[str, ...], lab: Lab) -> Finding:
     """The sum of the forces [N] on both ends of a block, its top tilted by 0.3 rad, in a fluid that wets ``faces``."""
     mesh = wet(shapes.box((2, 2, 2), SIZE, "tetrahedron"), faces)
     acting = (*NEO.effects, resistance("P2/P1", BULK), pressed(2 * MU))
-    forces = lab.solve(Continuum(mesh, acting, (*HELD, _TILT), (0, 1)), "P2/P1", **STEPS).last.forces
+    forces = lab.solve(Body(mesh, acting, (*HELD, _TILT), (0, 1)), "P2/P1", **STEPS).last.forces
     return Finding(float(np.linalg.norm(forces["z0"] + forces["z1"])))
 
 
@@ -183,7 +182,7 @@ def _turned(load: Effect, lab: Lab) -> Finding:
     mesh = wet(shapes.box((2, 2, 2), SIZE, "tetrahedron"), ("x1",))
     base = (Prescribed("z0", "z0", (0, 1, 2), _QUARTER),)
     acting = (*NEO.effects, resistance("P2/P1", BULK), load)
-    solved = lab.solve(Continuum(mesh, acting, base, (0, 1, 2)), "P2/P1", **STEPS)
+    solved = lab.solve(Body(mesh, acting, base, (0, 1, 2)), "P2/P1", **STEPS)
     after, before = solved.last.points, solved.states[1].points
     return Finding(float(np.linalg.norm(after - before - _QUARTER(before, 2), axis=1).max()))
 

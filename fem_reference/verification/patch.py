@@ -6,7 +6,7 @@ import numpy as np
 
 from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.courses import Along, Matrix, Turn
 from fem_reference.runs.solved import Reached
 from fem_reference.verification.fibres import active
@@ -33,11 +33,11 @@ class Patch:
     degree: int = 1
     share: float = 1.0
 
-    def body(self) -> Continuum:
+    def body(self) -> Body:
         """The box and what moves it."""
         mesh = shapes.warped_box(COUNTS, SIZE, ELEMENTS[self.element][0], self.degree, BUMP)
         acting = (*NEO.effects, resistance(self.element, BULK))
-        return Continuum(mesh, acting, everywhere(_times(self.share)), (0, 1))
+        return Body(mesh, acting, everywhere(_times(self.share)), (0, 1))
 
     def error(self, lab: Lab) -> Finding:
         """How far a node is at most from where the whole gradient takes it [mm]."""
@@ -72,7 +72,7 @@ class Turned:
         )
         acting = (*self.material.effects, resistance(self.element, BULK))
         steps = AT_ONCE if self.faces == SURFACE else STEPS
-        solved = lab.solve(Continuum(mesh, acting, prescribed, (0, 1, 2), Along(X)), self.element, **steps)
+        solved = lab.solve(Body(mesh, acting, prescribed, (0, 1, 2), Along(X)), self.element, **steps)
         return solved.states[1], solved.last
 
     def error(self, lab: Lab) -> Finding:

@@ -15,7 +15,7 @@ from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.effects import make
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Cells, Continuum, Prescribed
+from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
 from fem_reference.problems.courses import Affine, Along, Rest, Turn
 from fem_reference.runs.solved import Reached
 from fem_reference.verification import fibres
@@ -63,10 +63,10 @@ class Sample:
     quadrature: int
     residual = RESIDUAL
 
-    def body(self) -> Continuum:
+    def body(self) -> Body:
         """The body."""
         acting = tuple(make(name, **parameters) for name, parameters in self.acting)
-        return Continuum(self.mesh(kind=ELEMENTS[self.element][0]), acting, self.prescribed, (0.0, 1.0), FIBRE)
+        return Body(self.mesh(kind=ELEMENTS[self.element][0]), acting, self.prescribed, (0.0, 1.0), FIBRE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +75,7 @@ class Borrowed:
     that of each solver.
     """
 
-    body: Callable[[], Continuum]
+    body: Callable[[], Body]
     element: str
     quadrature: int | None = None
     residual: float = 1e-13
@@ -94,7 +94,7 @@ PULLED = (
 )
 
 
-def stiffer(body: Continuum, error: float) -> Continuum:
+def stiffer(body: Body, error: float) -> Body:
     """``body`` with an ``error`` of the first parameter of its first effect, a modulus, relative."""
     first, *others = body.effects
     name, value, _ = first.parameters[0]

@@ -11,7 +11,7 @@ import numpy as np
 
 from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.courses import Affine, Rest
 from fem_reference.runs.solved import Reached, Solved
 from fem_reference.verification.parts import neo_hooke, zero
@@ -36,7 +36,7 @@ def _smooth(lab: Lab, element: str, bulk: float, *, growing: bool = False) -> tu
         Prescribed("plate", "z1", (2,), Affine(_NOT_MOVING, (0.0, 0.0, HEIGHT - 1), THERE_AND_BACK)),
     )
     frames = (0.0, 1.0, 2.0) if growing else tuple(np.linspace(0, 2, 2 * STEPS + 1).tolist())
-    body = Continuum(mesh, neo_hooke(MU, bulk), prescribed, frames)
+    body = Body(mesh, neo_hooke(MU, bulk), prescribed, frames)
     # Every state by Newton's method, those of the way back too.
     solved = lab.solve(body, element, first_step=0.05, smallest_step=1e-3, residual=RESIDUAL, reuse=False)
     return (*solved.states[:-1], solved.last)
@@ -76,7 +76,7 @@ def _glued(lab: Lab, element: str, count: int, height: float, **settings: float)
         Prescribed("top", "z1", (0, 1, 2), Affine(_NOT_MOVING, (0.0, 0.0, height - 1))),
     )
     frames = tuple(np.linspace(0, 1, GLUED_STEPS + 1).tolist())
-    body = Continuum(mesh, neo_hooke(MU, 10.0), prescribed, frames)
+    body = Body(mesh, neo_hooke(MU, 10.0), prescribed, frames)
     return lab.solve(body, element, first_step=1.0, smallest_step=0.005, residual=RESIDUAL, **settings)
 
 

@@ -6,7 +6,7 @@ from functools import partial
 from fem_reference.assessment.catalogue import Entry, Lab
 from fem_reference.effects import Effect
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.courses import Rest, Turn
 from fem_reference.runs.solved import Reached
 from fem_reference.verification import truths
@@ -28,7 +28,7 @@ def twisted(lab: Lab, rings: int, element: str, matter: Matter, degree: int = 2)
     mesh = shapes.cylinder(RADIUS, LENGTH, rings, rings, ELEMENTS[element][0], degree)
     turn = Turn((0.0, 0.0, 1.0), TWIST, per_length=True)
     held = tuple(Prescribed(end, end, (0, 1, 2), turn) for end in ("bottom", "top"))
-    return lab.solve(Continuum(mesh, matter(), held, (0.0, 1.0)), element, first_step=0.5, residual=1e-9).last
+    return lab.solve(Body(mesh, matter(), held, (0.0, 1.0)), element, first_step=0.5, residual=1e-9).last
 
 
 def _moment(lab: Lab, rings: int, element: str, matter: Matter, degree: int = 2) -> float:
@@ -51,7 +51,7 @@ def _square_bar(lab: Lab, cells: int, element: str, *, warps: bool = True) -> fl
         Prescribed("bottom", "z0", turned, turn),
         Prescribed("top", "z1", turned, turn),
     )
-    body = Continuum(mesh, neo_hooke(MU, BULK), held, (0.0, 1.0))
+    body = Body(mesh, neo_hooke(MU, BULK), held, (0.0, 1.0))
     top = lab.solve(body, element, first_step=1.0, residual=1e-12).last.moments["top"]
     return float(4 * top[2] / SMALL_TWIST)
 

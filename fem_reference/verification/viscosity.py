@@ -5,7 +5,7 @@ import numpy as np
 from fem_reference.assessment.catalogue import Entry, Finding, Lab, order
 from fem_reference.effects import Effect, make
 from fem_reference.problems import shapes
-from fem_reference.problems.body import Continuum, Prescribed
+from fem_reference.problems.body import Body, Prescribed
 from fem_reference.problems.courses import Affine
 from fem_reference.verification import truths
 from fem_reference.verification.homogeneous import MU, NEO
@@ -30,7 +30,7 @@ def _squeezed(lab: Lab, step: float, eta: float) -> float:
     mesh = shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
     frames = tuple(np.linspace(0, 1, round(1 / step) + 1).tolist())
     acting = (*NEO.effects, resistance("P2/P1", _BULK), viscosity(eta))
-    solved = lab.solve(Continuum(mesh, acting, (*SYMMETRY, plate), frames, interval=_SECONDS), "P2/P1", first_step=step)
+    solved = lab.solve(Body(mesh, acting, (*SYMMETRY, plate), frames, interval=_SECONDS), "P2/P1", first_step=step)
     return float(solved.last.forces["plate"][2])
 
 
@@ -75,7 +75,7 @@ def _decay(lab: Lab, step: float, eta: float) -> float:
     weight = make("traction", on="z1", force=f"0, 0, {-_STRESS} MPa", course=_GONE)
     frames = tuple(np.linspace(0, _TO, round(_TO / step) + 1).tolist())
     acting = (*NEO.effects, resistance("P2/P1", _BULK), weight, viscosity(eta))
-    body = Continuum(mesh, acting, SYMMETRY, frames, interval=_SECONDS)
+    body = Body(mesh, acting, SYMMETRY, frames, interval=_SECONDS)
     solved = lab.solve(body, "P2/P1", first_step=step, residual=1e-14)
     ends = [state.points[:, 2].max() - 3.0 for state in (solved.states[round(_FROM / step)], solved.last)]
     return float(np.log(ends[0] / ends[1])) / ((_TO - _FROM) * _SECONDS)

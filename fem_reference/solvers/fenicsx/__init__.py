@@ -21,9 +21,9 @@ from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import join
 from fem_reference.foundations.subprocesses import command
 from fem_reference.geometry.embedding import Locator
-from fem_reference.problems.body import Continuum, check_element
+from fem_reference.problems.body import Body, check_element
 from fem_reference.problems.muscle import Problem
-from fem_reference.problems.muscle_body import as_continuum
+from fem_reference.problems.muscle_body import as_body
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers.fenicsx import resources
 from fem_reference.solvers.fenicsx.field import FieldSettings, solve_field
@@ -61,7 +61,7 @@ def check_effects(settings: Settings, effects: tuple[Effect, ...], place: str) -
 def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
     """Solve every requested frame in worker processes; frames carry surface, fibres and tets."""
     require(settings)
-    body = as_continuum(problem)
+    body = as_body(problem)
     settings = _planned(settings, body)
     with tempfile.TemporaryDirectory(prefix="fem_reference-") as folder:
         job = Path(folder) / "job.pickle"
@@ -139,7 +139,7 @@ def _command(settings: Settings, job: Path) -> list[str]:
     return [mpiexec, "-n", str(ranks), *worker]
 
 
-def _planned(settings: Settings, body: Continuum) -> Settings:
+def _planned(settings: Settings, body: Body) -> Settings:
     """The settings with what the size of ``body`` and the machine ask for where they leave it open."""
     chosen = resources.planned(settings, body.mesh, resources.available())
     if chosen.linear_solver == "multigrid" and (chosen.ranks or 1) > 1:

@@ -14,7 +14,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from fem_reference.foundations.mesh import Floats, Ints
-from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.solvers.common.load_steps import Attempt
 from fem_reference.solvers.fenicsx import choice, compiling, forms, meshes, pushed_points
 from fem_reference.solvers.fenicsx.clock import Clock
@@ -32,10 +32,10 @@ from fem_reference.solvers.fenicsx.system import System
 from fem_reference.solvers.fenicsx.validity import Validity
 
 
-class Body:
+class AssembledBody:
     """The unknowns of a body, made of an element of ``ELEMENTS``, and their equations."""
 
-    def __init__(self, body: Continuum, settings: BodySettings) -> None:
+    def __init__(self, body: Body, settings: BodySettings) -> None:
         self.comm, self.reuse = MPI.COMM_WORLD, settings.reuse
         self.effects = body.effects
         self.mesh = meshes.distribute(self.comm, body.mesh)
@@ -77,7 +77,7 @@ class Body:
         points = pushed_points.on_skin(self.displacement_space, parents, entry.on, self.local)
         return PointHold(self.unknowns, entry, points)
 
-    def _contact(self, body: Continuum, form: forms.Form) -> Pushes:
+    def _contact(self, body: Body, form: forms.Form) -> Pushes:
         """What obstructions do."""
         law, space, parents = body.contact, self.displacement_space, np.ravel(self.displacement_dofs)
         assert law is not None  # asked for only where it is there

@@ -94,7 +94,7 @@ class PointHold:
     targets: Floats = np.zeros(0)
 
     def __init__(self, unknowns: fem.Function, entry: Prescribed, points: PushedPoints) -> None:
-        assert entry.stiffness is not None  # continuum.check
+        assert entry.stiffness is not None  # body.check
         self.entry, self.unknowns, self.points = entry, unknowns, points
         along = np.isin(np.arange(3), entry.components)
         self.stiffness = entry.stiffness * points.areas[:, None] * along  # [N/mm]

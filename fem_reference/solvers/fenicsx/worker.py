@@ -17,7 +17,7 @@ from fem_reference.solvers.fenicsx.jobs import Job
 from fem_reference.solvers.fenicsx.processes import MARK
 
 from fem_reference.solvers.fenicsx import compiling  # isort: skip - after the door
-from fem_reference.solvers.fenicsx.body import Body  # isort: skip
+from fem_reference.solvers.fenicsx.body import AssembledBody  # isort: skip
 from fem_reference.solvers.fenicsx.validity import Ranges  # isort: skip
 from fem_reference.solvers.common.load_steps import Attempt, Step, Steps, march  # isort: skip
 
@@ -30,7 +30,7 @@ class Worker:
         begin = time.perf_counter()
         _forget_peak()
         self.job, self.folder, self.settings = job, folder, job.settings
-        self.body = Body(job.body, job.settings)
+        self.body = AssembledBody(job.body, job.settings)
         self.set_up = time.perf_counter() - begin
         self.solving = self.checking = 0.0
         self.counts = {"newton_iterations": 0, "load_steps": 0, "cut_backs": 0}

@@ -12,7 +12,7 @@ from scipy.sparse.linalg import splu
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.records import Record
-from fem_reference.problems.body import Continuum, Prescribed, check
+from fem_reference.problems.body import Body, Prescribed, check
 from fem_reference.runs.solved import Reached, Solved
 from fem_reference.runs.store import Outcome
 from fem_reference.solvers.common.load_steps import Attempt, Step, Steps, march
@@ -28,7 +28,7 @@ _GROWTH = 10.0  # of the out-of-balance forces, above which a Newton step is hal
 class BodySettings(Record):
     """Numerics of a body; steps are in frame numbers.
 
-    ``element``: one of ``continuum.ELEMENTS``. ``first_step`` and ``smallest_step`` bound the load step, by default one to each
+    ``element``: one of ``body.ELEMENTS``. ``first_step`` and ``smallest_step`` bound the load step, by default one to each
     frame: it grows by half after an easy step (at most 5 Newton iterations) and is halved when Newton needs more than
     ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3] ends Newton's iteration: the norm of out-of-balance nodal forces
     and of the volume equation. ``quadrature_degree``: of the polynomials that are integrated exactly on a straight cell, by
@@ -43,7 +43,7 @@ class BodySettings(Record):
     quadrature_degree: int | None = Field(default=None, gt=0)
 
 
-def solve_body(body: Continuum, settings: BodySettings) -> Solved:
+def solve_body(body: Body, settings: BodySettings) -> Solved:
     """The states of ``body`` at its frames, as far as they can be reached."""
     check(body, settings.element)
     if body.contact is not None:
@@ -94,7 +94,7 @@ class _Tangent:
 class _March:
     """The unknowns of a body on their way through its frames."""
 
-    def __init__(self, body: Continuum, settings: BodySettings) -> None:
+    def __init__(self, body: Body, settings: BodySettings) -> None:
         self.body, self.settings = body, settings
         self.equations = Equations(body, settings.element, settings.quadrature_degree)
         self.unknowns = np.zeros(self.equations.space.size)

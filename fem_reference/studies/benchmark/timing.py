@@ -21,7 +21,7 @@ from fem_reference import solvers
 from fem_reference.effects import make
 from fem_reference.foundations.mesh import Floats, fingerprint
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, ByCell, Cells, Continuum, Prescribed
+from fem_reference.problems.body import ELEMENTS, Body, ByCell, Cells, Prescribed
 from fem_reference.problems.courses import Rest, Turn
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
@@ -43,7 +43,7 @@ EFFECTS: dict[str, dict[str, Any]] = {
 Solve = Callable[[bool], tuple[Outcome, Floats]]
 
 
-def fusiform(element: str, rings: int, slices: int) -> Continuum:
+def fusiform(element: str, rings: int, slices: int) -> Body:
     """A muscle like a spindle along z, of ``slices`` layers of straight cells, ``rings`` of them around its core; its fibres run
     from end to end, its bottom is held and its top is turned.
     """
@@ -57,7 +57,7 @@ def fusiform(element: str, rings: int, slices: int) -> Continuum:
         Prescribed("top", "top", (0, 1, 2), Turn((0.0, 1.0, 0.0), ANGLE, HINGE, knots=knots)),
     )
     acting = tuple(make(name, **parameters) for name, parameters in EFFECTS.items())
-    return Continuum(mesh, acting, held, tuple(map(float, range(FRAMES + 1))), ByCell(_fibres(mesh)))
+    return Body(mesh, acting, held, tuple(map(float, range(FRAMES + 1))), ByCell(_fibres(mesh)))
 
 
 def _fibres(mesh: Cells) -> Floats:
