@@ -147,8 +147,8 @@ def test_what_relaxes_waits_for_the_first_frame(tmp_path) -> None:
     assert body.first == 0
     assert body.obstructions[1].pose(-10.0) == pytest.approx(np.eye(4))
     top = np.array([[5.0, 5.0, 40.0]])
-    assert body.prescribed[1].course(top, -10.0) == pytest.approx(np.zeros((1, 3)))
-    assert np.abs(body.prescribed[1].course(top, 5.0)).max() > 0.1
+    assert body.prescribed[1].path(top, -10.0) == pytest.approx(np.zeros((1, 3)))
+    assert np.abs(body.prescribed[1].path(top, 5.0)).max() > 0.1
 
 
 def test_a_bone_that_pushes_and_an_attachment_have_names_of_their_own(tmp_path) -> None:

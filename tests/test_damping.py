@@ -9,7 +9,7 @@ from test_stability import LENGTH, STILL, THIN, column, critical, effect, flesh,
 from fem_reference.foundations.errors import InputError
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body, Prescribed, check
-from fem_reference.problems.courses import Affine, Rest
+from fem_reference.problems.paths import Affine, Rest
 from fem_reference.scenes import casefile
 from fem_reference.solvers.fenicsx import BodySettings
 from fem_reference.solvers.scikit_fem import BodySettings as OtherSettings
@@ -79,8 +79,8 @@ def test_speed_costs_force_but_stores_nothing(session) -> None:  # noqa: F811
 def test_a_step_that_fails_leaves_the_clock_alone(session) -> None:  # noqa: F811
     # One Newton iteration is not enough for the whole step: it is cut, and the block falls as far as its drag allows.
     mesh = shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
-    course = [{"frame": 0, "amount": 0.0}, {"frame": 1, "amount": 1.0}]
-    weight = effect("gravity", density="1000 kg/m^3", acceleration="0, 0, -10 m/s^2", course=course)
+    ramp = [{"frame": 0, "amount": 0.0}, {"frame": 1, "amount": 1.0}]
+    weight = effect("gravity", density="1000 kg/m^3", acceleration="0, 0, -10 m/s^2", ramp=ramp)
     turn = Prescribed("z1", "z1", (0,), Affine(((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), (0.5, 0.0, 0.0)))
     body = Body(mesh, (*flesh("P2/P1"), weight, DRAG), (turn,), (0.0, 1.0, 3.0), interval=0.1)
     tight = session.solve(body, BodySettings(first_step=1.0, residual=1e-12, newton_iterations=3, smallest_step=0.001))

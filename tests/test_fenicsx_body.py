@@ -15,7 +15,7 @@ from fem_reference.foundations.records import parse
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed, boundary_facets, check
-from fem_reference.problems.courses import Affine, Rest, Turn
+from fem_reference.problems.paths import Affine, Rest, Turn
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import BodySettings
 from fem_reference.solvers.fenicsx.jobs import Job
@@ -82,7 +82,7 @@ def test_a_session_checks_the_element(session) -> None:
 @BOTH
 def test_a_block_on_springs_moves_by_the_load_over_their_stiffness(element, session) -> None:
     stiffness, load = 0.05, 0.004  # [MPa/mm], [MPa]
-    acting = (*FLESH, effect("traction", on="z1", force=f"0, 0, -{load} MPa", course=ONCE))
+    acting = (*FLESH, effect("traction", on="z1", force=f"0, 0, -{load} MPa", ramp=ONCE))
     springs = Prescribed("springs", "z0", (2,), Rest(), stiffness)
     held = (Prescribed("x0", "x0", (0,), Rest()), Prescribed("y0", "y0", (1,), Rest()), springs)
     mesh = box(element, size=(2.0, 1.0, 1.0))
@@ -97,7 +97,7 @@ def test_a_block_on_springs_moves_by_the_load_over_their_stiffness(element, sess
 def test_springs_at_points_beside_the_cells_take_the_load_and_its_moment(element, session) -> None:
     # Points 0.05 mm below the face that springs hold, of uneven areas; the pull is off their middle: the block turns on them.
     stiffness, load = 1e-4, 1e-7  # so soft that the block is rigid, and turns by a thousandth
-    acting = (*FLESH, effect("traction", on="x1", force=f"0, 0, -{load} MPa", course=ONCE))
+    acting = (*FLESH, effect("traction", on="x1", force=f"0, 0, -{load} MPa", ramp=ONCE))
     mesh = box(element, (2, 2, 2), (1.0, 1.0, 1.0))
     at = np.array([[0.2, 0.3, -0.05], [0.7, 0.2, -0.05], [0.3, 0.8, -0.05], [0.9, 0.9, -0.05]])
     middles = mesh.points[mesh.cells].mean(axis=1)
@@ -225,10 +225,10 @@ def test_regions_and_fibres_that_a_body_lacks_are_named() -> None:
     lost = Body(box("Q1/P0"), FLESH, (Prescribed("lid", "lid", (0,), Rest()),), (0.0, 1.0))
     with pytest.raises(InputError, match='on: got "lid", want a region of the body: x0, x1'):
         check(lost, "Q1/P0")
-    pressed = effect("pressure", on="roof", pressure="1 kPa", course=ONCE)
+    pressed = effect("pressure", on="roof", pressure="1 kPa", ramp=ONCE)
     with pytest.raises(InputError, match='on: got "roof"'):
         check(Body(box("Q1/P0"), (*FLESH, pressed), (), (0.0, 1.0)), "Q1/P0")
-    active = effect("fibre_active", stress="10 kPa", optimal_stretch=1.0, course=ONCE)
+    active = effect("fibre_active", stress="10 kPa", optimal_stretch=1.0, ramp=ONCE)
     with pytest.raises(InputError, match="fibre: got nothing, want fibre directions"):
         check(Body(box("Q1/P0"), (*FLESH, active), (), (0.0, 1.0)), "Q1/P0")
 
@@ -271,7 +271,7 @@ def test_regions_are_on_the_boundary_of_the_cells(element) -> None:
     lost = shared_facet(mesh)
     with pytest.raises(InputError, match=r"facets\.lid: got facets that are not of one cell each \(1 of 3"):
         checked([every[0], every[1], lost])
-    pressed = effect("pressure", on="lid", pressure="1 kPa", course=ONCE)
+    pressed = effect("pressure", on="lid", pressure="1 kPa", ramp=ONCE)
     with pytest.raises(InputError, match=r"facets\.lid: got facets that are not of one cell each \(1 of 1"):
         checked([lost], (*acting, pressed), ())
     with pytest.raises(InputError, match=r"facets\.lid: got none, want facets of one cell each"):

@@ -8,7 +8,7 @@ from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body, Prescribed
 from fem_reference.problems.contact import Contact, Obstruction
-from fem_reference.problems.courses import Rest
+from fem_reference.problems.paths import Rest
 from fem_reference.solvers import scikit_fem
 from fem_reference.verification import contact, parts
 from fem_reference.verification.contact import Slide

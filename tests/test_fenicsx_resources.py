@@ -11,7 +11,7 @@ from fem_reference.effects import make
 from fem_reference.foundations.errors import InputError
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
-from fem_reference.problems.courses import Rest
+from fem_reference.problems.paths import Rest
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import BodySettings, Settings, resources
 from fem_reference.verification.parts import resistance

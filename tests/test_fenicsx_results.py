@@ -11,7 +11,7 @@ from acting import make
 from fem_reference.foundations.mesh import TetMesh
 from fem_reference.foundations.motion import Rotation
 from fem_reference.problems.body import Body, Prescribed
-from fem_reference.problems.courses import Affine, Rest
+from fem_reference.problems.paths import Affine, Rest
 from fem_reference.problems.shapes import box
 from fem_reference.runs import results
 from fem_reference.runs.results import NAMES, Results
@@ -121,8 +121,8 @@ def test_viscosity_stores_the_step_it_took(fem_lab) -> None:  # noqa: ARG001
     # A cube sheared by 0.1 in a step of 1 s: sigma_xy = mu g + eta g' to first order in the step.
     effects = (*PENALTY, make("viscosity"))
     mesh = box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
-    course = Affine(((0, 1e-4, 0), (0, 0, 0), (0, 0, 0)))
-    held = tuple(Prescribed(side, side, (0, 1, 2), course) for side in ("x0", "x1", "y0", "y1", "z0", "z1"))
+    path = Affine(((0, 1e-4, 0), (0, 0, 0), (0, 0, 0)))
+    held = tuple(Prescribed(side, side, (0, 1, 2), path) for side in ("x0", "x1", "y0", "y1", "z0", "z1"))
     body = Body(mesh, effects, held, (0.0, 1.0), interval=1.0)
     state = fenicsx.solve_body(body, BodySettings(element="P2", first_step=0.5, store_state=True)).last.state
     assert state.rate == 2

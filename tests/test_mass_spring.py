@@ -19,10 +19,10 @@ from fem_reference.geometry.rigid_bodies import HalfSpace
 from fem_reference.problems.muscle import Problem, RigidBody
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import mass_spring
-from fem_reference.solvers.spring_kernels import Course, Network, advance, forces
+from fem_reference.solvers.spring_kernels import Network, PrescribedPath, advance, forces
 
 NOTHING = np.zeros((0, 3))
-FREE = Course(np.zeros(0, np.int64), NOTHING, NOTHING)
+FREE = PrescribedPath(np.zeros(0, np.int64), NOTHING, NOTHING)
 STIFFNESS, MASS = 0.3, 2e-6  # N/mm, tonne
 USUAL = {"stiffness": "1 N/mm", "density": "1060 kg/m3", "frame_time": "20 ms", "damping": "0.02 N s/m"}
 BEND = Rotation((1, 0, 0), (5, 5, 0), (0.0, 10.0), (0.0, 0.3))
@@ -37,8 +37,8 @@ def on_a_line(*places: float) -> np.ndarray:
     return np.column_stack([np.zeros((len(places), 2)), places])
 
 
-def still(points: np.ndarray, *held: int) -> Course:
-    return Course(np.array(held), points[list(held)], points[list(held)])
+def still(points: np.ndarray, *held: int) -> PrescribedPath:
+    return PrescribedPath(np.array(held), points[list(held)], points[list(held)])
 
 
 def tangle(seed: int, damping: float = 0.0) -> tuple[np.ndarray, Network]:
@@ -111,15 +111,15 @@ def energy(points: np.ndarray, previous: np.ndarray, springs: Network, time_step
 def test_energy_is_kept_without_damping_and_lost_with_it(damping) -> None:
     points, springs = tangle(1, damping)
     previous, time_step = points.copy(), 0.02 * mass_spring.stable_time_step(springs, FREE.held)
-    course = []
+    energies = []
     for _ in range(200):
         advance(points, previous, springs, FREE, time_step, 20)
-        course.append(energy(points, previous, springs, time_step))
+        energies.append(energy(points, previous, springs, time_step))
     if damping:
-        assert (np.diff(course) < 0).all()
-        assert course[-1] < 0.5 * course[0]
+        assert (np.diff(energies) < 0).all()
+        assert energies[-1] < 0.5 * energies[0]
     else:  # of second order: a fiftieth of the stable step leaves some 1e-3
-        assert_allclose(course, course[0], rtol=3e-3)
+        assert_allclose(energies, energies[0], rtol=3e-3)
 
 
 def test_momentum_and_angular_momentum_are_kept() -> None:
@@ -376,7 +376,7 @@ def test_steps_in_parts_are_the_steps_at_once() -> None:
     points, previous, at_once, before = (rest.copy() for _ in range(4))
     model.move(points, previous, 1, 2e-6, 450)
     ends = [model._carried(number)[model.held] for number in (0, 1)]
-    advance(at_once, before, model.network, Course(model.held, *ends), 2e-6, 450)
+    advance(at_once, before, model.network, PrescribedPath(model.held, *ends), 2e-6, 450)
     assert np.abs(points - rest).max() > 0.1
     assert_allclose(points, at_once, rtol=0, atol=1e-11)
     assert_allclose(previous, before, rtol=0, atol=1e-11)

@@ -153,7 +153,7 @@ FIBRE = """
 [[effect]]
 name = "active_tension"
 tension = "60 kPa"
-course = [{ frame = 0, amount = 0.0 }, { frame = 20, amount = 1.0 }]
+ramp = [{ frame = 0, amount = 0.0 }, { frame = 20, amount = 1.0 }]
 """
 
 
@@ -184,7 +184,7 @@ def test_as_a_body_its_bones_prescribe_their_facets_and_the_rest_is_free(built) 
             (0, 1, 2),
             None,
         )
-        assert entry.course(points, 7.0) == pytest.approx(apply(held.bone.pose(7.0), points) - points)
+        assert entry.path(points, 7.0) == pytest.approx(apply(held.bone.pose(7.0), points) - points)
 
 
 def test_a_stiffness_of_an_attachment_reaches_the_body(bar) -> None:

@@ -103,8 +103,8 @@ TURN = {
     "keyframes": [{"frame": 0, "angle": "0 deg"}, {"frame": 9, "angle": "1 deg"}],
 }
 SLIDE = {"direction": [0, -3, 0], "keyframes": [{"frame": 0, "distance": "0 mm"}, {"frame": 9, "distance": "1 cm"}]}
-COURSE = [{"frame": 0, "amount": 0}, {"frame": 10, "amount": 1}]
-PRESSURE = {"name": "pressure", "on": "free", "pressure": "1 kPa", "course": COURSE}
+RAMP = [{"frame": 0, "amount": 0}, {"frame": 10, "amount": 1}]
+PRESSURE = {"name": "pressure", "on": "free", "pressure": "1 kPa", "ramp": RAMP}
 POLYLINES = {"file": "fibres.vtk", "unit": "mm"}
 OUTLINE = {"file": "marks.csv", "unit": "mm", "clouds": ["a", "b"], "reach": "3 mm"}
 
@@ -242,8 +242,8 @@ WRONG = [
     ("effect[1]", PRESSURE | {"on": "top"}, 'effect[1].on: got "top", want one of start, end, free'),
     (
         "effect[0]",
-        PRESSURE | {"course": [{"frame": 0, "amount": 0.5}]},
-        "effect[0].course: got an amount of 0.5 at frame 0, the first, want 0 there, where the muscle rests",
+        PRESSURE | {"ramp": [{"frame": 0, "amount": 0.5}]},
+        "effect[0].ramp: got an amount of 0.5 at frame 0, the first, want 0 there, where the muscle rests",
     ),
     ("effect", [PRESSURE, PRESSURE], 'effect[1].name: got "pressure" on "free" a second time, want every effect once'),
     ("attachment[0].name", "free", 'attachment: got the name "free" twice, want every name once'),

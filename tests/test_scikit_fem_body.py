@@ -18,7 +18,7 @@ from fem_reference.solvers.scikit_fem.spaces import Space
 MU, BULK = 0.5, 20.0
 FACES = ("x0", "x1", "y0", "y1", "z0", "z1")
 ALL = (0, 1, 2)
-COURSE = [{"frame": 0.0, "amount": 0.0}, {"frame": 1.0, "amount": 1.0}]
+RAMP = [{"frame": 0.0, "amount": 0.0}, {"frame": 1.0, "amount": 1.0}]
 
 
 def effect(name: str, **keys) -> effects.Effect:
@@ -132,7 +132,7 @@ def test_rotating_costs_nothing_and_holding_is_in_balance(element) -> None:
 
 @pytest.mark.parametrize("element", ["P2/P1", "Q1"])
 def test_the_ground_carries_the_weight(element) -> None:
-    weight = effect("gravity", course=COURSE, density="1000 kg/m^3", acceleration="0, 0, -1000 m/s^2")
+    weight = effect("gravity", ramp=RAMP, density="1000 kg/m^3", acceleration="0, 0, -1000 m/s^2")
     given = Body(box(element, 2), (*law(element), weight), (moved("ground", "z0", ALL),), (0.0, 0.5, 1.0))
     states = solved(given, element).states
     # 1e-9 tonne/mm3 x 24 mm3 x 1e6 mm/s2.
@@ -143,7 +143,7 @@ def test_the_ground_carries_the_weight(element) -> None:
 
 @pytest.mark.parametrize(("element", "degree"), [("P2/P1", 1), ("Q1/P0", 1), ("P2", 2), ("Q2/Q1", 2)])
 def test_a_fluid_all_around_compresses_by_its_pressure_over_the_bulk_modulus(element, degree) -> None:
-    pressure = [effect("pressure", course=COURSE, on=face, pressure="2 MPa") for face in FACES]
+    pressure = [effect("pressure", ramp=RAMP, on=face, pressure="2 MPa") for face in FACES]
     given = Body(box(element, 1, degree), (*law(element), *pressure), SLIDING, (0.0, 1.0))
     state = solved(given, element, residual=1e-10).last
     assert state.scalars["volume_ratio"] == pytest.approx(1 - 2 / BULK, abs=1e-10)
@@ -153,7 +153,7 @@ def test_a_fluid_all_around_compresses_by_its_pressure_over_the_bulk_modulus(ele
 
 
 def test_a_dead_load_stretches_springs_and_body() -> None:
-    pull = effect("traction", course=COURSE, on="z1", force="0, 0, 0.4 MPa")
+    pull = effect("traction", ramp=RAMP, on="z1", force="0, 0, 0.4 MPa")
     springs = moved("springs", "z0", (2,), lambda points, frame: points * 0 + frame, stiffness=0.8)
     given = Body(box("P2/P1"), (*law("P2/P1"), pull), (*SLIDING[:2], springs), (0.0, 1.0))
     state = solved(given, "P2/P1", residual=1e-11).last
@@ -177,10 +177,10 @@ def loaded(element: str) -> Body:
 
     acting = (
         *law(element),
-        effect("active_tension", course=COURSE, tension="0.1 MPa"),
-        effect("prestretch", course=COURSE, stretch=1.1),
-        effect("gravity", course=COURSE, density="1000 kg/m^3", acceleration="0, 90, 9 m/s^2"),
-        effect("pressure", course=COURSE, on="x1", pressure="0.1 MPa"),
+        effect("active_tension", ramp=RAMP, tension="0.1 MPa"),
+        effect("prestretch", ramp=RAMP, stretch=1.1),
+        effect("gravity", ramp=RAMP, density="1000 kg/m^3", acceleration="0, 90, 9 m/s^2"),
+        effect("pressure", ramp=RAMP, on="x1", pressure="0.1 MPa"),
     )
     held = (moved("ground", "z0", ALL), moved("springs", "z1", (0, 2), stiffness=0.3))
     return Body(box(element), acting, held, (0.0, 1.0), fibre)
@@ -248,7 +248,7 @@ def test_cells_turned_inside_out_are_a_status() -> None:
 
 def test_equations_without_a_solution_are_a_status() -> None:
     # Nothing holds a body on which a force pulls.
-    pull = effect("traction", course=COURSE, on="z1", force="0, 0, 0.4 MPa")
+    pull = effect("traction", ramp=RAMP, on="z1", force="0, 0, 0.4 MPa")
     given = Body(box("P1"), (*law("P1"), pull), (), (0.0, 1.0))
     solution = solve_body(given, BodySettings(element="P1"))
     assert solution.outcome.status == "diverged"
@@ -291,7 +291,7 @@ def test_what_cannot_be_solved_is_named() -> None:
         solve_body(Body(curved, law("P1"), (), (0.0, 1.0)), settings)
     with pytest.raises(InputError, match='on: got "lid", want a region of the body: x0, x1'):
         solve_body(Body(straight, law("P1"), (moved("lid", "lid", ALL),), (0.0, 1.0)), settings)
-    pulling = effect("active_tension", course=COURSE, tension="0.1 MPa")
+    pulling = effect("active_tension", ramp=RAMP, tension="0.1 MPa")
     with pytest.raises(InputError, match="fibre: got nothing, want fibre directions"):
         solve_body(Body(straight, (*law("P1"), pulling), (), (0.0, 1.0)), settings)
     corners = reference_nodes("tetrahedron", 1)

@@ -14,7 +14,7 @@ from fem_reference.foundations.motion import Translation
 from fem_reference.foundations.records import parse
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
-from fem_reference.problems.courses import Affine, Rest
+from fem_reference.problems.paths import Affine, Rest
 from fem_reference.runs.store import Frame
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import BodySettings, Settings
@@ -127,9 +127,9 @@ def test_it_is_told_where_a_run_is_unstable(session) -> None:
 
 
 def test_nobody_counts_where_a_load_may_have_no_energy(session) -> None:
-    course = [{"frame": 0, "amount": 0.0}, {"frame": 1, "amount": 1.0}]
+    ramp = [{"frame": 0, "amount": 0.0}, {"frame": 1, "amount": 1.0}]
     body = column("Q2/Q1", (1, 1, 2), [0.0])
-    pressed = effect("pressure", on="x1", pressure="0.01 kPa", course=course)
+    pressed = effect("pressure", on="x1", pressure="0.01 kPa", ramp=ramp)
     solved = session.solve(replace(body, effects=(*body.effects, pressed)), BodySettings(element="Q2/Q1"))
     assert solved.outcome.status == "converged"
     assert not any("negative_modes" in state.scalars for state in solved.states)

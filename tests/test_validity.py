@@ -14,7 +14,7 @@ from fem_reference.foundations.motion import Translation
 from fem_reference.foundations.records import parse
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, ByCell, Prescribed
-from fem_reference.problems.courses import Affine, Along, Rest
+from fem_reference.problems.paths import Affine, Along, Rest
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import BodySettings, Settings
 from fem_reference.verification import squeeze
@@ -39,7 +39,7 @@ def effect(name: str, **parameters) -> Effect:
     return parse(effects.find(name), parameters, name)
 
 
-ACTIVE = effect("fibre_active", stress="10 kPa", optimal_stretch=1.1, course=ONCE)
+ACTIVE = effect("fibre_active", stress="10 kPa", optimal_stretch=1.1, ramp=ONCE)
 PASSIVE = effect("fibre_passive", stress="10 kPa", p1=0.05, p2=6.6, optimal_stretch=1.1, linear_from=1.4)
 
 
@@ -199,14 +199,14 @@ def test_fibres_outside_their_range_are_named(stretch, beyond, session) -> None:
 
 
 def test_only_laws_that_act_have_a_range(session) -> None:
-    resting = ACTIVE.model_copy(update={"course": (effects.Knot(frame=0, amount=0.0),)})
+    resting = ACTIVE.model_copy(update={"ramp": (effects.RampPoint(frame=0, amount=0.0),)})
     solved = drawn(session, (resting,), 1.8)
     assert solved.last.scalars["outside_law"] == 0
     assert solved.outcome.message == "all 2 frames reached"
 
 
 def test_fibres_are_as_long_as_their_prestretch_has_them(session) -> None:
-    prestretch = effect("prestretch", stretch=1.5, course=ONCE)
+    prestretch = effect("prestretch", stretch=1.5, ramp=ONCE)
     solved = drawn(session, (PASSIVE, prestretch), 1.2)
     assert solved.last.scalars["max_cell_fibre_stretch"] == pytest.approx(1.2 * 1.5, abs=1e-9)
     assert "fibre_passive is outside the range" in solved.outcome.message

@@ -11,7 +11,7 @@ from fem_reference.effects import total_energy
 from fem_reference.foundations.errors import InputError
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body, Prescribed, check
-from fem_reference.problems.courses import Affine, Turn
+from fem_reference.problems.paths import Affine, Turn
 from fem_reference.scenes import casefile
 from fem_reference.solvers.fenicsx import BodySettings
 from fem_reference.solvers.scikit_fem import BodySettings as OtherSettings

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from fem_reference.assessment import judge
-from fem_reference.cli.telling import out
+from fem_reference.cli.printing import out
 from fem_reference.foundations.errors import InputError
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import Candidate, Scene

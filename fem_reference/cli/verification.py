@@ -4,7 +4,7 @@ import time
 
 from fem_reference import __version__
 from fem_reference.assessment.catalogue import Result
-from fem_reference.cli.scalar import Told
+from fem_reference.cli.scalar import Printed
 from fem_reference.report.verify_page import Verification, facts
 from fem_reference.runs.key import versions
 from fem_reference.verification import runner
@@ -26,10 +26,10 @@ def verify(names: list[str], with_negative_control: list[str]) -> Verification:
     return Verification(results, time.perf_counter() - begin, made_with)
 
 
-def told(verification: Verification) -> Told:
-    """What to tell of a verification."""
+def printed(verification: Verification) -> Printed:
+    """The output of a verification."""
     text = [*_lines(verification.results), verification.summary]
-    return Told(facts(verification), "\n".join(text), verification.word)
+    return Printed(facts(verification), "\n".join(text), verification.word)
 
 
 def _lines(results: tuple[Result, ...]) -> list[str]:

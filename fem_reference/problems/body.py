@@ -137,14 +137,14 @@ class Cells:
 @dataclass(frozen=True, eq=False)
 class Prescribed:
     """What is prescribed on the facets ``on``, or on a skin: along each of ``components`` (0, 1, 2 for x, y, z) the displacement
-    that ``course`` gives for rest points (n, 3) [mm] at a frame number, (n, 3) [mm]; a picklable callable. With a ``stiffness``
+    that ``path`` gives for rest points (n, 3) [mm] at a frame number, (n, 3) [mm]; a picklable callable. With a ``stiffness``
     [MPa/mm] it is not exact: springs over the area pull towards it; a skin has no unknowns that could be prescribed exactly.
     """
 
     name: str
     on: str | Skin
     components: tuple[int, ...]
-    course: Callable[[Floats, float], Floats]
+    path: Callable[[Floats, float], Floats]
     stiffness: float | None = None
 
 

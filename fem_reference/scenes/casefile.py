@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.effects import Coursed, Effect, FieldEffect, Load
+from fem_reference.effects import Effect, FieldEffect, Load, Ramped
 from fem_reference.effects import find as find_effect
 from fem_reference.effects import names as effect_names
 from fem_reference.effects.contact import Contact, among
@@ -237,9 +237,9 @@ def _check_used(known: list[str], uses: list[tuple[str, str]], place: str) -> No
 def _check_rest(scene: Scene) -> None:
     """At the first frame every bone is where its surface is, and nothing acts that comes and goes: the muscle rests."""
     for i, effect in enumerate(scene.effects):
-        if isinstance(effect, Coursed) and effect.amount(scene.frames.first) != 0:
+        if isinstance(effect, Ramped) and effect.amount(scene.frames.first) != 0:
             got = f"an amount of {effect.amount(scene.frames.first):g} at frame {scene.frames.first}, the first"
-            raise InputError(join(scene.place, f"effect[{i}].course"), got, "0 there, where the muscle rests")
+            raise InputError(join(scene.place, f"effect[{i}].ramp"), got, "0 there, where the muscle rests")
     for i, bone in enumerate(scene.bone):
         pose = bone.motion.poses().pose(scene.frames.first) if bone.motion else np.eye(4)
         if not abs(pose - np.eye(4)).max() <= 1e-12:  # NaN is no rest

@@ -26,7 +26,7 @@ from fem_reference.solvers import collision_kernels
 from fem_reference.solvers.collision_kernels import Obstacle, push_out
 from fem_reference.solvers.common.state_checks import trouble
 from fem_reference.solvers.pbd import Collision
-from fem_reference.solvers.spring_kernels import Course, Network, advance, forces
+from fem_reference.solvers.spring_kernels import Network, PrescribedPath, advance, forces
 from fem_reference.solvers.xpbd import other_clock
 
 # Where no time step is asked for, it is this share of the greatest that is stable.
@@ -155,11 +155,11 @@ class Model:
             for done in range(0, steps, _AT_ONCE):
                 upto = min(done + _AT_ONCE, steps)
                 start, end = ((1 - step / steps) * before + step / steps * after for step in (done, upto))
-                advance(points, previous, self.network, Course(self.held, start, end), time_step, upto - done)
+                advance(points, previous, self.network, PrescribedPath(self.held, start, end), time_step, upto - done)
             return
         for share in np.arange(1, steps + 1) / steps:
             there = (1 - share) * before + share * after
-            advance(points, previous, self.network, Course(self.held, there, there), time_step, 1)
+            advance(points, previous, self.network, PrescribedPath(self.held, there, there), time_step, 1)
             for one in self.obstacles:
                 one.move(number - 1 + share)
             push_out(points, self.obstacles, self.stiffness)
@@ -248,7 +248,7 @@ def _compile(settings: Settings) -> float:
     begin = time.perf_counter()
     points, nothing = np.array([[0.0, 0, 0], [1, 0, 0]]), np.zeros((0, 3))
     network = Network(np.ones(2), np.array([[0, 1]]), np.ones(1), 1.0, 0.0, np.zeros(3))
-    advance(points, points.copy(), network, Course(np.zeros(0, np.int64), nothing, nothing), 0.1, 1)
+    advance(points, points.copy(), network, PrescribedPath(np.zeros(0, np.int64), nothing, nothing), 0.1, 1)
     forces(points, network)
     if settings.collision is not None:
         collision_kernels.compile_all()

@@ -14,7 +14,7 @@ from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere, Vector
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.contact import Contact, Obstruction
-from fem_reference.problems.courses import Rest
+from fem_reference.problems.paths import Rest
 from fem_reference.runs.solved import Reached
 from fem_reference.verification.parts import SYMMETRY, neo_hooke
 from fem_reference.verification.truths import find

@@ -16,8 +16,8 @@ from fem_reference.effects import make
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
-from fem_reference.problems.courses import Rest
-from fem_reference.verification.parts import course, ladder, once, resistance
+from fem_reference.problems.paths import Rest
+from fem_reference.verification.parts import ladder, once, ramp, resistance
 from fem_reference.verification.truths import find
 
 FAMILY = "Cook's membrane"
@@ -68,7 +68,7 @@ class Panel:
         acting = (
             make("neo_hooke", mu=f"{self.membrane.shear * self.shear} MPa"),
             resistance(self.element, self.membrane.bulk * self.bulk),
-            make("traction", on="x1", force=pull, course=course()),
+            make("traction", on="x1", force=pull, ramp=ramp()),
         )
         return Body(mesh, acting, HELD, (0.0, 1.0))
 

@@ -6,11 +6,11 @@ from fem_reference.assessment.catalogue import Entry, Finding, Lab, order
 from fem_reference.effects import Effect, make
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body, Prescribed
-from fem_reference.problems.courses import Rest
+from fem_reference.problems.paths import Rest
 from fem_reference.verification import truths
 from fem_reference.verification.homogeneous import MU, NEO
 from fem_reference.verification.loads import FREE_FALL, MUSCLE
-from fem_reference.verification.parts import course, resistance
+from fem_reference.verification.parts import ramp, resistance
 
 FAMILY = "damping"
 _SECONDS = 0.1  # from a frame number to the next
@@ -29,7 +29,7 @@ def _velocity(lab: Lab, seconds: float = _SECONDS) -> Finding:
     """Of a free block with its whole weight, over four frames [mm/s]; ``seconds`` are from a frame number to the next."""
     mesh = shapes.box((2, 2, 2), (1.0, 2.0, 3.0), "tetrahedron")
     pull = f"0, 0, {-FREE_FALL} mm/s^2"
-    weight = make("gravity", density=f"{MUSCLE} tonne/mm^3", acceleration=pull, course=course())
+    weight = make("gravity", density=f"{MUSCLE} tonne/mm^3", acceleration=pull, ramp=ramp())
     acting = (*NEO.effects, resistance("P2/P1", 100 * MU), weight, drag(_DRAG))
     body = Body(mesh, acting, (), (0, 1, 5), interval=seconds)
     solved = lab.solve(body, "P2/P1", first_step=0.5, residual=1e-13)
@@ -66,7 +66,7 @@ def _decay(lab: Lab, step: float, coefficient: float) -> float:
     """The rate [1/s] at which the end of the bar creeps back from frame ``_FROM`` to ``_TO``, in load steps of ``step`` frames."""
     mesh = shapes.box((1, 1, 4), (2.0, 2.0, _LENGTH), "hexahedron")
     pull = f"0, 0, {-_WEIGHT / MUSCLE} mm/s^2"
-    weight = make("gravity", density=f"{MUSCLE} tonne/mm^3", acceleration=pull, course=_GONE)
+    weight = make("gravity", density=f"{MUSCLE} tonne/mm^3", acceleration=pull, ramp=_GONE)
     walls = tuple(Prescribed(face, face, ("xyz".index(face[0]),), Rest()) for face in ("x0", "x1", "y0", "y1", "z0"))
     frames = tuple(np.linspace(0, _TO, round(_TO / step) + 1).tolist())
     acting = (*NEO.effects, resistance("Q2", _SOFT), weight, drag(coefficient))

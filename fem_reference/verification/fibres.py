@@ -18,7 +18,7 @@ from fem_reference.verification.homogeneous import (
     force_entry,
     stretch_entry,
 )
-from fem_reference.verification.parts import course
+from fem_reference.verification.parts import ramp
 
 FAMILY = "fibres"
 STRESS, OPTIMUM = 0.3, 1.05  # the peak active stress [MPa] and the fibre stretch at which it is reached
@@ -48,7 +48,7 @@ def passive_febio(c4: float = 6.0, c5: float = 0.3) -> Material:
 def active(activation: float = 1.0, stress: float = STRESS) -> Material:
     """Blemker's active fibres at an ``activation`` that grows to its full from frame 0 to 1; ``stress`` [MPa]."""
     numbers = {"stress": f"{stress} MPa", "optimal_stretch": OPTIMUM}
-    acting = make("fibre_active", course=course(activation), **numbers)
+    acting = make("fibre_active", ramp=ramp(activation), **numbers)
     return Material((acting,), _fibre_law("FibreActive", stress, OPTIMUM, activation))
 
 
@@ -61,13 +61,13 @@ def two_families(degrees: float) -> Material:
 
 def tension(activation: float = 1.0) -> Material:
     """A constant active tension of 0.06 MPa, times ``activation``."""
-    acting = make("active_tension", tension="0.06 MPa", course=course(activation))
+    acting = make("active_tension", tension="0.06 MPa", ramp=ramp(activation))
     return Material((acting,), _law("ActiveTension", 0.06 * activation))
 
 
 def taut(material: Material, stretch: float) -> Material:
     """``material`` whose fibres are stretched at rest by ``stretch``."""
-    acting = make("prestretch", stretch=stretch, course=course())
+    acting = make("prestretch", stretch=stretch, ramp=ramp())
     return Material((*material.effects, acting), lambda: truths.find("laws").Prestretched(material.law(), stretch))
 
 

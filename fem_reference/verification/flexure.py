@@ -10,7 +10,7 @@ from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
-from fem_reference.problems.courses import Rest
+from fem_reference.problems.paths import Rest
 from fem_reference.runs.solved import Reached
 from fem_reference.verification import truths
 from fem_reference.verification.parts import ladder, neo_hooke, once

@@ -12,8 +12,8 @@ from fem_reference.effects import Effect, make
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
-from fem_reference.problems.courses import Along, Rest
-from fem_reference.verification.parts import Value, course, once, resistance
+from fem_reference.problems.paths import Along, Rest
+from fem_reference.verification.parts import Value, once, ramp, resistance
 from fem_reference.verification.truths import find
 
 FAMILY = "heart benchmark"
@@ -42,11 +42,11 @@ def matter(problem: Any, element: str, on: str, bulk: float) -> tuple[Effect, ..
     acting = (
         make("guccione", c=f"{law.c} MPa", bf=law.bf, bt=law.bt, bfs=law.bfs),
         resistance(element, bulk),
-        make("pressure", on=on, pressure=f"{problem.pressure} MPa", course=course()),
+        make("pressure", on=on, pressure=f"{problem.pressure} MPa", ramp=ramp()),
     )
     if problem.tension == 0:
         return acting
-    return (*acting, make("active_tension", tension=f"{problem.tension} MPa", course=course()))
+    return (*acting, make("active_tension", tension=f"{problem.tension} MPa", ramp=ramp()))
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.effects import Effect, make
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
-from fem_reference.problems.courses import Affine, Along, Matrix, Radial
+from fem_reference.problems.paths import Affine, Along, Matrix, Radial
 from fem_reference.runs.solved import Solved
 from fem_reference.verification import truths
 from fem_reference.verification.parts import SYMMETRY, resistance

@@ -16,10 +16,10 @@ from fem_reference.assessment.catalogue import Entry, Lab
 from fem_reference.effects import make
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
-from fem_reference.problems.courses import Radial, Rest
+from fem_reference.problems.paths import Radial, Rest
 from fem_reference.runs.solved import Solved
 from fem_reference.verification import truths
-from fem_reference.verification.parts import SYMMETRY, course, ladder, mooney_rivlin, neo_hooke, once
+from fem_reference.verification.parts import SYMMETRY, ladder, mooney_rivlin, neo_hooke, once, ramp
 from fem_reference.verification.torsion import Matter
 
 # [MPa]; C1 and C2 make a Mooney-Rivlin law of the shear modulus MU. Pressures are proportional to the moduli.
@@ -91,7 +91,7 @@ def _top(pressures: Pressures) -> float:
 def _pressed(lab: Lab, n: int, mu: float) -> float:
     """The mean stretch of the sphere's inner face, over its nodes, where a fluid of the pressure PRESSED is in it."""
     mesh = sphere("P2/P1", n, 2)
-    fluid = make("pressure", on="inner", pressure=f"{PRESSED} MPa", course=course())
+    fluid = make("pressure", on="inner", pressure=f"{PRESSED} MPa", ramp=ramp())
     body = Body(mesh, (*neo_hooke(mu, BULK), fluid), SYMMETRY, (0.0, 1.0))
     state = lab.solve(body, "P2/P1", first_step=0.25, residual=RESIDUAL).last
     inside = np.linalg.norm(mesh.points, axis=1) < INNER * (1 + 1e-9)

@@ -10,7 +10,7 @@ from fem_reference.effects import make
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body, Prescribed
-from fem_reference.problems.courses import Along, Rest, Turn
+from fem_reference.problems.paths import Along, Rest, Turn
 from fem_reference.verification.parts import neo_hooke, zero
 
 ELEMENT = "P2/P1"

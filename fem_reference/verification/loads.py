@@ -8,7 +8,7 @@ from fem_reference.assessment.catalogue import Entry, Finding, Lab, order
 from fem_reference.effects import Effect, make
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
-from fem_reference.problems.courses import Rest, Turn
+from fem_reference.problems.paths import Rest, Turn
 from fem_reference.verification import truths
 from fem_reference.verification.homogeneous import (
     BULK,
@@ -19,7 +19,7 @@ from fem_reference.verification.homogeneous import (
     Specimen,
     stretch_entry,
 )
-from fem_reference.verification.parts import SYMMETRY, course, resistance, zero
+from fem_reference.verification.parts import SYMMETRY, ramp, resistance, zero
 
 FAMILY = "loads"
 MUSCLE, FAT = 1.06e-9, 0.92e-9  # densities [tonne/mm3]
@@ -30,7 +30,7 @@ HELD = (Prescribed("z0", "z0", (0, 1, 2), Rest()),)
 def weight(density: float, times: float = 1.0) -> Effect:
     """Gravity along -z, ``times`` that of the earth, on ``density`` [tonne/mm3]."""
     pull = f"0, 0, {-FREE_FALL * times} mm/s^2"
-    return make("gravity", density=f"{density} tonne/mm^3", acceleration=pull, course=course())
+    return make("gravity", density=f"{density} tonne/mm^3", acceleration=pull, ramp=ramp())
 
 
 def wet(mesh: Cells, faces: tuple[str, ...]) -> Cells:
@@ -40,12 +40,12 @@ def wet(mesh: Cells, faces: tuple[str, ...]) -> Cells:
 
 def pressed(pressure: float) -> Effect:
     """A fluid of ``pressure`` [MPa] on what is wet."""
-    return make("pressure", on="wet", pressure=f"{pressure} MPa", course=course())
+    return make("pressure", on="wet", pressure=f"{pressure} MPa", ramp=ramp())
 
 
 def dead(nominal: float) -> Effect:
     """A force per area at rest along x on the face x1 [MPa]."""
-    return make("traction", on="x1", force=f"{nominal}, 0, 0 MPa", course=course())
+    return make("traction", on="x1", force=f"{nominal}, 0, 0 MPa", ramp=ramp())
 
 
 # The weight of a standing block.
@@ -207,7 +207,7 @@ _FOLLOWER = Entry(
 
 def _dead_pull() -> Entry:
     pulled = Specimen(NEO, "P2/P1", "pulled", MU, loads=(dead(MU),))
-    follower = make("pressure", on="x1", pressure=f"{-MU} MPa", course=course())
+    follower = make("pressure", on="x1", pressure=f"{-MU} MPa", ramp=ramp())
     control = "The force spread over the area as it is now.", replace(pulled, loads=(follower,))
     return stretch_entry(FAMILY, "dead_pull", "Block pulled by a dead force: how far it stretches", 0, pulled, control)
 

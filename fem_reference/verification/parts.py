@@ -6,7 +6,7 @@ from fem_reference.assessment import catalogue
 from fem_reference.assessment.catalogue import Finding, Lab
 from fem_reference.effects import Effect, make
 from fem_reference.problems.body import ELEMENTS, Prescribed
-from fem_reference.problems.courses import Rest
+from fem_reference.problems.paths import Rest
 
 Value = Callable[[Lab, int], float]  # of so many cells
 
@@ -14,7 +14,7 @@ Value = Callable[[Lab, int], float]  # of so many cells
 SYMMETRY = tuple(Prescribed(face, face, (axis,), Rest()) for axis, face in enumerate(("x0", "y0", "z0")))
 
 
-def course(full: float = 1.0) -> list[dict[str, float]]:
+def ramp(full: float = 1.0) -> list[dict[str, float]]:
     """From nothing at frame 0 to ``full`` at frame 1, as scene files write it."""
     return [{"frame": 0.0, "amount": 0.0}, {"frame": 1.0, "amount": full}]
 

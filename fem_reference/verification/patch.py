@@ -7,7 +7,7 @@ import numpy as np
 from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
-from fem_reference.problems.courses import Along, Matrix, Turn
+from fem_reference.problems.paths import Along, Matrix, Turn
 from fem_reference.runs.solved import Reached
 from fem_reference.verification.fibres import active
 from fem_reference.verification.homogeneous import BULK, NEO, SIZE, STEPS, Material, X, everywhere

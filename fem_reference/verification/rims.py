@@ -14,8 +14,8 @@ from fem_reference.effects import make
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
-from fem_reference.problems.courses import Rest
-from fem_reference.verification.parts import course, neo_hooke
+from fem_reference.problems.paths import Rest
+from fem_reference.verification.parts import neo_hooke, ramp
 from fem_reference.verification.truths import find
 
 FAMILY = "rims of attachments"
@@ -66,7 +66,7 @@ def _block(level: int, grading: float) -> Body:
 
 
 def _pulled(mesh: Cells, slides: tuple[Prescribed, ...]) -> Body:
-    acting = (*neo_hooke(MU, BULK), make("traction", on="pulled", force=f"{LOAD}, 0, 0 MPa", course=course()))
+    acting = (*neo_hooke(MU, BULK), make("traction", on="pulled", force=f"{LOAD}, 0, 0 MPa", ramp=ramp()))
     held = Prescribed("clamped", "clamped", (0, 1, 2), Rest()), Prescribed("x0", "x0", (0,), Rest())
     return Body(mesh, acting, (*held, *slides), (0.0, 1.0))
 

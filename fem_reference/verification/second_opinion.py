@@ -16,20 +16,20 @@ from fem_reference.effects import make
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
-from fem_reference.problems.courses import Affine, Along, Rest, Turn
+from fem_reference.problems.paths import Affine, Along, Rest, Turn
 from fem_reference.runs.solved import Reached
 from fem_reference.verification import fibres
 from fem_reference.verification.cook import Panel
 from fem_reference.verification.homogeneous import HEART, MOONEY, MU, NEO, Specimen
 from fem_reference.verification.loads import dead
-from fem_reference.verification.parts import course, zero
+from fem_reference.verification.parts import ramp, zero
 from fem_reference.verification.patch import Patch
 
 RESIDUAL = 1e-14  # [N, mm3]
 FIBRE = Along((2 / 7, 3 / 7, 6 / 7))
 # Bends and twists at once: an axis between that of the bar, z, and one across it.
 TURN = Turn((1.0, 0.0, 2.0), 0.5, (0.5, 0.5, 2.0))
-RAMP = course()
+RAMP = ramp()
 MIXED = ("incompressible", {"bulk": "1 MPa"})
 PENALTY = ("incompressible_penalty", {"bulk": "1 MPa"})
 NEO_HOOKE = ("neo_hooke", {"mu": "10 kPa"})
@@ -40,12 +40,12 @@ PASSIVE = (
     "fibre_passive",
     {"stress": "300 kPa", "p1": 0.05, "p2": 6.6, "optimal_stretch": 1.0, "linear_from": 1.4},
 )
-ACTIVE = ("fibre_active", {"stress": "20 kPa", "optimal_stretch": 1.0, "course": RAMP})
+ACTIVE = ("fibre_active", {"stress": "20 kPa", "optimal_stretch": 1.0, "ramp": RAMP})
 FEBIO = ("fibre_passive_febio", {"c3": "5 kPa", "c4": 5.0, "c5": "300 kPa", "linear_from": 1.3})
-TENSION = ("active_tension", {"tension": "5 kPa", "course": RAMP})
-PRESTRETCH = ("prestretch", {"stretch": 1.1, "course": RAMP})
-WEIGHT = ("gravity", {"density": "1060 kg/m3", "acceleration": "9.81, 0, -500 m/s^2", "course": RAMP})
-FLUID = ("pressure", {"on": "x1", "pressure": "1 kPa", "course": RAMP})
+TENSION = ("active_tension", {"tension": "5 kPa", "ramp": RAMP})
+PRESTRETCH = ("prestretch", {"stretch": 1.1, "ramp": RAMP})
+WEIGHT = ("gravity", {"density": "1060 kg/m3", "acceleration": "9.81, 0, -500 m/s^2", "ramp": RAMP})
+FLUID = ("pressure", {"on": "x1", "pressure": "1 kPa", "ramp": RAMP})
 
 Named = tuple[str, dict[str, Any]]  # an effect and its parameters as scene files write them
 

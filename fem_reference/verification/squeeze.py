@@ -12,7 +12,7 @@ import numpy as np
 from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
-from fem_reference.problems.courses import Affine, Rest
+from fem_reference.problems.paths import Affine, Rest
 from fem_reference.runs.solved import Reached, Solved
 from fem_reference.verification.parts import neo_hooke, zero
 from fem_reference.verification.truths import find

@@ -7,7 +7,7 @@ from fem_reference.assessment.catalogue import Entry, Lab
 from fem_reference.effects import Effect
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
-from fem_reference.problems.courses import Rest, Turn
+from fem_reference.problems.paths import Rest, Turn
 from fem_reference.runs.solved import Reached
 from fem_reference.verification import truths
 from fem_reference.verification.parts import ladder, mooney_rivlin, neo_hooke, once

@@ -6,7 +6,7 @@ from fem_reference.assessment.catalogue import Entry, Finding, Lab, order
 from fem_reference.effects import Effect, make
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body, Prescribed
-from fem_reference.problems.courses import Affine
+from fem_reference.problems.paths import Affine
 from fem_reference.verification import truths
 from fem_reference.verification.homogeneous import MU, NEO
 from fem_reference.verification.parts import SYMMETRY, resistance
@@ -72,7 +72,7 @@ _GONE = [{"frame": 0.0, "amount": 0.0}, {"frame": 1.0, "amount": 1.0}, {"frame":
 def _decay(lab: Lab, step: float, eta: float) -> float:
     """The rate [1/s] at which the block creeps back from frame ``_FROM`` to ``_TO``, in load steps of ``step`` frames."""
     mesh = shapes.box((1, 1, 1), (1.0, 2.0, 3.0), "tetrahedron")
-    weight = make("traction", on="z1", force=f"0, 0, {-_STRESS} MPa", course=_GONE)
+    weight = make("traction", on="z1", force=f"0, 0, {-_STRESS} MPa", ramp=_GONE)
     frames = tuple(np.linspace(0, _TO, round(_TO / step) + 1).tolist())
     acting = (*NEO.effects, resistance("P2/P1", _BULK), weight, viscosity(eta))
     body = Body(mesh, acting, SYMMETRY, frames, interval=_SECONDS)

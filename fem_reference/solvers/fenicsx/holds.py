@@ -70,9 +70,9 @@ class Hold:
         return np.concatenate([entry.values.x.array for entry in self.components])
 
     def move_to(self, frame: float) -> None:
-        """Prescribe what the course gives at ``frame``."""
+        """Prescribe the displacement of the path at ``frame``."""
         for entry in self.components:
-            entry.values.x.array[entry.dofs[1]] = self.entry.course(entry.rest, frame)[:, entry.component]
+            entry.values.x.array[entry.dofs[1]] = self.entry.path(entry.rest, frame)[:, entry.component]
 
     def force(self, residual: Floats, now: Floats, shared: Ints) -> tuple[Floats, Floats]:
         """The force (3,) [N] and its moment (3,) [N mm] about the origin that this rank's part of the region takes, from the
@@ -106,8 +106,8 @@ class PointHold:
         return self.wanted.ravel()
 
     def move_to(self, frame: float) -> None:
-        """Prescribe what the course gives at ``frame``."""
-        self.wanted = self.points.rest + self.entry.course(self.points.rest, frame)
+        """Prescribe the displacement of the path at ``frame``."""
+        self.wanted = self.points.rest + self.entry.path(self.points.rest, frame)
 
     def add_residual(self, residual: Floats, moves: Floats | None) -> None:
         """Add what pulls to ``residual`` over this rank's unknowns; as if the unknowns had made ``moves`` (n,), where given."""

@@ -157,7 +157,7 @@ class _March:
         for entry in self.body.prescribed:
             if entry.stiffness is None:
                 nodes = self.nodes[entry.name]
-                moved = entry.course(self.equations.space.rest[nodes], frame)
+                moved = entry.path(self.equations.space.rest[nodes], frame)
                 for i in entry.components:
                     values |= dict(zip((3 * nodes + i).tolist(), moved[:, i].tolist(), strict=True))
         return np.array(list(values), np.int64), np.array(list(values.values()))

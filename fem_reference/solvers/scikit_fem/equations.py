@@ -128,7 +128,7 @@ def _load_law(load: Load, points: Points, jets: list[Any], frame: float) -> tupl
 
 def _spring_law(entry: Prescribed, points: Points, jets: list[Any], frame: float) -> tuple[Floats, Floats]:
     """The virtual work of springs that pull towards what is prescribed."""
-    wanted = entry.course(points.places.reshape(-1, 3), frame)
+    wanted = entry.path(points.places.reshape(-1, 3), frame)
     pull = [
         entry.stiffness * (jets[9 + i] - wanted[:, i]) if i in entry.components else constant(0.0, jets[0])
         for i in range(3)

@@ -22,7 +22,7 @@ from fem_reference.effects import make
 from fem_reference.foundations.mesh import Floats, fingerprint
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, ByCell, Cells, Prescribed
-from fem_reference.problems.courses import Rest, Turn
+from fem_reference.problems.paths import Rest, Turn
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
 from fem_reference.solvers import fenicsx
