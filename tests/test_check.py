@@ -110,7 +110,7 @@ def test_where_nothing_can_be_said_it_is_told_and_holds_nothing_up(work, capsys)
     assert "verdict: inconclusive" in printed
 
 
-def test_an_update_takes_todays_values(work) -> None:
+def test_an_update_takes_current_values(work) -> None:
     work.write(moved=10)
     before = work.baseline.read_text()
     assert work.check("--update") == cli.VERDICT_FAIL  # further from the reference than was allowed
@@ -170,7 +170,8 @@ def test_bad_input_is_told_before_anything_is_solved(work, capsys) -> None:
 def test_another_scene_is_not_this_baseline(work, capsys) -> None:
     assert work.check("--set", "muscle.tet_size=7 mm") == cli.BAD_INPUT
     assert (
-        "want the key of this scene (it was changed since; --update takes today's measures)" in capsys.readouterr().err
+        "want the key of this scene (it was changed since; --update takes the current measures)"
+        in capsys.readouterr().err
     )
 
 

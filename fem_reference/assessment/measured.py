@@ -15,7 +15,7 @@ from fem_reference.scenes.muscle import Scene
 
 
 @dataclass(frozen=True, eq=False)
-class Today:
+class CurrentMeasures:
     """A candidate, measured now against the ``reference``; ``error_bars``: how well that is known, None without any."""
 
     scene: Scene
@@ -27,7 +27,7 @@ class Today:
     @classmethod
     def of(
         cls, scene: Scene, setup: Setup, candidate: Run, reference: Run, error_bars: ErrorBars | None = None
-    ) -> "Today":
+    ) -> "CurrentMeasures":
         """Measure a candidate and its reference, which both have the frames of the scene."""
         if reference.fibres is None:
             got, want = "a run without an interior", "a reference that carries the fibres"

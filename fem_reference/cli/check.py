@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 from fem_reference.assessment import baseline, regression
-from fem_reference.assessment.measured import Today
+from fem_reference.assessment.measured import CurrentMeasures
 from fem_reference.cli.choosing import check_names, checked_bench, choose, scene_of
 from fem_reference.cli.printing import DONE, SOLVER_FAILED, VERDICT_FAIL, write_output
 from fem_reference.foundations.errors import InputError
@@ -28,7 +28,7 @@ def add_options(parser: argparse.ArgumentParser, unit: str) -> None:
     parser.add_argument("--unit", help=unit)
     past = "its measures as they were, JSON"
     parser.add_argument("--baseline", type=Path, required=True, metavar="FILE", help=past)
-    anew = "write the baseline anew from today's measures; its tolerances and limits stay"
+    anew = "write the baseline anew from the current measures; its tolerances and limits stay"
     parser.add_argument("--update", action="store_true", help=anew)
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write the judgements as JUnit XML")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the worst of them for a pull request")
@@ -55,7 +55,7 @@ def check(options: argparse.Namespace) -> int:
         write_output(facts, "\n".join([*why, "verdict: failed"]), options)
         return SOLVER_FAILED
     bars = refinement.obtain(bench, reference) if options.error_bar else refinement.offered(bench, reference)
-    return _printed(Today.of(scene, bench.setup(), run, reference, bars), options, begin)
+    return _printed(CurrentMeasures.of(scene, bench.setup(), run, reference, bars), options, begin)
 
 
 def _runs(bench: Bench, chosen: tuple[Candidate, str]) -> tuple[Run, Run]:
@@ -65,11 +65,11 @@ def _runs(bench: Bench, chosen: tuple[Candidate, str]) -> tuple[Run, Run]:
     return run, bench.obtain("reference", bench.scene.reference, "reference")
 
 
-def _printed(today: Today, options: argparse.Namespace, begin: float) -> int:
+def _printed(current: CurrentMeasures, options: argparse.Namespace, begin: float) -> int:
     """Judge, write what is wanted, and return the exit status."""
     if options.update:
-        baseline.update(options.baseline, today)
-    result = regression.check(baseline.read(options.baseline, today.scene, today.candidate.name), today)
+        baseline.update(options.baseline, current)
+    result = regression.check(baseline.read(options.baseline, current.scene, current.candidate.name), current)
     _write(
         {
             options.junit: regression_texts.junit(result, time.perf_counter() - begin),

@@ -16,12 +16,12 @@ from fem_reference.report.claims_page import facts as claims_facts
 from fem_reference.report.overview import (
     comparison_text,
     field_scene_facts,
+    ranking_text,
     run_facts,
     run_text,
     scene_facts,
-    standings_text,
 )
-from fem_reference.report.standings_page import facts as standings_facts
+from fem_reference.report.ranking_page import facts as ranking_facts
 from fem_reference.runs import store
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import Candidate, Scene, SolverChoice
@@ -104,8 +104,8 @@ def _table(options: argparse.Namespace) -> int:
     for name in scenes if options.case else foreign:
         Bench(scenes[name], out(options)).setup()  # only what nobody asked for by name may be missing
     table = table_5_1.stand(scenes.values(), out(options) / "runs", foreign)
-    path = report.write_standings(table, out(options), TABLE)
-    write_output(standings_facts(table), f"{standings_text(table)}\npage: {path}", options)
+    path = report.write_ranking(table, out(options), TABLE)
+    write_output(ranking_facts(table), f"{ranking_text(table)}\npage: {path}", options)
     return DONE if all(one.reference.status == "converged" for one in table.scenarios) else SOLVER_FAILED
 
 

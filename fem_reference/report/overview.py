@@ -258,10 +258,10 @@ def run_text(run: Run) -> str:
     return f"{run.name}: {run.outcome.status}, {run.outcome.message}\nstored in {run.folder}"
 
 
-def standings_text(table: Table) -> str:
+def ranking_text(table: Table) -> str:
     """Who stands how on which scene, a line each."""
     lines = []
-    for one in table.standings:
+    for one in table.results:
         found = (one.worst("surface_deviation", "rms"), one.worst("volume", "deviation"))
         told = [
             f"{name} {value[0]:.3g} {unit}"

@@ -9,7 +9,7 @@ from fem_reference.assessment.regression import WORST_FIRST, Check, Judgement, Q
 
 # A pull request is read by people: the worst judgements, and how many there are.
 MOST_ROWS = 15
-_COLUMNS = ("verdict", "question", "statistic", "frame", "was", "today", "allowed", "known to")
+_COLUMNS = ("verdict", "question", "statistic", "frame", "was", "now", "allowed", "known to")
 
 
 def facts(check: Check) -> dict[str, Any]:
@@ -29,7 +29,7 @@ def facts(check: Check) -> dict[str, Any]:
                 "unit": one.unit,
                 "frame": one.frame,
                 "was": _null(one.was),
-                "today": _null(one.today),
+                "today": _null(one.current),
                 "allowed": _null(one.allowed),
                 "known_to": _null(one.known),
                 "why": one.why,
@@ -144,7 +144,7 @@ def _answers(check: Check) -> list[str]:
 
 
 def _cells(one: Judgement) -> tuple[str, ...]:
-    numbers = (_told(value, one.unit) for value in (one.was, one.today, one.allowed, one.known))
+    numbers = (_told(value, one.unit) for value in (one.was, one.current, one.allowed, one.known))
     return (one.word, one.question, one.name, str(one.frame), *numbers)
 
 
