@@ -19,8 +19,8 @@ def up(points, frame):  # a function of the script's own
 
 effects = (fr.make_effect("neo_hooke", mu=0.01), fr.make_effect("incompressible", bulk=100.0))  # [MPa]
 block = fr.box((2, 2, 2), (10.0, 10.0, 10.0), "tetrahedron")  # [mm]
-held = [fr.Prescribed(face, face, (axis,), lambda points, frame: 0 * points) for axis, face in enumerate(("x0", "y0", "z0"))]
-body = fr.Body(block, effects, (*held, fr.Prescribed("top", "z1", (2,), up)), frames=(0.0, 1.0, 2.0))
+fixed = [fr.Prescribed(face, face, (axis,), lambda points, frame: 0 * points) for axis, face in enumerate(("x0", "y0", "z0"))]
+body = fr.Body(block, effects, (*fixed, fr.Prescribed("top", "z1", (2,), up)), frames=(0.0, 1.0, 2.0))
 solved = fr.solve_body(body, element="P2/P1", first_step=1.0)
 print(solved.last.forces["top"][2])
 """

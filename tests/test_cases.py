@@ -33,7 +33,7 @@ MUSCLES = {
     "iliacus_anatomical": "6 mm",
 }
 
-# What the report's program held moves there past each other, by springs as well: the reference ends before the muscle is bent.
+# What the report's program attached moves there past each other, by springs as well: the reference ends before the muscle is bent.
 UNSOLVED = "iliacus"
 
 
@@ -72,11 +72,11 @@ def test_the_page_of_the_octave_examples(tmp_path) -> None:
     orders = {
         (case["case"], ladder["element"]): ladder["order"] for case in facts["cases"] for ladder in case["convergence"]
     }
-    # Linear elements are of order 2 in L2 where the right side is square integrable and values are held along a rim.
+    # Linear elements are of order 2 in L2 where the right side is square integrable and values are attached along a rim.
     for name in ("rod", "plate_square", "plate_spiral"):
         assert orders[name, "P1"] == pytest.approx(2, abs=0.1)
     assert orders["rod", "P2"] is None, "a parabola lies in the space: what is left is rounding"
-    assert orders["surface_figure", "P1"] < 1.5, "a surface does not feel a value held at a point"
+    assert orders["surface_figure", "P1"] < 1.5, "a surface does not feel a value attached at a point"
     page = (tmp_path / "octave-examples.html").read_text()
     assert page.count("<h2") >= len(FIELDS) + 1
 
@@ -174,7 +174,7 @@ def test_muscles_of_the_report(data, name, tmp_path, monkeypatch) -> None:
     assert scene.frames.numbers == (0, 100, 200, 300)
 
 
-# Those held anatomically have the effects, and the negative control, of those held as in the report.
+# Those attached anatomically have the effects, and the negative control, of those attached as in the report.
 @pytest.mark.parametrize("name", ["adductor_brevis", "box_squeeze_report", "gluteus_maximus", "gluteus_medius"])
 def test_muscles_of_the_report_with_negative_control_fails(data, name, tmp_path, monkeypatch) -> None:
     assert data.is_dir()

@@ -99,7 +99,7 @@ def test_a_vertex_goes_the_shortest_way_out() -> None:
     obstacle = collision.Obstacle(ball, rest, np.array([True, True, True, False]), 0.0)
     obstacle.move(1)
     points = rest.copy()
-    collision.push_out(points, [obstacle], 1.0)
+    collision.move_out(points, [obstacle], 1.0)
     centre = np.array([30.0, 0, 0])
     wanted = centre + 20 * (rest[:2] - centre) / np.linalg.norm(rest[:2] - centre, axis=1)[:, None]
     assert_allclose(points, [*wanted, *rest[2:]], atol=1e-13)  # a few roundings of 50 mm
@@ -109,7 +109,7 @@ def test_stiffness_is_the_share_of_the_way() -> None:
     points = np.array([[0.0, 0, 5]])
     obstacle = collision.Obstacle(floor(), points, np.ones(1, bool), 0.0)
     points[0, 2] = -2.0
-    collision.push_out(points, [obstacle], 0.25)
+    collision.move_out(points, [obstacle], 0.25)
     assert_allclose(points, [[0, 0, -1.5]], atol=1e-15)
 
 
@@ -119,7 +119,7 @@ def test_several_bones_push_by_the_sum() -> None:
     free = np.ones(1, bool)
     corner = [collision.Obstacle(floor(normal=normal), points, free, 0.0) for normal in ((0, 0, 1), (1, 0, 0))]
     points[:] = [[-3.0, 0, -1]]
-    collision.push_out(points, corner, 1.0)
+    collision.move_out(points, corner, 1.0)
     assert_allclose(points, 0, atol=1e-15)
 
 
@@ -127,10 +127,10 @@ def test_what_is_near_at_rest_may_stay_as_near() -> None:
     rest = np.array([[0.0, 0, -1.5], [0, 0, 0.3], [0, 0, 9]])
     obstacle = collision.Obstacle(floor(), rest, np.ones(3, bool), 1.0)
     points = rest.copy()
-    collision.push_out(points, [obstacle], 1.0)
+    collision.move_out(points, [obstacle], 1.0)
     assert_array_equal(points, rest)
     points[:, 2] -= 20
-    collision.push_out(points, [obstacle], 1.0)
+    collision.move_out(points, [obstacle], 1.0)
     assert_allclose(points[:, 2], [-1.5, 0.3, 1.0], atol=1e-14)  # roundings of 20 mm
 
 
@@ -150,7 +150,7 @@ def test_in_the_middle_of_a_ball_there_is_no_way_out_but_no_harm() -> None:
         RigidBody("ball", BALL, None, solid=Sphere((0, 0, 0), 20.0)), rest, np.ones(1, bool), 0.0
     )
     points = np.zeros((1, 3))
-    collision.push_out(points, [obstacle], 1.0)
+    collision.move_out(points, [obstacle], 1.0)
     assert np.linalg.norm(points) <= 20 + 1e-12
 
 
@@ -158,7 +158,7 @@ def test_vertices_that_are_no_number_stay_so(grid) -> None:
     rest = np.array([[50.0, 0, 0], [0, 50, 0]])
     obstacle = collision.Obstacle(gridded(grid, None), rest, np.ones(2, bool), 0.0)
     points = np.array([[np.nan, 0, 0], [0, 19.0, 0]])
-    collision.push_out(points, [obstacle], 1.0)
+    collision.move_out(points, [obstacle], 1.0)
     assert np.isnan(points[0, 0])
     # To what the grid rounds of the triangles of the ball, 20 mm wide: its error is below 0.5 mm.
     assert np.linalg.norm(points[1]) == pytest.approx(20, abs=0.5)

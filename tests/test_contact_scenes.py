@@ -91,7 +91,7 @@ def test_bones_push_only_what_they_do_not_hold(tmp_path) -> None:
     assert [entry.name for entry in body.obstructions] == ["floor", "lid", "ball"]
     assert [type(effect).__name__ for effect in body.effects] == ["NeoHooke", "Incompressible"]
     heights = body.contact.on.points[:, 2]
-    assert 2 < heights.min() < heights.max() < 38  # the ends are held, and triangles are 3.3 mm high
+    assert 2 < heights.min() < heights.max() < 38  # the ends are attached, and triangles are 3.3 mm high
     turned = body.obstructions[1].pose(10)
     assert apply(turned, np.array([[5.0, 5, 30]])) == pytest.approx(np.array([[5, 5, 30]]))
 
@@ -107,12 +107,12 @@ def test_only_some_bones_push(tmp_path) -> None:
 def test_a_step_through_a_plate_is_cut(fem_lab) -> None:
     # A plate 0.2 mm thin jumps over the top of a block in one step: at both ends of the step it touches nothing.
     mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), "tetrahedron")
-    held = parts.SYMMETRY
+    attached = parts.SYMMETRY
     plate = Obstruction("plate", Box((0.5, 0.5, 1.2), (4.0, 4.0, 0.2), 0.0), Slide((0.0, 0.0, -0.5)))
     body = Body(
         mesh,
         parts.neo_hooke(0.01, 10.0),
-        held,
+        attached,
         (0.0, 1.0),
         contact=Contact("z1", 1.0, 0.01),
         obstructions=(plate,),

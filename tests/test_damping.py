@@ -42,14 +42,14 @@ def test_the_second_opinion_knows_no_time() -> None:
 
 
 def stretched(acting, interval: float | None = None, speed: float = 1.0) -> Body:
-    """A block stretched by a half until frame 1 / ``speed``, and then held for 40 frames."""
+    """A block stretched by a half until frame 1 / ``speed``, and then fixed for 40 frames."""
     pull = Affine(STILL, (0.0, 0.0, 0.5), ((0.0, 0.0), (1 / speed, 1.0)))
-    held = Prescribed("z0", "z0", (0, 1, 2), Rest()), Prescribed("z1", "z1", (0, 1, 2), pull)
+    fixed = Prescribed("z0", "z0", (0, 1, 2), Rest()), Prescribed("z1", "z1", (0, 1, 2), pull)
     mesh = shapes.box((1, 1, 2), (1.0, 1.0, 1.0), "tetrahedron")
-    return Body(mesh, acting, held, (0.0, 1 / speed, 1 / speed + 40), interval=interval)
+    return Body(mesh, acting, fixed, (0.0, 1 / speed, 1 / speed + 40), interval=interval)
 
 
-def test_what_is_held_long_enough_ends_where_it_would_without(session) -> None:  # noqa: F811
+def test_what_is_fixed_long_enough_ends_where_it_would_without(session) -> None:  # noqa: F811
     # A drag of 1e-6 MPa s/mm2 over 1 mm2 against a stiffness of 0.01 MPa: it has settled in a ten-thousandth of a frame of 1 s.
     settings = BodySettings(first_step=0.5, residual=1e-12)
     without, slow = (
@@ -62,7 +62,7 @@ def test_what_is_held_long_enough_ends_where_it_would_without(session) -> None: 
 
 
 def test_speed_costs_force_but_stores_nothing(session) -> None:  # noqa: F811
-    # The mean speed of the block is half that of its end, 0.5 mm a frame of 1 ms: its drag has to be held up by both ends.
+    # The mean speed of the block is half that of its end, 0.5 mm a frame of 1 ms: its drag has to be limited by both ends.
     settings = BodySettings(first_step=100.0, residual=1e-12)
     fast, still = (
         session.solve(stretched(acting, 1e-3), settings).states[1]

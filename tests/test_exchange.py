@@ -92,15 +92,19 @@ def test_poses_of_every_bone_and_frame(exported: Path, built: Problem) -> None:
 
 
 def test_what_bones_hold(exported: Path, built: Problem) -> None:
-    for held in built.held:
+    for attached in built.attached:
         vertices = [
-            int(row[2]) for row in rows(exported / "attachments.csv") if row[:2] == [held.attachment, held.bone.name]
+            int(row[2])
+            for row in rows(exported / "attachments.csv")
+            if row[:2] == [attached.attachment, attached.bone.name]
         ]
-        assert np.array_equal(vertices, held.vertices)
+        assert np.array_equal(vertices, attached.vertices)
         facets = [
-            row[2:] for row in rows(exported / "attachment_facets.csv") if row[:2] == [held.attachment, held.bone.name]
+            row[2:]
+            for row in rows(exported / "attachment_facets.csv")
+            if row[:2] == [attached.attachment, attached.bone.name]
         ]
-        assert np.array_equal(np.array(facets, int), built.mesh.facets[held.attachment])
+        assert np.array_equal(np.array(facets, int), built.mesh.facets[attached.attachment])
 
 
 def test_the_surface_lies_where_its_shares_of_the_tets_say(exported: Path, built: Problem) -> None:
@@ -143,7 +147,7 @@ def test_the_reading_example_runs(exported: Path, built: Problem) -> None:
     words = [sys.executable, "-I", "-W", "error", "-c", code(text)]
     said = subprocess.run(words, cwd=exported, capture_output=True, text=True, check=True).stdout
     head, numbers = said.split(" at [")
-    insertion = built.held[1]
+    insertion = built.attached[1]
     assert head == f"At frame 10, lid has vertices {' '.join(map(str, insertion.vertices))}"
     moved = apply(insertion.bone.pose(10), built.surface.points[insertion.vertices])
     found = np.array(re.findall(r"-?\d+\.?\d*(?:e[+-]\d+)?", numbers), float).reshape(-1, 3)

@@ -46,8 +46,8 @@ def box(element: str, counts=(2, 2, 2), size=(1.0, 1.0, 1.0)) -> Cells:
 
 
 def turned(mesh: Cells, top, bottom=None) -> Body:
-    held = (Prescribed("bottom", "z0", ALL, bottom or Rest()), Prescribed("top", "z1", ALL, top))
-    return Body(mesh, FLESH, held, (0.0, 1.0))
+    fixed = (Prescribed("bottom", "z0", ALL, bottom or Rest()), Prescribed("top", "z1", ALL, top))
+    return Body(mesh, FLESH, fixed, (0.0, 1.0))
 
 
 def settings(element: str, **changes) -> BodySettings:
@@ -84,9 +84,9 @@ def test_a_block_on_springs_moves_by_the_load_over_their_stiffness(element, sess
     stiffness, load = 0.05, 0.004  # [MPa/mm], [MPa]
     acting = (*FLESH, effect("traction", on="z1", force=f"0, 0, -{load} MPa", ramp=ONCE))
     springs = Prescribed("springs", "z0", (2,), Rest(), stiffness)
-    held = (Prescribed("x0", "x0", (0,), Rest()), Prescribed("y0", "y0", (1,), Rest()), springs)
+    fixed = (Prescribed("x0", "x0", (0,), Rest()), Prescribed("y0", "y0", (1,), Rest()), springs)
     mesh = box(element, size=(2.0, 1.0, 1.0))
-    state = session.solve(Body(mesh, acting, held, (0.0, 1.0)), settings(element)).last
+    state = session.solve(Body(mesh, acting, fixed, (0.0, 1.0)), settings(element)).last
     # Homogeneous, so that every element has it; Newton's residual of 1e-12 N over 0.05 N/mm.
     assert state.points[mesh.points[:, 2] == 0, 2] == pytest.approx(-load / stiffness, abs=1e-10)
     assert state.forces["springs"] == pytest.approx([0, 0, load * 2.0], abs=1e-11)
@@ -117,10 +117,10 @@ def test_springs_at_points_beside_the_cells_take_the_load_and_its_moment(element
 @BOTH
 def test_stiff_springs_come_near_to_what_they_stand_for(element, session) -> None:
     stretch, forces = Affine(((0.0, 0.0, 0.0),) * 3, (0.0, 0.0, 0.2)), []
-    held = tuple(Prescribed(face, face, (axis,), Rest()) for axis, face in enumerate(("x0", "y0", "z0")))
+    fixed = tuple(Prescribed(face, face, (axis,), Rest()) for axis, face in enumerate(("x0", "y0", "z0")))
     for stiffness in (None, 1e2, 1e3):
         pulled = Prescribed("top", "z1", (2,), stretch, stiffness)
-        state = session.solve(Body(box(element), FLESH, (*held, pulled), (0.0, 1.0)), settings(element)).last
+        state = session.solve(Body(box(element), FLESH, (*fixed, pulled), (0.0, 1.0)), settings(element)).last
         forces.append(state.forces["top"][2])
     # Ten times stiffer, ten times nearer, up to what the body's 0.03 N/mm are of the springs' 100 N/mm.
     assert (forces[1] - forces[0]) / (forces[2] - forces[0]) == pytest.approx(10, rel=1e-3)
@@ -234,16 +234,16 @@ def test_regions_and_fibres_that_a_body_lacks_are_named() -> None:
 
 
 def test_forces_have_names_of_their_own() -> None:
-    held = (Prescribed("end", "z0", (2,), Rest()), Prescribed("end", "z1", (2,), Rest()))
+    fixed = (Prescribed("end", "z0", (2,), Rest()), Prescribed("end", "z1", (2,), Rest()))
     with pytest.raises(InputError, match='prescribed: got "end" twice, want a name for each'):
-        check(Body(box("Q1/P0"), FLESH, held, (0.0, 1.0)), "Q1/P0")
+        check(Body(box("Q1/P0"), FLESH, fixed, (0.0, 1.0)), "Q1/P0")
 
 
 @pytest.mark.parametrize("stiffness", [0.0, -1.0, float("nan")])
 def test_springs_pull(stiffness) -> None:
-    held = (Prescribed("end", "z0", (2,), Rest(), stiffness),)
+    fixed = (Prescribed("end", "z0", (2,), Rest(), stiffness),)
     with pytest.raises(InputError, match=r"prescribed\.end\.stiffness: got .*, want more than 0, or None: exact"):
-        check(Body(box("Q1/P0"), FLESH, held, (0.0, 1.0)), "Q1/P0")
+        check(Body(box("Q1/P0"), FLESH, fixed, (0.0, 1.0)), "Q1/P0")
 
 
 def shared_facet(mesh: Cells) -> list[int]:
@@ -261,11 +261,11 @@ def test_regions_are_on_the_boundary_of_the_cells(element) -> None:
     every = np.concatenate(list(mesh.facets.values()))
     assert {tuple(facet) for facet in boundary_facets(mesh).tolist()} == {tuple(sorted(f)) for f in every.tolist()}
 
-    held = (Prescribed("end", "lid", (2,), Rest()),)
+    fixed = (Prescribed("end", "lid", (2,), Rest()),)
 
-    def checked(facets, acting=acting, held=held) -> None:
+    def checked(facets, acting=acting, fixed=fixed) -> None:
         other = replace(mesh, facets={"lid": np.asarray(facets), "unused": np.zeros_like(every[:1])})
-        check(Body(other, acting, held, (0.0, 1.0)), element)
+        check(Body(other, acting, fixed, (0.0, 1.0)), element)
 
     checked(np.flip(every, axis=1))  # in whatever order
     lost = shared_facet(mesh)
@@ -295,18 +295,18 @@ def test_a_time_limit_ends_one_body_and_not_the_session(session) -> None:  # noq
 
 def test_what_attachments_share_counts_once(session, tmp_path) -> None:
     # Two regions meet in an edge and hold it both. Of a muscle, which has points to be followed, all forces are in balance.
-    held = (
+    fixed = (
         Prescribed("bottom", "z0", ALL, Rest()),
         Prescribed("side", "x0", ALL, Affine(((0.0, 0.0, 0.0), (0.0, 0.0, 0.1), (0.0, 0.0, -0.2)))),
         Prescribed("top", "z1", ALL, Affine(((0.0, 0.0, 0.0),) * 3, (0.0, 0.1, -0.2))),
     )
-    body = Body(box("P2/P1"), FLESH, held, (0.0, 1.0))
+    body = Body(box("P2/P1"), FLESH, fixed, (0.0, 1.0))
     centre = body.mesh.points[body.mesh.cells[0]].mean(axis=0)
     job, found = tmp_path / "job.pickle", []
     job.write_bytes(pickle.dumps(Job(body, settings("P2/P1"), {"surface": (np.array([0]), centre[None])})))
     outcome = session.run(job, None, lambda event: found.append(dict(np.load(event["file"]))), "frames")
     assert outcome.status == "converged"
-    forces = [found[-1][f"force {entry.name}"] for entry in held]
+    forces = [found[-1][f"force {entry.name}"] for entry in fixed]
     assert np.abs(forces[1]).max() > 1e-4
     assert np.abs(sum(forces)).max() < 1e-10
     # Of a body of the catalogue each region has all of what its unknowns take.

@@ -13,13 +13,13 @@ from fem_reference.solvers import scikit_fem
 from fem_reference.verification import contact, parts
 from fem_reference.verification.contact import Slide
 
-HELD = (Prescribed("ground", "z0", (0, 1, 2), Rest()),)
+FIXED = (Prescribed("ground", "z0", (0, 1, 2), Rest()),)
 LAW = Contact("z1", 1.0, 0.01)
 
 
 def block(*obstructions: Obstruction) -> Body:
     mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), "hexahedron")
-    return Body(mesh, parts.neo_hooke(0.01, 10.0), HELD, (0.0, 1.0), contact=LAW, obstructions=obstructions)
+    return Body(mesh, parts.neo_hooke(0.01, 10.0), FIXED, (0.0, 1.0), contact=LAW, obstructions=obstructions)
 
 
 def solved(lab, *obstructions: Obstruction):

@@ -66,7 +66,7 @@ def example_of(folder, values=None, **tables) -> Example:
         tables["domain"] = tables["domain"](folder)
     scene = fields.scene(folder, **tables)
     problem = field_problem.build(scene)
-    base = np.linspace(0.0, -2.0, len(problem.held))
+    base = np.linspace(0.0, -2.0, len(problem.fixed))
     values = base if values is None else values(base)
     done = Outcome("converged", "done", {"seconds_assembly": 0.25, "seconds_solve": 0.5})
     reference = FieldRun("reference", "fenicsx", problem, Solution(base, done))
@@ -85,9 +85,9 @@ def example_of(folder, values=None, **tables) -> Example:
 
 
 def rod(folder, values=None, **tables) -> Example:
-    held = {"boundary": [{"on": "left", "value": "0"}], "exact": "x**2/2 - 2*x"}
+    fixed = {"boundary": [{"on": "left", "value": "0"}], "exact": "x**2/2 - 2*x"}
     interval = {"interval": {"start": 0.0, "end": 1.0, "count": 20, "seed": 1}}
-    return example_of(folder, values, **({"domain": interval} | held | tables))
+    return example_of(folder, values, **({"domain": interval} | fixed | tables))
 
 
 def plate(folder, values=None, **tables) -> Example:

@@ -68,7 +68,7 @@ def test_via_points_go_with_their_bones() -> None:
     assert outcome.message == "2 lines, straight, through 2 via-points; no surface"
     low, high = given.fibres.points[20], given.fibres.points[61]  # the middles of both fibres
     for frame in frames:
-        up, down = SWING.pose(frame.number), given.held[0].bone.pose(frame.number)
+        up, down = SWING.pose(frame.number), given.attached[0].bone.pose(frame.number)
         assert_allclose(frame.fibres[20], apply(up, low[None])[0], atol=1e-10)
         assert_allclose(frame.fibres[61], apply(up, high[None])[0], atol=1e-10)
         # A quarter of the way along the straight fibre, which begins at the top, at z = 22.5.
@@ -180,7 +180,7 @@ def test_too_few_points_and_no_attachment_are_refused() -> None:
     ):
         solved(bar(points=2), via=[{"at": 0.5, "bone": "top"}])
     with pytest.raises(InputError, match="a muscle that no bone holds, want attachments that lines are fixed to"):
-        solved(replace(bar(), held=()))
+        solved(replace(bar(), attached=()))
 
 
 CANDIDATES = """
@@ -297,7 +297,7 @@ def test_a_reference_of_lines_alone_is_refused(tmp_path, capsys) -> None:
     )
 
 
-def test_the_ends_are_held_by_the_bones_of_the_nearest_attachments() -> None:
+def test_the_ends_are_attached_by_the_bones_of_the_nearest_attachments() -> None:
     given = bar()
     spare = RigidBody("spare", given.bones[0].surface, Translation((1, 0, 0), (0.0, 10.0), (0.0, 50.0)))
     _, frames = solved(replace(given, bones=(spare, *given.bones)))

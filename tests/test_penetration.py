@@ -15,7 +15,7 @@ from fem_reference.foundations.motion import Rotation
 from fem_reference.geometry.rigid_bodies import Box, HalfSpace, Sphere
 from fem_reference.io.files import read_surface, write_surface
 from fem_reference.metrics import Measure, MeasurementContext, at_rest, measure, penetration
-from fem_reference.problems.muscle import Held, RigidBody, Setup
+from fem_reference.problems.muscle import AttachedVertices, RigidBody, Setup
 from fem_reference.runs.store import Outcome, Run
 
 RADIUS = 20.0
@@ -112,14 +112,14 @@ def test_the_deepest_bone_decides_and_volumes_add() -> None:
 
 def test_what_bones_hold_is_exempt_and_its_neighbours_in_triangles() -> None:
     low = np.flatnonzero(BALL.points[:, 2] < LOW + 4)
-    rest = Setup(BALL, (floor(LOW + 3),), (Held("origin", floor(LOW + 3), low),), (0,), None)
+    rest = Setup(BALL, (floor(LOW + 3),), (AttachedVertices("origin", floor(LOW + 3), low),), (0,), None)
     neighbours = {k for triangle in BALL.triangles.tolist() if set(triangle) & set(low.tolist()) for k in triangle}
     assert set(np.flatnonzero(~rest.free).tolist()) == neighbours > set(low.tolist())
     deepest, volume = taken(run_of(BALL.points), *rest.bones, free=rest.free)
     assert (deepest.values, volume.values) == ([0], [0])
     # Without the springs of the lower left half the right half is met: as deep as before, and half of the volume of the cap.
     left = low[BALL.points[low, 0] < 0]
-    half = Setup(BALL, rest.bones, (Held("origin", rest.bones[0], left),), (0,), None)
+    half = Setup(BALL, rest.bones, (AttachedVertices("origin", rest.bones[0], left),), (0,), None)
     deepest, volume = taken(run_of(BALL.points), *half.bones, free=half.free)
     whole = cap(RADIUS + LOW + 3)
     assert deepest.values < 3

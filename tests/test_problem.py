@@ -1,4 +1,4 @@
-"""Scene -> problem: what is held, what the mesh is like, and fibres that stay where the solution is."""
+"""Scene -> problem: what is attached, what the mesh is like, and fibres that stay where the solution is."""
 
 from dataclasses import replace
 
@@ -41,7 +41,10 @@ def built(bar):
 
 def test_attachments_keep_their_names(built) -> None:
     assert set(built.mesh.facets) == {"origin", "insertion"}
-    assert {held.attachment: held.bone.name for held in built.held} == {"origin": "floor", "insertion": "lid"}
+    assert {attached.attachment: attached.bone.name for attached in built.attached} == {
+        "origin": "floor",
+        "insertion": "lid",
+    }
 
 
 @pytest.mark.parametrize("size", [3.5, 4.5, 6.0])
@@ -50,7 +53,7 @@ def test_attachments_keep_their_area_at_every_size(bar, size) -> None:
     built = build_scene(scene.model_copy(update={"muscle": scene.muscle.model_copy(update={"tet_size": size})}))
     for name in ("origin", "insertion"):
         facts = {key.removeprefix(name): value for key, value in built.mesh_facts.items() if key.startswith(name)}
-        # Each end is a square of 10 mm with sharp edges, on which the strip around it is not held.
+        # Each end is a square of 10 mm with sharp edges, on which the strip around it is not attached.
         assert facts["_area_mm2"] == pytest.approx(100)
         # Each of four shifts of its rim leaves about a tenth of what is missing.
         assert facts["_area_on_tets_mm2"] == pytest.approx(100, rel=0.003)
@@ -110,7 +113,7 @@ def test_fibres_and_contact_do_not_depend_on_the_tetrahedra(bar) -> None:
     cells = np.zeros(len(points), int)
     assert np.array_equal(one.fibre(cells, points), other.fibre(cells, points))
     assert len(one.skin.points) > 0
-    for mine, theirs in ((one.skin, other.skin), (one.held_skins["insertion"], other.held_skins["insertion"])):
+    for mine, theirs in ((one.skin, other.skin), (one.attached_skins["insertion"], other.attached_skins["insertion"])):
         assert np.array_equal(mine.points, theirs.points)
         assert np.array_equal(mine.areas, theirs.areas)
 
@@ -177,14 +180,14 @@ def test_as_a_body_its_bones_prescribe_their_facets_and_the_rest_is_free(built) 
     assert sorted(parts) == sorted(tuple(sorted(facet)) for facet in skin.tolist())
     assert set(body.mesh.facets) == {"origin", "insertion", "free"}
     points = built.mesh.points[:5]
-    for entry, held in zip(body.prescribed, built.held, strict=True):
+    for entry, attached in zip(body.prescribed, built.attached, strict=True):
         assert (entry.name, entry.on, entry.components, entry.stiffness) == (
-            held.attachment,
-            held.attachment,
+            attached.attachment,
+            attached.attachment,
             (0, 1, 2),
             None,
         )
-        assert entry.path(points, 7.0) == pytest.approx(apply(held.bone.pose(7.0), points) - points)
+        assert entry.path(points, 7.0) == pytest.approx(apply(attached.bone.pose(7.0), points) - points)
 
 
 def test_a_stiffness_of_an_attachment_reaches_the_body(bar) -> None:
@@ -279,9 +282,9 @@ def test_bones_of_closed_form_are_their_own_distance(squeezed) -> None:
     assert np.array_equal(floor.pose(50), np.eye(4))
 
 
-def test_a_body_may_be_held_by_nothing(squeezed) -> None:
+def test_a_body_may_be_attached_by_nothing(squeezed) -> None:
     built = build_scene(squeezed)
-    assert built.held == ()
+    assert built.attached == ()
     assert built.mesh.facets == {}
     body = as_body(built)
     assert body.prescribed == ()
@@ -318,7 +321,7 @@ def test_show_says_what_bones_are_and_how_they_move(squeezed, bar) -> None:
     assert "turns about (5, 5, 30) mm along" in scene_facts(turning, muscle.setup(turning))["bones"]["lid"]
 
 
-def test_a_frame_of_a_body_held_by_nothing_tells_nothing_of_attachments(squeezed) -> None:
+def test_a_frame_of_a_body_attached_by_nothing_tells_nothing_of_attachments(squeezed) -> None:
     built = build_scene(squeezed)
     frame = Frame(0, np.array(built.surface.points), scalars={"energy": 1.0})
-    assert fenicsx._with_held(built, frame).scalars == {"energy": 1.0}
+    assert fenicsx._with_attachment_errors(built, frame).scalars == {"energy": 1.0}

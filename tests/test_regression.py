@@ -1,4 +1,4 @@
-"""A candidate is checked against its own past and against the reference: what is noticed, and what is not held against it."""
+"""A candidate is checked against its own past and against the reference: what is noticed, and what is not compared with it."""
 
 import json
 import math

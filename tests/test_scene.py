@@ -639,7 +639,7 @@ def test_shipped_case_reads_and_its_files_exist(case: str) -> None:
     scene = casefile.read(case)
     assert scene.name == case
     if isinstance(scene, FieldScene):
-        assert len(build_field(scene).held) == len(build_field(casefile.read(case, with_negative_control=True)).held)
+        assert len(build_field(scene).fixed) == len(build_field(casefile.read(case, with_negative_control=True)).fixed)
         return
     assert len(scene.key) == 64
     assert casefile.read(case, with_negative_control=True).key != scene.key

@@ -97,8 +97,8 @@ def test_a_uniaxial_stretch_is_that_of_the_scalar_equation(element) -> None:
 def test_patch_test_on_crooked_cells(element, degree) -> None:
     gradient = np.array([[0.2, 0.1, 0.0], [-0.1, 0.1, 0.3], [0.05, 0.0, -0.2]])
     mesh = shapes.warped_box((2, 2, 2), (2.0, 3.0, 4.0), ELEMENTS[element][0], degree)
-    held = tuple(moved(face, face, ALL, lambda points, frame: frame * points @ gradient.T) for face in FACES)
-    state = solved(Body(mesh, law(element), held, (0.0, 1.0)), element).last
+    fixed = tuple(moved(face, face, ALL, lambda points, frame: frame * points @ gradient.T) for face in FACES)
+    state = solved(Body(mesh, law(element), fixed, (0.0, 1.0)), element).last
     # An affine field is in the space of isoparametric elements; the forces are in balance to 1e-8 N at 0.5 N/mm.
     assert state.points == pytest.approx(mesh.points + mesh.points @ gradient.T, abs=1e-7)
     assert state.scalars["volume_ratio"] == pytest.approx(np.linalg.det(np.eye(3) + gradient), abs=1e-8)
@@ -113,17 +113,17 @@ def test_rotating_costs_nothing_and_holding_is_in_balance(element) -> None:
     def place(points, frame, shift=0.0):
         return points @ turn(0.6 * frame).T - points + shift * frame * np.array([0.3, 0.2, 0.5])
 
-    def held(shift: float) -> tuple[Prescribed, ...]:
+    def fixed(shift: float) -> tuple[Prescribed, ...]:
         return (
             moved("bottom", "z0", ALL, place),
             moved("top", "z1", ALL, lambda points, frame: place(points, frame, shift)),
         )
 
-    rigid = solved(Body(box(element, 2), law(element), held(0.0), (0.0, 1.0)), element).last
+    rigid = solved(Body(box(element, 2), law(element), fixed(0.0), (0.0, 1.0)), element).last
     assert rigid.points == pytest.approx(box(element, 2).points @ turn(0.6).T, abs=1e-7)
     assert rigid.forces["top"] == pytest.approx(np.zeros(3), abs=1e-7)
     assert rigid.scalars["energy"] == pytest.approx(0, abs=1e-9)
-    pulled = solved(Body(box(element, 2), law(element), held(1.0), (0.0, 1.0)), element).last
+    pulled = solved(Body(box(element, 2), law(element), fixed(1.0), (0.0, 1.0)), element).last
     assert np.linalg.norm(pulled.forces["top"]) > 0.1
     # Rigid velocities are in the space, so that forces and moments are in balance as far as Newton's residual goes.
     assert pulled.forces["top"] + pulled.forces["bottom"] == pytest.approx(np.zeros(3), abs=1e-6)
@@ -182,8 +182,8 @@ def loaded(element: str) -> Body:
         effect("gravity", ramp=RAMP, density="1000 kg/m^3", acceleration="0, 90, 9 m/s^2"),
         effect("pressure", ramp=RAMP, on="x1", pressure="0.1 MPa"),
     )
-    held = (moved("ground", "z0", ALL), moved("springs", "z1", (0, 2), stiffness=0.3))
-    return Body(box(element), acting, held, (0.0, 1.0), fibre)
+    fixed = (moved("ground", "z0", ALL), moved("springs", "z1", (0, 2), stiffness=0.3))
+    return Body(box(element), acting, fixed, (0.0, 1.0), fibre)
 
 
 @pytest.mark.parametrize("element", ["P1", "P2/P1", "Q1/P0"])
@@ -212,12 +212,12 @@ def test_forces_are_the_slope_of_the_energy(element) -> None:
 def test_newton_converges_quadratically(monkeypatch) -> None:
     sizes: list[float] = []
     march = _March(loaded("P2/P1"), BodySettings(newton_iterations=20))
-    held, _ = march._held(1.0)
+    fixed, _ = march._fixed(1.0)
     assembled = march.equations.assembled
 
     def noted(unknowns, frame):
         residual, tangent = assembled(unknowns, frame)
-        sizes.append(np.linalg.norm(np.delete(residual, held)))
+        sizes.append(np.linalg.norm(np.delete(residual, fixed)))
         return residual, tangent
 
     monkeypatch.setattr(march.equations, "assembled", noted)

@@ -62,8 +62,8 @@ def column(element: str, cells: tuple[int, int, int], shortenings: list[float], 
     mesh = shapes.box(cells, size, ELEMENTS[element][0])
     knots = tuple(enumerate([0.0, *shortenings]))
     push = Affine(STILL, (0.0, 0.0, -size[2]), knots)
-    held = Prescribed("foot", "z0", (0, 1, 2), Rest()), Prescribed("head", "z1", (2,), push)
-    return Body(mesh, flesh(element), held, tuple(float(frame) for frame, _ in knots))
+    fixed = Prescribed("foot", "z0", (0, 1, 2), Rest()), Prescribed("head", "z1", (2,), push)
+    return Body(mesh, flesh(element), fixed, tuple(float(frame) for frame, _ in knots))
 
 
 def test_a_column_buckles_in_one_plane_and_then_in_the_other(session) -> None:
@@ -108,12 +108,12 @@ def test_a_squeezed_slab_bends_when_it_should(element, session) -> None:
     shares = (0.0, 0.05, 0.1, 1 - stretch - 0.005, 1 - stretch + 0.005)
     mesh = shapes.box((2, 1, 5), (2 * HALF, 1.0, HEIGHT), ELEMENTS[element][0])
     knots = tuple((float(i), float(share)) for i, share in enumerate(shares))
-    held = (
+    fixed = (
         *(Prescribed(face, face, ("xyz".index(face[0]),), Rest()) for face in ("y0", "y1", "z0")),
         Prescribed("z1", "z1", (2,), Affine(STILL, (0.0, 0.0, -HEIGHT), knots)),
         Prescribed("slides", "z0", (0,), Rest(), 1e-9),
     )
-    body = Body(mesh, flesh(element), held, tuple(frame for frame, _ in knots))
+    body = Body(mesh, flesh(element), fixed, tuple(frame for frame, _ in knots))
     assert modes(session, body, element) == [0, 0, 0, 0, 1]
 
 

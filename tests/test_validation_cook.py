@@ -87,7 +87,7 @@ def test_a_stretched_strip_thins_as_a_single_equation_says() -> None:
 
 def test_what_holds_is_what_pulls() -> None:
     found = cook.solve(plane_strain.neo_hooke(80.194), 400889.8, 6.25, order=3, layers=1, steps=2)
-    np.testing.assert_allclose(found.held, (0, -100), atol=1e-6)
+    np.testing.assert_allclose(found.fixed, (0, -100), atol=1e-6)
 
 
 def test_a_load_too_large_for_one_step_is_told() -> None:

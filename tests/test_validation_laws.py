@@ -173,8 +173,8 @@ def test_a_prestretched_body_is_free_where_its_fibres_are_slack_again() -> None:
     ("mode", "pulling"),
     [("uniaxial", [(0, 0)]), ("equibiaxial", [(0, 0), (1, 1)]), ("planar", [(0, 0)]), ("simple_shear", [(0, 1)])],
 )
-def test_the_work_of_the_held_stresses_is_the_energy(law: MooneyRivlin, mode: str, pulling: list) -> None:
-    """What is free does no work, so the energy along the path has the held stress as its slope; a wrong free stretch shows."""
+def test_the_work_of_the_fixed_stresses_is_the_energy(law: MooneyRivlin, mode: str, pulling: list) -> None:
+    """What is free does no work, so the energy along the path has the fixed stress as its slope; a wrong free stretch shows."""
 
     def energy(amount: float) -> float:
         F = getattr(homogeneous, mode)(law, 5.0, amount).F

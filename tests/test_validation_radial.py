@@ -52,7 +52,7 @@ def test_with_the_pressure_found_the_outer_face_is_free(power: int, inner_stretc
 
 
 def incompressible_tube(inner: float, outer: float, stretch: float) -> tuple[float, float]:
-    """Pressure [MPa] and force in the wall [N] of a neo-Hookean tube held at its length, ``r^2 = R^2 + k`` (Rivlin 1949; Ogden
+    """Pressure [MPa] and force in the wall [N] of a neo-Hookean tube fixed at its length, ``r^2 = R^2 + k`` (Rivlin 1949; Ogden
     1984, ch. 5.3.3): ``p = mu (log(a B / (A b)) + k/2 (1/a^2 - 1/b^2))`` and ``pi a^2 p - pi mu k log(a B / (A b))``.
     """
     a, k = stretch * inner, inner**2 * (stretch**2 - 1)

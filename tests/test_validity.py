@@ -155,7 +155,7 @@ def test_a_low_determinant_at_a_vertex_is_no_collapse(fem_lab) -> None:
 
 @pytest.mark.parametrize(("layer", "status"), [(0.004, "converged"), (0.02, "collapsed")])
 def test_next_to_nothing_of_a_body_may_collapse(layer, status, session) -> None:
-    """A bottom layer of a cube of 1 mm, flattened to a tenth and held at its sides: it is named, and it counts from a hundredth."""
+    """A bottom layer of a cube of 1 mm, flattened to a tenth and fixed at its sides: named, and it counts from a hundredth."""
     mesh = shapes.box((1, 1, 3), (1.0, 1.0, 1.0), "hexahedron")
     levels = np.array([0.0, layer, 0.5, 1.0])
     points = np.column_stack([mesh.points[:, :2], levels[np.rint(3 * mesh.points[:, 2]).astype(int)]])
@@ -163,9 +163,9 @@ def test_next_to_nothing_of_a_body_may_collapse(layer, status, session) -> None:
     low = sides[(points[sides, 2] <= layer).all(axis=1)]
     mesh = replace(mesh, points=points, facets=mesh.facets | {"low": low})
     flat = Affine(((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, -0.9)))
-    held = Prescribed("low", "low", (0, 1, 2), flat), Prescribed("top", "z1", (0, 1, 2), Rest())
+    fixed = Prescribed("low", "low", (0, 1, 2), flat), Prescribed("top", "z1", (0, 1, 2), Rest())
     flesh = (effect("neo_hooke", mu="10 kPa"), resistance("Q1/P0", 1.0))
-    body = Body(mesh, flesh, held, (0.0, 1.0))
+    body = Body(mesh, flesh, fixed, (0.0, 1.0))
     solved = session.solve(body, BodySettings(element="Q1/P0", first_step=0.1, smallest_step=1e-2, residual=1e-10))
     assert solved.outcome.status == status, solved.outcome.message
     assert "incompressible is outside the range that it is meant for" in solved.outcome.message

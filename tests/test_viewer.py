@@ -239,7 +239,7 @@ def test_the_slider_moves_the_mesh(opened, comparison):
         for run in (comparison.reference, *comparison.candidates):
             told, mean = labels(opened)[run.name]
             if np.isfinite(run.positions[i]).all():
-                # Each coordinate is rounded by half a step at most, and held in 32 bits: 30 mm times 6e-8.
+                # Each coordinate is rounded by half a step at most, and attached in 32 bits: 30 mm times 6e-8.
                 np.testing.assert_allclose(mean, run.positions[i].mean(axis=0), rtol=0, atol=error + 2e-6)
             else:
                 assert (told, mean) == ("no frame", [])

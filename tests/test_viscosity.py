@@ -96,13 +96,13 @@ def test_the_time_from_frame_to_frame_must_be_known() -> None:
 
 
 def pulled(acting, interval: float | None = None) -> Body:
-    """A block stretched by a half until frame 1, free to thin, and then held for 40 frames."""
-    held = *SYMMETRY, Prescribed("z1", "z1", (2,), Affine(STILL, (0.0, 0.0, 0.5)))
+    """A block stretched by a half until frame 1, free to thin, and then fixed for 40 frames."""
+    fixed = *SYMMETRY, Prescribed("z1", "z1", (2,), Affine(STILL, (0.0, 0.0, 0.5)))
     mesh = shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
-    return Body(mesh, acting, held, (0.0, 1.0, 41.0), interval=interval)
+    return Body(mesh, acting, fixed, (0.0, 1.0, 41.0), interval=interval)
 
 
-def test_speed_costs_force_and_what_is_held_long_enough_ends_where_it_would_without(session) -> None:  # noqa: F811
+def test_speed_costs_force_and_what_is_fixed_long_enough_ends_where_it_would_without(session) -> None:  # noqa: F811
     settings = BodySettings(first_step=1.0, residual=1e-12)
     still, thick = (
         session.solve(body, settings)
@@ -112,7 +112,7 @@ def test_speed_costs_force_and_what_is_held_long_enough_ends_where_it_would_with
     more = thick.states[1].forces["z1"][2] - still.states[1].forces["z1"][2]
     assert more == pytest.approx(2 * 0.02 / 10 * (1.25 / 2 * 1.5 + 1 / 6 / 1.5**2), rel=3e-3)
     assert thick.states[1].scalars["energy"] == pytest.approx(still.states[1].scalars["energy"], rel=3e-3)
-    # What is held still has no viscous stress.
+    # What is fixed still has no viscous stress.
     assert thick.last.points == pytest.approx(still.last.points, abs=1e-9)
     assert thick.last.scalars["energy"] == pytest.approx(still.last.scalars["energy"], rel=1e-9)
     assert thick.last.forces["z1"] == pytest.approx(still.last.forces["z1"], abs=1e-9)
@@ -121,8 +121,8 @@ def test_speed_costs_force_and_what_is_held_long_enough_ends_where_it_would_with
 def test_turning_costs_nothing_however_fast(session) -> None:  # noqa: F811
     mesh = shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
     turn = Turn((1.0, 2.0, 3.0), 1.0)
-    held = tuple(Prescribed(face, face, (0, 1, 2), turn) for face in ("x0", "x1", "y0", "y1", "z0", "z1"))
-    body = Body(mesh, (*flesh("P2/P1"), THICK), held, (0.0, 1.0), interval=1e-3)
+    fixed = tuple(Prescribed(face, face, (0, 1, 2), turn) for face in ("x0", "x1", "y0", "y1", "z0", "z1"))
+    body = Body(mesh, (*flesh("P2/P1"), THICK), fixed, (0.0, 1.0), interval=1e-3)
     solved = session.solve(body, BodySettings(first_step=0.5, residual=1e-11))
     assert solved.outcome.status == "converged", solved.outcome.message
     for force in solved.last.forces.values():

@@ -52,7 +52,7 @@ def sphere_pressure(law: Law, bulk: float, radii: tuple[float, float], inner_str
 
 
 def tube(law: Law, bulk: float, radii: tuple[float, float], inner_stretch: float) -> tuple[float, float]:
-    """Pressure [MPa] in a tube that is held at its length, and force along the axis in its wall [N], the integral of
+    """Pressure [MPa] in a tube that is fixed at its length, and force along the axis in its wall [N], the integral of
     ``2 pi R P_zz``; arguments as of :func:`sphere_pressure`, a fibre runs along the axis.
     """
 
@@ -66,7 +66,7 @@ def tube(law: Law, bulk: float, radii: tuple[float, float], inner_stretch: float
 
 
 def _hollow(radii: tuple[float, float], inner_stretch: float, power: int) -> Wall:
-    """A wall whose inner face is held: ``start^(n+1) - a^(n+1) = R^(n+1) - A^(n+1)``, shapes that vanish at the inner face."""
+    """A wall whose inner face is fixed: ``start^(n+1) - a^(n+1) = R^(n+1) - A^(n+1)``, shapes that vanish at the inner face."""
     ticks, weights = legendre.leggauss(DEGREE + 8)
     half = (radii[1] - radii[0]) / 2
     R, inner = radii[0] + half * (ticks + 1), inner_stretch * radii[0]

@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Torsion:
-    """A solid cylinder of ``radius`` A [mm] held at its length, each section turned by ``twist`` [rad/mm] times its height:
+    """A solid cylinder of ``radius`` A [mm] fixed at its length, each section turned by ``twist`` [rad/mm] times its height:
     ``r = R, theta = Theta + twist Z, z = Z``; c1, c2 [MPa].
 
     Source: Rivlin 1949, Phil. Trans. R. Soc. A 242, 173, doi 10.1098/rsta.1949.0009; Ogden 1984, ch. 5.3.

@@ -36,9 +36,9 @@ def check(body: "Body", element: str) -> None:
     """
     check_element(element, body.mesh.kind, body.mesh.degree, body.effects, "element")
     _check_prescribed(body.prescribed)
-    held = [entry.on for entry in body.prescribed if isinstance(entry.on, str)]
+    fixed = [entry.on for entry in body.prescribed if isinstance(entry.on, str)]
     pushed = [body.contact.on] if body.contact and isinstance(body.contact.on, str) else []
-    used = dict.fromkeys([*held, *pushed, *(effect.on for effect in body.effects if isinstance(effect, Load))])
+    used = dict.fromkeys([*fixed, *pushed, *(effect.on for effect in body.effects if isinstance(effect, Load))])
     for on in used:
         if on not in body.mesh.facets:
             raise InputError("on", f'"{on}"', f"a region of the body: {', '.join(body.mesh.facets)}")

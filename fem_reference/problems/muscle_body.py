@@ -1,4 +1,4 @@
-"""The muscle of a problem as a body that finite elements deform: held by bones, and pushed by them."""
+"""The muscle of a problem as a body that finite elements deform: attached by bones, and pushed by them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -45,21 +45,21 @@ def as_body(problem: Problem) -> Body:
     the rest of its skin is ``"free"``.
     """
     mesh = problem.mesh
-    held = np.concatenate([np.zeros((0, 3), int), *(mesh.facets[entry.attachment] for entry in problem.held)])
+    attached = np.concatenate([np.zeros((0, 3), int), *(mesh.facets[entry.attachment] for entry in problem.attached)])
     skin, _ = boundary(mesh.tets)
-    taken = {tuple(facet) for facet in np.sort(held, axis=1).tolist()}
+    taken = {tuple(facet) for facet in np.sort(attached, axis=1).tolist()}
     free = skin[[tuple(facet) not in taken for facet in np.sort(skin, axis=1).tolist()]]
     cells = Cells(mesh.points, mesh.tets, "tetrahedron", 1, {**mesh.facets, "free": free})
     first = problem.frames[0]
     prescribed = tuple(
         Prescribed(
             entry.attachment,
-            problem.held_skins.get(entry.attachment, entry.attachment),
+            problem.attached_skins.get(entry.attachment, entry.attachment),
             (0, 1, 2),
             Follows(From(first, entry.bone.pose)),
             entry.stiffness,
         )
-        for entry in problem.held
+        for entry in problem.attached
     )
     acting = tuple(effect for effect in problem.effects if not isinstance(effect, Interaction))
     body = Body(cells, acting, prescribed, problem.frames, problem.fibre, interval=problem.interval)

@@ -13,9 +13,9 @@ from fem_reference.assessment.solver_table import Table
 from fem_reference.effects import Effect
 from fem_reference.foundations.mesh import Surface, enclosed_volume
 from fem_reference.foundations.motion import RigidMotion, Translation
-from fem_reference.geometry.sectors import held_area, held_shares
+from fem_reference.geometry.sectors import attached_area, attached_shares
 from fem_reference.metrics import find
-from fem_reference.problems.muscle import Held, RigidBody, Setup
+from fem_reference.problems.muscle import AttachedVertices, RigidBody, Setup
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.report.words import exact
 from fem_reference.runs.scalar import FieldRun
@@ -51,9 +51,9 @@ def scene_facts(scene: Scene, setup: Setup) -> dict[str, Any]:
         },
         "bones": {bone.name: f"{_shape(bone)}, {_motion(bone.motion)}" for bone in setup.bones},
         "attachments": {
-            held.attachment: f"{len(held.vertices)} vertices, {_area(surface, held):.0f} mm2, held by {held.bone.name} "
-            + ("exactly" if held.stiffness is None else f"by springs of {held.stiffness:g} MPa/mm")
-            for held in setup.held
+            one.attachment: f"{len(one.vertices)} vertices, {_area(surface, one):.0f} mm2, attached to {one.bone.name} "
+            + ("exactly" if one.stiffness is None else f"by springs of {one.stiffness:g} MPa/mm")
+            for one in setup.attached
         },
         "effects": {effect.title: _parameters(effect) for effect in scene.effects},
         "frames": f"{scene.frames.first} to {scene.frames.last}, every {scene.frames.every}",
@@ -66,8 +66,8 @@ def scene_facts(scene: Scene, setup: Setup) -> dict[str, Any]:
     }
 
 
-def _area(surface: Surface, held: Held) -> float:
-    return held_area(surface, held_shares(surface, held.vertices))
+def _area(surface: Surface, attached: AttachedVertices) -> float:
+    return attached_area(surface, attached_shares(surface, attached.vertices))
 
 
 def _parameters(effect: Effect) -> dict[str, str]:
@@ -106,7 +106,7 @@ def field_scene_facts(scene: FieldScene, problem: FieldProblem) -> dict[str, Any
         "title": scene.title,
         "proves": scene.proves,
         "domain": f"{len(problem.mesh.cells)} cells, {len(problem.mesh.points)} vertices, size {problem.mesh.sizes.sum():.6g}",
-        "element": f"P{problem.order}, {len(problem.held)} nodes, {_held(problem)} held",
+        "element": f"P{problem.order}, {len(problem.fixed)} nodes, {_fixed(problem)} fixed",
         "form": f"{'galerkin' if problem.tau is None else 'supg'}, mesh Peclet number up to {problem.peclet:.3g}",
         "effects": {
             type(effect).__name__: {name: str(value) for name, value in effect.model_dump().items()}
@@ -118,8 +118,8 @@ def field_scene_facts(scene: FieldScene, problem: FieldProblem) -> dict[str, Any
     }
 
 
-def _held(problem: FieldProblem) -> int:
-    return sum(not math.isnan(value) for value in problem.held)
+def _fixed(problem: FieldProblem) -> int:
+    return sum(not math.isnan(value) for value in problem.fixed)
 
 
 def field_facts(

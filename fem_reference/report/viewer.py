@@ -144,14 +144,14 @@ def _runs(frames: dict[str, Floats], reference: str, box: _Box) -> dict[str, Any
                 "worst": [float(known.max()), int(known.argmax())],
                 "reached": reached.tolist(),
                 "off": np.where(reached, (~inside).sum(axis=1), 0).tolist(),
-                "positions": _positions(_held_on(positions), box),
+                "positions": _positions(_last_finite(positions), box),
             }
         )
         top = max(top, float(known[inside.all(axis=1)].max(initial=0.0)))
     return {"runs": rows, "top": top}
 
 
-def _held_on(frames: Floats) -> Floats:
+def _last_finite(frames: Floats) -> Floats:
     """The frames with the last that was reached in the place of one that was not, which then costs no bytes."""
     reached = np.isfinite(frames).all(axis=(1, 2))
     last = np.maximum.accumulate(np.where(reached, np.arange(len(frames)), 0))

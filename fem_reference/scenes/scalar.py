@@ -73,7 +73,7 @@ class Boundary(Record):
     ``on`` an end of an interval or the ``rim`` of triangles, there only ``where`` a formula is above zero at every vertex of a
     facet (an edge counts only with both its ends): the ``value`` of the field (Dirichlet) or its ``slope`` along the outward
     normal (Neumann). Or ``bounds``, a file as listing 4.5 loads it: a row of vertices, the first of all being 1, and a row of the
-    values that they are held at. What no condition names has slope 0.
+    values that they are fixed at. What no condition names has slope 0.
     """
 
     on: Literal["left", "right", "rim"] | None = None

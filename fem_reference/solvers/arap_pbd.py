@@ -42,7 +42,7 @@ class Projections(Record):
 
 
 class Settings(Record):
-    """ARAP with the rows of held vertices removed and rotations fitted in each iteration, and what keeps its volume.
+    """ARAP with the rows of attached vertices removed and rotations fitted in each iteration, and what keeps its volume.
 
     ``weights``, ``iterations`` and ``tolerance`` as in ``arap``; Tutte's are not offered, as with removed rows they have the
     states of kirchhoff. ``volume_constraint``: whether the energy is minimised at the volume of rest. ``projections``: off
@@ -66,8 +66,8 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
     """Iterate through every frame number from the first of ``setup.frames``, at rest, to the last."""
     cost = {"seconds_compile": compile_kernels() + _compile_projections()}
     begin = time.perf_counter()
-    system = System.of(Cells.of(setup.surface, settings.weights), setup.held_vertices, "remove")
-    rest = Constraints.at_rest(setup.surface.points, setup.surface.triangles, system.held)
+    system = System.of(Cells.of(setup.surface, settings.weights), setup.attached_vertices, "remove")
+    rest = Constraints.at_rest(setup.surface.points, setup.surface.triangles, system.attached)
     cost["seconds_setup"] = time.perf_counter() - begin
 
     def relax(points: Floats) -> Relaxed:

@@ -166,7 +166,7 @@ class Obstacle:
         return distance if self.grid is None else np.minimum(distance, self.grid.margin)
 
 
-def push_out(points: Floats, obstacles: Sequence[Obstacle], stiffness: float) -> None:
+def move_out(points: Floats, obstacles: Sequence[Obstacle], stiffness: float) -> None:
     """Move ``points`` (n, 3) [mm] out of all bones in place, each by the sum of the ways out of every bone that it is in.
 
     ``stiffness`` is the share of each way that is gone. The masses cancel: a constraint has one vertex.

@@ -198,15 +198,15 @@ def _spread(count: int, places: list[float]) -> tuple[Ints, Floats]:
 
 def _nearest(problem: Problem, points: Floats) -> Ints:
     """The index of the bone (n,) whose attachment has the vertex nearest to each of ``points`` (n, 3)."""
-    if not problem.held:
+    if not problem.attached:
         raise InputError("line_of_action", "a muscle that no bone holds", "attachments that lines are fixed to")
     away = np.array(
         [
-            np.linalg.norm(points[:, None] - problem.surface.points[held.vertices], axis=2).min(axis=1)
-            for held in problem.held
+            np.linalg.norm(points[:, None] - problem.surface.points[attached.vertices], axis=2).min(axis=1)
+            for attached in problem.attached
         ]
     )
-    found = [_index(problem.bones, held.bone.name, "attachment") for held in problem.held]
+    found = [_index(problem.bones, attached.bone.name, "attachment") for attached in problem.attached]
     return np.array(found)[np.argmin(away, axis=0)]
 
 

@@ -22,7 +22,7 @@ from fem_reference.foundations.units import Length
 from fem_reference.problems.muscle import Problem, Setup
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers import collision_kernels
-from fem_reference.solvers.collision_kernels import Obstacle, push_out
+from fem_reference.solvers.collision_kernels import Obstacle, move_out
 from fem_reference.solvers.common.state_checks import trouble
 from fem_reference.solvers.pbd_kernels import (
     dihedrals,
@@ -91,11 +91,11 @@ class Constraints:
     angles: Floats
 
     @classmethod
-    def at_rest(cls, points: Floats, triangles: Ints, held: Ints) -> "Constraints":
-        """The constraints of a closed surface whose vertices ``held`` (k,) are held; all edges are as stiff."""
+    def at_rest(cls, points: Floats, triangles: Ints, attached: Ints) -> "Constraints":
+        """The constraints of a closed surface whose vertices ``attached`` (k,) are attached; all edges are as stiff."""
         points, triangles = np.array(points), np.array(triangles)  # the compiled functions know writable arrays only
         inverse_masses = np.ones(len(points))
-        inverse_masses[held] = 0
+        inverse_masses[attached] = 0
         hinges = hinges_of(triangles)
         edges = np.ascontiguousarray(hinges[:, :2])
         return cls(
@@ -156,7 +156,7 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
 def _constraints(setup: Setup, settings: Settings) -> Constraints:
     """Those of the surface at rest, with the stiffness that fibres leave to its edges."""
     surface = setup.surface
-    found = Constraints.at_rest(surface.points, surface.triangles, setup.held_vertices)
+    found = Constraints.at_rest(surface.points, surface.triangles, setup.attached_vertices)
     if settings.anisotropy is None:
         return found
     assert isinstance(setup, Problem)  # what a scene is solved from; it has fibres
@@ -166,13 +166,13 @@ def _constraints(setup: Setup, settings: Settings) -> Constraints:
 def obstacles_of(setup: Setup, gap: float) -> list[Obstacle]:
     """All bones, as they push what none of them holds."""
     loose = np.ones(len(setup.surface.points), bool)
-    loose[setup.held_vertices] = False
+    loose[setup.attached_vertices] = False
     return [Obstacle(bone, setup.surface.points, loose, gap) for bone in setup.bones]
 
 
 def carry(points: Floats, setup: Setup, frame: float) -> None:
     """Put the vertices that bones hold where those are at ``frame``."""
-    for entry in setup.held:
+    for entry in setup.attached:
         points[entry.vertices] = apply(entry.bone.pose(frame), setup.surface.points[entry.vertices])
 
 
@@ -187,13 +187,13 @@ def advance(
         project_volume(moved, at.inverse_masses, at.triangles, at.six_volumes, settings.volume)
         project_dihedrals(moved, at.inverse_masses, at.hinges, at.angles, settings.bending)
         if settings.collision is not None:
-            push_out(moved, obstacles, settings.collision.stiffness)
+            move_out(moved, obstacles, settings.collision.stiffness)
     return moved, moved - points
 
 
 def follow(setup: Setup, iterate: Iterate, sink: Sink, cost: dict[str, float]) -> Outcome:
     """Iterate from rest at the first of ``setup.frames`` to the last, into ``sink``; what that costs is added to ``cost``."""
-    points, held, (first, *_, last) = np.array(setup.surface.points), setup.held_vertices, setup.frames
+    points, attached, (first, *_, last) = np.array(setup.surface.points), setup.attached_vertices, setup.frames
     kept = np.zeros(points.shape)
     sink(Frame(first, points.copy()))
     cost |= {"seconds_solve": 0.0, "iterations": 0, "threads": 1}
@@ -203,7 +203,7 @@ def follow(setup: Setup, iterate: Iterate, sink: Sink, cost: dict[str, float]) -
         cost["seconds_solve"] += time.perf_counter() - begin
         cost["iterations"] += 1
         cost["seconds_per_iteration"] = cost["seconds_solve"] / cost["iterations"]
-        if found := trouble(points, setup.surface, held):
+        if found := trouble(points, setup.surface, attached):
             advice = "a slower motion, more steps or a lower stiffness may help"
             return Outcome(found.status, f"frame {iteration}: {found.sentence}; {advice}", cost)
         if iteration in setup.frames:

@@ -3,7 +3,7 @@
 The program (github.com/cervenkam/muscle-deformation-PBD) departs from the report's text, section 5.5.3 and Algorithm 1:
 
 - edges: each is projected twice in a sweep, as a half-edge of either triangle, vertex by vertex (text: one constraint)
-- held vertices weigh as much as all others and are put back after each step, so that what they take of a correction is
+- attached vertices weigh as much as all others and are put back after each step, so that what they take of a correction is
   lost (text: their w is 0, line 2)
 - volume: its change is divided by 6 and its gradient is not, which takes away a sixth of the error in a step (text:
   eq. 5.18 to 5.21 drop the 6 in both)
@@ -28,7 +28,7 @@ with the flags it comes with, -Ofast among them (gcc 12 on x86-64 does it again;
 leaves the recorded one by iteration 50). For the same reason a bone's pose is here the product of its motions, and the angle of
 flat pairs at rest is off by 2e-8 rad.
 
-Two things are not as there: held is what the scene says (there: all vertices in the voxels of a bone at rest), and fibres have
+Two things are not as there: attached is what the scene says (there: all vertices in the voxels of a bone at rest), and fibres have
 the direction they have (there: it is taken from points read beside their own).
 """
 
@@ -183,7 +183,7 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
     """Iterate from rest at the first of ``setup.frames`` to the last of them; each frame wanted goes into ``sink``."""
     seconds_compile = _compile(settings)
     begin = time.perf_counter()
-    constraints, held = constraints_of(setup, settings), setup.held_vertices
+    constraints, attached = constraints_of(setup, settings), setup.attached_vertices
     count, first = settings.voxels, setup.frames[0]
     bones = [] if count is None else [Bone(body, count, first) for body in setup.bones]
     cost = {"seconds_compile": seconds_compile, "seconds_setup": time.perf_counter() - begin}
@@ -196,7 +196,7 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
             goals = (1 - settings.damping) * velocity * STEP + points
             project(goals, constraints, settings.bending)
             reached = collided(points, goals, bones)
-            reached[held] = points[held]
+            reached[attached] = points[attached]
             points, velocity = reached, (reached - points) * (1 / STEP)
         return points, velocity
 

@@ -26,9 +26,9 @@ class Network(NamedTuple):
 
 
 class PrescribedPath(NamedTuple):
-    """Masses ``held`` (h,), and where they are (h, 3) [mm] ``before`` and ``after``: they go from one to the other evenly."""
+    """Masses ``fixed`` (h,), and where they are (h, 3) [mm] ``before`` and ``after``: they go from one to the other evenly."""
 
-    held: Ints
+    fixed: Ints
     before: Floats
     after: Floats
 
@@ -78,7 +78,7 @@ def advance(
                 previous[i, axis] = points[i, axis]
                 points[i, axis] += kept * way + gain * acting[i, axis]
         share = step / steps
-        for h in range(len(path.held)):
-            i = path.held[h]
+        for h in range(len(path.fixed)):
+            i = path.fixed[h]
             for axis in range(3):
                 points[i, axis] = (1 - share) * path.before[h, axis] + share * path.after[h, axis]

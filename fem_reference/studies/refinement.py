@@ -164,8 +164,8 @@ def _pair(bench: Bench, reference: Run, model: bool) -> Pair:
     scenes = {f"tetrahedra of {sizes[1]:.3g} mm": coarser}
     scenes |= {entry.name: coarser.model_copy(update=entry.changes) for entry in varied}
     if model and any(entry.stiffness is not None for entry in coarser.attachment):
-        held = tuple(entry.model_copy(update={"stiffness": None}) for entry in coarser.attachment)
-        scenes[_EXACT] = coarser.model_copy(update={"attachment": held})
+        attached = tuple(entry.model_copy(update={"stiffness": None}) for entry in coarser.attachment)
+        scenes[_EXACT] = coarser.model_copy(update={"attachment": attached})
     # Newton's method takes less than quadratic time of the unknowns: what larger tetrahedra save is at least their number.
     seconds = reference.outcome.cost.get("seconds", 0.0) * (sizes[0] / sizes[1]) ** 3
     runs = {}

@@ -1,4 +1,4 @@
-"""The finer solutions that error bars are held against: on smaller tetrahedra, with finer contact."""
+"""The finer solutions that error bars are compared with: on smaller tetrahedra, with finer contact."""
 
 import logging
 from collections.abc import Iterable

@@ -68,8 +68,8 @@ def pressed(lab: Lab, n: int, radius: float = RADIUS) -> Reached:
     mesh = shapes.ball_octant(CORE, FAR, n, 2 * n + 2, "hexahedron", 2)
     law = Contact("z0", BALL_STIFFNESS, 5e-4)
     ball = Obstruction("ball", Sphere((0.0, 0.0, -radius), radius), Slide((0.0, 0.0, APPROACH)))
-    held = (*SYMMETRY[:2], Prescribed("far", "outer", (0, 1, 2), Rest()))
-    body = Body(mesh, neo_hooke(MU, BULK), held, (0.0, 1.0), contact=law, obstructions=(ball,))
+    fixed = (*SYMMETRY[:2], Prescribed("far", "outer", (0, 1, 2), Rest()))
+    body = Body(mesh, neo_hooke(MU, BULK), fixed, (0.0, 1.0), contact=law, obstructions=(ball,))
     return lab.solve(body, "Q2/Q1", first_step=0.5, residual=1e-10, newton_iterations=25).last
 
 

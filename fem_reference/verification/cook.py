@@ -25,7 +25,7 @@ THICKNESS, HEIGHT = 2.0, 44.0  # of the panel, and of its clamped side [mm]
 SMALL = 1e-5  # the share of the load at which the answer is linear: terms of second order are some 1e-5 of it
 RESIDUAL = 1e-5  # at the whole load [N, mm3], where some 100 N act
 LOCKED = 0.5  # a tip that gets less than this share of its way is locked
-HELD = (
+FIXED = (
     Prescribed("clamp", "x0", (0, 1, 2), Rest()),
     Prescribed("z0", "z0", (2,), Rest()),
     Prescribed("z1", "z1", (2,), Rest()),
@@ -70,7 +70,7 @@ class Panel:
             resistance(self.element, self.membrane.bulk * self.bulk),
             make("traction", on="x1", force=pull, ramp=ramp()),
         )
-        return Body(mesh, acting, HELD, (0.0, 1.0))
+        return Body(mesh, acting, FIXED, (0.0, 1.0))
 
     def tip(self, lab: Lab, n: int) -> float:
         """How far the corner goes in n by n cells [mm], over ``share``."""
@@ -128,7 +128,7 @@ ENTRIES = (
         _COMPRESSIBLE,
         (4, 8, 16),
         0.005,
-        because="discretisation, held up by the singular clamped corners: 0.15 % too stiff",
+        because="discretisation, limited by the singular clamped corners: 0.15 % too stiff",
         negative_control="Poisson's ratio is 0.4 instead of 1/3, at the same Young's modulus",
         with_negative_control=_with_negative_control(
             Panel("COMPRESSIBLE", "P2", SMALL, shear=1.4**-1 * 4 / 3, bulk=5 / 3), 16
@@ -150,7 +150,7 @@ ENTRIES = (
         _NEARLY,
         (4, 8, 16),
         0.005,
-        because="discretisation, held up by the singular clamped corners: 0.16 % too stiff",
+        because="discretisation, limited by the singular clamped corners: 0.16 % too stiff",
         negative_control="linear tetrahedra without a pressure",
         with_negative_control=_with_negative_control(_NEARLY_LINEAR, 16),
     ),
@@ -180,7 +180,7 @@ ENTRIES = (
         _QUARTER_TETRAHEDRA,
         (4, 8, 16),
         0.005,
-        because="discretisation, held up by the singular clamped corners: 0.17 % too stiff",
+        because="discretisation, limited by the singular clamped corners: 0.17 % too stiff",
         negative_control="small strain, by linear extrapolation of a tiny load",
         with_negative_control=_with_negative_control(Panel("FINITE_QUARTER", "P2/P1", SMALL), 16),
     ),

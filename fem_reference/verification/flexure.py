@@ -43,12 +43,12 @@ def bent(
     their planes, ``mu`` [MPa].
     """
     mesh = shapes.box((2 * n, 2 * n, 1), (THICKNESS, LENGTH / 2, WIDTH), ELEMENTS[element][0], 2)
-    held = (
+    fixed = (
         Prescribed("middle", "y0", (1,), Rest()),
         Prescribed("end", "y1", (0, 1, 2), Bend(THICKNESS, LENGTH, ANGLE)),
         *(Prescribed(face, face, (2,), Rest()) for face in faces),
     )
-    body = Body(mesh, neo_hooke(mu, BULK), held, (0.0, 1.0))
+    body = Body(mesh, neo_hooke(mu, BULK), fixed, (0.0, 1.0))
     return mesh.points, lab.solve(body, element, first_step=0.5, residual=1e-9).last
 
 

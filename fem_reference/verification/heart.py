@@ -70,24 +70,24 @@ class Heart:
     def beam(self, n: int) -> Body:
         """Half of the beam of problem 1, y <= 0.5, in 10n by n by 2n cells."""
         mesh = shapes.box((10 * n, n, 2 * n), (10.0, 0.5, 1.0), ELEMENTS[self.element][0], self.degree)
-        held = (Prescribed("clamp", "x0", (0, 1, 2), Rest()), Prescribed("middle", "y1", (1,), Rest()))
-        return Body(mesh, matter(self.problem(1), self.element, "z0", self.bulk), held, (0.0, 1.0), Along(X))
+        fixed = (Prescribed("clamp", "x0", (0, 1, 2), Rest()), Prescribed("middle", "y1", (1,), Rest()))
+        return Body(mesh, matter(self.problem(1), self.element, "z0", self.bulk), fixed, (0.0, 1.0), Along(X))
 
     def passive(self, counts: shapes.Counts) -> Body:
         """A quarter of the ventricle of problem 2, whose matter is the same in all directions."""
         mesh = shapes.ventricle_quarter(counts, ELEMENTS[self.element][0], self.degree)
-        held = (
+        fixed = (
             Prescribed("base", "base", (0, 1, 2), Rest()),
             Prescribed("x0", "x0", (0,), Rest()),
             Prescribed("y0", "y0", (1,), Rest()),
         )
-        return Body(mesh, matter(self.problem(2), self.element, "endo", self.bulk), held, (0.0, 1.0), Along(X))
+        return Body(mesh, matter(self.problem(2), self.element, "endo", self.bulk), fixed, (0.0, 1.0), Along(X))
 
     def contracting(self, n: int) -> Body:
         """The ventricle of problem 3, whose pressure and tension grow together, with n cells around an eighth of a turn."""
         mesh = _crowded(shapes.ventricle((n, 7 * n // 2, n), ELEMENTS[self.element][0], self.degree))
-        held = (Prescribed("base", "base", (0, 1, 2), Rest()),)
-        return Body(mesh, matter(self.problem(3), self.element, "endo", self.bulk), held, (0.0, 1.0), Helix())
+        fixed = (Prescribed("base", "base", (0, 1, 2), Rest()),)
+        return Body(mesh, matter(self.problem(3), self.element, "endo", self.bulk), fixed, (0.0, 1.0), Helix())
 
     def height(self, lab: Lab, body: Body, point: Point) -> float:
         """The z [mm] to which the node at ``point`` of one of the bodies goes."""

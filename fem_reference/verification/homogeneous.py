@@ -159,7 +159,7 @@ STIFFER_MOONEY = "Both moduli 1 % too high.", mooney_rivlin(1.01 * 0.003, 1.01 *
 AMOUNTS = {
     "uniaxial": (1.6, "stretched along one axis, free across"),
     "equibiaxial": (1.3, "stretched alike along two axes"),
-    "planar": (0.7, "shortened with its width held"),
+    "planar": (0.7, "shortened with its width fixed"),
     "simple_shear": (0.6, "in simple shear"),
 }
 

@@ -101,9 +101,9 @@ def _pressed(lab: Lab, n: int, mu: float) -> float:
 def _tube(lab: Lab, n: int, element: str, ends: tuple[str, ...] = ("bottom", "top"), degree: int = 2) -> Solved:
     """A quarter of the tube, whose inner face is moved out to STRETCH, and whose ``ends`` stay in their planes."""
     mesh = shapes.tube_quarter(INNER, OUTER, LENGTH, (2 * n, 2 * n, 1), ELEMENTS[element][0], degree)
-    held = [Prescribed(end, end, (2,), Rest()) for end in ends]
+    fixed = [Prescribed(end, end, (2,), Rest()) for end in ends]
     grown = Prescribed("inner", "inner", (0, 1), Radial(1.0, (1.0, 1.0, 0.0), ((1.0, 0.0), (2.0, 1.0))))
-    body = Body(mesh, neo_hooke(MU, BULK), (*SYMMETRY[:2], *held, grown), stretches(STRETCH, 8))
+    body = Body(mesh, neo_hooke(MU, BULK), (*SYMMETRY[:2], *fixed, grown), stretches(STRETCH, 8))
     return lab.solve(body, element, first_step=0.2, residual=RESIDUAL)
 
 

@@ -24,7 +24,7 @@ MUSCLE = (
 
 @dataclass(frozen=True, eq=False)
 class Compared:
-    """A bar of muscle, one end held, the other turned by 1 rad about an oblique axis: solved directly, in double precision, and by
+    """A bar of muscle, one end fixed, the other turned by 1 rad about an oblique axis: solved directly, in double precision, and by
     ``solver`` with factorisations in ``precision``, up to ``residual``.
     """
 
@@ -41,8 +41,8 @@ class Compared:
     def _points(self, lab: Lab, solver: str, precision: str | None, residual: float) -> Floats:
         mesh = shapes.box((3, 3, 7), (10.0, 10.0, 25.0), "tetrahedron")
         turn = Turn((1.0, 0.0, 2.0), 1.0, (5.0, 5.0, 12.5))
-        held = (Prescribed("z0", "z0", (0, 1, 2), Rest()), Prescribed("z1", "z1", (0, 1, 2), turn))
-        body = Body(mesh, MUSCLE, held, (0.0, 1.0), Along((0.0, 0.0, 1.0)))
+        fixed = (Prescribed("z0", "z0", (0, 1, 2), Rest()), Prescribed("z1", "z1", (0, 1, 2), turn))
+        body = Body(mesh, MUSCLE, fixed, (0.0, 1.0), Along((0.0, 0.0, 1.0)))
         settings: dict[str, Any] = {
             "linear_solver": solver,
             "precision": precision,

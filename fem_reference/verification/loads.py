@@ -24,7 +24,7 @@ from fem_reference.verification.parts import SYMMETRY, ramp, resistance, zero
 FAMILY = "loads"
 MUSCLE, FAT = 1.06e-9, 0.92e-9  # densities [tonne/mm3]
 FREE_FALL = 9810.0  # mm/s2
-HELD = (Prescribed("z0", "z0", (0, 1, 2), Rest()),)
+FIXED = (Prescribed("z0", "z0", (0, 1, 2), Rest()),)
 
 
 def weight(density: float, times: float = 1.0) -> Effect:
@@ -56,7 +56,7 @@ def _reaction(density: float, lab: Lab) -> Finding:
     """Of a block of muscle of 300 ml that stands, stuck to its base [N]."""
     mesh = shapes.box((3, 2, 2), _LARGE, "tetrahedron")
     acting = (*NEO.effects, resistance("P2/P1", BULK), weight(density))
-    last = lab.solve(Body(mesh, acting, HELD, (0, 1)), "P2/P1", first_step=0.25, residual=1e-10).last
+    last = lab.solve(Body(mesh, acting, FIXED, (0, 1)), "P2/P1", first_step=0.25, residual=1e-10).last
     return Finding(float(last.forces["z0"][2]))
 
 
@@ -153,7 +153,7 @@ def _left_over(faces: tuple[str, ...], lab: Lab) -> Finding:
     """The sum of the forces [N] on both ends of a block, its top tilted by 0.3 rad, in a fluid that wets ``faces``."""
     mesh = wet(shapes.box((2, 2, 2), SIZE, "tetrahedron"), faces)
     acting = (*NEO.effects, resistance("P2/P1", BULK), pressed(2 * MU))
-    forces = lab.solve(Body(mesh, acting, (*HELD, _TILT), (0, 1)), "P2/P1", **STEPS).last.forces
+    forces = lab.solve(Body(mesh, acting, (*FIXED, _TILT), (0, 1)), "P2/P1", **STEPS).last.forces
     return Finding(float(np.linalg.norm(forces["z0"] + forces["z1"])))
 
 

@@ -67,8 +67,8 @@ def _block(level: int, grading: float) -> Body:
 
 def _pulled(mesh: Cells, slides: tuple[Prescribed, ...]) -> Body:
     acting = (*neo_hooke(MU, BULK), make("traction", on="pulled", force=f"{LOAD}, 0, 0 MPa", ramp=ramp()))
-    held = Prescribed("clamped", "clamped", (0, 1, 2), Rest()), Prescribed("x0", "x0", (0,), Rest())
-    return Body(mesh, acting, (*held, *slides), (0.0, 1.0))
+    fixed = Prescribed("clamped", "clamped", (0, 1, 2), Rest()), Prescribed("x0", "x0", (0,), Rest())
+    return Body(mesh, acting, (*fixed, *slides), (0.0, 1.0))
 
 
 @dataclass(frozen=True)

@@ -181,7 +181,7 @@ _SPECIMENS = {
         "with two families of fibres, stretched alike along two axes",
         Specimen(NEO + fibres.two_families(30.0), "P2/P1", "equibiaxial", 1.25),
     ),
-    "planar": ("of Mooney-Rivlin matter, shortened with its width held", Specimen(MOONEY, "Q1/P0", "planar", 0.7)),
+    "planar": ("of Mooney-Rivlin matter, shortened with its width fixed", Specimen(MOONEY, "Q1/P0", "planar", 0.7)),
     "simple_shear": ("of Guccione's heart muscle in simple shear", Specimen(HEART, "P2/P1", "simple_shear", 0.3)),
     "pulled": (
         "with active fibres, pulled by a dead force",
@@ -192,11 +192,11 @@ _SPECIMENS = {
         Specimen(NEO + fibres.passive_febio(), "P2/P1", "uniaxial", 1.6),
     ),
     "tension": (
-        "with fibres of constant tension, held short",
+        "with fibres of constant tension, fixed short",
         Specimen(NEO + fibres.tension(), "P2/P1", "uniaxial", 0.9),
     ),
     "taut": (
-        "of prestretched muscle, held",
+        "of prestretched muscle, fixed",
         Specimen(fibres.taut(NEO + fibres.passive(), 1.2), "P2/P1", "uniaxial", 1.0),
     ),
     "neo_hooke": ("of neo-Hookean matter, stretched along one axis", Specimen(NEO, "P1", "uniaxial", 1.6)),

@@ -24,11 +24,11 @@ SIDE, SHORT, SMALL_TWIST = 10.0, 2.5, 1e-4
 
 
 def twisted(lab: Lab, rings: int, element: str, matter: Matter, degree: int = 2) -> Reached:
-    """The cylinder, both ends turned by TWIST times their height and held there; with ``degree`` 1 its cells are straight."""
+    """The cylinder, both ends turned by TWIST times their height and fixed there; with ``degree`` 1 its cells are straight."""
     mesh = shapes.cylinder(RADIUS, LENGTH, rings, rings, ELEMENTS[element][0], degree)
     turn = Turn((0.0, 0.0, 1.0), TWIST, per_length=True)
-    held = tuple(Prescribed(end, end, (0, 1, 2), turn) for end in ("bottom", "top"))
-    return lab.solve(Body(mesh, matter(), held, (0.0, 1.0)), element, first_step=0.5, residual=1e-9).last
+    fixed = tuple(Prescribed(end, end, (0, 1, 2), turn) for end in ("bottom", "top"))
+    return lab.solve(Body(mesh, matter(), fixed, (0.0, 1.0)), element, first_step=0.5, residual=1e-9).last
 
 
 def _moment(lab: Lab, rings: int, element: str, matter: Matter, degree: int = 2) -> float:
@@ -45,13 +45,13 @@ def _square_bar(lab: Lab, cells: int, element: str, *, warps: bool = True) -> fl
     mesh = shapes.box((cells, cells, 1), (half, half, SHORT), ELEMENTS[element][0])
     turn = Turn((0.0, 0.0, 1.0), SMALL_TWIST, per_length=True)
     turned = (0, 1) if warps else (0, 1, 2)
-    held = (
+    fixed = (
         Prescribed("x0", "x0", (1, 2), Rest()),
         Prescribed("y0", "y0", (0, 2), Rest()),
         Prescribed("bottom", "z0", turned, turn),
         Prescribed("top", "z1", turned, turn),
     )
-    body = Body(mesh, neo_hooke(MU, BULK), held, (0.0, 1.0))
+    body = Body(mesh, neo_hooke(MU, BULK), fixed, (0.0, 1.0))
     top = lab.solve(body, element, first_step=1.0, residual=1e-12).last.moments["top"]
     return float(4 * top[2] / SMALL_TWIST)
 

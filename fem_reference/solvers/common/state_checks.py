@@ -23,12 +23,12 @@ class Trouble:
     sentence: str
 
 
-def trouble(points: Floats, rest: Surface, held: Ints) -> Trouble | None:
-    """What is wrong with ``points`` (n, 3) [mm] of a closed surface, of which bones hold ``held`` (k,); None if nothing is."""
+def trouble(points: Floats, rest: Surface, attached: Ints) -> Trouble | None:
+    """What is wrong with ``points`` (n, 3) [mm] of a closed surface, of which bones hold ``attached`` (k,); None if nothing is."""
     lost = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if len(lost):
         return Trouble("diverged", f"the position of {len(lost)} points is not a number (point {lost[0]} for one)")
-    wide, at_rest, between = _spread(points), _spread(rest.points), _spread(points[held])
+    wide, at_rest, between = _spread(points), _spread(rest.points), _spread(points[attached])
     if wide > _WIDE * max(at_rest, between):
         return Trouble("diverged", f"the muscle is spread over {wide:.3g} mm, at rest {at_rest:.3g} mm")
     ratio = enclosed_volume(points, rest.triangles) / enclosed_volume(rest.points, rest.triangles)

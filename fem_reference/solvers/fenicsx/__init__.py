@@ -96,24 +96,25 @@ def _pass_on(problem: Problem, frame: Frame, sink: Sink, passed: list[int]) -> N
         if not passed and (overlap := frame.scalars.get("overlap_at_rest", 0.0)) > 0:
             frame = replace(frame, note=f"{frame.note}, {overlap:.2g} mm of overlap with bones at rest pushed out")
         passed.append(int(frame.number))
-        sink(_with_held(problem, replace(frame, number=int(frame.number))))
+        sink(_with_attachment_errors(problem, replace(frame, number=int(frame.number))))
 
 
-def _with_held(problem: Problem, frame: Frame) -> Frame:
+def _with_attachment_errors(problem: Problem, frame: Frame) -> Frame:
     """The frame with how far the surface vertices that bones hold are from where the bones have them, ``held_off_rms`` and
     ``held_off_max`` [mm]: exact attachments are facets of tets, which cover them only roughly, and springs give way. As it is
     where no bone holds anything.
     """
     surface = frame.surface
-    if not problem.held or surface is None:
+    if not problem.attached or surface is None:
         return frame
     off = np.concatenate(
         [
             np.linalg.norm(
-                surface[held.vertices] - apply(held.bone.pose(frame.number), problem.surface.points[held.vertices]),
+                surface[attached.vertices]
+                - apply(attached.bone.pose(frame.number), problem.surface.points[attached.vertices]),
                 axis=1,
             )
-            for held in problem.held
+            for attached in problem.attached
         ]
     )
     scalars = {"held_off_rms": float(np.sqrt(np.mean(off**2))), "held_off_max": float(off.max())}

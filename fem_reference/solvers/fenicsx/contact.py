@@ -14,11 +14,11 @@ from mpi4py import MPI
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.motion import apply
 from fem_reference.problems.contact import Contact, Nearby, Obstruction, nearest_on_way
-from fem_reference.solvers.fenicsx.pushed_points import PushedPoints
+from fem_reference.solvers.fenicsx.contact_points import ContactPoints
 
 
 @dataclass(frozen=True, eq=False)
-class Push:
+class Pressed:
     """What one obstruction does at the m of n points that are ``near``: ``gap`` (m,) [mm], negative inside, ``pressure`` (m,) [MPa
     per rest area], ``traction`` (m, 3) and its ``slope`` (m, 3, 3) [MPa/mm]; and in the obstruction's rest frame all points,
     ``local`` (n, 3) [mm]. No other point is within the smoothing.
@@ -32,14 +32,14 @@ class Push:
     local: Floats
 
 
-class Pushes:
+class ContactForces:
     """What obstructions do to this rank's pushed points."""
 
     def __init__(
         self,
         law: Contact,
         obstructions: tuple[Obstruction, ...],
-        points: PushedPoints,
+        points: ContactPoints,
         unknowns: fem.Function,
         frame: float,
     ) -> None:
@@ -58,9 +58,9 @@ class Pushes:
         """What obstructions do with the unknowns as they are and the obstructions where they are at ``frame``."""
         self.frame = frame
         points = self.points.positions(self.unknowns.x.array)
-        self.now = [self._push(i, points, frame) for i in range(len(self.obstructions))]
+        self.now = [self._pressed(i, points, frame) for i in range(len(self.obstructions))]
 
-    def _push(self, i: int, points: Floats, frame: float) -> Push:
+    def _pressed(self, i: int, points: Floats, frame: float) -> Pressed:
         """What an obstruction, where it is at ``frame``, does to ``points`` (n, 3) [mm]; they feel what overlaps at rest less."""
         pose, shape = self.obstructions[i].pose(frame), self.obstructions[i].shape
         turn = pose[:3, :3]
@@ -72,7 +72,7 @@ class Pushes:
         pressure, change = self.law.pressure(sampled.distance + allowed)
         normal, curvature = sampled.gradient @ turn.T, turn @ sampled.curvature @ turn.T
         slope = change[:, None, None] * normal[:, :, None] * normal[:, None, :] + pressure[:, None, None] * curvature
-        return Push(near, sampled.distance, pressure, pressure[:, None] * normal, slope, local)
+        return Pressed(near, sampled.distance, pressure, pressure[:, None] * normal, slope, local)
 
     def tractions(self) -> Floats:
         """What all of them do together (n, 3) [MPa]."""

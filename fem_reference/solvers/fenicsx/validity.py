@@ -1,8 +1,8 @@
 """Whether the laws of a body are used where they are meant, and whether the body has collapsed: judged by means over cells.
 
-By means, since the strain at the rim of what is held has no bound in the exact solution: det F at a vertex there may be far off in
-a cell that has kept its volume. A mean may be off there too, in single cells (0.37 and 1.9 in ``gluteus_maximus``, with a bulk
-modulus of a thousand shear moduli): there laws are named, and a body has collapsed only where more of it than that is lost.
+By means, since the strain at the rim of what is attached has no bound in the exact solution: det F at a vertex there may be far
+off in a cell that has kept its volume. A mean may be off there too, in single cells (0.37 and 1.9 in ``gluteus_maximus``, with a
+bulk modulus of a thousand shear moduli): there laws are named, and a body has collapsed only where more of it than that is lost.
 """
 
 from collections.abc import Iterable

@@ -82,12 +82,12 @@ class _Tangent:
     residual: Floats
     matrix: Any
 
-    def step(self, free: Ints, held: Ints, gap: Floats) -> Floats:
-        """The Newton step, where the ``held`` unknowns change by ``gap``; RuntimeError where there is no unique one."""
+    def step(self, free: Ints, fixed: Ints, gap: Floats) -> Floats:
+        """The Newton step, where the ``fixed`` unknowns change by ``gap``; RuntimeError where there is no unique one."""
         step = np.zeros_like(self.unknowns)
-        step[held] = gap
+        step[fixed] = gap
         rows = self.matrix[free]
-        step[free] = splu(rows[:, free].tocsc()).solve(-self.residual[free] - rows[:, held] @ gap)
+        step[free] = splu(rows[:, free].tocsc()).solve(-self.residual[free] - rows[:, fixed] @ gap)
         return step
 
 
@@ -116,21 +116,21 @@ class _March:
         return attempt
 
     def _newton(self, frame: float) -> tuple[Attempt, Floats]:
-        held, wanted = self._held(frame)
-        free = np.setdiff1d(np.arange(len(self.unknowns)), held)
+        fixed, wanted = self._fixed(frame)
+        free = np.setdiff1d(np.arange(len(self.unknowns)), fixed)
         now, allowed = self._tangent(self.unknowns.copy(), frame), self.settings.newton_iterations
         rounding = _ROUNDING * np.ptp(self.equations.space.rest, axis=0).max()
         for iteration in range(allowed + 1):
-            gap = wanted - now.unknowns[held]
+            gap = wanted - now.unknowns[fixed]
             gap[np.abs(gap) < rounding] = 0
             size = float(np.linalg.norm(now.residual[free]))
             if size < self.settings.residual and not gap.any():
-                now.unknowns[held] = wanted
+                now.unknowns[fixed] = wanted
                 return Attempt(None, iteration), now.unknowns
             if iteration == allowed:
                 break
             try:
-                step = now.step(free, held, gap)
+                step = now.step(free, fixed, gap)
             except RuntimeError:  # what SuperLU raises where a pivot is zero
                 return Attempt("diverged", iteration, "the equations have no unique solution"), now.unknowns
             then = self._along(now, step, free, np.inf if gap.any() else _GROWTH * size, frame)
@@ -151,7 +151,7 @@ class _March:
     def _tangent(self, unknowns: Floats, frame: float) -> "_Tangent":
         return _Tangent(unknowns, *self.equations.assembled(unknowns, frame))
 
-    def _held(self, frame: float) -> tuple[Ints, Floats]:
+    def _fixed(self, frame: float) -> tuple[Ints, Floats]:
         """The unknowns that are prescribed exactly, each once, and their values at ``frame``."""
         values: dict[int, float] = {}
         for entry in self.body.prescribed:
@@ -167,13 +167,13 @@ class _March:
         equations, unknowns = self.equations, self.unknowns
         places = equations.space.rest + unknowns[: equations.space.rest.size].reshape(-1, 3)
         residual, _ = equations.assembled(unknowns, step.frame, springs=False)
-        held = {entry.name: self._force(entry, places, residual) for entry in self.body.prescribed}
+        fixed = {entry.name: self._force(entry, places, residual) for entry in self.body.prescribed}
         inside, vertices = equations.smallest_determinants(unknowns)
         return Reached(
             step.frame,
             places[equations.space.nodes],
-            {name: force for name, (force, _) in held.items()},
-            {name: moment for name, (_, moment) in held.items()},
+            {name: force for name, (force, _) in fixed.items()},
+            {name: moment for name, (_, moment) in fixed.items()},
             {
                 "min_det_F_quadrature": inside,
                 "min_det_F_vertices": vertices,

@@ -45,19 +45,19 @@ Solve = Callable[[bool], tuple[Outcome, Floats]]
 
 def fusiform(element: str, rings: int, slices: int) -> Body:
     """A muscle like a spindle along z, of ``slices`` layers of straight cells, ``rings`` of them around its core; its fibres run
-    from end to end, its bottom is held and its top is turned.
+    from end to end, its bottom is fixed and its top is turned.
     """
     straight = shapes.cylinder(RADIUS, LENGTH, rings, slices, ELEMENTS[element][0], 1)
     along = 2 * straight.points[:, 2:] / LENGTH - 1
     points = straight.points * np.hstack([np.repeat(1 - THINNER * along**2, 2, axis=1), np.ones_like(along)])
     mesh = replace(straight, points=points)
     knots = ((0.0, 0.0), (float(FRAMES), 1.0))
-    held = (
+    fixed = (
         Prescribed("bottom", "bottom", (0, 1, 2), Rest()),
         Prescribed("top", "top", (0, 1, 2), Turn((0.0, 1.0, 0.0), ANGLE, HINGE, knots=knots)),
     )
     acting = tuple(make(name, **parameters) for name, parameters in EFFECTS.items())
-    return Body(mesh, acting, held, tuple(map(float, range(FRAMES + 1))), ByCell(_fibres(mesh)))
+    return Body(mesh, acting, fixed, tuple(map(float, range(FRAMES + 1))), ByCell(_fibres(mesh)))
 
 
 def _fibres(mesh: Cells) -> Floats:

@@ -10,8 +10,8 @@ from dolfinx import fem
 
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import Prescribed
+from fem_reference.solvers.fenicsx.contact_points import ContactPoints
 from fem_reference.solvers.fenicsx.forms import Form
-from fem_reference.solvers.fenicsx.pushed_points import PushedPoints
 
 
 class _Component:
@@ -28,7 +28,7 @@ class _Component:
         self.own = self.dofs[0] < owned
 
 
-class Hold:
+class PrescribedRegion:
     """A ``Prescribed`` on this rank's ``facets``."""
 
     def __init__(self, unknowns: fem.Function, entry: Prescribed, facets: Ints) -> None:
@@ -87,13 +87,13 @@ class Hold:
         return forces.sum(axis=0), np.cross(places, forces).sum(axis=0)
 
 
-class PointHold:
+class PointSprings:
     """A ``Prescribed`` by springs at the ``points`` of this rank's cells: they are not unknowns, so that none is exact."""
 
     exact: Ints = np.zeros(0, np.int64)
     targets: Floats = np.zeros(0)
 
-    def __init__(self, unknowns: fem.Function, entry: Prescribed, points: PushedPoints) -> None:
+    def __init__(self, unknowns: fem.Function, entry: Prescribed, points: ContactPoints) -> None:
         assert entry.stiffness is not None  # body.check
         self.entry, self.unknowns, self.points = entry, unknowns, points
         along = np.isin(np.arange(3), entry.components)
@@ -115,11 +115,11 @@ class PointHold:
         self.points.add_forces(residual, self._pulls(now if moves is None else now + moves))
 
     def tangent(self) -> tuple[Ints, Floats, Floats]:
-        """The slope of the residual, as ``Pushes.tangent`` has it."""
+        """The slope of the residual, as ``ContactForces.tangent`` has it."""
         return self.points.cells, self.points.basis, self.stiffness[:, :, None] * np.eye(3)
 
     def force(self, _residual: Floats, now: Floats, _shared: Ints) -> tuple[Floats, Floats]:
-        """As ``Hold.force``: of springs, it is what they pull with."""
+        """As ``PrescribedRegion.force``: of springs, it is what they pull with."""
         pulls = -self._pulls(now)
         return pulls.sum(axis=0), np.cross(self.points.positions(now), pulls).sum(axis=0)
 
