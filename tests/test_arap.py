@@ -320,7 +320,7 @@ def test_frames_wanted_and_cost():
     assert outcome.cost["seconds_setup"] > 0
 
 
-def test_the_energy_of_a_frame_is_told():
+def test_the_energy_of_a_frame_is_reported():
     setup, frames = attached_setup(None, JUMP), []
     arap.solve(setup, parse(arap.Settings, USUAL, "candidate[0]"), frames.append)
     cells = arap.Cells.of(setup.surface, "cotangent")
@@ -344,7 +344,7 @@ def test_what_nothing_or_all_holds_does_not_deform():
     np.testing.assert_array_equal(frames[1], apply(SWING.pose(1), setup.surface.points))
 
 
-def test_a_tolerance_that_is_not_met_is_told_at_the_end_and_all_frames_are_kept():
+def test_a_tolerance_that_is_not_met_is_reported_at_the_end_and_all_frames_are_kept():
     setup = attached_setup(None, SWING, last=10)
     outcome, frames = run(setup, tolerance="1e-6 mm")
     assert outcome.status == "out of steps"

@@ -221,7 +221,7 @@ def test_no_number_has_no_root(lost):
     assert arap_pbd._least_root(points, setup.surface.points * 0.1, constraints_of(setup)) is None
 
 
-def test_a_tolerance_that_is_not_met_is_told():
+def test_a_tolerance_that_is_not_met_is_reported():
     setup = attached_setup(None, SWING, last=10)
     outcome, frames = run(setup, tolerance="1e-6 mm")
     assert outcome.status == "out of steps"

@@ -39,9 +39,9 @@ UNSOLVED = "iliacus"
 
 @pytest.mark.parametrize("name", FIELDS)
 def test_scalar_cases_with_negative_control_fail(name, tmp_path) -> None:
-    told = scalar.run(casefile.read(name, with_negative_control=True), solver_of(name), tmp_path)
-    assert told.word == "fail"
-    assert [v["of"] for v in told.facts["verdicts"] if v["word"] == "fail"] == [FIELDS[name]]
+    printed = scalar.run(casefile.read(name, with_negative_control=True), solver_of(name), tmp_path)
+    assert printed.word == "fail"
+    assert [v["of"] for v in printed.facts["verdicts"] if v["word"] == "fail"] == [FIELDS[name]]
 
 
 def solver_of(name: str) -> str | None:
@@ -50,8 +50,8 @@ def solver_of(name: str) -> str | None:
 
 @pytest.mark.parametrize("name", [name for name in FIELDS if name != "surface_figure"])
 def test_scalar_cases_by_the_listing_alone(name, tmp_path) -> None:
-    told = scalar.run(casefile.read(name), solver_of(name), tmp_path)
-    assert (told.word, told.facts["verdict"], told.facts["status"]) == ("pass", "pass", "converged")
+    printed = scalar.run(casefile.read(name), solver_of(name), tmp_path)
+    assert (printed.word, printed.facts["verdict"], printed.facts["status"]) == ("pass", "pass", "converged")
 
 
 def test_the_page_of_the_octave_examples(tmp_path) -> None:

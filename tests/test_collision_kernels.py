@@ -57,7 +57,7 @@ def test_no_number_has_no_distance(grid, lost) -> None:
     assert_array_equal(gradient[1], 0)
 
 
-def test_who_has_come_near_is_told_in_the_frame_of_the_bone() -> None:
+def test_who_has_come_near_is_reported_in_the_frame_of_the_bone() -> None:
     random = np.random.default_rng(2)
     pose = Rotation((1, 2, 3), (5, -4, 7), (0.0, 1.0), (0.0, 2.0)).pose(1)
     points, asked_at = random.normal(size=(200, 3)), random.normal(size=(200, 3)) - [9, 1, -4]

@@ -11,7 +11,7 @@ from fem_reference.foundations.motion import apply
 from fem_reference.geometry.rigid_bodies import Box
 from fem_reference.problems import muscle, shapes
 from fem_reference.problems.body import Body
-from fem_reference.problems.contact import Contact, Obstruction, nearest_on_way
+from fem_reference.problems.contact import Contact, Obstruction, nearest_on_path
 from fem_reference.problems.muscle_body import as_body
 from fem_reference.scenes import casefile
 from fem_reference.solvers import fenicsx
@@ -73,7 +73,7 @@ def test_ranks_change_nothing(tmp_path) -> None:
 
 
 @pytest.mark.usefixtures("needs_fenicsx")
-def test_what_overlaps_at_rest_is_relaxed_first_and_told(tmp_path) -> None:
+def test_what_overlaps_at_rest_is_relaxed_first_and_reported(tmp_path) -> None:
     case = scene(tmp_path / "bar", -4.6)  # 0.46 mm deep
     assert as_body(muscle.build(case, muscle.setup(case))).frames == (-10.0, 0, 5, 10)
     frames, depths = solved(case)
@@ -128,7 +128,7 @@ def test_no_way_through_a_thin_plate_is_missed(start: float) -> None:
     # A plate 1 mm thin, ways of 36 mm from 3 to 33 mm before it: at most half a millimetre deep, and out on the other side.
     plate = Obstruction("plate", Box((0.0, 0.0, 0.0), (90.0, 90.0, 1.0), 0.0), Slide((0.0, 0.0, 0.0)))
     starts, ways = np.array([[0.3, 0.2, start], [0.0, 0.0, 40.0]]), np.array([[1.0, 2.0, -36.0]] * 2)
-    through, short = nearest_on_way(plate, starts, ways, 0.1)
+    through, short = nearest_on_path(plate, starts, ways, 0.1)
     assert -0.5 <= through < -0.3
     assert 3.5 <= short < 4.2  # it ends 3.5 mm above the plate, up to nine tenths of the last gap after the last look
 
@@ -157,7 +157,7 @@ def test_a_bone_that_pushes_and_an_attachment_have_names_of_their_own(tmp_path) 
     path.write_text(
         path.read_text().replace('name = "origin"', 'name = "floor"').replace('start = "origin"', 'start = "floor"')
     )
-    with pytest.raises(InputError, match=r'attachment\[0\]\.name: got "floor", which a bone that pushes has too'):
+    with pytest.raises(InputError, match=r'attachment\[0\]\.name: got "floor", which a bone in contact has too'):
         casefile.read(path)
 
 

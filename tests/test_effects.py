@@ -84,11 +84,11 @@ def test_every_parameter_is_felt_and_has_its_unit(name: str) -> None:
     effect, F = make(name), uniaxial(1.6) @ (np.eye(3) + 0.05 * deformations()[0])
     for key, _, unit in effect.parameters:
         changed = make(name, **{key: OTHER.get(key, "7 MPa")})
-        told = [
+        printed = [
             (np.array(outcome(one, state(F, fibre=ALONG))).tolist(), one.title, one.amount(5))
             for one in (effect, changed)
         ]
-        assert told[0] != told[1], key
+        assert printed[0] != printed[1], key
         if unit:
             with pytest.raises(InputError, match=rf'{name}\.{key}: got "1 s", want .*{KINDS[unit]}'):
                 make(name, **{key: "1 s"})

@@ -128,11 +128,11 @@ def test_the_scene_says_units_and_values(exported: Path, built: Problem) -> None
 
 
 @pytest.mark.parametrize("name", sorted(acting.PARAMETERS))
-def test_every_effect_can_be_told(scene: Scene, built: Problem, name: str) -> None:
+def test_every_effect_can_be_stated(scene: Scene, built: Problem, name: str) -> None:
     effect = parse(acting.effects.find(name), acting.PARAMETERS[name], "test")
-    (told,) = open_formats.facts(scene, replace(built, effects=(effect,)))["effects"]
-    assert told["name"] == name
-    assert json.loads(json.dumps(told, allow_nan=False))["parameters"].keys() == type(effect).model_fields.keys()
+    (printed,) = open_formats.facts(scene, replace(built, effects=(effect,)))["effects"]
+    assert printed["name"] == name
+    assert json.loads(json.dumps(printed, allow_nan=False))["parameters"].keys() == type(effect).model_fields.keys()
 
 
 def code(text: str) -> str:
@@ -265,9 +265,9 @@ def test_the_unit_of_a_foreign_solver_is_its_own(scene: Scene, foreign: Path, tm
 def test_the_verb(scene: Scene, tmp_path: Path, capsys) -> None:
     words = ["export", scene.place, "--quiet", "--to", str(tmp_path / "new" / "bar"), "--set", "muscle.tet_size=9 mm"]
     assert cli.main([*words, "--json", str(tmp_path / "facts.json")]) == cli.DONE
-    told = json.loads((tmp_path / "facts.json").read_text())
+    printed = json.loads((tmp_path / "facts.json").read_text())
     there = {str(path.relative_to(tmp_path / "new" / "bar")) for path in (tmp_path / "new" / "bar").rglob("*.*")}
-    assert set(told["files"]) == there
+    assert set(printed["files"]) == there
     assert cli.main(words) == cli.BAD_INPUT
     assert "which is not empty" in capsys.readouterr().err
     assert cli.main(["export", "rod", "--to", str(tmp_path / "rod")]) == cli.BAD_INPUT

@@ -115,7 +115,7 @@ def test_a_foreign_solver_stands_in_the_same_table(case, tmp_path) -> None:
     assert "Yours" in html
 
 
-def test_a_scene_that_is_not_there_is_left_out_and_told(case, capsys) -> None:
+def test_a_scene_that_is_not_there_is_left_out_and_reported(case, capsys) -> None:
     (case / "bar.vtp").unlink()
     made = table_5_1.stand([casefile.read_muscle(case)], case.parent, {})
     assert (made.scenarios, made.results) == ((), ())
@@ -172,7 +172,7 @@ def test_what_is_worst_over_frames_and_scenes() -> None:
     assert overall == Overall(median=(7.0 + 2.5) / 2, worst=-7.0, case="case0", count=2)
     assert made.over("PBD", "nobody", "surface_deviation", "rms_percent") is None
     assert made.speed("PBD", "pbd") == (made.scenarios[1], 0.5)  # that with more triangles
-    # A scene that was not come through is told, and does not hide behind the others, nor they behind it.
+    # A scene that was not come through is printed, and does not hide behind the others, nor they behind it.
     lost = table(solver_result("case0", 1.0, math.nan), solver_result("case1", 99.0))
     overall = lost.over("PBD", "pbd", "surface_deviation", "rms_percent")
     assert overall == Overall(99.0, 99.0, "case1", 1, ("case0",))
@@ -206,15 +206,15 @@ def test_the_benchmark_times_what_iterates(case, capsys, monkeypatch) -> None:
     ]
     assert all(len(one["seconds"]) == 2 for one in facts["timings"])
     assert min(facts["machine"].values()) > 0
-    told = capsys.readouterr().out
-    assert "iterations a second of CPU time" in told
+    printed = capsys.readouterr().out
+    assert "iterations a second of CPU time" in printed
 
 
-def test_a_ratio_is_told_where_the_report_has_a_speed() -> None:
+def test_a_ratio_is_reported_where_the_report_has_a_speed() -> None:
     timing = candidates.Timing("gluteus_maximus", "pbd", "pbd", 19752, (0.02, 0.01), 33.0)
     assert (timing.per_second, timing.ratio) == pytest.approx((100.0, 100 / 33))
-    told = candidates.text([timing], candidates.Machine(10.0, 2.0))
-    assert "pbd 50 to 100, 3.03 times the report's program (33 a second)" in told
+    printed = candidates.text([timing], candidates.Machine(10.0, 2.0))
+    assert "pbd 50 to 100, 3.03 times the report's program (33 a second)" in printed
 
 
 def test_a_solver_that_fails_has_no_time(case, monkeypatch) -> None:
@@ -223,7 +223,7 @@ def test_a_solver_that_fails_has_no_time(case, monkeypatch) -> None:
     assert [one.per_second for one in timings] == [None, None]
     assert "pbd failed" in candidates.text(timings, machine)
     json.dumps(candidates.facts(timings, machine), allow_nan=False)
-    assert cli.main(["benchmark", str(case), "--quiet"]) == cli.DONE  # it is told, not judged
+    assert cli.main(["benchmark", str(case), "--quiet"]) == cli.DONE  # it is printed, not judged
 
 
 def test_lines_do_not_iterate_and_a_short_scene_cannot_be_timed(case, capsys) -> None:

@@ -258,7 +258,7 @@ because = "none"
 """
 
 
-def test_a_reference_that_fails_is_told_in_full(tmp_path, capsys) -> None:
+def test_a_reference_that_fails_is_reported_in_full(tmp_path, capsys) -> None:
     # Three elements of length 1 resonate at -6 / 5: no solution, which is a status and never a pass.
     (tmp_path / "case.toml").write_text(RESONATES)
     target = tmp_path / "facts.json"

@@ -179,7 +179,7 @@ def test_too_few_points_and_no_attachment_are_refused() -> None:
         InputError, match="via: got fibre 0 of 2 points, want fibres of at least 3 points for 1 via-points"
     ):
         solved(bar(points=2), via=[{"at": 0.5, "bone": "top"}])
-    with pytest.raises(InputError, match="a muscle that no bone holds, want attachments that lines are fixed to"):
+    with pytest.raises(InputError, match="a muscle without attachments, want attachments that lines are fixed to"):
         solved(replace(bar(), attached=()))
 
 
@@ -232,20 +232,22 @@ def scene(folder: Path) -> Path:
 @pytest.fixture(scope="module")
 def compared(tmp_path_factory) -> tuple[dict, Path]:
     folder = tmp_path_factory.mktemp("lines")
-    told = folder / "told.json"
+    printed = folder / "printed.json"
     case = scene(folder / "bar")
     with pytest.MonkeyPatch.context() as patch:  # pictures take seconds, and lines are in none
         patch.setattr(gallery, "_command", lambda _job, _folder: [sys.executable, "-c", "raise SystemExit(3)"])
-        assert main(["compare", str(case), "--out", str(folder / "out"), "--json", str(told), "--quiet"]) == 0
-    return json.loads(told.read_text()), folder / "out"
+        assert main(["compare", str(case), "--out", str(folder / "out"), "--json", str(printed), "--quiet"]) == 0
+    return json.loads(printed.read_text()), folder / "out"
 
 
 def test_lines_are_measured_and_judged_on_their_lengths_alone(compared) -> None:
-    told, _ = compared
-    metrics = {name: {row["metric"] for row in told["measures"] if row["candidate"] == name} for name in told["cost"]}
+    printed, _ = compared
+    metrics = {
+        name: {row["metric"] for row in printed["measures"] if row["candidate"] == name} for name in printed["cost"]
+    }
     assert metrics["line"] == metrics["around"] == {"fibre_length"}
     assert {"fibre_length", "surface_deviation", "volume", "penetration"} <= metrics["springs"]
-    judged = {(row["of"], row["metric"]): row["verdict"] for row in told["verdicts"]}
+    judged = {(row["of"], row["metric"]): row["verdict"] for row in printed["verdicts"]}
     assert judged == {
         ("reference", "volume"): "pass",
         ("springs", "surface_deviation"): "pass",
@@ -253,14 +255,14 @@ def test_lines_are_measured_and_judged_on_their_lengths_alone(compared) -> None:
         ("line", "fibre_length"): "pass",
         ("around", "fibre_length"): "pass",
     }
-    assert {row["candidate"] for row in told["from_rest"] if row["metric"] == "volume"} == {"reference", "springs"}
+    assert {row["candidate"] for row in printed["from_rest"] if row["metric"] == "volume"} == {"reference", "springs"}
 
 
 def test_a_line_is_shorter_than_its_fibre_at_rest_already(compared) -> None:
-    told, out = compared
+    printed, out = compared
     rows = {
         (row["candidate"], row["statistic"]): row["value"]
-        for row in told["measures"]
+        for row in printed["measures"]
         if row["frame"] == 0 and row["metric"] == "fibre_length" and row["value"] is not None
     }
     assert rows["springs", "max"] == pytest.approx(0, abs=1e-9)

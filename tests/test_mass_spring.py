@@ -344,7 +344,7 @@ def test_a_muscle_turned_inside_out_is_an_outcome() -> None:
     assert [frame.number for frame in frames] == [0]
 
 
-def test_single_tetrahedra_inside_out_are_told() -> None:
+def test_single_tetrahedra_inside_out_are_reported() -> None:
     # The upper end is below the middle and above the lower end: all six tetrahedra of the upper cell are inside out.
     outcome, frames = solved(pressed(20.0), **FAST)
     assert outcome.status == "converged"
@@ -389,7 +389,7 @@ def test_the_stable_time_step_at_great_damping(damping) -> None:
     assert_allclose(found, 2 * MASS / damping, rtol=max(1e-12, 3 * STIFFNESS * MASS / damping / damping))
 
 
-def test_another_clock_than_the_scenes_is_told() -> None:
+def test_another_clock_than_the_scenes_is_reported() -> None:
     outcome, _ = solved(replace(bar(BEND), interval=0.5))
     assert outcome.message.endswith("; from a frame number to the next it takes 0.02 s, the scene 0.5 s")
     assert "the scene" not in solved(replace(bar(BEND), interval=0.02))[0].message

@@ -222,7 +222,7 @@ def test_attached_vertices_go_with_their_bone_whatever_are_obstacles():
         np.testing.assert_array_equal(frames[5][attached.vertices], setup.surface.points[attached.vertices])
 
 
-def test_edges_along_fibres_are_told_from_those_across():
+def test_edges_along_fibres_are_reported_from_those_across():
     # Two fibres: one along z about the origin, of points 40 mm apart, one along x at y = 100. Nearest is the segment, not its ends.
     fibres = Polylines(
         np.array([[0.0, 0, -20], [0, 0, 20], [0, 0, 20], [-20, 100, 0], [20, 100, 0]]), np.array([0, 3, 5])

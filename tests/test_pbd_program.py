@@ -318,7 +318,7 @@ def test_every_setting_is_felt(key, value):
     assert np.abs(changed - usual).max() > 1e-3
 
 
-def test_cost_is_told():
+def test_cost_is_reported():
     outcome, frames = run(attached_setup(None, SWING, last=10, every=5))
     assert list(frames) == [0, 5, 10]
     assert (outcome.status, outcome.cost["iterations"], outcome.cost["threads"]) == ("converged", 10, 1)

@@ -133,7 +133,7 @@ def test_given_fibres_are_read(bar) -> None:
 
 def test_a_vertex_has_one_bone(bar) -> None:
     scene = casefile.read(bar, changes={"attachment[1].bone": "floor"})
-    with pytest.raises(InputError, match=r"attachment\[1\]: got vertex \d+, which another attachment holds"):
+    with pytest.raises(InputError, match=r"attachment\[1\]: got vertex \d+, which another attachment has"):
         muscle.setup(scene)
 
 
@@ -321,7 +321,7 @@ def test_show_says_what_bones_are_and_how_they_move(squeezed, bar) -> None:
     assert "turns about (5, 5, 30) mm along" in scene_facts(turning, muscle.setup(turning))["bones"]["lid"]
 
 
-def test_a_frame_of_a_body_attached_by_nothing_tells_nothing_of_attachments(squeezed) -> None:
+def test_a_frame_of_a_body_attached_by_nothing_states_nothing_of_attachments(squeezed) -> None:
     built = build_scene(squeezed)
     frame = Frame(0, np.array(built.surface.points), scalars={"energy": 1.0})
     assert fenicsx._with_attachment_errors(built, frame).scalars == {"energy": 1.0}

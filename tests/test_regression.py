@@ -75,7 +75,7 @@ def asked(check: regression.Check, question: str, name: str) -> regression.Judge
 
 @pytest.fixture
 def path(tmp_path):
-    """A baseline, made where the reference is known to 0.5 of everything."""
+    """A baseline, made where the reference has an error bar of 0.5 of everything."""
     file = tmp_path / "new" / "ball.json"
     baseline.update(file, current(known=bars()))
     return file
@@ -151,14 +151,14 @@ def test_nothing_is_said_where_the_bar_reaches_both_sides_of_what_is_allowed(pat
     assert (judged.frame, judged.known) == (20, BAR)
     edited(path, lambda table: table["measures"][name].update(within=12.1))
     why = asked(checked(path, current(known=bars())), "within", name).why
-    assert why == "the reference is known to 0.5 mm, and 12 mm is that near to the 12.1 mm allowed"
+    assert why == "the reference has an error bar of 0.5 mm, and 12 mm is that near to the 12.1 mm allowed"
 
 
 def test_an_edited_tolerance_below_rounding_says_nothing(path) -> None:
     edited(path, lambda table: table["positions"].update(tolerance=0.001))
     moved = asked(checked(path, current(known=bars())), "unchanged", "positions.moved")
     assert moved.word == "inconclusive"
-    assert "the baseline is known to 0.00866 mm" in moved.why
+    assert "the baseline has an error bar of 0.00866 mm" in moved.why
 
 
 def test_without_error_bars_the_past_is_judged_and_the_truth_is_not(tmp_path) -> None:
@@ -326,7 +326,7 @@ def test_a_file_that_is_damaged_or_somebody_elses_is_neither_read_nor_written_ov
     assert path.read_text() == text
 
 
-def test_other_frames_are_told(path) -> None:
+def test_other_frames_are_reported(path) -> None:
     path.write_text(path.read_text().replace("[0, 10, 20]", "[0, 10, 30]"))
     with pytest.raises(InputError, match="frames: got 3 others, want the frame numbers of the scene"):
         baseline.read(path, SCENE, "mine")
@@ -374,7 +374,7 @@ def test_junit_has_a_case_for_each_judgement(mixed) -> None:
     assert suite.find("system-out") is None
 
 
-def test_notes_are_in_every_telling(mixed) -> None:
+def test_notes_are_in_every_text(mixed) -> None:
     noted = replace(mixed, notes=("a | b",))
     assert ElementTree.fromstring(regression_texts.junit(noted, 0)).find("testsuite/system-out").text == "a | b"
     assert "- note: a \\| b" in regression_texts.markdown(noted)
@@ -398,10 +398,8 @@ def test_markdown_shows_the_worst_first_and_is_short(mixed) -> None:
 def test_text_names_failures_and_why_nothing_can_be_said(mixed) -> None:
     lines = regression_texts.text(mixed).splitlines()
     assert lines[0] == "fail: positions.moved unchanged at frame 20: 3 mm from what it was, 0.1 mm allowed"
-    assert (
-        "inconclusive: the reference is known to 0.5 mm, and 0 mm is that near to the 0.1 mm allowed (fibre_length.rms within)"
-        in (lines)
-    )
+    unknown = "inconclusive: the reference has an error bar of 0.5 mm, and 0 mm is that near to the 0.1 mm allowed"
+    assert f"{unknown} (fibre_length.rms within)" in lines
     assert lines[-1] == "verdict: fail"
     many = replace(mixed, judgements=mixed.judgements[:1] * 20)
     assert regression_texts.text(many).count("fail: ") == regression_texts.MOST_ROWS

@@ -170,7 +170,7 @@ def test_bodies_travel_between_processes(body: Obstacle) -> None:
 
 
 @pytest.mark.parametrize(
-    ("make", "told"),
+    ("make", "printed"),
     [
         (lambda: HalfSpace((0, 0, 0), (0, 0, 0)), r"half space: normal: got \(0, 0, 0\), want a direction"),
         (lambda: Sphere((0, 0, 0), 0.0), "sphere: radius: got 0.0, want a length above 0 mm"),
@@ -184,6 +184,6 @@ def test_bodies_travel_between_processes(body: Obstacle) -> None:
         (lambda: Box(START, (1.0, 2.0, 1.0), np.nan), "box: rounding: got nan"),
     ],
 )
-def test_what_is_no_body(make, told: str) -> None:
-    with pytest.raises(InputError, match=told):
+def test_what_is_no_body(make, printed: str) -> None:
+    with pytest.raises(InputError, match=printed):
         make()

@@ -457,7 +457,7 @@ def test_every_key_is_needed(bar: Path, line: str) -> None:
         ("[negative_control]\n", "negative_control.colour", "because, key, value"),
     ],
 )
-def test_unknown_key_is_told_the_known_ones(bar: Path, table: str, place: str, known: str) -> None:
+def test_unknown_key_is_reported_the_known_ones(bar: Path, table: str, place: str, known: str) -> None:
     with pytest.raises(InputError) as caught:
         casefile.read(edited(bar, table, table + 'colour = "red"\n'))
     assert f"case.toml: {place}: got an unknown key, want one of {known}" in str(caught.value)
@@ -469,9 +469,9 @@ def test_what_the_folder_says_is_no_key(bar: Path, key: str) -> None:
         casefile.read(edited(bar, 'title = "A bar"\n', f'title = "A bar"\n{key} = "hip_flexion"\n'))
 
 
-@pytest.mark.parametrize(("number", "told"), [("nan", "nan"), ("inf", "inf"), ("-inf", "-inf")])
-def test_numbers_of_a_file_are_finite(bar: Path, number: str, told: str) -> None:
-    with pytest.raises(InputError, match=rf"axis\[2\]: got {told}, want a finite number"):
+@pytest.mark.parametrize(("number", "printed"), [("nan", "nan"), ("inf", "inf"), ("-inf", "-inf")])
+def test_numbers_of_a_file_are_finite(bar: Path, number: str, printed: str) -> None:
+    with pytest.raises(InputError, match=rf"axis\[2\]: got {printed}, want a finite number"):
         casefile.read(edited(bar, "axis = [0, 0, 2]", f"axis = [0, 0, {number}]"))
 
 

@@ -92,7 +92,7 @@ HALF, HEIGHT = 2.0, 10.0  # mm
 
 def _surplus(stretch: float, waves: int) -> float:
     """What vanishes where a slab of half-thickness ``HALF`` and height ``HEIGHT`` between smooth plates, in plane strain and of
-    incompressible neo-Hookean matter, begins to bend by so many half waves (Sawyers and Rivlin 1974, doi
+    incompressible neo-Hookean material, begins to bend by so many half waves (Sawyers and Rivlin 1974, doi
     10.1016/0020-7683(74)90012-7): Biot's exponentials of k x and stretch^2 k x, without traction on the sides. For thin slabs it
     is Euler's shortening, k^2 HALF^2 / 3; for thick ones Biot's 0.5437 for a wrinkling half-space.
     """
@@ -117,11 +117,11 @@ def test_a_squeezed_slab_bends_when_it_should(element, session) -> None:
     assert modes(session, body, element) == [0, 0, 0, 0, 1]
 
 
-def test_it_is_told_where_a_run_is_unstable(session) -> None:
+def test_it_is_reported_where_a_run_is_unstable(session) -> None:
     body = column("Q2/Q1", (1, 1, 10), [0.9 * critical(THIN), 1.1 * critical(THIN), 1.1 * critical(WIDE)])
     solved = session.solve(body, BodySettings(element="Q2/Q1", first_step=100.0))
-    told = "in 2 of them the equilibrium is unstable, first at frame 2 (negative modes: up to 2)"
-    assert solved.outcome.message == f"all 4 frames reached; {told}"
+    printed = "in 2 of them the equilibrium is unstable, first at frame 2 (negative modes: up to 2)"
+    assert solved.outcome.message == f"all 4 frames reached; {printed}"
     assert solved.outcome.cost["factorisations"] >= len(solved.states)
     assert solved.outcome.cost["seconds_stability"] > 0
 

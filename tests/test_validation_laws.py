@@ -236,7 +236,7 @@ def test_fibres_that_a_stretch_would_turn_are_refused() -> None:
         homogeneous.uniaxial(MUSCLE, 5.0, 1.2, FIBRE)
 
 
-def test_a_body_that_cannot_hold_the_pull_is_told() -> None:
+def test_a_body_that_cannot_hold_the_pull_is_reported() -> None:
     with pytest.raises(ArithmeticError, match="no homogeneous state found"):
         homogeneous.pulled(ACTIVE, 1.0, 0.5)  # a fibre alone, that pulls with 0.19 MPa at most
 

@@ -62,7 +62,7 @@ def incompressible_tube(inner: float, outer: float, stretch: float) -> tuple[flo
     return pressure, np.pi * a**2 * pressure - np.pi * MU * k * thinned
 
 
-def test_a_stiffer_bulk_tends_to_incompressible_matter_as_one_over_it() -> None:
+def test_a_stiffer_bulk_tends_to_incompressible_material_as_one_over_it() -> None:
     law, radii = neo_hooke(MU), (4.0, 7.0)
     truth = [Sphere(MU, *radii).pressure(1.4), *incompressible_tube(*radii, 1.4)]
     off = []
@@ -81,6 +81,6 @@ def test_a_wall_at_rest_needs_nothing() -> None:
     assert found == pytest.approx((0, 0, 0), abs=1e-14)
 
 
-def test_a_wall_without_balance_is_told() -> None:
+def test_a_wall_without_balance_is_reported() -> None:
     with pytest.raises(ArithmeticError, match="no balance found"):
         radial.sphere_pressure(neo_hooke(MU), 0.0, (4.0, 7.0), 1.4)  # nothing resists a change of volume

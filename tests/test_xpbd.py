@@ -55,7 +55,7 @@ def graph(inverse_masses, edges, lengths, softness) -> Constraints:
 
 
 def settle(points, constraints, step, seconds, contacts=(), still=True):
-    """Where the points come to rest; a body that nothing holds may keep turning slowly, as its sweeps are not symmetric."""
+    """Where the points come to rest; a free body may keep turning slowly, as its sweeps are not symmetric."""
     points, velocities = np.array(points, float), np.zeros(np.shape(points))
     for _ in range(round(seconds / step.seconds)):
         points, velocities = xpbd.advance(points, velocities, constraints, step, contacts)
@@ -217,7 +217,7 @@ def test_a_flap_hangs_where_its_weight_and_its_hinge_agree(seconds, sweeps):
     flap = Constraints(**(vars(springs) | hinge))
     end = settle(points, flap, Step(seconds, sweeps, 100.0, (0, 0, -GRAVITY)), 1.0)
     angle = brentq(lambda t: stiffness * (lift - t) - mass * GRAVITY * 10 * math.cos(t), -1.5, 1.5)
-    assert 0.1 < angle < lift - 0.1  # dihedral angles cannot tell the two sides of a fold
+    assert 0.1 < angle < lift - 0.1  # dihedral angles cannot distinguish the two sides of a fold
     assert math.atan2(end[3, 2], end[3, 0]) == pytest.approx(angle, rel=2e-3)
 
 
@@ -352,10 +352,10 @@ def test_every_setting_is_felt(key, value):
     assert np.abs(changed - usual).max() > 1e-3
 
 
-def test_another_clock_than_the_scenes_is_told():
+def test_another_clock_than_the_scenes_is_reported():
     setup = muscle(None, last=2)
-    told = [run(replace(setup, interval=interval))[0].message for interval in (None, 0.01, 0.05)]
-    assert told == ["2 iterations"] * 2 + [
+    printed = [run(replace(setup, interval=interval))[0].message for interval in (None, 0.01, 0.05)]
+    assert printed == ["2 iterations"] * 2 + [
         "2 iterations; from a frame number to the next it takes 0.01 s, the scene 0.05 s"
     ]
 

@@ -1,4 +1,4 @@
-"""Matter that the ground brakes, by ``-coefficient v`` per rest volume, without inertia: derived here from the balance of forces.
+"""Tissue that the ground brakes, by ``-coefficient v`` per rest volume, without inertia: derived here from the balance of forces.
 
 ``coefficient`` c [MPa s/mm^2], ``mu`` and ``bulk`` [MPa], lengths [mm].
 """

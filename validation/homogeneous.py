@@ -1,7 +1,7 @@
 """Homogeneous states of a body of a law (``validation/laws.py``) and a finite bulk modulus, ``W(F) + K/2 (J - 1)^2``.
 
-Stretches that no stress holds are found by root finding, to 1e-13 of the bulk modulus in what remains of the stress. The mixed
-form ``p (J - 1) - p^2 / (2 K)`` has the same states, with ``p = K (J - 1)``.
+Stretches along which no stress acts are found by root finding, to 1e-13 of the bulk modulus in what remains of the stress. The
+mixed form ``p (J - 1) - p^2 / (2 K)`` has the same states, with ``p = K (J - 1)``.
 
 Source: Ogden 1984, Non-linear Elastic Deformations, ch. 4.3 (the homogeneous deformations). No reading error.
 """

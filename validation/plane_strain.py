@@ -57,7 +57,7 @@ class Grid:
 
 @dataclass(frozen=True, eq=False)
 class Rested:
-    """Where a body comes to rest: ``displacement`` (n, 2) [mm] of the nodes, and ``fixed`` (2,) [N/mm], what holds the clamped
+    """Where a body comes to rest: ``displacement`` (n, 2) [mm] of the nodes, and ``fixed`` (2,) [N/mm], the force on the clamped
     side.
     """
 

@@ -1,7 +1,7 @@
 """Inflation of a sphere and of a tube, of any law with a finite bulk modulus.
 
-What ``validation/rivlin.py`` has in closed form for incompressible matter, without its part of the order of mu / K. The radius
-now is ``r(R)`` of incompressible matter plus a polynomial, such that the virtual work, the integral of ``P : dF R^n``, vanishes
+What ``validation/rivlin.py`` has in closed form for incompressible material, without its part of the order of mu / K. The radius
+now is ``r(R)`` of incompressible material plus a polynomial, such that the virtual work, the integral of ``P : dF R^n``, vanishes
 for every polynomial of its degree (Galerkin, Gauss quadrature, root finding). Source: the deformations are those of Ogden 1984,
 ch. 5.2 and 5.3. The error falls exponentially with the degree: below 1e-11 of what is found, for a wall as thick as its
 inner radius.
@@ -25,7 +25,7 @@ Gradient = Callable[[float, float, float], Floats]
 
 @dataclass(frozen=True, eq=False)
 class Wall:
-    """At radii at rest ``R`` (q,) [mm] with ``weights`` (q,) of their quadrature: where they are in incompressible matter,
+    """At radii at rest ``R`` (q,) [mm] with ``weights`` (q,) of their quadrature: where they are in incompressible material,
     ``start`` (q,) [mm], and its ``steepness`` (q,); polynomials that may be added to it, ``shapes`` (q, k), and their
     ``slopes`` (q, k).
     """

@@ -1,4 +1,4 @@
-"""Closed forms for bodies of incompressible matter: torsion of a cylinder, inflation of a sphere, flexure of a block.
+"""Closed forms for bodies of incompressible material: torsion of a cylinder, inflation of a sphere, flexure of a block.
 
 Neo-Hooke ``mu/2 (I1 - 3)`` or Mooney-Rivlin ``c1 (I1 - 3) + c2 (I2 - 3)`` with J = 1. A body of bulk modulus K differs from it by
 a part of the order of mu / K. No reading error: closed forms, and root finding to rounding where a docstring says so.

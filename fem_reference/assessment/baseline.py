@@ -65,7 +65,7 @@ class Positions(Record):
 
 
 class Baseline(Record):
-    """What the file holds: whose it is (``case``, ``scene`` key, ``candidate``), what it was made with (``reference`` run and
+    """The contents of the file: whose it is (``case``, ``scene`` key, ``candidate``), what it was made with (``reference`` run and
     version of ``fem_reference``), the ``frames`` (f,), and the measures by ``metric.statistic``.
     """
 

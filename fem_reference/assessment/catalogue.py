@@ -1,4 +1,4 @@
-"""Problems whose answers are known: what an entry of the verification catalogue is, and what came of one."""
+"""Problems whose answers are known: entries of the verification catalogue and their results."""
 
 import math
 from collections.abc import Callable

@@ -46,7 +46,7 @@ class Comparison:
 
     @property
     def rankings(self) -> tuple[Ranking, ...]:
-        """Which candidates are nearer, as far as the error bars tell them apart; nothing without these."""
+        """Which candidates are nearer, as far as the error bars separate them; nothing without these."""
         return rankings(self.deviations, self.error_bars.of_deviations) if self.error_bars else ()
 
     @property

@@ -62,18 +62,18 @@ class Judgement:
         if self.word == "inconclusive":
             return self._why_silent
         much = f"{self.away:.4g} {self.unit}"
-        told = f"{much} from what it was" if self.question == "unchanged" else f"{much} from the reference"
-        return f"{told}, {self.allowed:.4g} {self.unit} allowed"
+        text = f"{much} from what it was" if self.question == "unchanged" else f"{much} from the reference"
+        return f"{text}, {self.allowed:.4g} {self.unit} allowed"
 
     @property
     def _why_silent(self) -> str:
         if math.isnan(self.known):
-            return "nobody knows how well the reference is known; --error-bar tells"
+            return "the error bar of the reference is unknown; --error-bar measures it"
         if math.isnan(self.allowed):
             return "the baseline does not say how far from the reference is allowed; --update does, now that the error bar is known"
         known = "the reference" if self.question == "within" else "the baseline"
-        told = f"{known} is known to {self.known:.4g} {self.unit}"
-        return f"{told}, and {self.away:.4g} {self.unit} is that near to the {self.allowed:.4g} {self.unit} allowed"
+        text = f"{known} has an error bar of {self.known:.4g} {self.unit}"
+        return f"{text}, and {self.away:.4g} {self.unit} is that near to the {self.allowed:.4g} {self.unit} allowed"
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The families of solvers in Table 5.1 of the report, and how a solver of each stands on scenes, in numbers."""
+"""The families of models in Table 5.1 of the report, and the results of their solvers on scenes."""
 
 import tomllib
 from dataclasses import dataclass
@@ -135,15 +135,15 @@ class Table:
             for one in self.results
             if (one.family, one.name) == (family, name) and (value := one.worst(metric, statistic)) is not None
         ]
-        told = [(value, case) for value, case in found if not np.isnan(value)]
+        finite = [(value, case) for value, case in found if not np.isnan(value)]
         lost = tuple(case for value, case in found if np.isnan(value))
-        if not told:
+        if not finite:
             return Overall(np.nan, np.nan, "", 0, lost) if lost else None
-        worst, case = max(told, key=lambda entry: abs(entry[0]))
-        return Overall(float(np.median([abs(value) for value, _ in told])), worst, case, len(told), lost)
+        worst, case = max(finite, key=lambda entry: abs(entry[0]))
+        return Overall(float(np.median([abs(value) for value, _ in finite])), worst, case, len(finite), lost)
 
     def rankings(self, case: str) -> tuple[Ranking, ...]:
-        """Who is nearer on a case, as far as the reference's error bars tell them apart; nothing without these."""
+        """Who is nearer on a case, as far as the reference's error bars separate them; nothing without these."""
         here = [one for one in self.results if one.case == case]
         bars = [measure for one in here if one.of_reference for measure in one.measures]
         return rankings({one.name: one.measures for one in here if not one.of_reference}, bars)

@@ -1,4 +1,4 @@
-"""What a command line chooses: a scene, candidates of it, and the bench that they are solved on."""
+"""Choices of the command line: a scene, candidates of it, and the bench that they are solved on."""
 
 import argparse
 from pathlib import Path

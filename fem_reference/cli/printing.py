@@ -1,4 +1,4 @@
-"""What a command says, and where: on standard output, as JSON, as exit status."""
+"""Output of commands: on standard output, as JSON, as exit status."""
 
 import argparse
 import json

@@ -1,4 +1,4 @@
-"""What the verbs do with scalar cases; the command line prints it."""
+"""The verbs for scalar cases; they return their output."""
 
 from dataclasses import dataclass
 from pathlib import Path

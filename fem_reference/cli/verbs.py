@@ -1,4 +1,4 @@
-"""What each verb does; it prints what came of it and returns the exit status."""
+"""The verbs: each prints its results and returns the exit status."""
 
 import argparse
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What the verb ``verify`` does; the command line prints it."""
+"""The verb ``verify``; it returns its output."""
 
 import time
 

@@ -1,4 +1,4 @@
-"""What acts: one file per effect, named as in scene files. A problem sums its effects and adds nothing else.
+"""Effects: one file each, named as in scene files. A problem sums its effects and adds nothing else.
 
 Contract (tests/test_effects.py): an effect is a frozen record of its parameters, and one expression written once, with operators
 and the few functions of ``Functions`` only, so that a solver can take it symbolically and a test can evaluate it in numpy. What
@@ -198,7 +198,7 @@ class Energy(Effect):
 
 
 class Load(Effect):
-    """An effect that pushes or pulls on a part of the surface; ``on`` names it."""
+    """A load on a part of the surface; ``on`` names it."""
 
     on: str
 

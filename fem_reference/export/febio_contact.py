@@ -1,4 +1,4 @@
-"""What acts between surfaces in FEBio's input file: bones that push, springs that hold.
+"""Contact with bones and springs of attachments in FEBio's input file.
 
 FEBio's ``tied-elastic`` pulls with a traction: its penalty times the vector from a point of the first surface to the point of the
 second that was nearest at rest. It integrates over the first surface as that is now: a rigid copy of the area attached, which keeps
@@ -30,7 +30,7 @@ def add_contact(root: Element, problem: Problem) -> None:
         settings = {"penalty": attached.stiffness, "search_radius": SPRING_SEARCH_RADIUS}
         _pair(contacts, "tied-elastic", springs_id(attached), settings)
     for bone in obstacles(problem):
-        assert problem.contact is not None  # or no bone pushes
+        assert problem.contact is not None  # or there is no contact
         settings = {"penalty": problem.contact.stiffness, "search_radius": SEARCH_RADIUS, "fric_coeff": 0.0}
         _pair(contacts, "sliding-elastic", bone_id(bone), settings)
 

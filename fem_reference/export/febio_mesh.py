@@ -35,7 +35,7 @@ def springs_id(attached: AttachedVertices) -> str:
 
 
 def by_springs(problem: Problem) -> list[AttachedVertices]:
-    """The attachments that springs hold."""
+    """The attachments by springs."""
     return [attached for attached in problem.attached if attached.stiffness is not None]
 
 
@@ -53,7 +53,7 @@ def quadratic(mesh: TetMesh) -> tuple[Floats, Ints]:
 
 
 def obstacles(problem: Problem) -> list[RigidBody]:
-    """The bones that push on the muscle."""
+    """The bones in contact with the muscle."""
     contact = problem.contact
     return [bone for bone in problem.bones if contact is not None and contact.is_by(bone.name)]
 
@@ -114,7 +114,7 @@ class Mesh:
         return np.hstack([facets, np.reshape(np.array(middles, np.int64), (-1, 3))])
 
     def _area(self, attached: AttachedVertices) -> Ints:
-        """The triangles (m, 6) that an attachment holds, outward."""
+        """The triangles (m, 6) of an attachment, outward."""
         own = set(map(tuple, np.sort(self.problem.mesh.facets[attached.attachment], axis=1).tolist()))
         mine = [tuple(facet) in own for facet in np.sort(self.outer, axis=1).tolist()]
         return self._curved(self.outer[mine])
@@ -133,7 +133,7 @@ class Mesh:
             SubElement(mesh, "NodeSet", name=name).text = ",".join(str(node + 1) for node in sorted(nodes))
 
     def _contact_surface(self, mesh: Element, cells: dict[str, Ints]) -> None:
-        """The surface that bones push on: none of what is attached, nor its neighbours."""
+        """The contact surface: none of what is attached, nor its neighbours."""
         attached = np.concatenate([np.zeros((0, 3), np.int64), *self.problem.mesh.facets.values()])
         free = self.outer[~np.isin(self.outer, attached).any(axis=1)]
         self._surface(mesh, "muscle_free", "tri6", self._curved(free))

@@ -1,4 +1,4 @@
-"""Rims of attachments as edges of a coarse surface: where a bone's hold ends, so do the triangles that it holds."""
+"""Rims of attachments as edges of a coarse surface: the triangles end where the attachment ends."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -215,8 +215,8 @@ def _snapped(parts: Parts, fine: Surface, crossings: _Crossings) -> tuple[Floats
     ends, fractions = crossings.ends[across], crossings.fractions[across]
     point = np.concatenate([ends[:, 0], ends[:, 1]])
     share = np.concatenate([fractions[:, 0], 1 - fractions[:, 1]])
-    way = parts.points[ends[:, 1]] - parts.points[ends[:, 0]]
-    shift = np.concatenate([way, -way]) * share[:, None]
+    direction = parts.points[ends[:, 1]] - parts.points[ends[:, 0]]
+    shift = np.concatenate([direction, -direction]) * share[:, None]
     free = free_part(parts.points, parts.triangles, point, shift)
     stuck = parts.rim[point] | (np.linalg.norm(shift - free, axis=1) > np.linalg.norm(shift, axis=1) / 3)
     near = share < np.where(stuck, np.where(parts.rim[point], _NEAR, _THERE), _NEAR)

@@ -1,4 +1,4 @@
-"""What is measured: one file per metric, named as in scene files and JSON. A metric cannot tell who made a run.
+"""Metrics: one file each, named as in scene files and JSON. A metric does not know the solver of a run.
 
 Contract (tests/test_metrics.py): zero against itself, a known change gives a known value, NaN stays NaN, units stated. One
 metric, penetration, is of the run alone: against itself too it is what it is.
@@ -104,7 +104,7 @@ def find(measures: Iterable[Measure], metric: str, statistic: str) -> Measure | 
 
 
 def at_rest(run: Run) -> Run:
-    """The rest state of ``run``, fibres too, repeated over its frames: against it, a run tells its change from rest."""
+    """The rest state of ``run``, fibres too, repeated over its frames: against it, a run reports its change from rest."""
     frames = len(run.numbers)
     still = np.broadcast_to(run.surface.points, (frames, *run.surface.points.shape))
     fibres = None if run.fibres is None else np.broadcast_to(run.fibres.points, (frames, *run.fibres.points.shape))

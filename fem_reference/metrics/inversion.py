@@ -1,6 +1,6 @@
 """How much of a run's surface is turned inside out or lies within another part of the body, against the reference.
 
-It is told from the surface alone, so of every run; where a solver has an interior, its smallest det F says more.
+It is computed from the surface alone, so of every run; where a solver has an interior, its smallest det F says more.
 """
 
 from functools import lru_cache

@@ -1,4 +1,4 @@
-"""Which part of a muscle a bone holds: vertices of its surface, and boundary triangles of its tetrahedra below."""
+"""The attached part of a muscle: vertices of its surface, and boundary triangles of its tetrahedra below."""
 
 import re
 from pathlib import Path

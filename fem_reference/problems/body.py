@@ -32,7 +32,7 @@ ELEMENTS: dict[str, tuple[Kind, int, int | None]] = {
 
 def check(body: "Body", element: str) -> None:
     """InputError unless ``element`` suits the cells and effects of ``body``, which has every region and fibre direction that it
-    speaks of, and prescribes what can be told apart and be solved.
+    speaks of, and prescribes what can be distinguished and solved.
     """
     check_element(element, body.mesh.kind, body.mesh.degree, body.effects, "element")
     _check_prescribed(body.prescribed)
@@ -50,7 +50,7 @@ def check(body: "Body", element: str) -> None:
 
 
 def _check_prescribed(prescribed: tuple["Prescribed", ...]) -> None:
-    """InputError where two share a name, by which their forces are told, or springs would push away."""
+    """InputError where two share a name, by which their forces are reported, or springs would push away."""
     names = [entry.name for entry in prescribed]
     for entry in prescribed:
         if names.count(entry.name) > 1:
@@ -162,7 +162,7 @@ class ByCell:
 @dataclass(frozen=True, eq=False)
 class Body:
     """A body of ``mesh`` with its ``effects``; at ``frames[0]`` it rests. A load acts on the facets that its ``on`` names; by
-    ``contact``, where there is one, every obstruction pushes. ``interval`` [s]: from a frame number to the next, where time
+    ``contact``, where there is one, with every obstruction. ``interval`` [s]: from a frame number to the next, where time
     matters.
     """
 

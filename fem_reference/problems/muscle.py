@@ -86,7 +86,7 @@ class RigidBody:
 
 @dataclass(frozen=True, eq=False)
 class AttachedVertices:
-    """An attachment: the ``vertices`` (k,) of the muscle surface that ``bone`` holds, by springs of ``stiffness`` [MPa/mm] or
+    """An attachment: the ``vertices`` (k,) of the muscle surface attached to ``bone``, by springs of ``stiffness`` [MPa/mm] or
     (None) exactly.
     """
 
@@ -98,7 +98,7 @@ class AttachedVertices:
 
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """What a surface solver needs: the muscle ``surface`` at rest, the bones, what they hold, and the frames wanted;
+    """What a surface solver needs: the muscle ``surface`` at rest, the bones, the attached vertices, and the frames wanted;
     ``interval`` [s] from a frame number to the next where the scene says it.
     """
 
@@ -110,12 +110,14 @@ class Setup:
 
     @cached_property
     def attached_vertices(self) -> Ints:
-        """The vertices (k,) of the surface that bones hold, attachment by attachment."""
+        """The vertices (k,) of the surface that are attached to bones, attachment by attachment."""
         return np.concatenate([np.zeros(0, np.int64), *(entry.vertices for entry in self.attached)])
 
     @cached_property
     def free(self) -> NDArray[np.bool_]:
-        """Which vertices (n,) of the surface bones may push on: those that none holds, nor any of their neighbours."""
+        """Which vertices (n,) of the surface may be in contact with bones: those that are not attached, nor any of their
+        neighbours.
+        """
         triangles = self.surface.triangles
         attached = np.zeros(len(self.surface.points), bool)
         attached[self.attached_vertices] = True
@@ -127,8 +129,9 @@ class Setup:
 @dataclass(frozen=True, eq=False)
 class Problem(Setup):
     """A setup filled with tetrahedra (``mesh.facets`` by attachment), with its effects and fibres; ``fibre``, the direction of the
-    fibres at any point, where an effect needs it; ``skin``, what bones push on, where they do; ``attached_skins``, by attachment
-    that holds by springs, what these pull at; ``mesh_facts`` are what the mesh is like, ``seconds`` how long it took to make.
+    fibres at any point, where an effect needs it; ``skin``, the contact surface, where there is contact; ``attached_skins``, by
+    attachment that holds by springs, what these pull at; ``mesh_facts`` are what the mesh is like, ``seconds`` how long it took
+    to make.
     """
 
     mesh: TetMesh
@@ -148,7 +151,7 @@ class Problem(Setup):
 
     @property
     def contact(self) -> ContactEffect | None:
-        """The effect by which bones push, None where they do not."""
+        """The effect of contact, None where there is none."""
         return among(self.effects)
 
 
@@ -202,7 +205,7 @@ def build(scene: Scene, rest: Setup) -> Problem:
 
 
 def _check_outside(scene: Scene, rest: Setup, contact: ContactEffect) -> None:
-    """InputError where a bone that pushes is wholly inside the muscle: there is no way out of it."""
+    """InputError where a bone in contact is wholly inside the muscle: there is no way out of it."""
     for i, bone in enumerate(rest.bones):
         if contact.is_by(bone.name) and signed_distances(bone.surface.points, rest.surface).max() < 0:
             raise InputError(join(scene.place, f"bone[{i}]"), "a bone wholly inside the muscle", "one that is not")
@@ -220,7 +223,7 @@ def _distance_facts(rest: Setup) -> dict[str, float | str]:
 
 
 def _filled(scene: Scene, rest: Setup, size: float) -> TetMesh:
-    """Tets of a ``size`` [mm], with the facets that each attachment holds: up to its rim where the mesher keeps it, else those
+    """Tets of a ``size`` [mm], with the facets of each attachment: up to its rim where the mesher keeps it, else those
     under it.
     """
     shares = {attached.attachment: attached_shares(rest.surface, attached.vertices) for attached in rest.attached}
@@ -255,7 +258,7 @@ def _attached(scene: Scene, surface: Surface, bones: tuple[RigidBody, ...]) -> t
             raise InputError(place, "no vertex of the muscle", "an attachment that selects some")
         if taken[vertices].any():
             raise InputError(
-                place, f"vertex {vertices[taken[vertices]][0]}, which another attachment holds", "each vertex once"
+                place, f"vertex {vertices[taken[vertices]][0]}, which another attachment has", "each vertex once"
             )
         taken[vertices] = True
         attached.append(AttachedVertices(attachment.name, by_name[attachment.bone], vertices, attachment.stiffness))

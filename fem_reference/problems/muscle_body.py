@@ -1,4 +1,4 @@
-"""The muscle of a problem as a body that finite elements deform: attached by bones, and pushed by them."""
+"""The muscle of a problem as a body that finite elements deform: attached to bones, and in contact with them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -13,7 +13,7 @@ from fem_reference.problems.body import Body, Cells, Prescribed
 from fem_reference.problems.contact import Contact, Obstruction
 from fem_reference.problems.muscle import Problem
 
-# Frame numbers before the first one over which what overlaps at rest is pushed out of the bones.
+# Frame numbers before the first one over which an overlap at rest is removed.
 RELAXING = 10.0
 
 
@@ -31,7 +31,7 @@ class From:
 
 @dataclass(frozen=True)
 class Follows:
-    """The displacement of what a bone holds that has a ``pose`` by frame number."""
+    """The displacement of what is attached to a bone that has a ``pose`` by frame number."""
 
     pose: Callable[[float], Floats]
 
@@ -41,7 +41,7 @@ class Follows:
 
 
 def as_body(problem: Problem) -> Body:
-    """The muscle as a body: its bones prescribe where the facets that they hold exactly are, or pull at what they hold by springs;
+    """The muscle as a body: its bones prescribe where exactly attached facets are, or pull by springs;
     the rest of its skin is ``"free"``.
     """
     mesh = problem.mesh
@@ -67,7 +67,7 @@ def as_body(problem: Problem) -> Body:
 
 
 def _among_bones(body: Body, problem: Problem, effect: ContactEffect) -> Body:
-    """The body with the bones that push on it; where they overlap it at rest, it is relaxed before the first frame."""
+    """The body with the bones in contact with it; where they overlap it at rest, it is relaxed before the first frame."""
     assert problem.skin is not None  # built with the effect
     bones = [bone for bone in problem.bones if effect.is_by(bone.name)]
     first, points = body.frames[0], problem.skin.points

@@ -195,7 +195,7 @@ def at(formula: str, points: Floats) -> Floats:
 
 
 def _given(scene: FieldScene, mesh: FieldMesh) -> Floats:
-    """The values (n,) that files of bounds hold vertices at, NaN where they hold none."""
+    """The values (n,) that files of bounds prescribe at vertices, NaN where they prescribe none."""
     values = np.full(len(mesh.points), np.nan)
     for i, entry in enumerate(scene.boundary):
         if entry.bounds is not None:

@@ -1,4 +1,4 @@
-"""A comparison as something to read: one page that holds everything itself, and the same numbers as JSON and CSV."""
+"""A comparison as something to read: one page that contains everything itself, and the same numbers as JSON and CSV."""
 
 import json
 from pathlib import Path

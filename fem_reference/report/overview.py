@@ -1,4 +1,4 @@
-"""What a case is made of and what came of a scalar one, in words and numbers: what ``show``, ``run`` and ``compare`` tell."""
+"""The contents of a case and the results of scalar ones, in words and numbers: what ``show``, ``run`` and ``compare`` print."""
 
 import math
 from collections.abc import Iterable
@@ -206,29 +206,27 @@ def _worst(result: Comparison) -> list[str]:
     """A line a candidate: how far it is off where it is worst, in the statistics of the page's first table."""
     lines = []
     for name, measures in result.deviations.items():
-        told = [
+        text = [
             f"{' '.join(key).replace('_', ' ')} {measure.values[measure.worst]:.4g} {measure.unit}"
             f" (frame {result.reference.numbers[measure.worst]})"
             for key in TOLD
             if (measure := find(measures, *key)) is not None
         ]
-        lines.append(f"{name} at its worst: {', '.join(told)}")
+        lines.append(f"{name} at its worst: {', '.join(text)}")
     return lines
 
 
 def _known(result: Comparison) -> list[str]:
-    """How well the reference is known, a line a statistic; nothing without them."""
+    """Error bars of the reference, a line a statistic; nothing without them."""
     if result.error_bars is None:
         return []
-    lines = [
-        "how well the reference is known (its greatest change from rest; the error bar of it, where that is widest):"
-    ]
+    lines = ["error bars of the reference (its greatest change from rest; the error bar of it, where that is widest):"]
     for measure in result.changes[result.reference.name]:
         bar = result.error_bars.find("change", measure.metric, measure.statistic)
         if bar is not None:
             value = f"{measure.values[measure.worst]:.4g} {measure.unit}"
             lines.append(f"  {measure.metric} {measure.statistic}: {value}, {_bar(result, bar)}")
-    lines.append("how well deviations from it are known (the error bar, where that is widest):")
+    lines.append("error bars of deviations from it (the error bar, where that is widest):")
     deviations = [bar for bar in result.error_bars.bars if bar.of == "deviation"]
     return lines + [f"  {bar.metric} {bar.statistic}: {_bar(result, bar)}" for bar in deviations]
 
@@ -263,13 +261,13 @@ def ranking_text(table: Table) -> str:
     lines = []
     for one in table.results:
         found = (one.worst("surface_deviation", "rms"), one.worst("volume", "deviation"))
-        told = [
+        text = [
             f"{name} {value[0]:.3g} {unit}"
             for name, unit, value in zip(("surface rms", "volume"), ("mm", "%"), found, strict=True)
             if value is not None
         ]
         if one.seconds_per_frame:
-            told.insert(0, f"{1 / one.seconds_per_frame:.3g} frames/s")
+            text.insert(0, f"{1 / one.seconds_per_frame:.3g} frames/s")
         known = " (its error bar)" if one.of_reference and one.measures else ""
-        lines.append(f"{one.case}: {one.family}, {one.name}: {one.outcome.status}, {', '.join(told)}{known}")
+        lines.append(f"{one.case}: {one.family}, {one.name}: {one.outcome.status}, {', '.join(text)}{known}")
     return "\n".join([*lines, *(f"{case}: left out, {reason}" for case, reason in table.missing.items())])

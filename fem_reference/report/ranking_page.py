@@ -1,4 +1,4 @@
-"""The page ``table-5-1``: what the report rates with pluses and minuses, in numbers."""
+"""The page ``table-5-1``: speed and precision of solvers, which the report rates with pluses and minuses, in numbers."""
 
 import io
 import math
@@ -115,7 +115,7 @@ def _colours(table: Table) -> dict[str, str]:
 
 
 def _label_of(one: SolverResult) -> str:
-    """What tells a solver from all others: somebody else's may have the name of one of ours."""
+    """What distinguishes a solver from all others: somebody else's may have the name of one of ours."""
     ours = one.of_reference or one.solver != "recorded"
     return one.name if ours else f"{one.name} ({one.family.lower()})"
 

@@ -1,4 +1,4 @@
-"""The page of the verification catalogue. It holds everything itself, and reads without a network."""
+"""The page of the verification catalogue. It contains everything itself, and reads without a network."""
 
 import math
 from collections import Counter
@@ -37,8 +37,8 @@ class Verification:
     def summary(self) -> str:
         """The verdict in one line."""
         passed, controls = len(self.results) - len(self.failed), sum(one.with_negative_control for one in self.results)
-        told = f", {controls} measured with their negative control" if controls else ""
-        return f"verdict: {self.word}, {passed} of {len(self.results)} pass{told}, {self.seconds:.0f} s"
+        note = f", {controls} measured with their negative control" if controls else ""
+        return f"verdict: {self.word}, {passed} of {len(self.results)} pass{note}, {self.seconds:.0f} s"
 
     @property
     def families(self) -> dict[str, list[Result]]:

@@ -18,7 +18,7 @@ from fem_reference.foundations.records import Record, join, parse
 from fem_reference.scenes.muscle import HOME, NegativeControl, Scene, SceneFile
 from fem_reference.scenes.scalar import FieldScene, FieldSceneFile
 
-# What a load acts on, where it is no attachment: the surface that no bone holds.
+# What a load acts on, where it is no attachment: the surface that is not attached to bone.
 FREE = "free"
 
 
@@ -61,10 +61,10 @@ def _scene_file(case: str | Path) -> Path:
 
 def _change(table: dict[str, Any], key: str, value: Any, place: str) -> None:
     parts = re.findall(r"[^.\[\]]+", key) or [""]
-    *way, last = [int(part) if part.isdecimal() else part for part in parts]
+    *parents, last = [int(part) if part.isdecimal() else part for part in parts]
     inside: Any = table
     try:
-        for part in way:
+        for part in parents:
             inside = inside[part]
         inside[last]  # a change replaces what is there
         inside[last] = value
@@ -111,7 +111,7 @@ def _with_negative_control(table: dict[str, Any], path: Path) -> Scene | FieldSc
     except InputError as error:
         why = str(error).removeprefix(f"{place}: ")
         raise InputError(
-            join(place, "negative_control.value"), _told(control), f"a value that can be read ({why})"
+            join(place, "negative_control.value"), _value_text(control), f"a value that can be read ({why})"
         ) from error
 
 
@@ -119,12 +119,12 @@ def _check_negative_control(scene: Scene | FieldScene, changed: Scene | FieldSce
     if changed.model_copy(update={"negative_control": scene.negative_control}) == scene:
         raise InputError(
             join(scene.place, "negative_control.value"),
-            _told(scene.negative_control),
+            _value_text(scene.negative_control),
             f"a value that changes {scene.negative_control.key}",
         )
 
 
-def _told(control: NegativeControl) -> str:
+def _value_text(control: NegativeControl) -> str:
     return f'"{control.value}"' if isinstance(control.value, str) else repr(control.value)
 
 
@@ -188,13 +188,13 @@ def _check_names(scene: Scene) -> None:
     ends = [(f"fibres.traced.{end}", getattr(traced, end)) for end in ("start", "end") if traced]
     _check_used(bones, [(f"attachment[{i}].bone", entry.bone) for i, entry in enumerate(scene.attachment)], scene.place)
     _check_used(attachments, ends, scene.place)
-    pushing = [
+    obstacles = [
         (f"effect[{i}].bones", name)
         for i, effect in enumerate(scene.effects)
         if isinstance(effect, Contact)
         for name in effect.bones or ()
     ]
-    _check_used(bones, pushing, scene.place)
+    _check_used(bones, obstacles, scene.place)
     _check_forces(scene)
     loads = [(f"effect[{i}].on", effect.on) for i, effect in enumerate(scene.effects) if isinstance(effect, Load)]
     _check_used([*attachments, FREE], loads, scene.place)
@@ -202,13 +202,13 @@ def _check_names(scene: Scene) -> None:
 
 
 def _check_forces(scene: Scene) -> None:
-    """Forces are told by the name of who exerts them, and something keeps the muscle from drifting."""
+    """Forces are reported by the name of the bone, and something keeps the muscle from drifting."""
     bones = [bone.name for bone in scene.bone]
-    pushed = among(scene.effects) is not None
+    contact = among(scene.effects) is not None
     for i, attachment in enumerate(scene.attachment):
-        if pushed and attachment.name in bones:
+        if contact and attachment.name in bones:
             place = join(scene.place, f"attachment[{i}].name")
-            raise InputError(place, f'"{attachment.name}", which a bone that pushes has too', "a name of its own")
+            raise InputError(place, f'"{attachment.name}", which a bone in contact has too', "a name of its own")
     if not scene.attachment and not any(isinstance(effect, Damping) for effect in scene.effects):
         want = 'an attachment, soft as it may be, or the effect "damping": without either the muscle drifts'
         raise InputError(join(scene.place, "attachment"), "none", want)

@@ -60,8 +60,8 @@ class Outline(Record):
 
 
 class Attachment(Record):
-    """Which part of the muscle surface a bone holds: exactly one of ``vertices``, ``within`` (of the bone), ``outline``; and how:
-    by springs of a ``stiffness`` over its area, without it exactly.
+    """Which part of the muscle surface is attached to a bone: exactly one of ``vertices``, ``within`` (of the bone), ``outline``;
+    and how: by springs of a ``stiffness`` over its area, without it exactly.
     """
 
     name: str
@@ -73,7 +73,7 @@ class Attachment(Record):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if sum(way is not None for way in (self.vertices, self.within, self.outline)) != 1:
+        if sum(one is not None for one in (self.vertices, self.within, self.outline)) != 1:
             raise ValueError('exactly one of "vertices", "within", "outline"')
         return self
 
@@ -175,7 +175,7 @@ class NegativeControl(Record):
 
 
 class SceneFile(Record):
-    """What a scene file holds."""
+    """The contents of a scene file."""
 
     title: str
     proves: str
@@ -192,7 +192,7 @@ class SceneFile(Record):
 
 
 class Scene(SceneFile):
-    """A case, read and checked: what its file holds, and the name and place of its folder."""
+    """A case, read and checked: the contents of its file, and the name and place of its folder."""
 
     name: str
     folder: Path

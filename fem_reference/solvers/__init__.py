@@ -1,4 +1,4 @@
-"""Who computes: one file per solver, named as in scene files.
+"""Solvers: one file each, named as in scene files.
 
 Contract (tests/test_solvers.py): a solver of muscles has ``Settings``, a strict record of its own settings, and
 ``solve(problem, settings, sink) -> Outcome``, which sinks every requested frame as it is reached. A solver of scalar fields has

@@ -1,10 +1,10 @@
 """As rigid as possible: the surface keeps the shape of every vertex's edges. Report section 5.5.2; Sorkine and Alexa 2007.
 
-Frame number n is the state after the bones took their pose of frame n: the vertices that a bone holds go with it exactly, and
+Frame number n is the state after the bones took their pose of frame n: the vertices attached to a bone go with it exactly, and
 from the state before, the rotations of all cells (local step) and the positions of all other vertices (global step) take
 turns. Where the rows of attached vertices are removed and weights are the same from both ends, both steps minimise eq. 5.10, each
 over its own unknowns, so that the energy never rises; negative weights do not change that, as the matrix is still the
-positive one of linear elements. What a bone holds by springs it holds exactly here, and bones push nothing aside.
+positive one of linear elements. Attachments by springs are exact here, and there is no contact.
 """
 
 import time
@@ -44,7 +44,7 @@ class Settings(Record):
     ``fixed``: the rows and columns of attached vertices are left out ("remove"), or the columns alone, and all rows are met by
     least squares ("ols", eq. 5.12). With removed rows tutte has the states of kirchhoff.
     ``rotations``: fitted before "each" global step, or once in a frame ("first only"): its later iterations then change nothing.
-    ``volume_step``: after each global step the vertices that no bone holds are scaled about the mean of all by eq. 5.9.
+    ``volume_step``: after each global step the free vertices are scaled about the mean of all by eq. 5.9.
     ``iterations``: in each frame; their number is the method. With a ``tolerance`` [mm] a frame is done as soon as no vertex moved
     by more in an iteration, and the run is out of steps where a frame is not done after so many.
     """
@@ -163,8 +163,8 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
             moved = system.place(points, rotations)
             if settings.volume_step:
                 moved = scaled(moved, triangles, system.free, volume)
-            way, points = farthest(moved - points), moved
-            if settings.tolerance is not None and way <= settings.tolerance:
+            displacement, points = farthest(moved - points), moved
+            if settings.tolerance is not None and displacement <= settings.tolerance:
                 return Relaxed(points, count, True)
         return Relaxed(points, settings.iterations, settings.tolerance is None)
 
@@ -205,7 +205,7 @@ def march(
 def scaled(points: Floats, triangles: Ints, free: Ints, volume: float) -> Floats:
     """``points`` (n, 3) with the ``free`` ones scaled about the mean of all by the cube root of V0 / V, eq. 5.9.
 
-    V0 is ``volume`` [mm3]. It is reached where all are free: as those that a bone holds stay, some of it is missing. What encloses
+    V0 is ``volume`` [mm3]. It is reached where all are free: as attached ones stay, some of it is missing. What encloses
     nothing stays as it is.
     """
     centre, inside = points.mean(axis=0), abs(enclosed_volume(points, triangles))
@@ -215,9 +215,9 @@ def scaled(points: Floats, triangles: Ints, free: Ints, volume: float) -> Floats
     return found
 
 
-def farthest(ways: Floats) -> float:
-    """The greatest length of ``ways`` (n, 3)."""
-    return float(np.sqrt(np.max(np.einsum("ij,ij->i", ways, ways))))
+def farthest(displacements: Floats) -> float:
+    """The greatest length of ``displacements`` (n, 3)."""
+    return float(np.sqrt(np.max(np.einsum("ij,ij->i", displacements, displacements))))
 
 
 def factorised(matrix: Any) -> Any:

@@ -171,9 +171,9 @@ def move_out(points: Floats, obstacles: Sequence[Obstacle], stiffness: float) ->
 
     ``stiffness`` is the share of each way that is gone. The masses cancel: a constraint has one vertex.
     """
-    ways = np.zeros_like(points)
+    moves = np.zeros_like(points)
     for one in obstacles:
         near = one.near(points)
         inside = near.value < 0
-        ways[near.vertices[inside]] -= stiffness * near.value[inside, None] * near.away[inside]
-    points += ways
+        moves[near.vertices[inside]] -= stiffness * near.value[inside, None] * near.away[inside]
+    points += moves

@@ -34,13 +34,13 @@ class Via(Record):
 
 
 class SphereOn(bones.Sphere):
-    """A sphere, told at rest, that moves with a ``bone``."""
+    """A sphere, given at rest, that moves with a ``bone``."""
 
     bone: str
 
 
 class CylinderOn(bones.Rod):
-    """A cylinder that moves with a ``bone``; ``start`` and ``end``, told at rest, say where its axis is: it does not end there."""
+    """A cylinder that moves with a ``bone``; ``start`` and ``end``, given at rest, say where its axis is: it does not end there."""
 
     bone: str
 
@@ -90,7 +90,7 @@ class Lines:
 
 @dataclass(frozen=True)
 class Wrap:
-    """An ``obstacle``, told at rest, on a ``bone``; ``name`` is what messages call it."""
+    """An ``obstacle``, given at rest, on a ``bone``; ``name`` is what messages call it."""
 
     obstacle: Obstacle
     bone: RigidBody
@@ -182,8 +182,10 @@ def _lines(problem: Problem, settings: Settings) -> Lines:
 
 def _along(points: Floats, places: list[float]) -> Floats:
     """The points (k, 3) after ``places`` (k,) of the length of the polyline ``points`` (n, 3)."""
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    return np.column_stack([np.interp(np.array(places) * way[-1], way, points[:, axis]) for axis in range(3)])
+    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    return np.column_stack(
+        [np.interp(np.array(places) * travelled[-1], travelled, points[:, axis]) for axis in range(3)]
+    )
 
 
 def _spread(count: int, places: list[float]) -> tuple[Ints, Floats]:
@@ -199,7 +201,7 @@ def _spread(count: int, places: list[float]) -> tuple[Ints, Floats]:
 def _nearest(problem: Problem, points: Floats) -> Ints:
     """The index of the bone (n,) whose attachment has the vertex nearest to each of ``points`` (n, 3)."""
     if not problem.attached:
-        raise InputError("line_of_action", "a muscle that no bone holds", "attachments that lines are fixed to")
+        raise InputError("line_of_action", "a muscle without attachments", "attachments that lines are fixed to")
     away = np.array(
         [
             np.linalg.norm(points[:, None] - problem.surface.points[attached.vertices], axis=2).min(axis=1)

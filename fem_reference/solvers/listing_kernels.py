@@ -2,7 +2,7 @@
 
 Vertices are numbered from 0 here and from 1 there. ``bounds`` (2, m) is the listings' list of Dirichlet conditions: a row of
 vertices and a row of values. Lengths have any unit, or none: of the points of a mesh only the directions of its edges are felt.
-validation/octave holds the listings as Octave runs them, what they give, and how each misprint was read.
+validation/octave has the listings as Octave runs them, what they give, and how each misprint was read.
 """
 
 from typing import Any
@@ -112,7 +112,7 @@ def rim(triangles: Ints) -> Ints:
 
 
 def fixed_at_zero(vertices: Ints) -> Floats:
-    """Bounds (2, m) that hold ``vertices`` (m,) at 0."""
+    """Bounds (2, m) that fix ``vertices`` (m,) at 0."""
     return np.array([vertices, np.zeros(len(vertices))], dtype=np.float64)
 
 

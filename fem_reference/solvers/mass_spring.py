@@ -2,8 +2,8 @@
 
 A volumetric model, as Table 5.1 has it: the masses are the points of the tetrahedra, the springs their edges. (Janak's masses
 sample fibres and are joined to those near them; here the mesh says which are.) They carry the surface and the fibres along.
-Springs resist neither a change of volume nor a tetrahedron that turns inside out. Bones hold exactly, whatever the stiffness
-of an attachment. Where bones push, they push the masses of the surface: what is between those may be inside.
+Springs resist neither a change of volume nor a tetrahedron that turns inside out. Attachments are exact, whatever the stiffness
+of an attachment. Contact acts on the masses of the surface: what is between those may be inside.
 """
 
 import math
@@ -56,8 +56,8 @@ class Settings(Record):
     ``frame_time``: the solver's own time from a frame number to the next, and the longer it is the nearer the muscle is to
     equilibrium; the scene's interval is the clock of what the reference and recorded sequences do in time. ``damping``: the
     coefficient c, or ``"eq. 5.5"``, see ``report_damping``; without it none.
-    ``gravity``: an acceleration; without it none. ``collision``: bones push, at every step; without it not. ``time_step``: the
-    longest step wanted; without it one that is stable.
+    ``gravity``: an acceleration; without it none. ``collision``: contact with bones, at every step; without it none.
+    ``time_step``: the longest step wanted; without it one that is stable.
     """
 
     stiffness: Stiffness
@@ -118,8 +118,8 @@ def stable_time_step(network: Network, fixed: Ints) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A muscle as masses and springs: its ``network``, the masses that each attachment holds and all of them together, ``fixed``,
-    the bones as ``obstacles`` that push with ``stiffness``, and where the ``surface`` and the ``fibres`` are in the tetrahedra.
+    """A muscle as masses and springs: its ``network``, the masses of each attachment and all of them together, ``fixed``,
+    the bones as ``obstacles`` with ``stiffness``, and where the ``surface`` and the ``fibres`` are in the tetrahedra.
     """
 
     problem: Problem
@@ -165,16 +165,16 @@ class Model:
             move_out(points, self.obstacles, self.stiffness)
 
     def _carried(self, number: int) -> Floats:
-        """The masses (n, 3) [mm] at rest, but those that bones hold where they are at frame ``number``."""
+        """The masses (n, 3) [mm] at rest, but attached ones where they are at frame ``number``."""
         points = np.array(self.problem.mesh.points)
         for entry, masses in zip(self.problem.attached, self.attached, strict=True):
             points[masses] = apply(entry.bone.pose(number), points[masses])
         return points
 
     def frame(self, points: Floats, number: int) -> Frame:
-        """What masses at ``points`` (n, 3) make of surface and fibres; vertices that bones hold are where the bones have them.
+        """What masses at ``points`` (n, 3) make of surface and fibres; attached vertices are where the bones have them.
 
-        Scalars: ``unbalanced_max`` [N], the greatest force on a mass that none holds, and ``inverted_tets``, how many are inside
+        Scalars: ``unbalanced_max`` [N], the greatest force on a free mass, and ``inverted_tets``, how many are inside
         out.
         """
         given, mesh = self.problem, self.problem.mesh
@@ -193,7 +193,7 @@ class Model:
 
 
 def _obstacles(problem: Problem, fixed: Ints, gap: float) -> list[Obstacle]:
-    """All bones, as they push the masses of the surface that none of them holds."""
+    """All bones, as obstacles of the free masses of the surface."""
     loose = np.zeros(len(problem.mesh.points), bool)
     loose[boundary(problem.mesh.tets)[0]] = True
     loose[fixed] = False
@@ -224,8 +224,8 @@ def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
             return Outcome(found.status, f"frame {number}: {found.sentence}; {_advice(time_step, limit)}", cost)
         if number in problem.frames:
             sink(model.frame(points, number))
-    told = _inverted(points, problem.mesh.tets) + other_clock(problem, settings.frame_time)
-    return Outcome("converged", f"{last - first} frame numbers of {steps} steps of {time_step:.3g} s{told}", cost)
+    notes = _inverted(points, problem.mesh.tets) + other_clock(problem, settings.frame_time)
+    return Outcome("converged", f"{last - first} frame numbers of {steps} steps of {time_step:.3g} s{notes}", cost)
 
 
 def _too_many(steps: float, settings: Settings, network: Network) -> str:

@@ -42,7 +42,7 @@ _AS_NEAR = 1e-9
 
 
 class Collision(Record):
-    """How bones keep out what they do not hold: ``gap`` [mm], how near vertices may come, or as near as they are at rest;
+    """Contact of bones with free vertices: ``gap`` [mm], how near vertices may come, or as near as they are at rest;
     ``stiffness``, the share of the way out that one projection goes.
     """
 
@@ -59,7 +59,7 @@ class Settings(Record):
     share of its error that one projection of a constraint takes away, from 0 (constraint off) to 1.
 
     ``anisotropy`` a: edges have the stiffness ``stretch (1 - a |cos|)`` of their angle to the nearest fibre, both at rest;
-    1 in the report's program, when it has fibres. ``collision``: bones push (lines 12 to 14).
+    1 in the report's program, when it has fibres. ``collision``: contact with bones (lines 12 to 14).
     """
 
     sub_iterations: Annotated[int, Field(gt=0)]
@@ -78,7 +78,7 @@ class Constraints:
 
     ``lengths`` (e,) [mm] of ``edges`` (e, 2), of whose stiffness each has its ``share`` (e,); ``six_volumes`` [mm3], six
     times the volume inside ``triangles`` (m, 3); ``angles`` (e,) [rad] of ``hinges`` (e, 4), the two triangles at each
-    edge. ``inverse_masses`` (n,): 0 for a vertex that a bone holds, 1 for every other.
+    edge. ``inverse_masses`` (n,): 0 for an attached vertex, 1 for every other.
     """
 
     inverse_masses: Floats
@@ -142,13 +142,13 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
     obstacles = [] if settings.collision is None else obstacles_of(setup, settings.collision.gap)
     cost = {"seconds_compile": seconds_compile, "seconds_setup": time.perf_counter() - begin}
 
-    def iterate(points: Floats, way: Floats, frame: int) -> tuple[Floats, Floats]:
+    def iterate(points: Floats, displacement: Floats, frame: int) -> tuple[Floats, Floats]:
         carry(points, setup, frame)
         for one in obstacles:
             one.move(frame)
         for _ in range(settings.sub_iterations):
-            points, way = advance(points, way, constraints, settings, obstacles)
-        return points, way
+            points, displacement = advance(points, displacement, constraints, settings, obstacles)
+        return points, displacement
 
     return follow(setup, iterate, sink, cost)
 
@@ -164,23 +164,27 @@ def _constraints(setup: Setup, settings: Settings) -> Constraints:
 
 
 def obstacles_of(setup: Setup, gap: float) -> list[Obstacle]:
-    """All bones, as they push what none of them holds."""
+    """All bones, as obstacles of free vertices."""
     loose = np.ones(len(setup.surface.points), bool)
     loose[setup.attached_vertices] = False
     return [Obstacle(bone, setup.surface.points, loose, gap) for bone in setup.bones]
 
 
 def carry(points: Floats, setup: Setup, frame: float) -> None:
-    """Put the vertices that bones hold where those are at ``frame``."""
+    """Put the attached vertices where their bones are at ``frame``."""
     for entry in setup.attached:
         points[entry.vertices] = apply(entry.bone.pose(frame), setup.surface.points[entry.vertices])
 
 
 def advance(
-    points: Floats, way: Floats, constraints: Constraints, settings: Settings, obstacles: Sequence[Obstacle] = ()
+    points: Floats,
+    displacement: Floats,
+    constraints: Constraints,
+    settings: Settings,
+    obstacles: Sequence[Obstacle] = (),
 ) -> tuple[Floats, Floats]:
-    """Positions (n, 3) [mm] and ``way`` = dt v (n, 3) [mm] after one step of Algorithm 1, lines 8 to 20."""
-    moved = points + (1 - settings.damping) * way
+    """Positions (n, 3) [mm] and ``displacement`` = dt v (n, 3) [mm] after one step of Algorithm 1, lines 8 to 20."""
+    moved = points + (1 - settings.damping) * displacement
     at = constraints
     for _ in range(settings.solver_iterations):
         project_distances(moved, at.inverse_masses, at.edges, at.lengths, settings.stretch * at.share)

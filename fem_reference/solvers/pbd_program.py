@@ -127,7 +127,7 @@ class Bone:
             self.last = np.round(given @ np.linalg.inv(self.given), DIGITS)
             self.given, self.pose = given, self.last @ self.pose
 
-    def push(self, reached: Floats, starts: Floats, goals: Floats) -> None:
+    def move_out(self, reached: Floats, starts: Floats, goals: Floats) -> None:
         """Correct where vertices that go from ``starts`` (n, 3) to ``goals`` (n, 3) [mm] come to be: ``reached`` (n, 3)."""
         back, voxels = np.linalg.inv(self.pose), self.voxels
         before, after = apply(back, starts), apply(back, goals)
@@ -135,8 +135,8 @@ class Bone:
         stuck = are_inside(voxels.inside, first)
         entered = are_inside(voxels.inside, last) & ~stuck
         reached[stuck] = apply(self.pose, apply(self.last, before[stuck]))
-        ways = (before - after)[entered] * (1 / voxels.size)
-        ends, too_far = march_out(voxels.inside, last[entered], ways)
+        displacements = (before - after)[entered] * (1 / voxels.size)
+        ends, too_far = march_out(voxels.inside, last[entered], displacements)
         reached[entered] = apply(self.pose, np.where(too_far[:, None], before[entered], voxels.points(ends)))
 
 
@@ -214,7 +214,7 @@ def collided(starts: Floats, goals: Floats, bones: Sequence[Bone]) -> Floats:
     """Where vertices come to be, (n, 3) [mm], that go from ``starts`` to ``goals`` (n, 3) among ``bones``."""
     reached = goals.copy()
     for bone in bones:
-        bone.push(reached, starts, goals)
+        bone.move_out(reached, starts, goals)
     return reached
 
 

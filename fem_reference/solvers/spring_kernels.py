@@ -74,9 +74,9 @@ def advance(
             gain = time_step * time_step / network.masses[i]
             kept = 1 - time_step * network.damping / network.masses[i]
             for axis in range(3):
-                way = points[i, axis] - previous[i, axis]
+                displacement = points[i, axis] - previous[i, axis]
                 previous[i, axis] = points[i, axis]
-                points[i, axis] += kept * way + gain * acting[i, axis]
+                points[i, axis] += kept * displacement + gain * acting[i, axis]
         share = step / steps
         for h in range(len(path.fixed)):
             i = path.fixed[h]

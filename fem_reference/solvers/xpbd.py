@@ -42,7 +42,7 @@ from fem_reference.solvers.xpbd_kernels import pull_dihedrals, pull_distances, p
 
 
 class Collision(Record):
-    """How bones keep out what they do not hold: ``gap`` [mm], how near vertices may come, or as near as they are at rest;
+    """Contact of bones with free vertices: ``gap`` [mm], how near vertices may come, or as near as they are at rest;
     ``stiffness`` [MPa/mm]: pressed by p, the surface gets p / stiffness nearer.
     """
 
@@ -59,7 +59,7 @@ class Settings(Record):
 
     ``stretch`` [N/mm]: Young's modulus times thickness of the membrane. ``bending`` [N mm]: its stiffness as a plate. ``volume``
     [MPa]: bulk modulus of what it encloses. ``damping`` [1/s]: rate at which velocities decay that nothing keeps up.
-    ``collision``: bones push.
+    ``collision``: contact with bones.
     """
 
     frame_time: Time
@@ -153,26 +153,26 @@ def pair_areas(points: Floats, hinges: Ints) -> Floats:
 
 
 class Contact:
-    """An obstacle, how softly it pushes each vertex, (n,) [mm/N], and the multipliers (n,) of the present time step."""
+    """An obstacle, its contact softness at each vertex, (n,) [mm/N], and the multipliers (n,) of the present time step."""
 
     def __init__(self, obstacle: Obstacle, softness: Floats) -> None:
         self.obstacle, self.softness = obstacle, softness
         self.multipliers = np.zeros(len(softness))
 
     def begin(self) -> None:
-        """A time step begins: nothing pushes yet."""
+        """A time step begins: no contact yet."""
         self.multipliers[:] = 0
 
-    def push(self, points: Floats, inverse_masses: Floats, seconds: float) -> Floats:
-        """The ways (n, 3) [mm] of one projection: bones push and never pull, so that no multiplier is below 0."""
+    def project(self, points: Floats, inverse_masses: Floats, seconds: float) -> Floats:
+        """The ways (n, 3) [mm] of one projection: contact never pulls, so that no multiplier is below 0."""
         vertices, value, away = self.obstacle.near(points)
         soft, before, mass = self.softness[vertices] / seconds**2, self.multipliers[vertices], inverse_masses[vertices]
         after = np.maximum(before - (value + soft * before) / (mass + soft), 0)
         self.multipliers[vertices] = after
         self.obstacle.watch(vertices[after > 0])
-        ways = np.zeros_like(points)
-        ways[vertices] = ((after - before) * mass)[:, None] * away
-        return ways
+        moves = np.zeros_like(points)
+        moves[vertices] = ((after - before) * mass)[:, None] * away
+        return moves
 
 
 def advance(
@@ -191,7 +191,7 @@ def advance(
         pull_distances(moved, at.inverse_masses, at.edges, at.lengths, edges, of_edges)
         of_volume = pull_volume(moved, at.inverse_masses, at.triangles, at.six_volumes, enclosed, of_volume)
         pull_dihedrals(moved, at.inverse_masses, at.hinges, at.angles, hinges, of_hinges)
-        moved += sum((contact.push(moved, at.inverse_masses, dt) for contact in contacts), np.zeros_like(moved))
+        moved += sum((contact.project(moved, at.inverse_masses, dt) for contact in contacts), np.zeros_like(moved))
     return moved, (moved - points) / dt
 
 
@@ -225,7 +225,7 @@ def other_clock(setup: Setup, frame_time: float) -> str:
 
 
 def _contacts(setup: Setup, settings: Settings) -> list[Contact]:
-    """One of each bone, where bones push."""
+    """One of each bone, where there is contact."""
     if settings.collision is None:
         return []
     softness = 1 / (settings.collision.stiffness * vertex_areas(setup.surface))

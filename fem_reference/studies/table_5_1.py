@@ -18,7 +18,7 @@ from fem_reference.studies.execution import Bench, complete
 log = logging.getLogger(__name__)
 
 # Our own, which need nothing, and the five of the report (6.1.3 to 6.1.6). Its iliacus as the report's program attached it has no
-# solution beyond frame 77 (see the case): here it is attached where the anatomy holds it.
+# solution beyond frame 77 (see the case): here it has its anatomical attachments.
 SCENARIOS = (
     "hip_flexion",
     "box_squeeze",

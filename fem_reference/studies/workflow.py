@@ -1,4 +1,4 @@
-"""The way from a case to a page, one call a step: what the package offers to Python."""
+"""The steps from a case to a page, one call each: what the package offers to Python."""
 
 import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence

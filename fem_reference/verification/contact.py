@@ -1,4 +1,4 @@
-"""Bodies that are pushed by rigid ones: a plate on a block, and a ball on a large body, as Hertz has it."""
+"""Contact of bodies with rigid ones: a plate on a block, and a ball on a large body, as Hertz has it."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -27,11 +27,11 @@ BALL_STIFFNESS, FAR, CORE = 2.0, 300.0, 1.2  # [MPa/mm]; where the body ends, an
 
 @dataclass(frozen=True)
 class Slide:
-    """A rigid body, turned by the rotation vector ``turned`` [rad] and moved by ``start`` [mm], that goes by ``way`` [mm] from
+    """A rigid body, turned by the rotation vector ``turned`` [rad] and moved by ``start`` [mm], that goes by ``path`` [mm] from
     frame 0 to frame 1.
     """
 
-    way: Vector
+    path: Vector
     start: Vector = (0.0, 0.0, 0.0)
     turned: Vector = (0.0, 0.0, 0.0)
 
@@ -39,7 +39,7 @@ class Slide:
         """Its pose, 4 x 4."""
         pose = np.eye(4)
         pose[:3, :3] = Rotation.from_rotvec(self.turned).as_matrix()
-        pose[:3, 3] = np.array(self.start) + np.array(self.way) * frame
+        pose[:3, 3] = np.array(self.start) + np.array(self.path) * frame
         return pose
 
 
@@ -64,7 +64,7 @@ def _plate_truth() -> float:
 
 
 def pressed(lab: Lab, n: int, radius: float = RADIUS) -> Reached:
-    """A quarter of a large body, z >= 0, into which a ball of ``radius`` [mm] is pushed by APPROACH."""
+    """A quarter of a large body, z >= 0, into which a ball of ``radius`` [mm] is pressed by APPROACH."""
     mesh = shapes.ball_octant(CORE, FAR, n, 2 * n + 2, "hexahedron", 2)
     law = Contact("z0", BALL_STIFFNESS, 5e-4)
     ball = Obstruction("ball", Sphere((0.0, 0.0, -radius), radius), Slide((0.0, 0.0, APPROACH)))

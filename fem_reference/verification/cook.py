@@ -88,8 +88,8 @@ class Panel:
         return Finding(self.tip(lab, n) / self.true_tip())
 
 
-def _tip_entry(name: str, title: str, panel: Panel, counts: tuple[int, ...], within: float, **told: Any) -> Entry:
-    """An entry whose value is the tip; ``told`` has ``because``, ``negative_control`` and ``with_negative_control``."""
+def _tip_entry(name: str, title: str, panel: Panel, counts: tuple[int, ...], within: float, **fields: Any) -> Entry:
+    """An entry whose value is the tip; ``fields`` has ``because``, ``negative_control`` and ``with_negative_control``."""
     return Entry(
         name=name,
         family=FAMILY,
@@ -101,7 +101,7 @@ def _tip_entry(name: str, title: str, panel: Panel, counts: tuple[int, ...], wit
         kind="second solver",
         source=SOURCE,
         measure=partial(panel.ladder, counts=counts),
-        **told,
+        **fields,
     )
 
 

@@ -1,4 +1,4 @@
-"""Drag of the ground: a body that nothing holds, and a bar that creeps back."""
+"""Drag of the ground: a free body, and a bar that creeps back."""
 
 import numpy as np
 
@@ -33,14 +33,14 @@ def _velocity(lab: Lab, seconds: float = _SECONDS) -> Finding:
     acting = (*NEO.effects, resistance("P2/P1", 100 * MU), weight, drag(_DRAG))
     body = Body(mesh, acting, (), (0, 1, 5), interval=seconds)
     solved = lab.solve(body, "P2/P1", first_step=0.5, residual=1e-13)
-    way = (solved.last.points - solved.states[1].points)[:, 2]
-    return Finding(float(way[np.argmax(np.abs(way))]) / (4 * _SECONDS))
+    displacement = (solved.last.points - solved.states[1].points)[:, 2]
+    return Finding(float(displacement[np.argmax(np.abs(displacement))]) / (4 * _SECONDS))
 
 
 _FALL = Entry(
     name="damped_fall",
     family=FAMILY,
-    title="Block that nothing holds, with a drag and its weight: the speed of its fastest node",
+    title="Free block, with a drag and its weight: the speed of its fastest node",
     unit="mm/s",
     truth=lambda: -float(truths.find("damping").terminal_velocity(MUSCLE * FREE_FALL, _DRAG)),
     within=1e-9,

@@ -15,7 +15,7 @@ from fem_reference.runs.solved import Reached
 from fem_reference.verification import truths
 from fem_reference.verification.parts import ladder, neo_hooke, once
 
-MU, BULK = 0.01, 1e4  # [MPa]; the truth is of incompressible matter
+MU, BULK = 0.01, 1e4  # [MPa]; the truth is of incompressible material
 THICKNESS, LENGTH, WIDTH = 10.0, 20.0, 2.5  # [mm]
 ANGLE = 1.0  # [rad], between the ends: the faces are at 15.7 and 25.4 mm
 
@@ -119,7 +119,7 @@ ENTRIES: tuple[Entry, ...] = (
         unit="N",
         truth=_true_moment,
         within=5e-5,
-        because="discretisation of order 4, 1e-5 with 8 cells through the thickness; the matter's K/mu of 1e6 adds 1e-6",
+        because="discretisation of order 4, 1e-5 with 8 cells through the thickness; the material's K/mu of 1e6 adds 1e-6",
         measure=partial(_UP, value=partial(_moment, element="P2/P1"), counts=(1, 2, 4), truth=_true_moment),
         negative_control="one lateral face is free, so that the block may change its width",
         with_negative_control=partial(once, value=partial(_moment, element="P2/P1", faces=_FREE), count=4),

@@ -36,7 +36,7 @@ class Helix:
         return np.asarray(find("land").fibre(points))
 
 
-def matter(problem: Any, element: str, on: str, bulk: float) -> tuple[Effect, ...]:
+def effects_of(problem: Any, element: str, on: str, bulk: float) -> tuple[Effect, ...]:
     """What acts in a ``problem`` of ``validation.land``, its pressure ``on`` a part of the surface; ``bulk``: K [MPa]."""
     law = problem.law
     acting = (
@@ -71,23 +71,23 @@ class Heart:
         """Half of the beam of problem 1, y <= 0.5, in 10n by n by 2n cells."""
         mesh = shapes.box((10 * n, n, 2 * n), (10.0, 0.5, 1.0), ELEMENTS[self.element][0], self.degree)
         fixed = (Prescribed("clamp", "x0", (0, 1, 2), Rest()), Prescribed("middle", "y1", (1,), Rest()))
-        return Body(mesh, matter(self.problem(1), self.element, "z0", self.bulk), fixed, (0.0, 1.0), Along(X))
+        return Body(mesh, effects_of(self.problem(1), self.element, "z0", self.bulk), fixed, (0.0, 1.0), Along(X))
 
     def passive(self, counts: shapes.Counts) -> Body:
-        """A quarter of the ventricle of problem 2, whose matter is the same in all directions."""
+        """A quarter of the ventricle of problem 2, whose material is the same in all directions."""
         mesh = shapes.ventricle_quarter(counts, ELEMENTS[self.element][0], self.degree)
         fixed = (
             Prescribed("base", "base", (0, 1, 2), Rest()),
             Prescribed("x0", "x0", (0,), Rest()),
             Prescribed("y0", "y0", (1,), Rest()),
         )
-        return Body(mesh, matter(self.problem(2), self.element, "endo", self.bulk), fixed, (0.0, 1.0), Along(X))
+        return Body(mesh, effects_of(self.problem(2), self.element, "endo", self.bulk), fixed, (0.0, 1.0), Along(X))
 
     def contracting(self, n: int) -> Body:
         """The ventricle of problem 3, whose pressure and tension grow together, with n cells around an eighth of a turn."""
         mesh = _crowded(shapes.ventricle((n, 7 * n // 2, n), ELEMENTS[self.element][0], self.degree))
         fixed = (Prescribed("base", "base", (0, 1, 2), Rest()),)
-        return Body(mesh, matter(self.problem(3), self.element, "endo", self.bulk), fixed, (0.0, 1.0), Helix())
+        return Body(mesh, effects_of(self.problem(3), self.element, "endo", self.bulk), fixed, (0.0, 1.0), Helix())
 
     def height(self, lab: Lab, body: Body, point: Point) -> float:
         """The z [mm] to which the node at ``point`` of one of the bodies goes."""
@@ -127,8 +127,8 @@ def _ladder(lab: Lab, value: Value, counts: tuple[int, ...], size: float) -> Fin
     return Finding(steps[-1][1], ladder=steps)
 
 
-def _entry(name: str, title: str, truth: Callable[[], float], within: float, **told: Any) -> Entry:
-    """An entry whose value is a z [mm]; ``told`` has ``because``, ``measure``, ``negative_control`` and
+def _entry(name: str, title: str, truth: Callable[[], float], within: float, **fields: Any) -> Entry:
+    """An entry whose value is a z [mm]; ``fields`` has ``because``, ``measure``, ``negative_control`` and
     ``with_negative_control``.
     """
     return Entry(
@@ -141,7 +141,7 @@ def _entry(name: str, title: str, truth: Callable[[], float], within: float, **t
         relative=True,
         kind="published",
         source=SOURCE,
-        **told,
+        **fields,
     )
 
 

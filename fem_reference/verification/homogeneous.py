@@ -1,4 +1,4 @@
-"""Blocks in homogeneous states: finite elements that hold linear functions are exact there, so only rounding is left.
+"""Blocks in homogeneous states: finite elements that represent linear functions are exact there, so only rounding is left.
 
 ``Specimen`` serves the entries of fibres and loads too. The bulk modulus is finite in the body and in the truth alike.
 """
@@ -127,7 +127,7 @@ class Specimen:
 
 
 SOURCE = "validation/homogeneous.py: balance by root finding (Ogden 1984, ch. 4.3)"
-EXACT = "The element holds the exact answer: what is left is rounding and the residual of 1e-13 N that ends Newton's method."
+EXACT = "The element represents the exact answer: what is left is rounding and the residual of 1e-13 N that ends Newton's method."
 
 
 def force_entry(family: str, name: str, title: str, specimen: Specimen, control: tuple[str, Specimen]) -> Entry:

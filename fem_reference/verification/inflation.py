@@ -20,12 +20,12 @@ from fem_reference.problems.paths import Radial, Rest
 from fem_reference.runs.solved import Solved
 from fem_reference.verification import truths
 from fem_reference.verification.parts import SYMMETRY, ladder, mooney_rivlin, neo_hooke, once, ramp
-from fem_reference.verification.torsion import Matter
+from fem_reference.verification.torsion import Material
 
 # [MPa]; C1 and C2 make a Mooney-Rivlin law of the shear modulus MU. Pressures are proportional to the moduli.
 MU, BULK = 1.0, 1e4
 C1, C2 = 0.3, 0.2
-NEARLY = 1e6  # [MPa], the bulk modulus where the truth is of incompressible matter
+NEARLY = 1e6  # [MPa], the bulk modulus where the truth is of incompressible material
 INNER, OUTER, LENGTH = 10.0, 20.0, 5.0  # radii of sphere and tube, length of the tube [mm]
 STRETCH, BEYOND = 1.5, 2.2  # a / A of the inner face; the pressure of the sphere is largest at 1.83
 PRESSED = 0.7  # [MPa], of 0.82 that the sphere can bear
@@ -52,34 +52,34 @@ def slope(solved: Solved) -> Chebyshev:
     return Chebyshev.fit(frames, energies, len(frames) - 1, domain=[frames[0], end]).deriv()
 
 
-def _blown(lab: Lab, n: int, element: str, matter: Matter, degree: int = 2, largest: float = 1.6) -> Pressures:
+def _blown(lab: Lab, n: int, element: str, material: Material, degree: int = 2, largest: float = 1.6) -> Pressures:
     """The pressures of the sphere whose inner face is moved out up to the largest stretch: it encloses ``pi a^3 / 6``."""
     grown = Prescribed("inner", "inner", (0, 1, 2), Radial(1.0, knots=((1.0, 0.0), (2.0, 1.0), (3.0, 2.0))))
     frames = stretches(largest, 8 if largest < 2 else 10)
-    body = Body(sphere(element, n, degree), matter(), (*SYMMETRY, grown), frames)
+    body = Body(sphere(element, n, degree), material(), (*SYMMETRY, grown), frames)
     curve = slope(lab.solve(body, element, first_step=0.2, residual=RESIDUAL))
     return lambda stretch: float(curve(stretch) / (np.pi / 2 * INNER**3 * stretch**2))
 
 
-def _pressure(lab: Lab, n: int, element: str, matter: Matter, degree: int = 2) -> float:
+def _pressure(lab: Lab, n: int, element: str, material: Material, degree: int = 2) -> float:
     """In the sphere at STRETCH [MPa]."""
-    return _blown(lab, n, element, matter, degree)(STRETCH)
+    return _blown(lab, n, element, material, degree)(STRETCH)
 
 
-def _limit_stretch(lab: Lab, n: int, matter: Matter) -> float:
+def _limit_stretch(lab: Lab, n: int, material: Material) -> float:
     """Where the pressure in the sphere is largest."""
-    return _top(_blown(lab, n, "Q2/Q1", matter, largest=BEYOND))
+    return _top(_blown(lab, n, "Q2/Q1", material, largest=BEYOND))
 
 
-def _limit_pressure(lab: Lab, n: int, matter: Matter, degree: int = 2) -> float:
+def _limit_pressure(lab: Lab, n: int, material: Material, degree: int = 2) -> float:
     """The largest pressure in the sphere [MPa]."""
-    pressures = _blown(lab, n, "Q2/Q1", matter, degree, BEYOND)
+    pressures = _blown(lab, n, "Q2/Q1", material, degree, BEYOND)
     return pressures(_top(pressures))
 
 
-def _fall(lab: Lab, n: int, matter: Matter) -> float:
+def _fall(lab: Lab, n: int, material: Material) -> float:
     """From the largest pressure in the sphere to that at BEYOND [MPa]."""
-    pressures = _blown(lab, n, "Q2/Q1", matter, largest=BEYOND)
+    pressures = _blown(lab, n, "Q2/Q1", material, largest=BEYOND)
     return pressures(_top(pressures)) - pressures(BEYOND)
 
 
@@ -120,8 +120,8 @@ def _tube_force(lab: Lab, n: int, element: str, degree: int = 2) -> float:
 
 def _true_pressure(law: Callable[[Any], Any]) -> float:
     """In the sphere at STRETCH [MPa], of a law of ``validation/laws.py``."""
-    matter = law(truths.find("laws"))
-    return float(truths.find("radial").sphere_pressure(matter, BULK, (INNER, OUTER), STRETCH))
+    material = law(truths.find("laws"))
+    return float(truths.find("radial").sphere_pressure(material, BULK, (INNER, OUTER), STRETCH))
 
 
 def _true_pressed() -> float:
@@ -185,11 +185,11 @@ ENTRIES: tuple[Entry, ...] = (
         within=2e-4,
         because="discretisation of order 4, 5e-5 with 6 cells through the wall; the polynomial of the energy adds 1e-6",
         measure=partial(
-            _UP, value=partial(_pressure, element="P2/P1", matter=_NEO_HOOKE), counts=(1, 2, 3), truth=_TRUE_PRESSURE
+            _UP, value=partial(_pressure, element="P2/P1", material=_NEO_HOOKE), counts=(1, 2, 3), truth=_TRUE_PRESSURE
         ),
         negative_control="straight cells, whose surfaces have flat facets",
         with_negative_control=partial(
-            once, value=partial(_pressure, element="P2/P1", matter=_NEO_HOOKE, degree=1), count=3
+            once, value=partial(_pressure, element="P2/P1", material=_NEO_HOOKE, degree=1), count=3
         ),
     ),
     _FINITE(
@@ -200,11 +200,11 @@ ENTRIES: tuple[Entry, ...] = (
         within=4e-4,
         because="discretisation of order 4, 1.1e-4 with 4 cells through the wall; the polynomial of the energy adds 1e-6",
         measure=partial(
-            _UP, value=partial(_pressure, element="Q2/Q1", matter=_NEO_HOOKE), counts=(1, 2), truth=_TRUE_PRESSURE
+            _UP, value=partial(_pressure, element="Q2/Q1", material=_NEO_HOOKE), counts=(1, 2), truth=_TRUE_PRESSURE
         ),
         negative_control="straight cells, whose surfaces have flat facets",
         with_negative_control=partial(
-            once, value=partial(_pressure, element="Q2/Q1", matter=_NEO_HOOKE, degree=1), count=2
+            once, value=partial(_pressure, element="Q2/Q1", material=_NEO_HOOKE, degree=1), count=2
         ),
     ),
     _FINITE(
@@ -214,9 +214,9 @@ ENTRIES: tuple[Entry, ...] = (
         truth=partial(_true_pressure, lambda laws: laws.MooneyRivlin(C1, C2)),
         within=4e-4,
         because="discretisation of order 4, 1e-4 with 4 cells through the wall (Q2/Q1)",
-        measure=partial(once, value=partial(_pressure, element="Q2/Q1", matter=_MOONEY_RIVLIN), count=2),
-        negative_control="neo-Hookean matter of the same shear modulus",
-        with_negative_control=partial(once, value=partial(_pressure, element="Q2/Q1", matter=_NEO_HOOKE), count=2),
+        measure=partial(once, value=partial(_pressure, element="Q2/Q1", material=_MOONEY_RIVLIN), count=2),
+        negative_control="neo-Hookean material of the same shear modulus",
+        with_negative_control=partial(once, value=partial(_pressure, element="Q2/Q1", material=_NEO_HOOKE), count=2),
     ),
     _FINITE(
         name="inflation_sphere_stretch",
@@ -236,10 +236,10 @@ ENTRIES: tuple[Entry, ...] = (
         truth=_true_limit_pressure,
         within=4e-4,
         because="discretisation of order 4, 1e-4 with 4 cells through the wall (Q2/Q1); the polynomial adds 1e-6",
-        measure=partial(once, value=partial(_limit_pressure, matter=_NEARLY_INCOMPRESSIBLE), count=2),
+        measure=partial(once, value=partial(_limit_pressure, material=_NEARLY_INCOMPRESSIBLE), count=2),
         negative_control="straight cells, whose surfaces have flat facets",
         with_negative_control=partial(
-            once, value=partial(_limit_pressure, matter=_NEARLY_INCOMPRESSIBLE, degree=1), count=2
+            once, value=partial(_limit_pressure, material=_NEARLY_INCOMPRESSIBLE, degree=1), count=2
         ),
     ),
     _LIMIT(
@@ -249,9 +249,9 @@ ENTRIES: tuple[Entry, ...] = (
         truth=_true_limit_stretch,
         within=1e-4,
         because="discretisation of order 4, 2e-5 with 4 cells through the wall (Q2/Q1)",
-        measure=partial(once, value=partial(_limit_stretch, matter=_NEARLY_INCOMPRESSIBLE), count=2),
-        negative_control="Mooney-Rivlin matter of the same shear modulus, whose pressure goes on rising",
-        with_negative_control=partial(once, value=partial(_limit_stretch, matter=_MOONEY_RIVLIN), count=2),
+        measure=partial(once, value=partial(_limit_stretch, material=_NEARLY_INCOMPRESSIBLE), count=2),
+        negative_control="Mooney-Rivlin material of the same shear modulus, whose pressure goes on rising",
+        with_negative_control=partial(once, value=partial(_limit_stretch, material=_MOONEY_RIVLIN), count=2),
     ),
     _LIMIT(
         name="inflation_fall_beyond_limit",
@@ -260,9 +260,9 @@ ENTRIES: tuple[Entry, ...] = (
         truth=_true_fall,
         within=2e-3,
         because="4 % of a pressure that is found to 1e-4: of its error 2e-4 is left (Q2/Q1, 4 cells through the wall)",
-        measure=partial(once, value=partial(_fall, matter=_NEARLY_INCOMPRESSIBLE), count=2),
-        negative_control="Mooney-Rivlin matter of the same shear modulus, whose pressure goes on rising",
-        with_negative_control=partial(once, value=partial(_fall, matter=_MOONEY_RIVLIN), count=2),
+        measure=partial(once, value=partial(_fall, material=_NEARLY_INCOMPRESSIBLE), count=2),
+        negative_control="Mooney-Rivlin material of the same shear modulus, whose pressure goes on rising",
+        with_negative_control=partial(once, value=partial(_fall, material=_MOONEY_RIVLIN), count=2),
     ),
     _FINITE(
         name="inflation_tube_pressure",

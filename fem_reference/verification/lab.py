@@ -1,4 +1,4 @@
-"""Where entries are measured: one process of FEniCSx, and scikit-fem."""
+"""The solvers that measure entries: one process of FEniCSx, and scikit-fem."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

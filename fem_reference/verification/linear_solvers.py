@@ -1,4 +1,4 @@
-"""How linear systems are solved changes the time and not the answer: the same body by each solver of the reference."""
+"""Linear solvers change the time and not the answer: the same body by each solver of the reference."""
 
 from dataclasses import dataclass, replace
 from typing import Any

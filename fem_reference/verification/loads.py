@@ -136,7 +136,7 @@ _HYDROSTATIC = Entry(
     truth=lambda: float(truths.find("loads").pressed_volume(_COMPRESSIBLE, _FLUID)),
     within=1e-12,
     relative=True,
-    because="The element holds the exact answer, but for the residual: 1e-13 N may add up over the 100 nodes to 10 times as much, "
+    because="The element has the exact answer, but for the residual: 1e-13 N may add up over the 100 nodes to 10 times as much, "
     "and a pressure of this over a face of 3 mm2 changes the volume by 3e-13.",
     kind="closed form",
     source="validation/loads.py, pressed_volume",

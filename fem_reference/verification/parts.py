@@ -1,4 +1,4 @@
-"""What entries are made of: effects as scene files write them, planes of symmetry, values on ladders of meshes."""
+"""Parts of entries: effects as scene files write them, planes of symmetry, values on ladders of meshes."""
 
 from collections.abc import Callable
 
@@ -26,12 +26,12 @@ def resistance(element: str, bulk: float) -> Effect:
 
 
 def neo_hooke(mu: float, bulk: float) -> tuple[Effect, ...]:
-    """Matter of the moduli ``mu`` and ``bulk`` [MPa], the latter in mixed form."""
+    """Material of the moduli ``mu`` and ``bulk`` [MPa], the latter in mixed form."""
     return make("neo_hooke", mu=f"{mu} MPa"), make("incompressible", bulk=f"{bulk} MPa")
 
 
 def mooney_rivlin(c1: float, c2: float, bulk: float) -> tuple[Effect, ...]:
-    """Matter of ``c1``, ``c2`` and the modulus ``bulk`` [MPa], the latter in mixed form."""
+    """Material of ``c1``, ``c2`` and the modulus ``bulk`` [MPa], the latter in mixed form."""
     return make("mooney_rivlin", c1=f"{c1} MPa", c2=f"{c2} MPa"), make("incompressible", bulk=f"{bulk} MPa")
 
 

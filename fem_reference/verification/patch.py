@@ -1,4 +1,6 @@
-"""What every element must hold exactly, whatever the shape of its cells: linear functions, and turns of any size."""
+"""Patch tests: what every element must represent exactly, whatever the shape of its cells: linear functions, and turns of any
+size.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -97,7 +99,7 @@ def _patch(element: str, degree: int = 1) -> Entry:
     return Entry(
         name=f"patch_{element.lower().replace('/', '_')}{'_curved' if degree == 2 else ''}",
         family="patch tests",
-        title=f"{element} on {shape} cells holds a stretch, a shear and a turn at once: largest error of a node",
+        title=f"{element} on {shape} cells represents a stretch, a shear and a turn at once: largest error of a node",
         unit="mm",
         truth=zero,
         within=WITHIN,

@@ -62,8 +62,8 @@ def _known(catalogue: dict[str, Entry], text: str) -> str:
     """What could have been meant by ``text``: the names closest to it, and every family."""
     families = dict.fromkeys(entry.family for entry in catalogue.values())
     near = get_close_matches(text, catalogue, n=5)
-    told = f" (such as {', '.join(near)})" if near else ""
-    return f"an entry{told}, a family ({', '.join(families)}) or a pattern of them"
+    such = f" (such as {', '.join(near)})" if near else ""
+    return f"an entry{such}, a family ({', '.join(families)}) or a pattern of them"
 
 
 def run(
@@ -77,12 +77,12 @@ def run(
     Two at a time where there are two cores, each thread with a lab of its own. However this ends, its labs are closed.
     """
     waiting, found = deque(enumerate(wanted)), dict[int, Result]()
-    telling, begin = threading.Lock(), time.perf_counter()
+    reporting, begin = threading.Lock(), time.perf_counter()
 
     def work(lab: Lab) -> None:
         for place, entry in _taken(waiting):
             last = _measured(entry, lab, with_negative_control=entry.name in with_negative_control)
-            with telling:
+            with reporting:
                 found[place] = last
                 _log_progress(last, len(found), len(wanted), time.perf_counter() - begin)
 

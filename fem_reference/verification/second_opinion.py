@@ -181,7 +181,7 @@ _SPECIMENS = {
         "with two families of fibres, stretched alike along two axes",
         Specimen(NEO + fibres.two_families(30.0), "P2/P1", "equibiaxial", 1.25),
     ),
-    "planar": ("of Mooney-Rivlin matter, shortened with its width fixed", Specimen(MOONEY, "Q1/P0", "planar", 0.7)),
+    "planar": ("of Mooney-Rivlin material, shortened with its width fixed", Specimen(MOONEY, "Q1/P0", "planar", 0.7)),
     "simple_shear": ("of Guccione's heart muscle in simple shear", Specimen(HEART, "P2/P1", "simple_shear", 0.3)),
     "pulled": (
         "with active fibres, pulled by a dead force",
@@ -199,7 +199,7 @@ _SPECIMENS = {
         "of prestretched muscle, fixed",
         Specimen(fibres.taut(NEO + fibres.passive(), 1.2), "P2/P1", "uniaxial", 1.0),
     ),
-    "neo_hooke": ("of neo-Hookean matter, stretched along one axis", Specimen(NEO, "P1", "uniaxial", 1.6)),
+    "neo_hooke": ("of neo-Hookean material, stretched along one axis", Specimen(NEO, "P1", "uniaxial", 1.6)),
 }
 
 ENTRIES = (
@@ -220,7 +220,7 @@ ENTRIES = (
     ),
     _entry(
         "homogeneous",
-        "A block of Mooney-Rivlin matter pulled to 1.3 times its length,",
+        "A block of Mooney-Rivlin material pulled to 1.3 times its length,",
         Sample((MOONEY_RIVLIN, MIXED), SHORT_BAR, PULLED, "P2/P1", 4),
         1e-11,
         _CONSTANT,

@@ -1,4 +1,4 @@
-"""A box to squeeze between plates, straight fibres in it, and where to hold it loosely.
+"""A box to squeeze between plates, straight fibres in it, and where to attach it loosely.
 
     python meshes/box/build.py
 

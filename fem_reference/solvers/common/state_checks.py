@@ -7,7 +7,7 @@ import numpy as np
 from fem_reference.foundations.mesh import Floats, Ints, Surface, enclosed_volume
 from fem_reference.runs.store import Status
 
-# A body spread this many times as wide as at rest, or as what the bones hold of it, is lost.
+# A body spread this many times as wide as at rest, or as its attached part, is lost.
 _WIDE = 10.0
 # So is one of this many times its volume. Flesh keeps its volume within a few percent, and a surface that keeps its dihedral
 # angles alone was seen at twice its volume; one blown up by a wrong root or by scaling has no such bound. What the bones draw
@@ -24,7 +24,7 @@ class Trouble:
 
 
 def trouble(points: Floats, rest: Surface, attached: Ints) -> Trouble | None:
-    """What is wrong with ``points`` (n, 3) [mm] of a closed surface, of which bones hold ``attached`` (k,); None if nothing is."""
+    """What is wrong with ``points`` (n, 3) [mm] of a closed surface, with ``attached`` vertices (k,); None if nothing is."""
     lost = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if len(lost):
         return Trouble("diverged", f"the position of {len(lost)} points is not a number (point {lost[0]} for one)")

@@ -94,15 +94,15 @@ def _pass_on(problem: Problem, frame: Frame, sink: Sink, passed: list[int]) -> N
     """A frame that is wanted, its number noted in ``passed``; what relaxes before the first is not."""
     if frame.number in problem.frames:
         if not passed and (overlap := frame.scalars.get("overlap_at_rest", 0.0)) > 0:
-            frame = replace(frame, note=f"{frame.note}, {overlap:.2g} mm of overlap with bones at rest pushed out")
+            frame = replace(frame, note=f"{frame.note}, {overlap:.2g} mm of overlap with bones at rest removed")
         passed.append(int(frame.number))
         sink(_with_attachment_errors(problem, replace(frame, number=int(frame.number))))
 
 
 def _with_attachment_errors(problem: Problem, frame: Frame) -> Frame:
-    """The frame with how far the surface vertices that bones hold are from where the bones have them, ``held_off_rms`` and
+    """The frame with how far the surface vertices attached to bones are from where the bones have them, ``held_off_rms`` and
     ``held_off_max`` [mm]: exact attachments are facets of tets, which cover them only roughly, and springs give way. As it is
-    where no bone holds anything.
+    where nothing is attached.
     """
     surface = frame.surface
     if not problem.attached or surface is None:

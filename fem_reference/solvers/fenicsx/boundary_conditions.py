@@ -1,5 +1,5 @@
-"""What is prescribed on a region: exactly, by conditions on its unknowns, or by springs over its facets or at points of a skin; and
-the force that it takes.
+"""Boundary conditions on a region: exactly, by conditions on its unknowns, or by springs over its facets or at points of a skin;
+and the force that it takes.
 """
 
 from typing import Any

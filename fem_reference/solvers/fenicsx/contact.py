@@ -1,4 +1,4 @@
-"""Rigid bodies that push on material points of a body: pressure of the gap, with its tangent, added to what cells contribute.
+"""Contact of rigid bodies with material points of a body: pressure of the gap, with its tangent, added to what cells contribute.
 
 Only points that may be near a body are asked for their distance to it: how far the others were when they were asked last, and how
 far they moved since, says that they cannot be.
@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.motion import apply
-from fem_reference.problems.contact import Contact, Nearby, Obstruction, nearest_on_way
+from fem_reference.problems.contact import Contact, Nearby, Obstruction, nearest_on_path
 from fem_reference.solvers.fenicsx.contact_points import ContactPoints
 
 
@@ -33,7 +33,7 @@ class Pressed:
 
 
 class ContactForces:
-    """What obstructions do to this rank's pushed points."""
+    """What obstructions do to this rank's contact points."""
 
     def __init__(
         self,
@@ -84,11 +84,11 @@ class ContactForces:
     def predicted(self, frame: float, moves: Floats) -> Floats:
         """As ``tractions``, if the unknowns made ``moves`` and the obstructions went on to ``frame``, linearly in both."""
         points = self.points.positions(self.unknowns.x.array)
-        way = self.points.positions(moves) - self.points.rest
+        displacement = self.points.positions(moves) - self.points.rest
         found = self.tractions()
         for entry, one in zip(self.obstructions, self.now, strict=True):
             step = entry.pose(frame) @ np.linalg.inv(entry.pose(self.frame))
-            ahead = way[one.near] - (apply(step, points[one.near]) - points[one.near])
+            ahead = displacement[one.near] - (apply(step, points[one.near]) - points[one.near])
             found[one.near] += np.einsum("nij,nj->ni", one.slope, ahead)
         return found
 
@@ -98,7 +98,7 @@ class ContactForces:
         self.points.add_forces(residual, -self.points.areas[:, None] * tractions)
 
     def tangent(self) -> Iterator[tuple[Ints, Floats, Floats]]:
-        """The slope of the residual, obstruction by obstruction: cells (p,) of the points that are pushed, the basis (p, k) that
+        """The slope of the residual, obstruction by obstruction: cells (p,) of the points in contact, the basis (p, k) that
         carries them, and the slope (p, 3, 3) of what is out of balance there.
         """
         for one in self.now:
@@ -118,8 +118,8 @@ class ContactForces:
         return found
 
     def scalars(self, comm: MPI.Comm) -> dict[str, float]:
-        """The greatest ``contact_depth`` [mm] and largest ``contact_pressure`` [MPa] at a point, the rest area that is pushed,
-        ``contact_area`` [mm2], and how deep the deepest point that is pushed was at rest, ``overlap_at_rest`` [mm].
+        """The greatest ``contact_depth`` [mm] and largest ``contact_pressure`` [MPa] at a point, the rest area in contact,
+        ``contact_area`` [mm2], and how deep the deepest point in contact was at rest, ``overlap_at_rest`` [mm].
         """
         pushed = np.zeros(len(self.points.areas), bool)
         depth = pressure = overlap = 0.0
@@ -172,15 +172,15 @@ class ContactForces:
         met = np.flatnonzero(self.nearby[i].touched)
         starts, ends = self.settled[i].local[met], self.now[i].local[met]
         before, now = (self.obstructions[i].shape.sample(places) for places in (starts, ends))
-        ways = ends - starts
+        displacements = ends - starts
         # A gap is not known far away: what points outward there is the way back, and the way on.
         outward = [
-            np.where(one.gradient.any(axis=1)[:, None], one.gradient, sign * ways)
+            np.where(one.gradient.any(axis=1)[:, None], one.gradient, sign * displacements)
             for one, sign in ((before, -1), (now, 1))
         ]
         turned = np.flatnonzero(np.einsum("ni,ni->n", *outward) < 0)
-        on_way = nearest_on_way(self.obstructions[i], starts[turned], ways[turned], self.law.smoothing)
-        excess = np.minimum(np.minimum(before.distance, now.distance)[turned], 0) - on_way
+        on_path = nearest_on_path(self.obstructions[i], starts[turned], displacements[turned], self.law.smoothing)
+        excess = np.minimum(np.minimum(before.distance, now.distance)[turned], 0) - on_path
         if not excess.max(initial=0.0) > self.law.smoothing:
             return None
         worst = int(np.argmax(excess))

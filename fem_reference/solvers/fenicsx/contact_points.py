@@ -1,4 +1,4 @@
-"""Material points that rigid bodies push on or springs pull at: where they are in the cells, how displacement reaches them."""
+"""Contact points, and points that springs pull at: where they are in the cells, how displacement reaches them."""
 
 from dataclasses import dataclass, fields
 from functools import cached_property

@@ -141,7 +141,7 @@ def _solved(A: Any, b: Any) -> tuple[Floats, str | None]:
     """The solution of ``A x = b`` by MUMPS's sparse LU factorisation, and a sentence where there is none."""
     x = A.createVecRight()
     if not np.isfinite(A.norm() + b.norm()):
-        return x.array, "the equations hold a number that is not finite: a formula without a value somewhere?"
+        return x.array, "the equations have a number that is not finite: a formula without a value somewhere?"
     solver = PETSc.KSP().create(A.comm)
     solver.setOperators(A)
     solver.setType("preonly")

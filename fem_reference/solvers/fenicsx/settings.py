@@ -1,4 +1,4 @@
-"""How the reference is solved."""
+"""Settings of the reference solver."""
 
 from typing import Literal
 

@@ -78,7 +78,7 @@ class Worker:
         return {} if modes is None else {"negative_modes": modes}
 
     def instability(self) -> str:
-        """What is to be told of unstable states, nothing where there are none."""
+        """The note on unstable states, nothing where there are none."""
         if not self.unstable:
             return ""
         most, first = max(self.unstable.values()), min(self.unstable)
@@ -104,7 +104,7 @@ class Worker:
         return f", and contact is deepest, {contact.deepest(self.body.comm)}" if contact else ""
 
     def report_frame(self, reached: Step) -> None:
-        """Write the frame's positions and forces beside the job and tell of it."""
+        """Write the frame's positions and forces beside the job and report it."""
         forces, moments = self.body.forces(divided=bool(self.job.samples))
         arrays = {name: self.body.positions(*sample) for name, sample in self.job.samples.items()}
         arrays |= {"nodes": self.body.node_positions()}

@@ -163,7 +163,7 @@ class _March:
         return np.array(list(values), np.int64), np.array(list(values.values()))
 
     def state(self, step: Step) -> Reached:
-        """What is to be told of the present unknowns."""
+        """The note on the present unknowns."""
         equations, unknowns = self.equations, self.unknowns
         places = equations.space.rest + unknowns[: equations.space.rest.size].reshape(-1, 3)
         residual, _ = equations.assembled(unknowns, step.frame, springs=False)
