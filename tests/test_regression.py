@@ -166,7 +166,7 @@ def test_without_error_bars_the_past_is_judged_and_the_truth_is_not(tmp_path) ->
     baseline.update(path, current())
     check = checked(path, current())
     assert (check.answer("unchanged"), check.answer("within"), check.word) == ("pass", "inconclusive", "inconclusive")
-    assert "--error-bar tells" in asked(check, "within", "surface_deviation.rms").why
+    assert "--error-bar measures it" in asked(check, "within", "surface_deviation.rms").why
     # What is said of the run itself is known without them.
     assert asked(check, "within", "penetration.deepest").word == "pass"
     known = current(known=bars())
