@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from fem_reference.assessment.error_bars import ErrorBars
     from fem_reference.effects import make as make_effect
     from fem_reference.foundations.errors import InputError, MissingSoftware
-    from fem_reference.problems.body import Cells, Prescribed
-    from fem_reference.problems.body import Continuum as Body
+    from fem_reference.problems.body import Body, Cells, Prescribed
     from fem_reference.problems.shapes import box
     from fem_reference.runs.store import Run
     from fem_reference.scenes.casefile import cases
@@ -65,7 +64,7 @@ __all__ = [
 _WORKFLOW = "fem_reference.studies.workflow"
 # Where each public name stands: found when it is asked for, so that importing the package loads nothing.
 _PLACES = {
-    "Body": ("fem_reference.problems.body", "Continuum"),
+    "Body": ("fem_reference.problems.body", "Body"),
     "Case": ("fem_reference.scenes.muscle", "Scene"),
     "Cells": ("fem_reference.problems.body", "Cells"),
     "Comparison": ("fem_reference.assessment.comparison", "Comparison"),

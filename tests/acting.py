@@ -6,10 +6,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fem_reference import effects
-from fem_reference.effects import Coursed, Effect, Energy, Interaction, Load, State
+from fem_reference.effects import Effect, Energy, Interaction, Load, Ramped, State
 from fem_reference.foundations.records import parse
 
-COURSE = [{"frame": 0, "amount": 0.0}, {"frame": 10, "amount": 1.0}, {"frame": 30, "amount": 0.5}]
+RAMP = [{"frame": 0, "amount": 0.0}, {"frame": 10, "amount": 1.0}, {"frame": 30, "amount": 0.5}]
 PARAMETERS: dict[str, dict[str, Any]] = {
     "neo_hooke": {"mu": "10 kPa"},
     "mooney_rivlin": {"c1": "10 kPa", "c2": "4 kPa"},
@@ -17,15 +17,15 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     "incompressible_penalty": {"bulk": "10 MPa"},
     "fibre_passive": {"stress": "300 kPa", "p1": 0.05, "p2": 6.6, "optimal_stretch": 1.1, "linear_from": 1.4},
     "fibre_passive_febio": {"c3": "10 kPa", "c4": 12.0, "c5": "3 MPa", "linear_from": 1.3},
-    "fibre_active": {"stress": "300 kPa", "optimal_stretch": 1.1, "course": COURSE},
-    "active_tension": {"tension": "60 kPa", "course": COURSE},
+    "fibre_active": {"stress": "300 kPa", "optimal_stretch": 1.1, "ramp": RAMP},
+    "active_tension": {"tension": "60 kPa", "ramp": RAMP},
     "holzapfel_ogden": {"k1": "20 kPa", "k2": 1.5, "angle": "30 deg", "normal": [0.2, 0.5, 2.0]},
     "guccione": {"c": "2 kPa", "bf": 8.0, "bt": 2.0, "bfs": 4.0},
-    "gravity": {"density": "1060 kg/m3", "acceleration": "0, 0, -9.81 m/s^2", "course": COURSE},
-    "pressure": {"on": "top", "pressure": "8 kPa", "course": COURSE},
-    "traction": {"on": "top", "force": "0, 6.25, 1 kPa", "course": COURSE},
+    "gravity": {"density": "1060 kg/m3", "acceleration": "0, 0, -9.81 m/s^2", "ramp": RAMP},
+    "pressure": {"on": "top", "pressure": "8 kPa", "ramp": RAMP},
+    "traction": {"on": "top", "force": "0, 6.25, 1 kPa", "ramp": RAMP},
     "contact": {"stiffness": "500 kPa/mm", "smoothing": "0.3 mm", "bones": ["femur"]},
-    "prestretch": {"stretch": 1.1, "course": COURSE},
+    "prestretch": {"stretch": 1.1, "ramp": RAMP},
     "damping": {"coefficient": "2 Pa s/mm^2"},
     "viscosity": {"eta": "300 kPa s"},
 }
@@ -47,7 +47,7 @@ OTHER: dict[str, Any] = {
     "stretch": 1.2,
     "coefficient": "7 MPa s/mm^2",
     "eta": "7 MPa s",
-    "course": [{"frame": 0, "amount": 0.2}],
+    "ramp": [{"frame": 0, "amount": 0.2}],
     "on": "bottom",
 }  # of other parameters it is 7 MPa
 POSITIVE = ["mu", "bulk", "stress", "c3", "c5", "tension", "k1", "c", "density", "coefficient", "eta"]
@@ -63,7 +63,7 @@ KINDS = {
 EXPRESSED = [name for name in PARAMETERS if not issubclass(effects.find(name), Interaction)]
 ENERGIES = [name for name in PARAMETERS if issubclass(effects.find(name), Energy)]
 ELASTIC = [name for name in ENERGIES if name not in ("gravity", "damping", "viscosity")]
-COURSED = [name for name in PARAMETERS if issubclass(effects.find(name), Coursed)]
+RAMPED = [name for name in PARAMETERS if issubclass(effects.find(name), Ramped)]
 SLACK = ["fibre_passive", "fibre_passive_febio", "holzapfel_ogden"]
 
 

@@ -42,7 +42,7 @@ os.dup2(int(sys.argv[1]), 3), os.dup2(int(sys.argv[2]), 4), os.execv(sys.argv[3]
 
 
 class Browser:
-    """One page at a time; ``events`` is everything that the browser told of it."""
+    """One page at a time; ``events`` is everything that the browser reported of it."""
 
     def __init__(self, profile: Path, *flags: str) -> None:
         assert PROGRAM is not None
@@ -80,7 +80,7 @@ class Browser:
         return self._call(method, self._session, **parameters)
 
     def open(self, path: Path, fragment: str = "") -> None:
-        """Go to a file, and forget what was told of the page before."""
+        """Go to a file, and forget what was reported of the page before."""
         self.call("Page.navigate", url="about:blank")
         self.events.clear()
         self.call("Page.navigate", url=path.resolve().as_uri() + fragment)
@@ -95,7 +95,7 @@ class Browser:
         """Until an expression in the page is true."""
         until = time.monotonic() + seconds
         while not self.ask(f"Boolean({expression})"):
-            assert time.monotonic() < until, f"never true: {expression}; told: {self.complaints()}"
+            assert time.monotonic() < until, f"never true: {expression}; reported: {self.complaints()}"
             time.sleep(0.05)
 
     def press(self, key: str) -> None:
@@ -122,16 +122,16 @@ class Browser:
 
     def complaints(self) -> list[str]:
         """Errors and warnings of the page's console and of the browser about it, and exceptions."""
-        told = []
+        printed = []
         for event in self.events:
             kind, facts = event["method"], event["params"]
             if kind == "Runtime.exceptionThrown":
-                told.append(json.dumps(facts["exceptionDetails"]))
+                printed.append(json.dumps(facts["exceptionDetails"]))
             elif kind == "Runtime.consoleAPICalled" and facts["type"] in ("error", "warning", "assert"):
-                told.append(json.dumps(facts["args"]))
+                printed.append(json.dumps(facts["args"]))
             elif kind == "Log.entryAdded" and facts["entry"]["level"] in ("error", "warning"):
-                told.append(facts["entry"]["text"])
-        return told
+                printed.append(facts["entry"]["text"])
+        return printed
 
     def _call(self, method: str, session: str | None, **parameters: Any) -> dict[str, Any]:
         self._count += 1

@@ -11,7 +11,7 @@ import shapes
 from fem_reference.foundations.motion import Rotation, Translation
 from fem_reference.foundations.records import parse
 from fem_reference.problems.body import ByCell
-from fem_reference.problems.muscle import Body, Problem
+from fem_reference.problems.muscle import Problem, RigidBody
 
 FRAMES = (10, 15, 20, 25)
 TURNS = Rotation((1, 2, 2), (3.0, -4.0, 5.0), (10.0, 18.0, 40.0), (0.0, -0.7, 0.4))
@@ -26,16 +26,16 @@ def effects(*names: str) -> tuple[Any, ...]:
 
 
 def bar() -> Problem:
-    """A bar held by a bone that slides and one that turns and pushes, beside one that rests; its fibres point anywhere."""
+    """A bar attached by a bone that slides and one that turns and pushes, beside one that rests; its fibres point anywhere."""
     acts = effects("neo_hooke", "incompressible", "fibre_passive_febio", "contact")
     plain = shapes.bar((2, 2, 3), (10, 10, 30), {"bottom": SLIDES, "top": TURNS}, acts, FRAMES)
     ball = shapes.sphere(0, 5.0)
     bones = {bone.name: replace(bone, surface=ball) for bone in plain.bones}
-    held = tuple(replace(held, bone=bones[held.bone.name]) for held in plain.held)
+    attached = tuple(replace(attached, bone=bones[attached.bone.name]) for attached in plain.attached)
     along = np.random.default_rng(3).normal(size=(len(plain.mesh.tets), 3))
     directions = along / np.linalg.norm(along, axis=1)[:, None]
-    rests = Body("rests & <waits>", ball.moved_to(ball.points + [50, 0, 0]), None)
-    return replace(plain, bones=(*bones.values(), rests), held=held, fibre=ByCell(directions))
+    rests = RigidBody("rests & <waits>", ball.moved_to(ball.points + [50, 0, 0]), None)
+    return replace(plain, bones=(*bones.values(), rests), attached=attached, fibre=ByCell(directions))
 
 
 def numbers(element: Element) -> list[float]:

@@ -26,7 +26,7 @@ _HARMLESS = {
             "because": "some",
         }
     ],
-    "spoil": {"key": "title", "value": "another", "because": "it is harmless"},
+    "negative_control": {"key": "title", "value": "another", "because": "it is harmless"},
 }
 
 

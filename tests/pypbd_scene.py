@@ -2,7 +2,7 @@
 
 It keeps one state for the whole process and takes all cores that it is given, hence a process of its own.
 
-"rest" (n, 3) and "points" (n, 3) [m]: the particles at rest, and where they start. "masses" (n,) [kg], 0 for what is held.
+"rest" (n, 3) and "points" (n, 3) [m]: the particles at rest, and where they start. "masses" (n,) [kg], 0 for what is attached.
 "constraints": kind, vertices and stiffness of each. "steps" of so many "seconds" with so many "sweeps", under its gravity of
 9.81 m/s2 along -y; or, with 0 steps, one projection of each constraint.
 """

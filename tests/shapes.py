@@ -6,7 +6,7 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh, boundary
 from fem_reference.foundations.motion import Rotation
-from fem_reference.problems.muscle import Body, Held, Problem
+from fem_reference.problems.muscle import AttachedVertices, Problem, RigidBody
 
 
 def box(cells: tuple[int, int, int], size: tuple[float, float, float]) -> TetMesh:
@@ -76,19 +76,19 @@ def bar(
     effects: tuple,
     frames: tuple[int, ...],
 ) -> Problem:
-    """A bar whose ``bottom`` and ``top`` are each held by a bone with its own motion, with one fibre along its middle."""
+    """A bar whose ``bottom`` and ``top`` are each attached by a bone with its own motion, with one fibre along its middle."""
     mesh = box(cells, size)
     surface = skin(mesh)
     bone = Surface(np.eye(3), np.array([[0, 1, 2]]), "bone")
-    held = []
+    attached = []
     for name, z in (("bottom", 0.0), ("top", size[2])):
         vertices = np.flatnonzero(np.isclose(surface.points[:, 2], z))
-        held.append(Held(name, Body(name, bone, motions[name]), vertices))
+        attached.append(AttachedVertices(name, RigidBody(name, bone, motions[name]), vertices))
     middle = np.column_stack([np.full(5, size[0] / 2), np.full(5, size[1] / 2), np.linspace(0, size[2], 5)])
     return Problem(
         surface,
-        tuple(entry.bone for entry in held),
-        tuple(held),
+        tuple(entry.bone for entry in attached),
+        tuple(attached),
         frames,
         None,
         mesh=mesh,

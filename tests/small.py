@@ -83,7 +83,7 @@ within = "0.5 %"
 kind = "property"
 because = "the bulk modulus is 1000 times the shear modulus"
 
-[spoil]
+[negative_control]
 key = "effect[1].bulk"
 value = "5 kPa"
 because = "a body that gives way loses volume"

@@ -12,7 +12,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Surface, enclosed_volume
 from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
-from fem_reference.problems.muscle import Body, Held, Setup
+from fem_reference.problems.muscle import AttachedVertices, RigidBody, Setup
 from fem_reference.solvers import arap
 
 USUAL = {
@@ -39,16 +39,16 @@ def muscle(noise=0.0, seed=0):
     return Surface(ball.points * [1, 1, 1.5] + rough, ball.triangles)
 
 
-def held_setup(low, high, surface=None, last=1, pose=None):
-    """A muscle whose ends, a fifth of its half length each, are held by bones that move by ``low`` and ``high``."""
+def attached_setup(low, high, surface=None, last=1, pose=None):
+    """A muscle whose ends, a fifth of its half length each, are attached by bones that move by ``low`` and ``high``."""
     surface = surface or muscle()
     z = surface.points[:, 2]
     ends = np.flatnonzero(z < -24), np.flatnonzero(z > 24)
     if pose is not None:
         surface = surface.moved_to(apply(pose, surface.points))
-    bones = tuple(Body(name, surface, motion) for name, motion in (("low", low), ("high", high)))
-    held = tuple(Held(bone.name, bone, vertices) for bone, vertices in zip(bones, ends, strict=True))
-    return Setup(surface, bones, held, tuple(range(last + 1)), interval=None)
+    bones = tuple(RigidBody(name, surface, motion) for name, motion in (("low", low), ("high", high)))
+    attached = tuple(AttachedVertices(bone.name, bone, vertices) for bone, vertices in zip(bones, ends, strict=True))
+    return Setup(surface, bones, attached, tuple(range(last + 1)), interval=None)
 
 
 def run(setup, **changes):
@@ -59,15 +59,15 @@ def run(setup, **changes):
 
 
 def system_of(setup, weights="cotangent", fixed="remove"):
-    held = np.concatenate([entry.vertices for entry in setup.held])
-    return arap.System.of(arap.Cells.of(setup.surface, weights), held, fixed)
+    attached = np.concatenate([entry.vertices for entry in setup.attached])
+    return arap.System.of(arap.Cells.of(setup.surface, weights), attached, fixed)
 
 
 def started(setup, frame=1):
-    """Rest positions with the held vertices at ``frame``."""
+    """Rest positions with the attached vertices at ``frame``."""
     points = np.array(setup.surface.points)
-    for held in setup.held:
-        points[held.vertices] = apply(held.bone.pose(frame), setup.surface.points[held.vertices])
+    for attached in setup.attached:
+        points[attached.vertices] = apply(attached.bone.pose(frame), setup.surface.points[attached.vertices])
     return points
 
 
@@ -138,7 +138,7 @@ def test_a_mirrored_body_is_fitted_by_rotations():
 
 
 def test_cells_in_a_plane_and_without_size_have_a_rotation():
-    # The corners of a cube are held by three faces, its other vertices lie in a plane: least singular value 0.
+    # The corners of a cube are attached by three faces, its other vertices lie in a plane: least singular value 0.
     surface = shapes.skin(shapes.box((3, 3, 3), (3, 3, 3)))
     cells = arap.Cells.of(surface, "kirchhoff")
     found = cells.rotations(apply(TURN, surface.points))
@@ -164,11 +164,11 @@ def test_the_equations_are_the_slope_of_the_energy(weights):
 
 @pytest.mark.parametrize("weights", WEIGHTS)
 def test_least_squares_are_those_of_numpy(weights):
-    setup = held_setup(None, JUMP)
+    setup = attached_setup(None, JUMP)
     system, points = system_of(setup, weights, "ols"), started(setup)
     rotations = system.cells.rotations(points)
     matrix = system.cells.laplacian().toarray()
-    right = system.cells.right_side(rotations) - matrix[:, system.held] @ points[system.held]
+    right = system.cells.right_side(rotations) - matrix[:, system.attached] @ points[system.attached]
     expected = np.linalg.lstsq(matrix[:, system.free], right)[0]
     # The condition of the normal equations is the square of about 1e3, of positions of 60 mm.
     np.testing.assert_allclose(system.place(points, rotations)[system.free], expected, atol=1e-8)
@@ -177,15 +177,15 @@ def test_least_squares_are_those_of_numpy(weights):
 @pytest.mark.parametrize("noise", [0.0, 1.0])
 def test_the_same_as_libigl(noise):
     # libigl fits rotations in single precision: roundings of 1e-7 (and, for some cells of some noise, of 1e-4: seed 0).
-    setup = held_setup(None, JUMP, muscle(noise, seed=1))
+    setup = attached_setup(None, JUMP, muscle(noise, seed=1))
     outcome, frames = run(setup, **EXACT)
     assert outcome.status == "converged"
     assert outcome.cost["frames_off_tolerance"] == 0
-    held = np.concatenate([entry.vertices for entry in setup.held])
+    attached = np.concatenate([entry.vertices for entry in setup.attached])
     data = igl.ARAPData()
     data.energy, data.max_iter = igl.ARAPEnergyType.ARAP_ENERGY_TYPE_SPOKES, 600
-    igl.arap_precomputation(setup.surface.points, setup.surface.triangles, 3, held.astype(np.int32), data)
-    theirs = igl.arap_solve(frames[1][held], data, np.array(setup.surface.points))
+    igl.arap_precomputation(setup.surface.points, setup.surface.triangles, 3, attached.astype(np.int32), data)
+    theirs = igl.arap_solve(frames[1][attached], data, np.array(setup.surface.points))
     assert np.abs(theirs - frames[1]).max() < 1e-6 * 60
     cells = arap.Cells.of(setup.surface, "cotangent")
     assert (cells.weights < 0).any()
@@ -195,7 +195,7 @@ def test_the_same_as_libigl(noise):
 @pytest.mark.parametrize("weights", ["cotangent", "clamped cotangent", "kirchhoff"])
 def test_the_energy_never_rises(weights):
     for seed, noise in enumerate((0.0, 1.0, 2.0, 4.0)):
-        setup = held_setup(None, JUMP, muscle(noise, seed))
+        setup = attached_setup(None, JUMP, muscle(noise, seed))
         system, points = system_of(setup, weights), started(setup)
         energies = []
         for _ in range(60):
@@ -210,7 +210,7 @@ def test_the_energy_never_rises(weights):
 def test_tutte_is_kirchhoff_where_rows_are_removed():
     # Each equation divided by a number has the same solution, and a cell of scaled weights the same rotation; least
     # squares weigh the equations otherwise.
-    setup = held_setup(None, JUMP)
+    setup = attached_setup(None, JUMP)
     one, other = (run(setup, weights=weights)[1][1] for weights in ("kirchhoff", "tutte"))
     np.testing.assert_allclose(other, one, atol=1e-10)
     one, other = (run(setup, weights=weights, fixed="ols")[1][1] for weights in ("kirchhoff", "tutte"))
@@ -218,8 +218,8 @@ def test_tutte_is_kirchhoff_where_rows_are_removed():
 
 
 def test_least_squares_may_raise_the_energy():
-    # They minimise the residual of all equations, those of held vertices too, and not eq. 5.10: its least value is lower.
-    setup = held_setup(None, JUMP)
+    # They minimise the residual of all equations, those of attached vertices too, and not eq. 5.10: its least value is lower.
+    setup = attached_setup(None, JUMP)
     least, squares = (run(setup, fixed=fixed, **EXACT)[1][1] for fixed in ("remove", "ols"))
     cells = arap.Cells.of(setup.surface, "cotangent")
     assert cells.energy(squares) > 1.05 * cells.energy(least)
@@ -227,20 +227,20 @@ def test_least_squares_may_raise_the_energy():
 
 @pytest.mark.parametrize(("weights", "fixed"), list(itertools.product(WEIGHTS, ("remove", "ols"))))
 def test_a_rigid_motion_is_reproduced(weights, fixed):
-    setup = held_setup(JUMP, JUMP)
+    setup = attached_setup(JUMP, JUMP)
     outcome, frames = run(setup, weights=weights, fixed=fixed, **EXACT)
     assert outcome.status == "converged"
     np.testing.assert_allclose(frames[1], apply(JUMP.pose(1), setup.surface.points), rtol=0, atol=1e-9)
 
 
-def test_held_vertices_go_with_their_bone():
-    setup = held_setup(None, SWING, last=10)
+def test_attached_vertices_go_with_their_bone():
+    setup = attached_setup(None, SWING, last=10)
     for changes in ({}, {"fixed": "ols"}, {"volume_step": True}):
         _, frames = run(setup, **changes)
         for number, surface in frames.items():
-            for held in setup.held:
-                expected = apply(held.bone.pose(number), setup.surface.points[held.vertices])
-                np.testing.assert_array_equal(surface[held.vertices], expected)
+            for attached in setup.attached:
+                expected = apply(attached.bone.pose(number), setup.surface.points[attached.vertices])
+                np.testing.assert_array_equal(surface[attached.vertices], expected)
 
 
 @pytest.mark.parametrize("fixed", ["remove", "ols"])
@@ -250,25 +250,25 @@ def test_independent_of_where_the_world_is(fixed, volume_step):
     x, y, z = TURN[:3, :3] @ SWING.axis
     moved = Rotation((x, y, z), tuple(apply(TURN, np.array([SWING.centre]))[0]), SWING.frames, SWING.angles)
     changes = {"fixed": fixed, "volume_step": volume_step}
-    _, here = run(held_setup(None, SWING, last=10), **changes)
-    _, there = run(held_setup(None, moved, last=10, pose=TURN), **changes)
+    _, here = run(attached_setup(None, SWING, last=10), **changes)
+    _, there = run(attached_setup(None, moved, last=10, pose=TURN), **changes)
     np.testing.assert_allclose(there[10], apply(TURN, here[10]), rtol=0, atol=1e-7)
 
 
 def test_independent_of_the_order_of_vertices():
-    setup = held_setup(None, SWING, last=5)
+    setup = attached_setup(None, SWING, last=5)
     order = np.random.default_rng(3).permutation(len(setup.surface.points))
     place = np.argsort(order)
     surface = Surface(setup.surface.points[order], place[setup.surface.triangles])
-    held = tuple(Held(one.attachment, one.bone, place[one.vertices]) for one in setup.held)
+    attached = tuple(AttachedVertices(one.attachment, one.bone, place[one.vertices]) for one in setup.attached)
     _, one = run(setup)
-    _, other = run(Setup(surface, setup.bones, held, setup.frames, None))
+    _, other = run(Setup(surface, setup.bones, attached, setup.frames, None))
     np.testing.assert_allclose(other[5][place], one[5], rtol=0, atol=1e-10)
 
 
 def test_kept_negative_weights_may_not_let_rest_stay():
     # Where the two lesser eigenvalues of a cell's covariance have a negative sum, a half turn has less energy than none.
-    setup = held_setup(None, None, muscle(noise=3.0, seed=4))
+    setup = attached_setup(None, None, muscle(noise=3.0, seed=4))
     _, kept = run(setup)
     _, clamped = run(setup, weights="clamped cotangent")
     assert np.abs(kept[1] - setup.surface.points).max() > 0.1
@@ -284,8 +284,8 @@ def test_scaling_reaches_the_volume_where_all_is_free():
 
 
 def test_the_volume_step_misses_the_volume_and_costs_energy():
-    # Report 6.2: held vertices do not scale, and what scaling gains the next iteration takes back.
-    setup = held_setup(None, SWING, last=10)
+    # Report 6.2: attached vertices do not scale, and what scaling gains the next iteration takes back.
+    setup = attached_setup(None, SWING, last=10)
     triangles, cells = setup.surface.triangles, arap.Cells.of(setup.surface, "cotangent")
     _, plain = run(setup, iterations=200)
     _, scaled = run(setup, iterations=200, volume_step=True)
@@ -297,7 +297,7 @@ def test_the_volume_step_misses_the_volume_and_costs_energy():
 
 
 def test_rotations_of_the_first_iteration_only():
-    setup = held_setup(None, JUMP)
+    setup = attached_setup(None, JUMP)
     system, points = system_of(setup), started(setup)
     outcome, frames = run(setup, rotations="first only", tolerance="1e-6 mm")
     np.testing.assert_array_equal(frames[1], system.place(points, system.cells.rotations(points)))
@@ -306,8 +306,8 @@ def test_rotations_of_the_first_iteration_only():
 
 
 def test_frames_wanted_and_cost():
-    setup = held_setup(None, SWING, last=10)
-    outcome, frames = run(Setup(setup.surface, setup.bones, setup.held, (0, 5, 10), None))
+    setup = attached_setup(None, SWING, last=10)
+    outcome, frames = run(Setup(setup.surface, setup.bones, setup.attached, (0, 5, 10), None))
     assert list(frames) == [0, 5, 10]
     np.testing.assert_array_equal(frames[0], setup.surface.points)
     np.testing.assert_array_equal(frames[5], run(setup)[1][5])
@@ -320,8 +320,8 @@ def test_frames_wanted_and_cost():
     assert outcome.cost["seconds_setup"] > 0
 
 
-def test_the_energy_of_a_frame_is_told():
-    setup, frames = held_setup(None, JUMP), []
+def test_the_energy_of_a_frame_is_reported():
+    setup, frames = attached_setup(None, JUMP), []
     arap.solve(setup, parse(arap.Settings, USUAL, "candidate[0]"), frames.append)
     cells = arap.Cells.of(setup.surface, "cotangent")
     rotations = by_singular_values(setup.surface.points, frames[1].surface, cells)
@@ -334,18 +334,18 @@ def test_the_energy_of_a_frame_is_told():
 
 
 def test_what_nothing_or_all_holds_does_not_deform():
-    setup = held_setup(None, SWING)
+    setup = attached_setup(None, SWING)
     outcome, frames = run(Setup(setup.surface, setup.bones, (), setup.frames, None))
     assert outcome.status == "converged"
     np.testing.assert_array_equal(frames[1], setup.surface.points)
-    held = (Held("all", setup.bones[1], np.arange(162)),)
-    outcome, frames = run(Setup(setup.surface, setup.bones, held, setup.frames, None))
+    attached = (AttachedVertices("all", setup.bones[1], np.arange(162)),)
+    outcome, frames = run(Setup(setup.surface, setup.bones, attached, setup.frames, None))
     assert outcome.status == "converged"
     np.testing.assert_array_equal(frames[1], apply(SWING.pose(1), setup.surface.points))
 
 
-def test_a_tolerance_that_is_not_met_is_told_at_the_end_and_all_frames_are_kept():
-    setup = held_setup(None, SWING, last=10)
+def test_a_tolerance_that_is_not_met_is_reported_at_the_end_and_all_frames_are_kept():
+    setup = attached_setup(None, SWING, last=10)
     outcome, frames = run(setup, tolerance="1e-6 mm")
     assert outcome.status == "out of steps"
     assert outcome.message.startswith(
@@ -376,7 +376,7 @@ def test_a_muscle_blown_up_by_scaling_is_an_outcome():
 
 def test_positions_that_are_no_number_are_an_outcome():
     outcome, frames = run(
-        held_setup(None, Rotation((1, 0, 0), (0, 0, 0), (0.0, 2.0, 3.0), (0, 0.01, math.nan)), last=4)
+        attached_setup(None, Rotation((1, 0, 0), (0, 0, 0), (0.0, 2.0, 3.0), (0, 0.01, math.nan)), last=4)
     )
     assert outcome.status == "diverged"
     assert outcome.message.startswith("frame 3: the position of ")
@@ -388,7 +388,7 @@ def test_positions_that_are_no_number_are_an_outcome():
 def test_a_surface_turned_inside_out_is_an_outcome(volume_step):
     # The ends change places in one frame: with a single iteration rotations cannot follow, and scaling must not mirror.
     through = Translation((0, 0, -1), (0.0, 1.0), (0.0, 150.0))
-    outcome, frames = run(held_setup(None, through), iterations=1, volume_step=volume_step)
+    outcome, frames = run(attached_setup(None, through), iterations=1, volume_step=volume_step)
     assert outcome.status == "inverted"
     assert outcome.message.startswith("frame 1: the surface is turned inside out")
     assert list(frames) == [0]
@@ -400,7 +400,7 @@ def test_a_vertex_that_nothing_ties_is_an_outcome():
     vertex = np.argmin(np.abs(surface.points[:, 2]))
     points = np.array(surface.points)
     points[surface.triangles[(surface.triangles == vertex).any(axis=1)]] = points[vertex]
-    setup = held_setup(None, SWING, surface.moved_to(points))
+    setup = attached_setup(None, SWING, surface.moved_to(points))
     outcome, frames = run(setup)
     assert outcome.status == "diverged"
     assert outcome.message.startswith(f"vertex {vertex}: nothing but triangles without area or weight ties it")

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapes
-from test_arap import JUMP, SWING, TURN, held_setup, muscle, started, system_of
+from test_arap import JUMP, SWING, TURN, attached_setup, muscle, started, system_of
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import enclosed_volume
 from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
-from fem_reference.problems.muscle import Held, Setup
+from fem_reference.problems.muscle import AttachedVertices, Setup
 from fem_reference.solvers import arap, arap_pbd
 from fem_reference.solvers.pbd import Constraints
 from fem_reference.solvers.pbd_kernels import distances, volume
@@ -34,12 +34,12 @@ def run(setup, usual=CONSTRAINT, **changes):
 
 
 def constraints_of(setup):
-    held = np.concatenate([entry.vertices for entry in setup.held])
-    return Constraints.at_rest(setup.surface.points, setup.surface.triangles, held)
+    attached = np.concatenate([entry.vertices for entry in setup.attached])
+    return Constraints.at_rest(setup.surface.points, setup.surface.triangles, attached)
 
 
 def test_the_volume_is_kept_to_rounding():
-    setup = held_setup(None, SWING, last=10)
+    setup = attached_setup(None, SWING, last=10)
     outcome, frames = run(setup)
     assert outcome.status == "converged"
     rest = enclosed_volume(setup.surface.points, setup.surface.triangles)
@@ -50,7 +50,7 @@ def test_the_volume_is_kept_to_rounding():
 @pytest.mark.parametrize("weights", ["clamped cotangent", "kirchhoff"])
 def test_what_it_ends_with_is_stationary(weights):
     # The slope of the energy is the volume's, times one multiplier, at every free vertex.
-    setup = held_setup(None, JUMP, muscle(noise=1.0))
+    setup = attached_setup(None, JUMP, muscle(noise=1.0))
     system, rest = system_of(setup, weights), constraints_of(setup)
     found = arap_pbd.minimise(system, started(setup), settings(weights=weights, **EXACT), rest)
     assert found.met
@@ -66,7 +66,7 @@ def test_what_it_ends_with_is_stationary(weights):
 def test_less_energy_than_scaling_by_turns_at_the_same_volume(seed):
     random = np.random.default_rng(seed)
     motion = Rotation(tuple(random.normal(size=3)), tuple(random.normal(scale=20, size=3)), (0.0, 1.0), (0.0, 0.7))
-    setup = held_setup(None, motion, muscle(noise=1.0, seed=seed))
+    setup = attached_setup(None, motion, muscle(noise=1.0, seed=seed))
     triangles, states = setup.surface.triangles, []
     by_turns = {"weights": "clamped cotangent", "fixed": "remove", "rotations": "each", "volume_step": True}
     record = parse(arap.Settings, by_turns | {"iterations": 300, "tolerance": "1e-9 mm"}, "candidate[0]")
@@ -80,7 +80,7 @@ def test_less_energy_than_scaling_by_turns_at_the_same_volume(seed):
 
 
 def test_the_constraint_costs_energy():
-    setup = held_setup(None, JUMP)
+    setup = attached_setup(None, JUMP)
     system, rest = system_of(setup, "clamped cotangent"), constraints_of(setup)
     free, kept = (
         system.cells.energy(arap_pbd.minimise(system, started(setup), record, rest).points)
@@ -90,20 +90,20 @@ def test_the_constraint_costs_energy():
 
 
 @pytest.mark.parametrize("usual", [CONSTRAINT, GUESS])
-def test_held_vertices_go_with_their_bone(usual):
-    setup = held_setup(None, SWING, last=10)
+def test_attached_vertices_go_with_their_bone(usual):
+    setup = attached_setup(None, SWING, last=10)
     _, frames = run(setup, usual)
     assert list(frames) == list(range(11))
     for number, surface in frames.items():
-        for held in setup.held:
-            expected = apply(held.bone.pose(number), setup.surface.points[held.vertices])
-            np.testing.assert_array_equal(surface[held.vertices], expected)
+        for attached in setup.attached:
+            expected = apply(attached.bone.pose(number), setup.surface.points[attached.vertices])
+            np.testing.assert_array_equal(surface[attached.vertices], expected)
 
 
 @pytest.mark.parametrize("usual", [CONSTRAINT, GUESS])
 def test_a_rigid_motion_is_reproduced(usual):
     # Projections leave rest as it is up to roundings of about 1e-14 of 60 mm.
-    setup = held_setup(JUMP, JUMP)
+    setup = attached_setup(JUMP, JUMP)
     _, frames = run(setup, usual, **EXACT)
     np.testing.assert_allclose(frames[1], apply(JUMP.pose(1), setup.surface.points), rtol=0, atol=1e-9)
 
@@ -112,15 +112,15 @@ def test_a_rigid_motion_is_reproduced(usual):
 def test_independent_of_where_the_world_is(usual):
     x, y, z = TURN[:3, :3] @ SWING.axis
     moved = Rotation((x, y, z), tuple(apply(TURN, np.array([SWING.centre]))[0]), SWING.frames, SWING.angles)
-    _, here = run(held_setup(None, SWING, last=10), usual)
-    _, there = run(held_setup(None, moved, last=10, pose=TURN), usual)
+    _, here = run(attached_setup(None, SWING, last=10), usual)
+    _, there = run(attached_setup(None, moved, last=10, pose=TURN), usual)
     np.testing.assert_allclose(
         there[10], apply(TURN, here[10]), rtol=0, atol=1e-8
     )  # roundings of 60 mm, through 30 sweeps
 
 
 def test_projections_start_from_the_state_of_arap():
-    setup, states = held_setup(None, JUMP), []
+    setup, states = attached_setup(None, JUMP), []
     usual = {"weights": "kirchhoff", "fixed": "remove", "rotations": "each", "volume_step": False}
     record = parse(arap.Settings, usual | {"iterations": 5}, "candidate[0]")
     arap.solve(setup, record, lambda frame: states.append(frame.surface))
@@ -133,7 +133,7 @@ def test_projections_start_from_the_state_of_arap():
 
 def test_more_sweeps_keep_edges_and_volume_better():
     # Without bending: dihedral angles, the last of each sweep, stand against both.
-    setup = held_setup(None, JUMP)
+    setup = attached_setup(None, JUMP)
     rest = constraints_of(setup)
     _, few = run(setup, GUESS, projections=SWEEPS | {"sweeps": 1, "bending": 0})
     _, many = run(setup, GUESS, projections=SWEEPS | {"sweeps": 50, "bending": 0})
@@ -146,7 +146,7 @@ def test_more_sweeps_keep_edges_and_volume_better():
 def test_the_guess_saves_sweeps():
     # Report 6.2. A sweep carries a motion on by little, so that without a guess many are needed: with it, 3 come nearer than
     # 30 to where the projections end without it.
-    setup = held_setup(None, JUMP)
+    setup = attached_setup(None, JUMP)
     rest, given = constraints_of(setup), settings(GUESS).projections
     end, alone = (
         arap_pbd.projected(started(setup), rest, given.model_copy(update={"sweeps": sweeps})) for sweeps in (1000, 30)
@@ -158,14 +158,14 @@ def test_the_guess_saves_sweeps():
 @pytest.mark.parametrize("key", ["sweeps", "stretch", "volume", "bending"])
 def test_every_projection_is_felt(key):
     usual, changed = (
-        run(held_setup(None, JUMP), GUESS, projections=SWEEPS | changes)[1][1]
+        run(attached_setup(None, JUMP), GUESS, projections=SWEEPS | changes)[1][1]
         for changes in ({}, {key: 1 if key == "sweeps" else 0})
     )
     assert np.abs(changed - usual).max() > 1e-3
 
 
 def test_both_at_once():
-    setup = held_setup(None, JUMP)
+    setup = attached_setup(None, JUMP)
     _, constraint = run(setup)
     _, both = run(setup, projections=SWEEPS)
     expected = arap_pbd.projected(constraint[1], constraints_of(setup), settings(GUESS).projections)
@@ -174,12 +174,13 @@ def test_both_at_once():
 
 def test_a_volume_out_of_reach_is_an_outcome():
     # Bones hold every vertex, and move apart.
-    setup = held_setup(None, Translation((0, 0, 1), (0.0, 1.0), (0.0, 10.0)))
+    setup = attached_setup(None, Translation((0, 0, 1), (0.0, 1.0), (0.0, 10.0)))
     upper = setup.surface.points[:, 2] > 0
-    held = tuple(
-        Held(bone.name, bone, np.flatnonzero(mask)) for bone, mask in zip(setup.bones, (~upper, upper), strict=True)
+    attached = tuple(
+        AttachedVertices(bone.name, bone, np.flatnonzero(mask))
+        for bone, mask in zip(setup.bones, (~upper, upper), strict=True)
     )
-    outcome, frames = run(Setup(setup.surface, setup.bones, held, setup.frames, None))
+    outcome, frames = run(Setup(setup.surface, setup.bones, attached, setup.frames, None))
     assert outcome.status == "diverged"
     assert outcome.message.startswith("frame 1: no multiplier keeps the volume, it is 1.")
     assert list(frames) == [0]
@@ -214,14 +215,14 @@ def test_the_root_nearest_to_the_minimum_is_taken(way):
 
 @pytest.mark.parametrize("lost", [np.nan, np.inf])
 def test_no_number_has_no_root(lost):
-    setup = held_setup(None, SWING)
+    setup = attached_setup(None, SWING)
     points = np.array(setup.surface.points)
     points[5, 0] = lost
     assert arap_pbd._least_root(points, setup.surface.points * 0.1, constraints_of(setup)) is None
 
 
-def test_a_tolerance_that_is_not_met_is_told():
-    setup = held_setup(None, SWING, last=10)
+def test_a_tolerance_that_is_not_met_is_reported():
+    setup = attached_setup(None, SWING, last=10)
     outcome, frames = run(setup, tolerance="1e-6 mm")
     assert outcome.status == "out of steps"
     assert outcome.message.startswith("10 frames in 50 iterations, 10 did not meet the tolerance; ")

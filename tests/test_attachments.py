@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Surface, check_closed, triangle_areas, vertex_areas
-from fem_reference.geometry.sectors import held_shares
+from fem_reference.geometry.sectors import attached_shares
 from fem_reference.io import files
 from fem_reference.problems.attachments import facets_under, pick
 from fem_reference.scenes.muscle import Attachment, Scene
@@ -175,7 +175,7 @@ def test_facets_under_a_face_are_that_face() -> None:
     # One layer: on its sides the share sinks to 0 in half the height, 5/12 on average over a triangle that stands.
     mesh = shapes.box((5, 4, 1), (20.0, 20.0, 4.0))
     bottom = np.flatnonzero(BLOCK.points[:, 2] == 0)
-    facets = facets_under(mesh, BLOCK, held_shares(BLOCK, bottom))
+    facets = facets_under(mesh, BLOCK, attached_shares(BLOCK, bottom))
     assert {tuple(sorted(facet)) for facet in facets.tolist()} == {
         tuple(sorted(facet)) for facet in mesh.facets["bottom"].tolist()
     }
@@ -193,7 +193,7 @@ def test_the_area_converges_as_the_tets_shrink() -> None:
     wanted = vertex_areas(BLOCK.points, BLOCK.triangles)[disc].sum()
     for cells, within in ((10, 0.1), (30, 0.03)):
         mesh = shapes.box((cells, cells, 2), (20.0, 20.0, 4.0))
-        area = triangle_areas(mesh.points, facets_under(mesh, BLOCK, held_shares(BLOCK, disc))).sum()
+        area = triangle_areas(mesh.points, facets_under(mesh, BLOCK, attached_shares(BLOCK, disc))).sum()
         # A rim of 44 mm around 154 mm2, off by a tenth of a facet's side on average at most: 0.2 mm, then 0.07 mm.
         assert_allclose(area, wanted, rtol=within)
 

@@ -1,4 +1,4 @@
-"""Every shipped case: its expectations pass, and with its spoil applied the verdict turns to fail."""
+"""Every shipped case: its expectations pass, and with its negative control applied the verdict turns to fail."""
 
 import json
 
@@ -16,7 +16,7 @@ FEW = {"frames.every": 100}
 COARSE = {"muscle.refinements": 0}
 
 
-# The scalar cases, and the candidate that their spoil turns to fail.
+# The scalar cases, and the candidate that their negative control turns to fail.
 FIELDS = {
     "rod": "listing",
     "rod_advection": "reference",
@@ -35,15 +35,15 @@ MUSCLES = {
     "iliacus_anatomical": "6 mm",
 }
 
-# What the report's program held moves there past each other, by springs as well: the reference ends before the muscle is bent.
+# What the report's program attached moves there past each other, by springs as well: the reference ends before the muscle is bent.
 UNSOLVED = "iliacus"
 
 
 @pytest.mark.parametrize("name", FIELDS)
-def test_spoiled_scalar_cases_fail(name, tmp_path) -> None:
-    told = scalar.run(casefile.read(name, spoiled=True), solver_of(name), tmp_path)
-    assert told.word == "fail"
-    assert [v["of"] for v in told.facts["verdicts"] if v["word"] == "fail"] == [FIELDS[name]]
+def test_scalar_cases_with_negative_control_fail(name, tmp_path) -> None:
+    printed = scalar.run(casefile.read(name, with_negative_control=True), solver_of(name), tmp_path)
+    assert printed.word == "fail"
+    assert [v["of"] for v in printed.facts["verdicts"] if v["word"] == "fail"] == [FIELDS[name]]
 
 
 def solver_of(name: str) -> str | None:
@@ -52,8 +52,8 @@ def solver_of(name: str) -> str | None:
 
 @pytest.mark.parametrize("name", [name for name in FIELDS if name != "surface_figure"])
 def test_scalar_cases_by_the_listing_alone(name, tmp_path) -> None:
-    told = scalar.run(casefile.read(name), solver_of(name), tmp_path)
-    assert (told.word, told.facts["verdict"], told.facts["status"]) == ("pass", "pass", "converged")
+    printed = scalar.run(casefile.read(name), solver_of(name), tmp_path)
+    assert (printed.word, printed.facts["verdict"], printed.facts["status"]) == ("pass", "pass", "converged")
 
 
 def test_the_page_of_the_octave_examples(tmp_path) -> None:
@@ -74,11 +74,11 @@ def test_the_page_of_the_octave_examples(tmp_path) -> None:
     orders = {
         (case["case"], ladder["element"]): ladder["order"] for case in facts["cases"] for ladder in case["convergence"]
     }
-    # Linear elements are of order 2 in L2 where the right side is square integrable and values are held along a rim.
+    # Linear elements are of order 2 in L2 where the right side is square integrable and values are attached along a rim.
     for name in ("rod", "plate_square", "plate_spiral"):
         assert orders[name, "P1"] == pytest.approx(2, abs=0.1)
     assert orders["rod", "P2"] is None, "a parabola lies in the space: what is left is rounding"
-    assert orders["surface_figure", "P1"] < 1.5, "a surface does not feel a value held at a point"
+    assert orders["surface_figure", "P1"] < 1.5, "a surface does not feel a value attached at a point"
     page = (tmp_path / "octave-examples.html").read_text()
     assert page.count("<h2") >= len(FIELDS) + 1
 
@@ -99,8 +99,10 @@ def test_every_case_is_run_here() -> None:
     assert casefile.cases() == sorted(["box_squeeze", "gluteus_maximus", "hip_flexion", UNSOLVED, *FIELDS, *MUSCLES])
 
 
-def test_hip_flexion_spoiled_fails(tmp_path, monkeypatch) -> None:
-    status, facts = run(casefile.read("hip_flexion", changes=FEW | COARSE, spoiled=True), tmp_path, monkeypatch)
+def test_hip_flexion_with_negative_control_fails(tmp_path, monkeypatch) -> None:
+    status, facts = run(
+        casefile.read("hip_flexion", changes=FEW | COARSE, with_negative_control=True), tmp_path, monkeypatch
+    )
     assert status == cli.VERDICT_FAIL
     assert max(map(abs, rows(facts, "volume", "deviation").values())) > 2  # percent, where 0.5 is allowed
 
@@ -174,24 +176,26 @@ def test_muscles_of_the_report(data, name, tmp_path, monkeypatch) -> None:
     assert scene.frames.numbers == (0, 100, 200, 300)
 
 
-# Those held anatomically have the effects, and the spoil, of those held as in the report.
+# Those attached anatomically have the effects, and the negative control, of those attached as in the report.
 @pytest.mark.parametrize("name", ["adductor_brevis", "box_squeeze_report", "gluteus_maximus", "gluteus_medius"])
-def test_muscles_of_the_report_spoiled_fail(data, name, tmp_path, monkeypatch) -> None:
+def test_muscles_of_the_report_with_negative_control_fails(data, name, tmp_path, monkeypatch) -> None:
     assert data.is_dir()
     last = 110 if name == "gluteus_maximus" else 100  # where it expects something of a recorded candidate
     changes = {"frames.last": last, "frames.every": last, "expect[1].frame": last}
-    status, facts = run(casefile.read(name, changes=changes | coarse(name), spoiled=True), tmp_path, monkeypatch)
+    status, facts = run(
+        casefile.read(name, changes=changes | coarse(name), with_negative_control=True), tmp_path, monkeypatch
+    )
     assert status == cli.VERDICT_FAIL
-    spoiled = "penetration" if name == "adductor_brevis" else "volume"
+    expected = "penetration" if name == "adductor_brevis" else "volume"
     others = {"surface_deviation", "penetration"} - {
-        spoiled
+        expected
     }  # not back at rest yet; coarse tets do not bend around bones
     failed = {verdict["metric"] for verdict in facts["verdicts"] if verdict["verdict"] == "fail"}
-    assert failed - others == {spoiled}
+    assert failed - others == {expected}
 
 
-def test_the_box_spoiled_fails(tmp_path, monkeypatch) -> None:
-    status, facts = run(casefile.read("box_squeeze", changes=FEW, spoiled=True), tmp_path, monkeypatch)
+def test_the_box_with_negative_control_fails(tmp_path, monkeypatch) -> None:
+    status, facts = run(casefile.read("box_squeeze", changes=FEW, with_negative_control=True), tmp_path, monkeypatch)
     assert status == cli.VERDICT_FAIL
     volume = rows(facts, "volume", "deviation")
     assert volume[100] == pytest.approx(2 * -0.267, abs=0.02)  # percent; half the bulk modulus

@@ -89,31 +89,31 @@ def work(made, tmp_path) -> Work:
 
 
 def test_passes_on_the_same_run_and_fails_when_a_frame_is_moved(work, capsys) -> None:
-    junit, markdown, told = (work.root / "new" / name for name in ("check.xml", "check.md", "check.json"))
-    words = ("--junit", str(junit), "--markdown", str(markdown), "--json", str(told))
+    junit, markdown, printed = (work.root / "new" / name for name in ("check.xml", "check.md", "check.json"))
+    words = ("--junit", str(junit), "--markdown", str(markdown), "--json", str(printed))
     assert work.check(*words) == cli.DONE
     assert "verdict: pass" in capsys.readouterr().out
     assert ElementTree.parse(junit).getroot().get("failures") == "0"
     work.write(moved=10)
     assert work.check(*words) == cli.VERDICT_FAIL
     assert "fail: positions.moved unchanged at frame 10: 2" in capsys.readouterr().out
-    assert json.loads(told.read_text())["verdict"] == "fail"
+    assert json.loads(printed.read_text())["verdict"] == "fail"
     assert int(ElementTree.parse(junit).getroot().get("failures")) > 0
     assert markdown.read_text().startswith("### fail: mine on bar")
 
 
-def test_where_nothing_can_be_said_it_is_told_and_holds_nothing_up(work, capsys) -> None:
+def test_where_nothing_can_be_said_it_is_reported_and_holds_nothing_up(work, capsys) -> None:
     table = json.loads(work.baseline.read_text())
     rms = table["measures"]["surface_deviation.rms"]
     rms["within"] = max(rms["values"])  # somewhere in the bar of this reference, which is more than nothing
     work.baseline.write_text(json.dumps(table))
     assert work.check() == cli.DONE
     printed = capsys.readouterr().out
-    assert "inconclusive: the reference is known to" in printed
+    assert "inconclusive: the reference has an error bar of" in printed
     assert "verdict: inconclusive" in printed
 
 
-def test_an_update_takes_todays_values(work) -> None:
+def test_an_update_takes_current_values(work) -> None:
     work.write(moved=10)
     before = work.baseline.read_text()
     assert work.check("--update") == cli.VERDICT_FAIL  # further from the reference than was allowed
@@ -139,20 +139,20 @@ def test_a_solver_that_fails_is_status_three_and_writes_no_baseline(work, monkey
     for stored in (work.root / "reports" / "runs").glob(f"{solver.__name__.split('.')[-1]}-*"):
         shutil.rmtree(stored)
     work.baseline = work.root / "pbd.json"
-    told = work.root / "told.json"
+    printed = work.root / "printed.json"
     junit, markdown = work.root / "check.xml", work.root / "check.md"
     markdown.write_text("what the last check said")
-    told_too = ("--junit", str(junit), "--markdown", str(markdown))
-    assert work.check("--update", "--json", str(told), *told_too, candidate="pbd") == cli.SOLVER_FAILED
+    also = ("--junit", str(junit), "--markdown", str(markdown))
+    assert work.check("--update", "--json", str(printed), *also, candidate="pbd") == cli.SOLVER_FAILED
     suite = ElementTree.parse(junit).getroot()
     assert (suite.get("errors"), suite.find(".//error").get("message")[-14:]) == ("1", "no equilibrium")
     assert markdown.read_text().startswith("### failed: pbd on bar")
     assert "diverged, no equilibrium\nverdict: failed" in capsys.readouterr().out
-    assert json.loads(told.read_text())["verdict"] == "failed"
+    assert json.loads(printed.read_text())["verdict"] == "failed"
     assert not work.baseline.exists()
 
 
-def test_bad_input_is_told_before_anything_is_solved(work, capsys) -> None:
+def test_bad_input_is_reported_before_anything_is_solved(work, capsys) -> None:
     shutil.rmtree(work.root / "reports")
     work.baseline.write_text("{")
     for words in ((), ("--update",)):
@@ -173,7 +173,8 @@ def test_bad_input_is_told_before_anything_is_solved(work, capsys) -> None:
 def test_another_scene_is_not_this_baseline(work, capsys) -> None:
     assert work.check("--set", "muscle.tet_size=7 mm") == cli.BAD_INPUT
     assert (
-        "want the key of this scene (it was changed since; --update takes today's measures)" in capsys.readouterr().err
+        "want the key of this scene (it was changed since; --update takes the current measures)"
+        in capsys.readouterr().err
     )
 
 

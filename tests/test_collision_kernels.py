@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere
 from fem_reference.geometry.signed_distance import FAR, Grid, build
-from fem_reference.problems.muscle import Body
+from fem_reference.problems.muscle import RigidBody
 from fem_reference.solvers import collision_kernels as collision
 
 BALL = shapes.sphere(2, 20.0)
@@ -19,13 +19,13 @@ def grid() -> Grid:
     return build(BALL, 2.0, 6.0)
 
 
-def floor(height: float = 0.0, motion: Translation | None = None, normal=(0, 0, 1)) -> Body:
+def floor(height: float = 0.0, motion: Translation | None = None, normal=(0, 0, 1)) -> RigidBody:
     """All below z = ``height`` [mm]; its surface is not asked."""
-    return Body("floor", BALL, motion, solid=HalfSpace((0, 0, height), normal))
+    return RigidBody("floor", BALL, motion, solid=HalfSpace((0, 0, height), normal))
 
 
-def gridded(grid: Grid, motion: Rotation | None) -> Body:
-    body = Body("ball", BALL, motion)
+def gridded(grid: Grid, motion: Rotation | None) -> RigidBody:
+    body = RigidBody("ball", BALL, motion)
     vars(body)["shape"] = grid  # as if it had been read from the kept distances
     return body
 
@@ -57,7 +57,7 @@ def test_no_number_has_no_distance(grid, lost) -> None:
     assert_array_equal(gradient[1], 0)
 
 
-def test_who_has_come_near_is_told_in_the_frame_of_the_bone() -> None:
+def test_who_has_come_near_is_reported_in_the_frame_of_the_bone() -> None:
     random = np.random.default_rng(2)
     pose = Rotation((1, 2, 3), (5, -4, 7), (0.0, 1.0), (0.0, 2.0)).pose(1)
     points, asked_at = random.normal(size=(200, 3)), random.normal(size=(200, 3)) - [9, 1, -4]
@@ -76,7 +76,7 @@ def test_nobody_inside_a_bone_is_missed_and_few_are_asked(grid, kind) -> None:
     # Points that wander while the ball turns about an axis beside it: after each step those asked are all that are inside.
     random = np.random.default_rng(3)
     turn = Rotation((0, 1, 1), (40, 0, 0), (0.0, 60.0), (0.0, 3.0))
-    body = gridded(grid, turn) if kind == "grid" else Body("ball", BALL, turn, solid=Sphere((0, 0, 0), 20.0))
+    body = gridded(grid, turn) if kind == "grid" else RigidBody("ball", BALL, turn, solid=Sphere((0, 0, 0), 20.0))
     points = 60 * random.normal(size=(3000, 3))
     points = points[body.shape.sample(points).distance > 0]
     obstacle = collision.Obstacle(body, points, np.ones(len(points), bool), 0.0)
@@ -94,12 +94,12 @@ def test_nobody_inside_a_bone_is_missed_and_few_are_asked(grid, kind) -> None:
 
 
 def test_a_vertex_goes_the_shortest_way_out() -> None:
-    ball = Body("ball", BALL, Translation((1, 0, 0), (0.0, 1.0), (0.0, 30.0)), solid=Sphere((0, 0, 0), 20.0))
+    ball = RigidBody("ball", BALL, Translation((1, 0, 0), (0.0, 1.0), (0.0, 30.0)), solid=Sphere((0, 0, 0), 20.0))
     rest = np.array([[40.0, 0, 0], [40, 5, 0], [80, 0, 0], [40, 0, 5]])
     obstacle = collision.Obstacle(ball, rest, np.array([True, True, True, False]), 0.0)
     obstacle.move(1)
     points = rest.copy()
-    collision.push_out(points, [obstacle], 1.0)
+    collision.move_out(points, [obstacle], 1.0)
     centre = np.array([30.0, 0, 0])
     wanted = centre + 20 * (rest[:2] - centre) / np.linalg.norm(rest[:2] - centre, axis=1)[:, None]
     assert_allclose(points, [*wanted, *rest[2:]], atol=1e-13)  # a few roundings of 50 mm
@@ -109,7 +109,7 @@ def test_stiffness_is_the_share_of_the_way() -> None:
     points = np.array([[0.0, 0, 5]])
     obstacle = collision.Obstacle(floor(), points, np.ones(1, bool), 0.0)
     points[0, 2] = -2.0
-    collision.push_out(points, [obstacle], 0.25)
+    collision.move_out(points, [obstacle], 0.25)
     assert_allclose(points, [[0, 0, -1.5]], atol=1e-15)
 
 
@@ -119,7 +119,7 @@ def test_several_bones_push_by_the_sum() -> None:
     free = np.ones(1, bool)
     corner = [collision.Obstacle(floor(normal=normal), points, free, 0.0) for normal in ((0, 0, 1), (1, 0, 0))]
     points[:] = [[-3.0, 0, -1]]
-    collision.push_out(points, corner, 1.0)
+    collision.move_out(points, corner, 1.0)
     assert_allclose(points, 0, atol=1e-15)
 
 
@@ -127,10 +127,10 @@ def test_what_is_near_at_rest_may_stay_as_near() -> None:
     rest = np.array([[0.0, 0, -1.5], [0, 0, 0.3], [0, 0, 9]])
     obstacle = collision.Obstacle(floor(), rest, np.ones(3, bool), 1.0)
     points = rest.copy()
-    collision.push_out(points, [obstacle], 1.0)
+    collision.move_out(points, [obstacle], 1.0)
     assert_array_equal(points, rest)
     points[:, 2] -= 20
-    collision.push_out(points, [obstacle], 1.0)
+    collision.move_out(points, [obstacle], 1.0)
     assert_allclose(points[:, 2], [-1.5, 0.3, 1.0], atol=1e-14)  # roundings of 20 mm
 
 
@@ -146,9 +146,11 @@ def test_watched_vertices_are_asked_again() -> None:
 def test_in_the_middle_of_a_ball_there_is_no_way_out_but_no_harm() -> None:
     # The gradient of a spline vanishes on a ridge; nothing goes farther than it is deep.
     rest = np.array([[50.0, 0, 0]])
-    obstacle = collision.Obstacle(Body("ball", BALL, None, solid=Sphere((0, 0, 0), 20.0)), rest, np.ones(1, bool), 0.0)
+    obstacle = collision.Obstacle(
+        RigidBody("ball", BALL, None, solid=Sphere((0, 0, 0), 20.0)), rest, np.ones(1, bool), 0.0
+    )
     points = np.zeros((1, 3))
-    collision.push_out(points, [obstacle], 1.0)
+    collision.move_out(points, [obstacle], 1.0)
     assert np.linalg.norm(points) <= 20 + 1e-12
 
 
@@ -156,7 +158,7 @@ def test_vertices_that_are_no_number_stay_so(grid) -> None:
     rest = np.array([[50.0, 0, 0], [0, 50, 0]])
     obstacle = collision.Obstacle(gridded(grid, None), rest, np.ones(2, bool), 0.0)
     points = np.array([[np.nan, 0, 0], [0, 19.0, 0]])
-    collision.push_out(points, [obstacle], 1.0)
+    collision.move_out(points, [obstacle], 1.0)
     assert np.isnan(points[0, 0])
     # To what the grid rounds of the triangles of the ball, 20 mm wide: its error is below 0.5 mm.
     assert np.linalg.norm(points[1]) == pytest.approx(20, abs=0.5)

@@ -23,7 +23,7 @@ def test_only_what_was_left_half_done_long_ago_goes(tmp_path, monkeypatch) -> No
     compiling.prepare()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["done.c", "done.c.cached", "under_way.c"]
     assert handlers[signal.SIGINT] is signal.SIG_IGN
-    with pytest.raises(RuntimeError, match="told to stop"):  # FFCx cleans up after an Exception
+    with pytest.raises(RuntimeError, match="asked to stop"):  # FFCx cleans up after an Exception
         handlers[signal.SIGTERM](signal.SIGTERM, None)
 
 

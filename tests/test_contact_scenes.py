@@ -10,9 +10,9 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.rigid_bodies import Box
 from fem_reference.problems import muscle, shapes
-from fem_reference.problems.body import Continuum
-from fem_reference.problems.contact import Contact, Obstruction, nearest_on_way
-from fem_reference.problems.muscle_body import as_continuum
+from fem_reference.problems.body import Body
+from fem_reference.problems.contact import Contact, Obstruction, nearest_on_path
+from fem_reference.problems.muscle_body import as_body
 from fem_reference.scenes import casefile
 from fem_reference.solvers import fenicsx
 from fem_reference.verification import parts
@@ -75,9 +75,9 @@ def test_ranks_change_nothing(tmp_path) -> None:
 
 
 @pytest.mark.usefixtures("needs_fenicsx")
-def test_what_overlaps_at_rest_is_relaxed_first_and_told(tmp_path) -> None:
+def test_what_overlaps_at_rest_is_relaxed_first_and_reported(tmp_path) -> None:
     case = scene(tmp_path / "bar", -4.6)  # 0.46 mm deep
-    assert as_continuum(muscle.build(case, muscle.setup(case))).frames == (-10.0, 0, 5, 10)
+    assert as_body(muscle.build(case, muscle.setup(case))).frames == (-10.0, 0, 5, 10)
     frames, depths = solved(case)
     assert [frame.number for frame in frames] == [0, 5, 10]
     first = frames[0].scalars
@@ -89,11 +89,11 @@ def test_what_overlaps_at_rest_is_relaxed_first_and_told(tmp_path) -> None:
 def test_bones_push_only_what_they_do_not_hold(tmp_path) -> None:
     case = scene(tmp_path / "bar", -5.5)
     rest = muscle.setup(case)
-    body = as_continuum(muscle.build(case, rest))
+    body = as_body(muscle.build(case, rest))
     assert [entry.name for entry in body.obstructions] == ["floor", "lid", "ball"]
     assert [type(effect).__name__ for effect in body.effects] == ["NeoHooke", "Incompressible"]
     heights = body.contact.on.points[:, 2]
-    assert 2 < heights.min() < heights.max() < 38  # the ends are held, and triangles are 3.3 mm high
+    assert 2 < heights.min() < heights.max() < 38  # the ends are attached, and triangles are 3.3 mm high
     turned = body.obstructions[1].pose(10)
     assert apply(turned, np.array([[5.0, 5, 30]])) == pytest.approx(np.array([[5, 5, 30]]))
 
@@ -101,7 +101,7 @@ def test_bones_push_only_what_they_do_not_hold(tmp_path) -> None:
 def test_only_some_bones_push(tmp_path) -> None:
     some = CONTACT.replace("\n\n", '\nbones = ["ball"]\n\n')
     case = scene(tmp_path / "bar", -5.5, some)
-    assert [entry.name for entry in as_continuum(muscle.build(case, muscle.setup(case))).obstructions] == ["ball"]
+    assert [entry.name for entry in as_body(muscle.build(case, muscle.setup(case))).obstructions] == ["ball"]
     with pytest.raises(InputError, match=r'effect\[2\]\.bones: got "bal", want one of floor, lid, ball'):
         scene(tmp_path / "other", -5.5, some.replace("ball", "bal"))
 
@@ -109,12 +109,12 @@ def test_only_some_bones_push(tmp_path) -> None:
 def test_a_step_through_a_plate_is_cut(fem_lab) -> None:
     # A plate 0.2 mm thin jumps over the top of a block in one step: at both ends of the step it touches nothing.
     mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), "tetrahedron")
-    held = parts.SYMMETRY
+    attached = parts.SYMMETRY
     plate = Obstruction("plate", Box((0.5, 0.5, 1.2), (4.0, 4.0, 0.2), 0.0), Slide((0.0, 0.0, -0.5)))
-    body = Continuum(
+    body = Body(
         mesh,
         parts.neo_hooke(0.01, 10.0),
-        held,
+        attached,
         (0.0, 1.0),
         contact=Contact("z1", 1.0, 0.01),
         obstructions=(plate,),
@@ -130,7 +130,7 @@ def test_no_way_through_a_thin_plate_is_missed(start: float) -> None:
     # A plate 1 mm thin, ways of 36 mm from 3 to 33 mm before it: at most half a millimetre deep, and out on the other side.
     plate = Obstruction("plate", Box((0.0, 0.0, 0.0), (90.0, 90.0, 1.0), 0.0), Slide((0.0, 0.0, 0.0)))
     starts, ways = np.array([[0.3, 0.2, start], [0.0, 0.0, 40.0]]), np.array([[1.0, 2.0, -36.0]] * 2)
-    through, short = nearest_on_way(plate, starts, ways, 0.1)
+    through, short = nearest_on_path(plate, starts, ways, 0.1)
     assert -0.5 <= through < -0.3
     assert 3.5 <= short < 4.2  # it ends 3.5 mm above the plate, up to nine tenths of the last gap after the last look
 
@@ -145,12 +145,12 @@ def test_what_relaxes_waits_for_the_first_frame(tmp_path) -> None:
     )
     path.write_text(turning)
     case = casefile.read(path)
-    body = as_continuum(muscle.build(case, muscle.setup(case)))
+    body = as_body(muscle.build(case, muscle.setup(case)))
     assert body.first == 0
     assert body.obstructions[1].pose(-10.0) == pytest.approx(np.eye(4))
     top = np.array([[5.0, 5.0, 40.0]])
-    assert body.prescribed[1].course(top, -10.0) == pytest.approx(np.zeros((1, 3)))
-    assert np.abs(body.prescribed[1].course(top, 5.0)).max() > 0.1
+    assert body.prescribed[1].path(top, -10.0) == pytest.approx(np.zeros((1, 3)))
+    assert np.abs(body.prescribed[1].path(top, 5.0)).max() > 0.1
 
 
 def test_a_bone_that_pushes_and_an_attachment_have_names_of_their_own(tmp_path) -> None:
@@ -159,7 +159,7 @@ def test_a_bone_that_pushes_and_an_attachment_have_names_of_their_own(tmp_path) 
     path.write_text(
         path.read_text().replace('name = "origin"', 'name = "floor"').replace('start = "origin"', 'start = "floor"')
     )
-    with pytest.raises(InputError, match=r'attachment\[0\]\.name: got "floor", which a bone that pushes has too'):
+    with pytest.raises(InputError, match=r'attachment\[0\]\.name: got "floor", which a bone in contact has too'):
         casefile.read(path)
 
 

@@ -8,8 +8,8 @@ from test_stability import LENGTH, STILL, THIN, column, critical, effect, flesh,
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.problems import shapes
-from fem_reference.problems.body import Continuum, Prescribed, check
-from fem_reference.problems.courses import Affine, Rest
+from fem_reference.problems.body import Body, Prescribed, check
+from fem_reference.problems.paths import Affine, Rest
 from fem_reference.scenes import casefile
 from fem_reference.solvers.fenicsx import BodySettings
 from fem_reference.solvers.scikit_fem import BodySettings as OtherSettings
@@ -26,7 +26,7 @@ def test_the_time_from_frame_to_frame_must_be_known() -> None:
         InputError, match=r"frames.interval: got nothing, want the time .* effect\[0\] \(Damping\) needs"
     ):
         casefile.read("hip_flexion", changes={"effect[0]": drag})
-    body = Continuum(shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron"), (*flesh("P2/P1"), DRAG), (), (0.0, 1.0))
+    body = Body(shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron"), (*flesh("P2/P1"), DRAG), (), (0.0, 1.0))
     with pytest.raises(
         InputError, match="interval: got nothing, want the time from a frame number to the next, which an"
     ):
@@ -36,22 +36,22 @@ def test_the_time_from_frame_to_frame_must_be_known() -> None:
 
 def test_the_second_opinion_knows_no_time() -> None:
     mesh = shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
-    body = Continuum(mesh, (*flesh("P2/P1"), DRAG), (), (0.0, 1.0), interval=1.0)
+    body = Body(mesh, (*flesh("P2/P1"), DRAG), (), (0.0, 1.0), interval=1.0)
     with pytest.raises(
         InputError, match="effects: got Damping, want effects without rates, as this solver knows no time"
     ):
         solve_body(body, OtherSettings())
 
 
-def stretched(acting, interval: float | None = None, speed: float = 1.0) -> Continuum:
-    """A block stretched by a half until frame 1 / ``speed``, and then held for 40 frames."""
+def stretched(acting, interval: float | None = None, speed: float = 1.0) -> Body:
+    """A block stretched by a half until frame 1 / ``speed``, and then fixed for 40 frames."""
     pull = Affine(STILL, (0.0, 0.0, 0.5), ((0.0, 0.0), (1 / speed, 1.0)))
-    held = Prescribed("z0", "z0", (0, 1, 2), Rest()), Prescribed("z1", "z1", (0, 1, 2), pull)
+    fixed = Prescribed("z0", "z0", (0, 1, 2), Rest()), Prescribed("z1", "z1", (0, 1, 2), pull)
     mesh = shapes.box((1, 1, 2), (1.0, 1.0, 1.0), "tetrahedron")
-    return Continuum(mesh, acting, held, (0.0, 1 / speed, 1 / speed + 40), interval=interval)
+    return Body(mesh, acting, fixed, (0.0, 1 / speed, 1 / speed + 40), interval=interval)
 
 
-def test_what_is_held_long_enough_ends_where_it_would_without(session) -> None:  # noqa: F811
+def test_what_is_fixed_long_enough_ends_where_it_would_without(session) -> None:  # noqa: F811
     # A drag of 1e-6 MPa s/mm2 over 1 mm2 against a stiffness of 0.01 MPa: it has settled in a ten-thousandth of a frame of 1 s.
     settings = BodySettings(first_step=0.5, residual=1e-12)
     without, slow = (
@@ -64,7 +64,7 @@ def test_what_is_held_long_enough_ends_where_it_would_without(session) -> None: 
 
 
 def test_speed_costs_force_but_stores_nothing(session) -> None:  # noqa: F811
-    # The mean speed of the block is half that of its end, 0.5 mm a frame of 1 ms: its drag has to be held up by both ends.
+    # The mean speed of the block is half that of its end, 0.5 mm a frame of 1 ms: its drag has to be limited by both ends.
     settings = BodySettings(first_step=100.0, residual=1e-12)
     fast, still = (
         session.solve(stretched(acting, 1e-3), settings).states[1]
@@ -81,10 +81,10 @@ def test_speed_costs_force_but_stores_nothing(session) -> None:  # noqa: F811
 def test_a_step_that_fails_leaves_the_clock_alone(session) -> None:  # noqa: F811
     # One Newton iteration is not enough for the whole step: it is cut, and the block falls as far as its drag allows.
     mesh = shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
-    course = [{"frame": 0, "amount": 0.0}, {"frame": 1, "amount": 1.0}]
-    weight = effect("gravity", density="1000 kg/m^3", acceleration="0, 0, -10 m/s^2", course=course)
+    ramp = [{"frame": 0, "amount": 0.0}, {"frame": 1, "amount": 1.0}]
+    weight = effect("gravity", density="1000 kg/m^3", acceleration="0, 0, -10 m/s^2", ramp=ramp)
     turn = Prescribed("z1", "z1", (0,), Affine(((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), (0.5, 0.0, 0.0)))
-    body = Continuum(mesh, (*flesh("P2/P1"), weight, DRAG), (turn,), (0.0, 1.0, 3.0), interval=0.1)
+    body = Body(mesh, (*flesh("P2/P1"), weight, DRAG), (turn,), (0.0, 1.0, 3.0), interval=0.1)
     tight = session.solve(body, BodySettings(first_step=1.0, residual=1e-12, newton_iterations=3, smallest_step=0.001))
     loose = session.solve(body, BodySettings(first_step=1.0, residual=1e-12))
     cuts = [sum(state.scalars["cut_backs"] for state in one.states) for one in (tight, loose)]

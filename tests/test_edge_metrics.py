@@ -13,7 +13,16 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines, Surface, triangle_areas
 from fem_reference.geometry.edges import Edges
 from fem_reference.io.files import read_surface
-from fem_reference.metrics import Measure, Yardstick, at_rest, dihedral_angle, edge_extension, measure, names, units
+from fem_reference.metrics import (
+    Measure,
+    MeasurementContext,
+    at_rest,
+    dihedral_angle,
+    edge_extension,
+    measure,
+    names,
+    units,
+)
 from fem_reference.runs.store import Outcome, Run
 from fem_reference.scenes.muscle import Expectation
 
@@ -31,7 +40,7 @@ def run_of(rest: Surface, *frames: np.ndarray) -> Run:
 def taken(run: Run, reference: Run | None = None) -> dict[str, Measure]:
     """The measures of edges by ``metric.statistic``, against rest where there is no reference."""
     reference = at_rest(run) if reference is None else reference
-    found = measure(run, reference, Yardstick.of(reference, FIBRE, ()))
+    found = measure(run, reference, MeasurementContext.of(reference, FIBRE, ()))
     return {f"{one.metric}.{one.statistic}": one for one in found if one.metric in ("edge_extension", "dihedral_angle")}
 
 
@@ -238,14 +247,14 @@ def test_rigid_motion_and_the_order_of_vertices_change_nothing() -> None:
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e200])
 def test_what_is_not_a_number_never_passes(place: str, bad: float) -> None:
     ball = shapes.sphere(1, 10.0)
-    spoilt = ball.points.copy()
-    spoilt[5] = bad
-    runs = {"run": run_of(ball, ball.points), "reference": run_of(ball, ball.points)} | {place: run_of(ball, spoilt)}
-    yardstick = Yardstick.of(run_of(ball, ball.points), FIBRE, ())
+    damaged = ball.points.copy()
+    damaged[5] = bad
+    runs = {"run": run_of(ball, ball.points), "reference": run_of(ball, ball.points)} | {place: run_of(ball, damaged)}
+    context = MeasurementContext.of(run_of(ball, ball.points), FIBRE, ())
     measures = [
         one
         for metric in (edge_extension, dihedral_angle)
-        for one in metric.measure(runs["run"], runs["reference"], yardstick)
+        for one in metric.measure(runs["run"], runs["reference"], context)
     ]
     for one in measures:
         name = f"{one.metric}.{one.statistic}"

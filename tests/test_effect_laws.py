@@ -1,4 +1,4 @@
-"""What effects do: stress is the slope of the energy and follows the law as published; loads, courses and prestrain."""
+"""What effects do: stress is the slope of the energy and follows the law as published; loads, ramps and prestrain."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from acting import (
     ALONG,
-    COURSED,
     ELASTIC,
     FIBRE,
     PARAMETERS,
+    RAMPED,
     SLACK,
     TURN,
     deformations,
@@ -181,7 +181,7 @@ def test_incompressible_pressure_is_bulk_times_volume_change() -> None:
     assert make("incompressible_penalty").energy(state(F)) == pytest.approx(energies[1], rel=1e-12)
 
 
-# Loads, courses, prestrain
+# Loads, ramps, prestrain
 
 
 def test_damping_is_a_drag_against_the_way_of_a_step() -> None:
@@ -231,15 +231,15 @@ def test_a_pressure_around_a_cube_has_no_resultant_and_works_on_its_volume() -> 
         assert work == pytest.approx(-0.008 * dV, rel=1e-6)
 
 
-@pytest.mark.parametrize("name", COURSED)
-def test_courses_are_linear_between_knots_and_constant_beyond(name: str) -> None:
+@pytest.mark.parametrize("name", RAMPED)
+def test_ramps_are_linear_between_knots_and_constant_beyond(name: str) -> None:
     amounts = [make(name).amount(frame) for frame in (-5, 0, 2.5, 10, 20, 30, 99)]
     assert amounts == pytest.approx([0, 0, 0.25, 1, 0.75, 0.5, 0.5], rel=1e-14)
-    assert make(name, course=[{"frame": 7, "amount": 0.4}]).amount(0) == 0.4
+    assert make(name, ramp=[{"frame": 7, "amount": 0.4}]).amount(0) == 0.4
 
 
-@pytest.mark.parametrize("name", [name for name in PARAMETERS if name not in COURSED])
-def test_what_has_no_course_acts_wholly(name: str) -> None:
+@pytest.mark.parametrize("name", [name for name in PARAMETERS if name not in RAMPED])
+def test_what_has_no_ramp_acts_wholly(name: str) -> None:
     assert make(name).amount(3.0) == 1.0
 
 

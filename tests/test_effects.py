@@ -11,8 +11,6 @@ import numpy as np
 import pytest
 from acting import (
     ALONG,
-    COURSE,
-    COURSED,
     ELASTIC,
     ENERGIES,
     EXPRESSED,
@@ -21,6 +19,8 @@ from acting import (
     OTHER,
     PARAMETERS,
     POSITIVE,
+    RAMP,
+    RAMPED,
     TURN,
     deformations,
     make,
@@ -73,7 +73,7 @@ def test_the_rest_state_has_no_stress(name: str) -> None:
     # Central differences about F = 1, where the pressure is zero; a law with a kink there errs by step times the modulus, which is
     # of the order of 0.1 MPa. A stress that stayed at rest would be of the order of a parameter, 1e-2 MPa.
     effect, step = make(name), 1e-7
-    amount = 0.0 if name in COURSED else 1.0
+    amount = 0.0 if name in RAMPED else 1.0
     for push in step * np.eye(9).reshape(9, 3, 3):
         after, before = (effect.energy(state(np.eye(3) + sign * push, 0.0, amount=amount)) for sign in (1, -1))
         assert abs(after - before) / (2 * step) < 1e-7
@@ -84,11 +84,11 @@ def test_every_parameter_is_felt_and_has_its_unit(name: str) -> None:
     effect, F = make(name), uniaxial(1.6) @ (np.eye(3) + 0.05 * deformations()[0])
     for key, _, unit in effect.parameters:
         changed = make(name, **{key: OTHER.get(key, "7 MPa")})
-        told = [
+        printed = [
             (np.array(outcome(one, state(F, fibre=ALONG))).tolist(), one.title, one.amount(5))
             for one in (effect, changed)
         ]
-        assert told[0] != told[1], key
+        assert printed[0] != printed[1], key
         if unit:
             with pytest.raises(InputError, match=rf'{name}\.{key}: got "1 s", want .*{KINDS[unit]}'):
                 make(name, **{key: "1 s"})
@@ -119,16 +119,16 @@ def test_every_parameter_is_felt_and_has_its_unit(name: str) -> None:
         ("guccione", "bt", 0.0, "bt: got 0.0, want greater than 0"),
         ("guccione", "bfs", 0.0, "bfs: got 0.0, want greater than 0"),
         ("prestretch", "stretch", 0.0, "stretch: got 0.0, want greater than 0"),
-        ("prestretch", "course", [{"frame": 0, "amount": -10.0}], r"want a course whose stretches 1 \+ amount"),
+        ("prestretch", "ramp", [{"frame": 0, "amount": -10.0}], r"want a ramp whose stretches 1 \+ amount"),
         ("mooney_rivlin", "c2", "-10 kPa", r"want c1 \+ c2 above zero"),
-        ("pressure", "course", [], r"course: got \[\], want .* at least 1 item"),
+        ("pressure", "ramp", [], r"ramp: got \[\], want .* at least 1 item"),
         (
             "pressure",
-            "course",
-            [*COURSE, {"frame": 30, "amount": 1.0}],
-            r"course: .*want knots whose frames are each later",
+            "ramp",
+            [*RAMP, {"frame": 30, "amount": 1.0}],
+            r"ramp: .*want knots whose frames are each later",
         ),
-        ("pressure", "course", [{"frame": 0}], r"course\[0\]\.amount: got nothing, want this key"),
+        ("pressure", "ramp", [{"frame": 0}], r"ramp\[0\]\.amount: got nothing, want this key"),
     ],
 )
 def test_values_that_mean_nothing_are_refused(name: str, key: str, value: object, want: str) -> None:
@@ -179,7 +179,7 @@ def symbols(value: Any) -> Any:
 @pytest.mark.parametrize("name", EXPRESSED)
 def test_expressions_take_symbols(name: str) -> None:
     effect = make(name)
-    symbolic = effect.model_copy(update={key: symbols(value) for key, value, _ in effect.parameters if key != "course"})
+    symbolic = effect.model_copy(update={key: symbols(value) for key, value, _ in effect.parameters if key != "ramp"})
     for F in deformations():
         at = replace(state(F, amount=0.5), F=F.tolist(), fibre=FIBRE.tolist())
         keys = ("F", "displacement", "pressure", "fibre", "amount", "before", "F_before", "rate")
@@ -216,7 +216,7 @@ def test_effects_tell_what_they_are() -> None:
         ("density", pytest.approx(1.06e-9), "tonne/mm^3"),
         ("acceleration", pytest.approx((0, 0, -9810)), "mm/s^2"),
     ]
-    assert [str(knot) for knot in gravity.course[:2]] == ["0 at frame 0", "1 at frame 10"]
+    assert [str(knot) for knot in gravity.ramp[:2]] == ["0 at frame 0", "1 at frame 10"]
 
 
 @pytest.mark.parametrize(

@@ -94,15 +94,19 @@ def test_poses_of_every_bone_and_frame(exported: Path, built: Problem) -> None:
 
 
 def test_what_bones_hold(exported: Path, built: Problem) -> None:
-    for held in built.held:
+    for attached in built.attached:
         vertices = [
-            int(row[2]) for row in rows(exported / "attachments.csv") if row[:2] == [held.attachment, held.bone.name]
+            int(row[2])
+            for row in rows(exported / "attachments.csv")
+            if row[:2] == [attached.attachment, attached.bone.name]
         ]
-        assert np.array_equal(vertices, held.vertices)
+        assert np.array_equal(vertices, attached.vertices)
         facets = [
-            row[2:] for row in rows(exported / "attachment_facets.csv") if row[:2] == [held.attachment, held.bone.name]
+            row[2:]
+            for row in rows(exported / "attachment_facets.csv")
+            if row[:2] == [attached.attachment, attached.bone.name]
         ]
-        assert np.array_equal(np.array(facets, int), built.mesh.facets[held.attachment])
+        assert np.array_equal(np.array(facets, int), built.mesh.facets[attached.attachment])
 
 
 def test_the_surface_lies_where_its_shares_of_the_tets_say(exported: Path, built: Problem) -> None:
@@ -126,11 +130,11 @@ def test_the_scene_says_units_and_values(exported: Path, built: Problem) -> None
 
 
 @pytest.mark.parametrize("name", sorted(acting.PARAMETERS))
-def test_every_effect_can_be_told(scene: Scene, built: Problem, name: str) -> None:
+def test_every_effect_can_be_stated(scene: Scene, built: Problem, name: str) -> None:
     effect = parse(acting.effects.find(name), acting.PARAMETERS[name], "test")
-    (told,) = open_formats.facts(scene, replace(built, effects=(effect,)))["effects"]
-    assert told["name"] == name
-    assert json.loads(json.dumps(told, allow_nan=False))["parameters"].keys() == type(effect).model_fields.keys()
+    (printed,) = open_formats.facts(scene, replace(built, effects=(effect,)))["effects"]
+    assert printed["name"] == name
+    assert json.loads(json.dumps(printed, allow_nan=False))["parameters"].keys() == type(effect).model_fields.keys()
 
 
 def code(text: str) -> str:
@@ -145,7 +149,7 @@ def test_the_reading_example_runs(exported: Path, built: Problem) -> None:
     words = [sys.executable, "-I", "-W", "error", "-c", code(text)]
     said = subprocess.run(words, cwd=exported, capture_output=True, text=True, check=True).stdout
     head, numbers = said.split(" at [")
-    insertion = built.held[1]
+    insertion = built.attached[1]
     assert head == f"At frame 10, lid has vertices {' '.join(map(str, insertion.vertices))}"
     moved = apply(insertion.bone.pose(10), built.surface.points[insertion.vertices])
     found = np.array(re.findall(r"-?\d+\.?\d*(?:e[+-]\d+)?", numbers), float).reshape(-1, 3)
@@ -263,9 +267,9 @@ def test_the_unit_of_a_foreign_solver_is_its_own(scene: Scene, foreign: Path, tm
 def test_the_verb(scene: Scene, tmp_path: Path, capsys) -> None:
     words = ["export", scene.place, "--quiet", "--to", str(tmp_path / "new" / "bar"), "--set", "muscle.tet_size=9 mm"]
     assert cli.main([*words, "--json", str(tmp_path / "facts.json")]) == cli.DONE
-    told = json.loads((tmp_path / "facts.json").read_text())
+    printed = json.loads((tmp_path / "facts.json").read_text())
     there = {str(path.relative_to(tmp_path / "new" / "bar")) for path in (tmp_path / "new" / "bar").rglob("*.*")}
-    assert set(told["files"]) == there
+    assert set(printed["files"]) == there
     assert cli.main(words) == cli.BAD_INPUT
     assert "which is not empty" in capsys.readouterr().err
     assert cli.main(["export", "rod", "--to", str(tmp_path / "rod")]) == cli.BAD_INPUT

@@ -142,6 +142,6 @@ def test_an_element_that_does_not_suit_the_effects_is_named(tmp_path) -> None:
 def test_a_run_says_which_effects_its_solver_simulated(tmp_path) -> None:
     made = bench(tmp_path)
     reference, pbd = made.scene.reference, made.scene.candidate[0]
-    told = {one.solver: made.origin(one.solver, made.settings(one, "here"))["effects"] for one in (reference, pbd)}
-    assert list(told["fenicsx"]) == ["NeoHooke", "Incompressible"]
-    assert told["pbd"] == "none"
+    printed = {one.solver: made.origin(one.solver, made.settings(one, "here"))["effects"] for one in (reference, pbd)}
+    assert list(printed["fenicsx"]) == ["NeoHooke", "Incompressible"]
+    assert printed["pbd"] == "none"

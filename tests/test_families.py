@@ -1,4 +1,4 @@
-"""The families of Table 5.1 stand on scenes: who is measured, how fast, how far off, and what the page and the command say."""
+"""The families of models of Table 5.1 on scenes: who is measured, how fast, how far off, and what the page and the command say."""
 
 import json
 import math
@@ -10,9 +10,9 @@ import small
 
 from fem_reference import cli, report
 from fem_reference.assessment import solver_table
-from fem_reference.assessment.solver_table import Family, Overall, Scenario, Standing, Table
+from fem_reference.assessment.solver_table import Family, Overall, Scenario, SolverResult, Table
 from fem_reference.metrics import Measure
-from fem_reference.report import overview, standings_page
+from fem_reference.report import overview, ranking_page
 from fem_reference.runs import store
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
@@ -117,13 +117,13 @@ def test_a_foreign_solver_stands_in_the_same_table(case, tmp_path) -> None:
     assert "Yours" in html
 
 
-def test_a_scene_that_is_not_there_is_left_out_and_told(case, capsys) -> None:
+def test_a_scene_that_is_not_there_is_left_out_and_reported(case, capsys) -> None:
     (case / "bar.vtp").unlink()
     made = table_5_1.stand([casefile.read_muscle(case)], case.parent, {})
-    assert (made.scenarios, made.standings) == ((), ())
+    assert (made.scenarios, made.results) == ((), ())
     assert "bar.vtp" in made.missing["bar"]
-    assert "Left out" in standings_page.render(made)
-    assert "bar: left out" in overview.standings_text(made)
+    assert "Left out" in ranking_page.render(made)
+    assert "bar: left out" in overview.ranking_text(made)
     # One that was asked for by name is an error.
     assert cli.main(["page", "table-5-1", "--case", str(case), "--quiet"]) == cli.BAD_INPUT
     assert "bar.vtp" in capsys.readouterr().err
@@ -154,46 +154,46 @@ def test_other_pages_have_no_candidates(capsys) -> None:
     assert "page: got --case, --candidate or --unit for octave-examples" in capsys.readouterr().err
 
 
-def table(*found: Standing) -> Table:
+def table(*found: SolverResult) -> Table:
     scenarios = tuple(Scenario(f"case{i}", f"Case {i}", 100 * (i + 1), 50.0, Outcome("converged", "")) for i in (0, 1))
     return Table(ROWS, scenarios, found, {}, {}, ("this machine",))
 
 
-def standing(case: str, *values: float, seconds: float | None = 0.01) -> Standing:
+def solver_result(case: str, *values: float, seconds: float | None = 0.01) -> SolverResult:
     measures = (Measure("surface_deviation", "rms_percent", "%", np.array(values)),)
-    return Standing(
+    return SolverResult(
         "PBD", "pbd", "pbd", case, Outcome("converged", ""), seconds, measures, tuple(range(len(values))), ""
     )
 
 
 def test_what_is_worst_over_frames_and_scenes() -> None:
-    made = table(standing("case0", 1.0, -7.0, 3.0), standing("case1", 2.0, 2.5, seconds=0.5))
-    assert made.standings[0].worst("surface_deviation", "rms_percent") == (-7.0, 1)
-    assert made.standings[0].worst("volume", "deviation") is None
+    made = table(solver_result("case0", 1.0, -7.0, 3.0), solver_result("case1", 2.0, 2.5, seconds=0.5))
+    assert made.results[0].worst("surface_deviation", "rms_percent") == (-7.0, 1)
+    assert made.results[0].worst("volume", "deviation") is None
     overall = made.over("PBD", "pbd", "surface_deviation", "rms_percent")
     assert overall == Overall(median=(7.0 + 2.5) / 2, worst=-7.0, case="case0", count=2)
     assert made.over("PBD", "nobody", "surface_deviation", "rms_percent") is None
     assert made.speed("PBD", "pbd") == (made.scenarios[1], 0.5)  # that with more triangles
-    # A scene that was not come through is told, and does not hide behind the others, nor they behind it.
-    lost = table(standing("case0", 1.0, math.nan), standing("case1", 99.0))
+    # A scene that was not come through is printed, and does not hide behind the others, nor they behind it.
+    lost = table(solver_result("case0", 1.0, math.nan), solver_result("case1", 99.0))
     overall = lost.over("PBD", "pbd", "surface_deviation", "rms_percent")
     assert overall == Overall(99.0, 99.0, "case1", 1, ("case0",))
-    assert "failed on case0" in standings_page.render(lost)
-    nowhere = table(standing("case0", math.nan)).over("PBD", "pbd", "surface_deviation", "rms_percent")
+    assert "failed on case0" in ranking_page.render(lost)
+    nowhere = table(solver_result("case0", math.nan)).over("PBD", "pbd", "surface_deviation", "rms_percent")
     assert (nowhere.count, nowhere.lost) == (0, ("case0",))
 
 
 def test_what_is_not_a_number_stands_on_the_page_and_not_in_the_drawing() -> None:
-    lost = replace(standing("case0", math.nan), outcome=Outcome("diverged", "lost at <frame> 3"))
-    made = table(lost, standing("case1", 5.0, seconds=None))
-    html = standings_page.render(made)
+    lost = replace(solver_result("case0", math.nan), outcome=Outcome("diverged", "lost at <frame> 3"))
+    made = table(lost, solver_result("case1", 5.0, seconds=None))
+    html = ranking_page.render(made)
     assert "not a number" in html
     assert "lost at &lt;frame&gt; 3" in html
-    json.dumps(standings_page.facts(made), allow_nan=False)
+    json.dumps(ranking_page.facts(made), allow_nan=False)
 
 
 def test_the_page_is_whole_or_not_there(tmp_path) -> None:
-    path = report.write_standings(table(standing("case0", 1.0)), tmp_path / "new", "table-5-1")
+    path = report.write_ranking(table(solver_result("case0", 1.0)), tmp_path / "new", "table-5-1")
     assert sorted(file.name for file in path.parent.iterdir()) == ["table-5-1.html", "table-5-1.json"]
 
 
@@ -208,15 +208,15 @@ def test_the_benchmark_times_what_iterates(case, capsys, monkeypatch) -> None:
     ]
     assert all(len(one["seconds"]) == 2 for one in facts["timings"])
     assert min(facts["machine"].values()) > 0
-    told = capsys.readouterr().out
-    assert "iterations a second of CPU time" in told
+    printed = capsys.readouterr().out
+    assert "iterations a second of CPU time" in printed
 
 
-def test_a_ratio_is_told_where_the_report_has_a_speed() -> None:
+def test_a_ratio_is_reported_where_the_report_has_a_speed() -> None:
     timing = candidates.Timing("gluteus_maximus", "pbd", "pbd", 19752, (0.02, 0.01), 33.0)
     assert (timing.per_second, timing.ratio) == pytest.approx((100.0, 100 / 33))
-    told = candidates.text([timing], candidates.Machine(10.0, 2.0))
-    assert "pbd 50 to 100, 3.03 times the report's program (33 a second)" in told
+    printed = candidates.text([timing], candidates.Machine(10.0, 2.0))
+    assert "pbd 50 to 100, 3.03 times the report's program (33 a second)" in printed
 
 
 def test_a_solver_that_fails_has_no_time(case, monkeypatch) -> None:
@@ -225,7 +225,7 @@ def test_a_solver_that_fails_has_no_time(case, monkeypatch) -> None:
     assert [one.per_second for one in timings] == [None, None]
     assert "pbd failed" in candidates.text(timings, machine)
     json.dumps(candidates.facts(timings, machine), allow_nan=False)
-    assert cli.main(["benchmark", str(case), "--quiet"]) == cli.DONE  # it is told, not judged
+    assert cli.main(["benchmark", str(case), "--quiet"]) == cli.DONE  # it is printed, not judged
 
 
 def test_lines_do_not_iterate_and_a_short_scene_cannot_be_timed(case, capsys) -> None:

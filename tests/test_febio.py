@@ -115,13 +115,13 @@ def test_elements_are_straight_tets_of_positive_volume_in_febios_order(feb: Elem
     assert len(at) == len(bar.mesh.tets)
 
 
-def test_held_nodes_are_all_of_an_end(feb: Element) -> None:
+def test_attached_nodes_are_all_of_an_end(feb: Element) -> None:
     """5 x 5 nodes of the 2 x 2 cells in a face: corners, and middles of edges and diagonals."""
     points = nodes(feb)
     for name, height in (("bottom", 0.0), ("top", 30.0)):
-        held = [int(text) for text in feb.find(f"Mesh/NodeSet[@name='held_{name}']").text.split(",")]
-        assert set(held) == set(np.flatnonzero(np.isclose(points[: 1 + cells(feb, "muscle").max(), 2], height)))
-        assert len(held) == 25
+        attached = [int(text) for text in feb.find(f"Mesh/NodeSet[@name='held_{name}']").text.split(",")]
+        assert set(attached) == set(np.flatnonzero(np.isclose(points[: 1 + cells(feb, "muscle").max(), 2], height)))
+        assert len(attached) == 25
         assert feb.find(f"Boundary/bc[@node_set='held_{name}']/rb").text == f"bone_{name}"
 
 
@@ -136,7 +136,7 @@ def test_a_node_goes_with_one_bone(bar: Problem) -> None:
 
 
 def test_the_contact_surfaces(feb: Element) -> None:
-    """Of the sides 10 x 30 the third in the middle touches no held node; it faces outwards, as FEBio's surfaces must."""
+    """Of the sides 10 x 30 the third in the middle touches no attached node; it faces outwards, as FEBio's surfaces must."""
     points, free = nodes(feb), cells(feb, "muscle_free", "Surface")
     assert triangle_areas(points, free[:, :3]).sum() == pytest.approx(4 * 10 * 10, rel=1e-12)
     for middle, (a, b) in zip(free[:, 3:].T, ((0, 1), (1, 2), (2, 0)), strict=True):
@@ -157,7 +157,7 @@ def test_the_contact_surfaces(feb: Element) -> None:
 def test_a_bone_whose_triangles_face_inwards_is_turned(bar: Problem) -> None:
     ball = bar.bones[0].surface
     inwards = replace(bar.bones[0], surface=replace(ball, triangles=ball.triangles[:, ::-1]))
-    upright, turned = (febio.model(replace(bar, bones=(bone,), held=())) for bone in (bar.bones[0], inwards))
+    upright, turned = (febio.model(replace(bar, bones=(bone,), attached=())) for bone in (bar.bones[0], inwards))
     assert np.array_equal(cells(upright, "bone_bottom"), cells(turned, "bone_bottom"))
 
 
@@ -247,8 +247,8 @@ def test_contact_has_its_whole_tangent(bar: Problem, feb: Element) -> None:
 def test_load_controllers_are_numbered_without_gaps(bar: Problem, moving: tuple[str, ...]) -> None:
     """FEBio refuses an id that its list has no place for: here as well where the first bone rests."""
     bones = tuple(bone if bone.name in moving else replace(bone, motion=None) for bone in bar.bones)
-    held = tuple(replace(held, bone=bones[i]) for i, held in enumerate(bar.held))
-    feb = febio.model(replace(bar, bones=bones, held=held))
+    attached = tuple(replace(attached, bone=bones[i]) for i, attached in enumerate(bar.attached))
+    feb = febio.model(replace(bar, bones=bones, attached=attached))
     ids = [int(curve.attrib["id"]) for curve in feb.iterfind("LoadData/load_controller")]
     assert ids == list(range(1, len(moving) + 2))
     for bone in bones:

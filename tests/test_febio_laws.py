@@ -19,11 +19,11 @@ STIFFNESS = 0.1  # MPa/mm
 
 @pytest.fixture(scope="module")
 def bar() -> Problem:
-    """With passive fibres; held exactly at one end and by springs at the other."""
+    """With passive fibres; attached exactly at one end and by springs at the other."""
     plain = feb_file.bar()
     acts = effects("neo_hooke", "incompressible", "fibre_passive", "contact")
-    bottom, top = plain.held
-    return replace(plain, effects=acts, held=(bottom, replace(top, stiffness=STIFFNESS)))
+    bottom, top = plain.attached
+    return replace(plain, effects=acts, attached=(bottom, replace(top, stiffness=STIFFNESS)))
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +98,7 @@ def test_both_laws_of_fibres_together(bar: Problem) -> None:
     assert all(solid.find("fiber/vector").text == "1,0,0" for solid in solids)
 
 
-def test_an_end_held_by_springs_is_held_by_them_alone(feb: Element) -> None:
+def test_an_end_attached_by_springs_is_attached_by_them_alone(feb: Element) -> None:
     assert [entry.attrib["name"] for entry in feb.iterfind("Mesh/NodeSet")] == ["held_bottom"]
     assert [entry.attrib["node_set"] for entry in feb.iterfind("Boundary/bc")] == ["held_bottom"]
     springs = feb.find("Contact/contact[@type='tied-elastic']")
@@ -112,13 +112,13 @@ def test_an_end_held_by_springs_is_held_by_them_alone(feb: Element) -> None:
     assert feb.find("MeshDomains/ShellDomain[@name='springs_top']").attrib["mat"] == "bone_top"
 
 
-def test_no_node_of_the_muscle_is_held_where_all_is_held_by_springs(bar: Problem) -> None:
-    feb = febio.model(replace(bar, held=tuple(replace(held, stiffness=STIFFNESS) for held in bar.held)))
+def test_no_node_of_the_muscle_is_attached_where_all_is_attached_by_springs(bar: Problem) -> None:
+    feb = febio.model(replace(bar, attached=tuple(replace(attached, stiffness=STIFFNESS) for attached in bar.attached)))
     assert feb.find("Boundary") is None
     assert len(feb.findall("Contact/contact[@type='tied-elastic']")) == 2
 
 
-def test_springs_hang_from_a_rigid_copy_that_faces_the_area_held(feb: Element) -> None:
+def test_springs_hang_from_a_rigid_copy_that_faces_the_area_attached(feb: Element) -> None:
     """FEBio's rays from one surface of a pair meet the other only where the normals oppose (FESurface::IntersectTri6)."""
     points = nodes(feb)
     bone, muscle = (cells(feb, f"springs_top_{side}", "Surface") for side in ("bone", "muscle"))

@@ -55,7 +55,8 @@ def test_both_ends_moved_alike_is_a_rigid_motion() -> None:
 
 
 def test_torsion_stiffness_of_a_square_bar() -> None:
-    # Held ends stiffen both bars alike, so the difference of two lengths is free of them. P2 on 4 x 4 cells across: 1 %.
+    # Clamped ends stiffen both bars alike, so the difference of two lengths is free of them. P2 on 4 x 4 cells across: 1
+    # %.
     side, angle = 10.0, 0.1
     energy = {}
     for length, cells in ((20, 6), (40, 12)):
@@ -93,12 +94,12 @@ def test_ranks_change_the_time_and_not_the_answer(bent) -> None:
         assert two.scalars["energy"] == pytest.approx(one.scalars["energy"], rel=1e-6, abs=1e-9)
 
 
-def test_held_vertices_follow_their_bone(bent) -> None:
+def test_attached_vertices_follow_their_bone(bent) -> None:
     problem, _, frames = bent
     for frame in frames:
-        for held in problem.held:
-            expected = apply(held.bone.pose(frame.number), problem.surface.points[held.vertices])
-            assert frame.surface[held.vertices] == pytest.approx(expected, abs=1e-9)
+        for attached in problem.attached:
+            expected = apply(attached.bone.pose(frame.number), problem.surface.points[attached.vertices])
+            assert frame.surface[attached.vertices] == pytest.approx(expected, abs=1e-9)
 
 
 def test_cost_says_where_the_time_went(bent) -> None:
@@ -164,8 +165,8 @@ def test_an_error_on_one_rank_ends_all(tmp_path) -> None:
     assert "ZeroDivisionError" in outcome.message
 
 
-def test_how_far_held_vertices_are_off_is_recorded(bent) -> None:
-    # On this body every held vertex is a corner of a held facet.
+def test_how_far_attached_vertices_are_off_is_recorded(bent) -> None:
+    # On this body every attached vertex is a corner of a attached facet.
     _, _, frames = bent
     for frame in frames:
         assert 0 <= frame.scalars["held_off_rms"] <= frame.scalars["held_off_max"] < 1e-9

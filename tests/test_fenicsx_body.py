@@ -14,8 +14,8 @@ from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.foundations.records import parse
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Cells, Continuum, Prescribed, boundary_facets, check
-from fem_reference.problems.courses import Affine, Rest, Turn
+from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed, boundary_facets, check
+from fem_reference.problems.paths import Affine, Rest, Turn
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import BodySettings
 from fem_reference.solvers.fenicsx.jobs import Job
@@ -47,9 +47,9 @@ def box(element: str, counts=(2, 2, 2), size=(1.0, 1.0, 1.0)) -> Cells:
     return shapes.box(counts, size, ELEMENTS[element][0])
 
 
-def turned(mesh: Cells, top, bottom=None) -> Continuum:
-    held = (Prescribed("bottom", "z0", ALL, bottom or Rest()), Prescribed("top", "z1", ALL, top))
-    return Continuum(mesh, FLESH, held, (0.0, 1.0))
+def turned(mesh: Cells, top, bottom=None) -> Body:
+    fixed = (Prescribed("bottom", "z0", ALL, bottom or Rest()), Prescribed("top", "z1", ALL, top))
+    return Body(mesh, FLESH, fixed, (0.0, 1.0))
 
 
 def settings(element: str, **changes) -> BodySettings:
@@ -57,7 +57,7 @@ def settings(element: str, **changes) -> BodySettings:
 
 
 def test_an_element_must_exist_and_fit_the_cells_and_the_effects() -> None:
-    body = Continuum(box("P1"), FLESH, (), (0.0, 1.0))
+    body = Body(box("P1"), FLESH, (), (0.0, 1.0))
     with pytest.raises(InputError, match='element: got "P3", want one of P1, P2, P2/P0, P2/P1, Q1, Q2, Q1/P0, Q2/Q1'):
         check(body, "P3")
     with pytest.raises(
@@ -67,28 +67,28 @@ def test_an_element_must_exist_and_fit_the_cells_and_the_effects() -> None:
         check(body, "Q1/P0")
     with pytest.raises(InputError, match=r'got "P1", want one for .* with a pressure, which .* brings: P2/P0, P2/P1'):
         check(body, "P1")
-    free = Continuum(box("Q1"), PENALTY, (), (0.0, 1.0))
+    free = Body(box("Q1"), PENALTY, (), (0.0, 1.0))
     with pytest.raises(
         InputError, match=r'got "Q2/Q1", want one for .* without a pressure, which no effect brings: Q1, Q2'
     ):
         check(free, "Q2/Q1")
     for element in ELEMENTS:
-        check(Continuum(box(element), PENALTY if ELEMENTS[element][2] is None else FLESH, (), (0.0, 1.0)), element)
+        check(Body(box(element), PENALTY if ELEMENTS[element][2] is None else FLESH, (), (0.0, 1.0)), element)
 
 
 def test_a_session_checks_the_element(session) -> None:
     with pytest.raises(InputError, match="want one for tetrahedron cells"):
-        session.solve(Continuum(box("P1"), FLESH, (), (0.0, 1.0)), settings("Q1/P0"))
+        session.solve(Body(box("P1"), FLESH, (), (0.0, 1.0)), settings("Q1/P0"))
 
 
 @BOTH
 def test_a_block_on_springs_moves_by_the_load_over_their_stiffness(element, session) -> None:
     stiffness, load = 0.05, 0.004  # [MPa/mm], [MPa]
-    acting = (*FLESH, effect("traction", on="z1", force=f"0, 0, -{load} MPa", course=ONCE))
+    acting = (*FLESH, effect("traction", on="z1", force=f"0, 0, -{load} MPa", ramp=ONCE))
     springs = Prescribed("springs", "z0", (2,), Rest(), stiffness)
-    held = (Prescribed("x0", "x0", (0,), Rest()), Prescribed("y0", "y0", (1,), Rest()), springs)
+    fixed = (Prescribed("x0", "x0", (0,), Rest()), Prescribed("y0", "y0", (1,), Rest()), springs)
     mesh = box(element, size=(2.0, 1.0, 1.0))
-    state = session.solve(Continuum(mesh, acting, held, (0.0, 1.0)), settings(element)).last
+    state = session.solve(Body(mesh, acting, fixed, (0.0, 1.0)), settings(element)).last
     # Homogeneous, so that every element has it; Newton's residual of 1e-12 N over 0.05 N/mm.
     assert state.points[mesh.points[:, 2] == 0, 2] == pytest.approx(-load / stiffness, abs=1e-10)
     assert state.forces["springs"] == pytest.approx([0, 0, load * 2.0], abs=1e-11)
@@ -99,14 +99,14 @@ def test_a_block_on_springs_moves_by_the_load_over_their_stiffness(element, sess
 def test_springs_at_points_beside_the_cells_take_the_load_and_its_moment(element, session) -> None:
     # Points 0.05 mm below the face that springs hold, of uneven areas; the pull is off their middle: the block turns on them.
     stiffness, load = 1e-4, 1e-7  # so soft that the block is rigid, and turns by a thousandth
-    acting = (*FLESH, effect("traction", on="x1", force=f"0, 0, -{load} MPa", course=ONCE))
+    acting = (*FLESH, effect("traction", on="x1", force=f"0, 0, -{load} MPa", ramp=ONCE))
     mesh = box(element, (2, 2, 2), (1.0, 1.0, 1.0))
     at = np.array([[0.2, 0.3, -0.05], [0.7, 0.2, -0.05], [0.3, 0.8, -0.05], [0.9, 0.9, -0.05]])
     middles = mesh.points[mesh.cells].mean(axis=1)
     cells = np.array([np.argmin(np.linalg.norm(middles - point, axis=1)) for point in at])
     skin = Skin(cells, at, np.array([0.2, 0.3, 0.25, 0.25]))
     springs = Prescribed("springs", skin, (0, 1, 2), Rest(), stiffness)
-    state = session.solve(Continuum(mesh, acting, (springs,), (0.0, 1.0)), settings(element)).last
+    state = session.solve(Body(mesh, acting, (springs,), (0.0, 1.0)), settings(element)).last
     assert state.forces["springs"] == pytest.approx([0, 0, load], abs=1e-11)
     # The load acts at x = 1, y = z = 1/2: about the origin its moment is (-1/2, 1, 0) load, to the first order of its turning.
     assert state.moments["springs"] == pytest.approx([load / 2, -load, 0], abs=0.01 * load)
@@ -119,10 +119,10 @@ def test_springs_at_points_beside_the_cells_take_the_load_and_its_moment(element
 @BOTH
 def test_stiff_springs_come_near_to_what_they_stand_for(element, session) -> None:
     stretch, forces = Affine(((0.0, 0.0, 0.0),) * 3, (0.0, 0.0, 0.2)), []
-    held = tuple(Prescribed(face, face, (axis,), Rest()) for axis, face in enumerate(("x0", "y0", "z0")))
+    fixed = tuple(Prescribed(face, face, (axis,), Rest()) for axis, face in enumerate(("x0", "y0", "z0")))
     for stiffness in (None, 1e2, 1e3):
         pulled = Prescribed("top", "z1", (2,), stretch, stiffness)
-        state = session.solve(Continuum(box(element), FLESH, (*held, pulled), (0.0, 1.0)), settings(element)).last
+        state = session.solve(Body(box(element), FLESH, (*fixed, pulled), (0.0, 1.0)), settings(element)).last
         forces.append(state.forces["top"][2])
     # Ten times stiffer, ten times nearer, up to what the body's 0.03 N/mm are of the springs' 100 N/mm.
     assert (forces[1] - forces[0]) / (forces[2] - forces[0]) == pytest.approx(10, rel=1e-3)
@@ -224,28 +224,28 @@ def test_without_fenicsx_there_is_no_session(monkeypatch) -> None:
 
 
 def test_regions_and_fibres_that_a_body_lacks_are_named() -> None:
-    lost = Continuum(box("Q1/P0"), FLESH, (Prescribed("lid", "lid", (0,), Rest()),), (0.0, 1.0))
+    lost = Body(box("Q1/P0"), FLESH, (Prescribed("lid", "lid", (0,), Rest()),), (0.0, 1.0))
     with pytest.raises(InputError, match='on: got "lid", want a region of the body: x0, x1'):
         check(lost, "Q1/P0")
-    pressed = effect("pressure", on="roof", pressure="1 kPa", course=ONCE)
+    pressed = effect("pressure", on="roof", pressure="1 kPa", ramp=ONCE)
     with pytest.raises(InputError, match='on: got "roof"'):
-        check(Continuum(box("Q1/P0"), (*FLESH, pressed), (), (0.0, 1.0)), "Q1/P0")
-    active = effect("fibre_active", stress="10 kPa", optimal_stretch=1.0, course=ONCE)
+        check(Body(box("Q1/P0"), (*FLESH, pressed), (), (0.0, 1.0)), "Q1/P0")
+    active = effect("fibre_active", stress="10 kPa", optimal_stretch=1.0, ramp=ONCE)
     with pytest.raises(InputError, match="fibre: got nothing, want fibre directions"):
-        check(Continuum(box("Q1/P0"), (*FLESH, active), (), (0.0, 1.0)), "Q1/P0")
+        check(Body(box("Q1/P0"), (*FLESH, active), (), (0.0, 1.0)), "Q1/P0")
 
 
 def test_forces_have_names_of_their_own() -> None:
-    held = (Prescribed("end", "z0", (2,), Rest()), Prescribed("end", "z1", (2,), Rest()))
+    fixed = (Prescribed("end", "z0", (2,), Rest()), Prescribed("end", "z1", (2,), Rest()))
     with pytest.raises(InputError, match='prescribed: got "end" twice, want a name for each'):
-        check(Continuum(box("Q1/P0"), FLESH, held, (0.0, 1.0)), "Q1/P0")
+        check(Body(box("Q1/P0"), FLESH, fixed, (0.0, 1.0)), "Q1/P0")
 
 
 @pytest.mark.parametrize("stiffness", [0.0, -1.0, float("nan")])
 def test_springs_pull(stiffness) -> None:
-    held = (Prescribed("end", "z0", (2,), Rest(), stiffness),)
+    fixed = (Prescribed("end", "z0", (2,), Rest(), stiffness),)
     with pytest.raises(InputError, match=r"prescribed\.end\.stiffness: got .*, want more than 0, or None: exact"):
-        check(Continuum(box("Q1/P0"), FLESH, held, (0.0, 1.0)), "Q1/P0")
+        check(Body(box("Q1/P0"), FLESH, fixed, (0.0, 1.0)), "Q1/P0")
 
 
 def shared_facet(mesh: Cells) -> list[int]:
@@ -263,17 +263,17 @@ def test_regions_are_on_the_boundary_of_the_cells(element) -> None:
     every = np.concatenate(list(mesh.facets.values()))
     assert {tuple(facet) for facet in boundary_facets(mesh).tolist()} == {tuple(sorted(f)) for f in every.tolist()}
 
-    held = (Prescribed("end", "lid", (2,), Rest()),)
+    fixed = (Prescribed("end", "lid", (2,), Rest()),)
 
-    def checked(facets, acting=acting, held=held) -> None:
+    def checked(facets, acting=acting, fixed=fixed) -> None:
         other = replace(mesh, facets={"lid": np.asarray(facets), "unused": np.zeros_like(every[:1])})
-        check(Continuum(other, acting, held, (0.0, 1.0)), element)
+        check(Body(other, acting, fixed, (0.0, 1.0)), element)
 
     checked(np.flip(every, axis=1))  # in whatever order
     lost = shared_facet(mesh)
     with pytest.raises(InputError, match=r"facets\.lid: got facets that are not of one cell each \(1 of 3"):
         checked([every[0], every[1], lost])
-    pressed = effect("pressure", on="lid", pressure="1 kPa", course=ONCE)
+    pressed = effect("pressure", on="lid", pressure="1 kPa", ramp=ONCE)
     with pytest.raises(InputError, match=r"facets\.lid: got facets that are not of one cell each \(1 of 1"):
         checked([lost], (*acting, pressed), ())
     with pytest.raises(InputError, match=r"facets\.lid: got none, want facets of one cell each"):
@@ -297,18 +297,18 @@ def test_a_time_limit_ends_one_body_and_not_the_session(session) -> None:  # noq
 
 def test_what_attachments_share_counts_once(session, tmp_path) -> None:
     # Two regions meet in an edge and hold it both. Of a muscle, which has points to be followed, all forces are in balance.
-    held = (
+    fixed = (
         Prescribed("bottom", "z0", ALL, Rest()),
         Prescribed("side", "x0", ALL, Affine(((0.0, 0.0, 0.0), (0.0, 0.0, 0.1), (0.0, 0.0, -0.2)))),
         Prescribed("top", "z1", ALL, Affine(((0.0, 0.0, 0.0),) * 3, (0.0, 0.1, -0.2))),
     )
-    body = Continuum(box("P2/P1"), FLESH, held, (0.0, 1.0))
+    body = Body(box("P2/P1"), FLESH, fixed, (0.0, 1.0))
     centre = body.mesh.points[body.mesh.cells[0]].mean(axis=0)
     job, found = tmp_path / "job.pickle", []
     job.write_bytes(pickle.dumps(Job(body, settings("P2/P1"), {"surface": (np.array([0]), centre[None])})))
     outcome = session.run(job, None, lambda event: found.append(dict(np.load(event["file"]))), "frames")
     assert outcome.status == "converged"
-    forces = [found[-1][f"force {entry.name}"] for entry in held]
+    forces = [found[-1][f"force {entry.name}"] for entry in fixed]
     assert np.abs(forces[1]).max() > 1e-4
     assert np.abs(sum(forces)).max() < 1e-10
     # Of a body of the catalogue each region has all of what its unknowns take.

@@ -6,22 +6,22 @@ import pytest
 from fem_reference.foundations.errors import InputError
 from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere
 from fem_reference.problems import shapes
-from fem_reference.problems.body import Continuum, Prescribed
+from fem_reference.problems.body import Body, Prescribed
 from fem_reference.problems.contact import Contact, Obstruction
-from fem_reference.problems.courses import Rest
+from fem_reference.problems.paths import Rest
 from fem_reference.solvers import scikit_fem
 from fem_reference.verification import contact, parts
 from fem_reference.verification.contact import Slide
 
 pytestmark = pytest.mark.slow
 
-HELD = (Prescribed("ground", "z0", (0, 1, 2), Rest()),)
+FIXED = (Prescribed("ground", "z0", (0, 1, 2), Rest()),)
 LAW = Contact("z1", 1.0, 0.01)
 
 
-def block(*obstructions: Obstruction) -> Continuum:
+def block(*obstructions: Obstruction) -> Body:
     mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), "hexahedron")
-    return Continuum(mesh, parts.neo_hooke(0.01, 10.0), HELD, (0.0, 1.0), contact=LAW, obstructions=obstructions)
+    return Body(mesh, parts.neo_hooke(0.01, 10.0), FIXED, (0.0, 1.0), contact=LAW, obstructions=obstructions)
 
 
 def solved(lab, *obstructions: Obstruction):

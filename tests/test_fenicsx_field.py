@@ -123,7 +123,7 @@ def test_a_quadratic_field_is_met_exactly(tmp_path) -> None:
 
 
 @pytest.mark.parametrize("order", [1, 2])
-def test_a_closed_surface_held_at_some_vertices(tmp_path, order) -> None:
+def test_a_closed_surface_fixed_at_some_vertices(tmp_path, order) -> None:
     (tmp_path / "bounds.csv").write_text("3,8,1\n1,-1,0.5\n")
     scene = fields.scene(
         tmp_path,
@@ -142,7 +142,8 @@ def test_a_closed_surface_held_at_some_vertices(tmp_path, order) -> None:
 
 
 def resonant(tmp_path) -> FieldProblem:
-    """-psi'' = rate psi on three nodes of [0, 1], held on the left, at the rate of the mode sin(pi x / 2), which can then be added.
+    """-psi'' = rate psi on three nodes of [0, 1], fixed on the left, at the rate of the mode sin(pi x / 2), which can then be
+    added.
 
     Of linear elements of length h the mode sin(k x) has the rate 6 / h^2 (1 - cos kh) / (2 + cos kh).
     """

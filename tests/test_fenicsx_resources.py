@@ -10,8 +10,8 @@ import pytest
 from fem_reference.effects import make
 from fem_reference.foundations.errors import InputError
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
-from fem_reference.problems.courses import Rest
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed
+from fem_reference.problems.paths import Rest
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import BodySettings, Settings, resources
 from fem_reference.verification.parts import resistance
@@ -28,7 +28,7 @@ def test_unknowns_are_counted_as_the_solver_counts_them(element) -> None:
     if not any(importlib.util.find_spec(name) for name in ("dolfinx_solver", "dolfinx")):
         pytest.skip("FEniCSx is not installed")
     acting = (make("neo_hooke", mu="10 kPa"), resistance(element, 1.0))
-    body = Continuum(box(element), acting, (Prescribed("z0", "z0", (0, 1, 2), Rest()),), (0.0, 1.0))
+    body = Body(box(element), acting, (Prescribed("z0", "z0", (0, 1, 2), Rest()),), (0.0, 1.0))
     solved = fenicsx.solve_body(body, BodySettings(element=element))
     assert resources.unknowns(body.mesh, element) == solved.outcome.cost["unknowns"]
 

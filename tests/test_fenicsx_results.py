@@ -10,8 +10,8 @@ from acting import make
 
 from fem_reference.foundations.mesh import TetMesh
 from fem_reference.foundations.motion import Rotation
-from fem_reference.problems.body import Continuum, Prescribed
-from fem_reference.problems.courses import Affine, Rest
+from fem_reference.problems.body import Body, Prescribed
+from fem_reference.problems.paths import Affine, Rest
 from fem_reference.problems.shapes import box
 from fem_reference.runs import results
 from fem_reference.runs.results import NAMES, Results
@@ -33,10 +33,10 @@ CORNERS = np.eye(4)
 @pytest.mark.parametrize("element", ["P2/P1", "P2/P0", "P2", "P1"])
 def test_a_block_stretched_by_a_half_with_free_sides(fem_lab, element: str) -> None:  # noqa: ARG001
     mesh = box((2, 2, 2), (1.0, 1.0, 1.0), "tetrahedron")
-    held = [Prescribed(f"low {axis}", f"{axis}0", (i,), Rest()) for i, axis in enumerate("xyz")]
-    held += [Prescribed("pulled", "x1", (0,), Affine(((0.5, 0, 0), (0, 0, 0), (0, 0, 0))))]
+    fixed = [Prescribed(f"low {axis}", f"{axis}0", (i,), Rest()) for i, axis in enumerate("xyz")]
+    fixed += [Prescribed("pulled", "x1", (0,), Affine(((0.5, 0, 0), (0, 0, 0), (0, 0, 0))))]
     effects = MATRIX if "/" in element else PENALTY
-    body = Continuum(mesh, effects, tuple(held), (0.0, 1.0))
+    body = Body(mesh, effects, tuple(fixed), (0.0, 1.0))
     solved = fenicsx.solve_body(body, BodySettings(element=element, first_step=1, residual=1e-12, store_state=True))
     states = {state.frame: state.state for state in (solved.states[0], solved.last)}
     made = Results(TetMesh(mesh.points, mesh.cells), effects, states)
@@ -123,9 +123,9 @@ def test_viscosity_stores_the_step_it_took(fem_lab) -> None:  # noqa: ARG001
     # A cube sheared by 0.1 in a step of 1 s: sigma_xy = mu g + eta g' to first order in the step.
     effects = (*PENALTY, make("viscosity"))
     mesh = box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
-    course = Affine(((0, 1e-4, 0), (0, 0, 0), (0, 0, 0)))
-    held = tuple(Prescribed(side, side, (0, 1, 2), course) for side in ("x0", "x1", "y0", "y1", "z0", "z1"))
-    body = Continuum(mesh, effects, held, (0.0, 1.0), interval=1.0)
+    path = Affine(((0, 1e-4, 0), (0, 0, 0), (0, 0, 0)))
+    fixed = tuple(Prescribed(side, side, (0, 1, 2), path) for side in ("x0", "x1", "y0", "y1", "z0", "z1"))
+    body = Body(mesh, effects, fixed, (0.0, 1.0), interval=1.0)
     state = fenicsx.solve_body(body, BodySettings(element="P2", first_step=0.5, store_state=True)).last.state
     assert state.rate == 2
     found = Results(TetMesh(mesh.points, mesh.cells), effects, {1.0: state}).evaluate([[0.3, 0.4, 0.6]], 1.0)

@@ -160,25 +160,25 @@ def test_directions_follow_the_bar_and_the_ring() -> None:
     assert np.einsum("ij,ij->i", along, around).min() > np.cos(np.radians(5))
 
 
-def test_where_all_is_held_by_one_bone_fibres_go_the_mean_way() -> None:
+def test_where_all_is_attached_by_one_bone_fibres_go_the_mean_way() -> None:
     # The lowest layer of tets has all its corners on "bottom": the field has no slope there.
     bar = _bar()
     low = bar.points[bar.tets][:, :, 2].max(axis=1) < 6
     faces, _ = boundary(bar.tets)
-    held = TetMesh(
+    attached = TetMesh(
         bar.points,
         bar.tets,
         bar.facets | {"bottom": np.concatenate([faces, bar.tets[low][:, :3], bar.tets[low][:, 1:]])},
     )
-    held = TetMesh(
+    attached = TetMesh(
         bar.points,
         bar.tets,
         {
-            "bottom": held.facets["bottom"][(bar.points[held.facets["bottom"]][:, :, 2] < 6).all(axis=1)],
+            "bottom": attached.facets["bottom"][(bar.points[attached.facets["bottom"]][:, :, 2] < 6).all(axis=1)],
             "top": bar.facets["top"],
         },
     )
-    found = directions(held, "bottom", "top")
+    found = directions(attached, "bottom", "top")
     assert_allclose(np.linalg.norm(found, axis=1), 1, atol=1e-9)
     assert found[low][:, 2].min() > 0.9
 

@@ -68,7 +68,7 @@ def example_of(folder, values=None, **tables) -> Example:
         tables["domain"] = tables["domain"](folder)
     scene = fields.scene(folder, **tables)
     problem = field_problem.build(scene)
-    base = np.linspace(0.0, -2.0, len(problem.held))
+    base = np.linspace(0.0, -2.0, len(problem.fixed))
     values = base if values is None else values(base)
     done = Outcome("converged", "done", {"seconds_assembly": 0.25, "seconds_solve": 0.5})
     reference = FieldRun("reference", "fenicsx", problem, Solution(base, done))
@@ -87,9 +87,9 @@ def example_of(folder, values=None, **tables) -> Example:
 
 
 def rod(folder, values=None, **tables) -> Example:
-    held = {"boundary": [{"on": "left", "value": "0"}], "exact": "x**2/2 - 2*x"}
+    fixed = {"boundary": [{"on": "left", "value": "0"}], "exact": "x**2/2 - 2*x"}
     interval = {"interval": {"start": 0.0, "end": 1.0, "count": 20, "seed": 1}}
-    return example_of(folder, values, **({"domain": interval} | held | tables))
+    return example_of(folder, values, **({"domain": interval} | fixed | tables))
 
 
 def plate(folder, values=None, **tables) -> Example:
@@ -118,8 +118,14 @@ def test_page_shows_everything_and_needs_no_network(tmp_path):
     assert text.count("<img ") == 3 + 3
     assert all(source.startswith(("#", "data:image/webp;base64,")) for source in tags.sources)
     assert not re.search(r"<script|<link|<iframe|@import|url\((?!#)|http", text)
-    for told in ("Figure 4.5 of the report", "Figure 4.8 of the report", "Figure 4.9 of the report", "0.0312", "0.375"):
-        assert told in text
+    for printed in (
+        "Figure 4.5 of the report",
+        "Figure 4.8 of the report",
+        "Figure 4.9 of the report",
+        "0.0312",
+        "0.375",
+    ):
+        assert printed in text
     assert "Figure 4.6 of the report" not in text
     assert "distance to &lt;exact&gt;" in text
     assert "<td>0.0156</td><td>2.25</td>" in text
@@ -135,7 +141,7 @@ def test_every_id_on_the_page_is_unique_and_every_reference_meets_one(tmp_path):
 
 
 @pytest.mark.parametrize("make", [rod, plate, ball])
-def test_a_run_that_is_not_a_number_is_told_and_not_drawn(tmp_path, make):
+def test_a_run_that_is_not_a_number_is_reported_and_not_drawn(tmp_path, make):
     lost = make(tmp_path / "lost", lambda base: base * NAN)
     run = replace(lost.candidates[0], solution=Solution(base_of(lost) * NAN, Outcome("diverged", "it blew <up>")))
     text = field_page.render("Lost", (replace(lost, candidates=(run,), word="fail"),), differences=False)
@@ -181,7 +187,7 @@ def test_the_worst_example_gives_the_word(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("form", "speed", "told"),
+    ("form", "speed", "printed"),
     [
         ("auto", 100.0, "It is above 1, so that the form is SUPG"),
         ("auto", 1.0, "It is not above 1, so that the form is plain Galerkin"),
@@ -189,14 +195,14 @@ def test_the_worst_example_gives_the_word(tmp_path):
         ("galerkin", 100.0, "The scene asks for plain Galerkin"),
     ],
 )
-def test_the_form_is_told_with_its_reason(tmp_path, form, speed, told):
+def test_the_form_is_reported_with_its_reason(tmp_path, form, speed, printed):
     # 19 intervals of at most 0.2 with k = 1: the Peclet number v h / 2k of the longest is below 1 at 1 and above it at 100.
     flow = {"name": "advection", "velocity": [speed]}
     made = rod(tmp_path / "rod", effect=[DIFFUSION, flow, SOURCE], element=fields.element(1, form))
     text = field_page.render("Form", (made,), differences=False)
-    assert told in text
-    assert ("coth Pe" in text) == ("SUPG" in told)
-    assert ">supg</td>" in text if "SUPG" in told else ">galerkin</td>" in text
+    assert printed in text
+    assert ("coth Pe" in text) == ("SUPG" in printed)
+    assert ">supg</td>" in text if "SUPG" in printed else ">galerkin</td>" in text
     assert ">as listed</td>" in text
 
 

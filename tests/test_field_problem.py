@@ -1,4 +1,4 @@
-"""Scalar scenes: what is read, what is held where, and that what is not usable is named."""
+"""Scalar scenes: what is read, what is fixed where, and that what is not usable is named."""
 
 import json
 
@@ -23,8 +23,8 @@ def scene(folder, **tables):
 
 
 def test_what_ends_and_rims_hold(tmp_path) -> None:
-    held = build(scene(tmp_path)).held
-    assert held == pytest.approx([0, np.nan, np.nan, np.nan, 2], nan_ok=True)
+    fixed = build(scene(tmp_path)).fixed
+    assert fixed == pytest.approx([0, np.nan, np.nan, np.nan, 2], nan_ok=True)
     for order in (1, 2):
         plate = scene(
             tmp_path,
@@ -35,7 +35,7 @@ def test_what_ends_and_rims_hold(tmp_path) -> None:
         problem = build(plate, 1)
         nodes = problem.mesh.nodes[order]
         expected = np.where(nodes[:, 0] == 1, nodes[:, 1], np.nan)
-        assert problem.held == pytest.approx(expected, nan_ok=True)
+        assert problem.fixed == pytest.approx(expected, nan_ok=True)
 
 
 def test_bounds_go_along_the_rim_when_the_mesh_is_refined(tmp_path) -> None:
@@ -46,7 +46,7 @@ def test_bounds_go_along_the_rim_when_the_mesh_is_refined(tmp_path) -> None:
     (tmp_path / "bounds.csv").write_text("\n".join(rows) + "\n")
     problem = build(scene(tmp_path, domain=domain, boundary=[{"bounds": "bounds.csv"}], element=fields.element(2)), 2)
     nodes = problem.mesh.nodes[2]
-    assert problem.held == pytest.approx(np.where(nodes[:, 0] == 1, nodes[:, 1], np.nan), nan_ok=True)
+    assert problem.fixed == pytest.approx(np.where(nodes[:, 0] == 1, nodes[:, 1], np.nan), nan_ok=True)
 
 
 def test_nodes_at_random_are_those_of_the_seed(tmp_path) -> None:
@@ -63,10 +63,10 @@ def test_the_shipped_plates_are_the_report_s() -> None:
     square, bounds = listing_kernels.square()
     problem = build(casefile.read("plate_square"))
     assert problem.mesh.points == pytest.approx(square, abs=1e-15)
-    assert np.flatnonzero(~np.isnan(problem.held)).tolist() == sorted(bounds[0].astype(int).tolist())
+    assert np.flatnonzero(~np.isnan(problem.fixed)).tolist() == sorted(bounds[0].astype(int).tolist())
     problem = build(casefile.read("plate_spiral"))
     assert problem.mesh.points == pytest.approx(listing_kernels.spiral(400), abs=1e-13)
-    assert np.flatnonzero(~np.isnan(problem.held)).tolist() == listing_kernels.rim(problem.mesh.cells).tolist()
+    assert np.flatnonzero(~np.isnan(problem.fixed)).tolist() == listing_kernels.rim(problem.mesh.cells).tolist()
 
 
 @pytest.mark.parametrize(
@@ -251,14 +251,14 @@ truth = 0.0
 within = 1.0
 kind = "property"
 because = "it cannot be"
-[spoil]
+[negative_control]
 key = "title"
 value = "another"
 because = "none"
 """
 
 
-def test_a_reference_that_fails_is_told_in_full(tmp_path, capsys) -> None:
+def test_a_reference_that_fails_is_reported_in_full(tmp_path, capsys) -> None:
     # Three elements of length 1 resonate at -6 / 5: no solution, which is a status and never a pass.
     (tmp_path / "case.toml").write_text(RESONATES)
     target = tmp_path / "facts.json"

@@ -92,7 +92,7 @@ def test_a_file_cut_off_anywhere_is_refused(
 
 
 def test_a_cut_obj_is_refused_where_the_cut_shows(written: Path, tmp_path: Path) -> None:
-    # OBJ states no counts: a cut between two lines of faces cannot be told from a smaller file.
+    # OBJ states no counts: a cut between two lines of faces cannot be distinguished from a smaller file.
     path, text = tmp_path / "cut.obj", (written / "text.obj").read_text()
     faces = text.index("\nf ")
     for stop, got in (

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from fem_reference.assessment.judge import judge
 from fem_reference.foundations.mesh import Polylines, Surface, triangle_areas
 from fem_reference.geometry.windings import outer_windings
-from fem_reference.metrics import Yardstick, at_rest, inversion
+from fem_reference.metrics import MeasurementContext, at_rest, inversion
 from fem_reference.runs.store import Outcome, Run
 
 BALL = shapes.sphere(3, 10.0)
@@ -24,7 +24,7 @@ def shares(run: Run, reference: Run | None = None) -> tuple[np.ndarray, np.ndarr
     """``inside_out`` and ``overlapping`` [%] per frame, against rest where there is no reference."""
     reference = at_rest(run) if reference is None else reference
     fibre = Polylines(run.surface.points[:2], np.array([0, 2]))
-    inside_out, overlapping = inversion.measure(run, reference, Yardstick.of(at_rest(run), fibre, ()))
+    inside_out, overlapping = inversion.measure(run, reference, MeasurementContext.of(at_rest(run), fibre, ()))
     assert (inside_out.statistic, overlapping.statistic) == ("inside_out", "overlapping")
     return inside_out.values, overlapping.values
 
@@ -113,9 +113,9 @@ def test_rigid_motion_and_the_order_of_vertices_change_nothing() -> None:
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e200])
 def test_what_is_not_a_number_never_passes(bad: float) -> None:
-    spoilt = BALL.points.copy()
-    spoilt[5] = bad
-    for values in shares(run_of(BALL, BALL.points, spoilt)):
+    damaged = BALL.points.copy()
+    damaged[5] = bad
+    for values in shares(run_of(BALL, BALL.points, damaged)):
         assert np.isnan(values).tolist() == [False, True]
         assert judge(float(values[1]), 0.0, 1e6) == "fail"
 

@@ -18,7 +18,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines
 from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
-from fem_reference.problems.muscle import Body, Problem
+from fem_reference.problems.muscle import Problem, RigidBody
 from fem_reference.report import gallery
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import line_of_action
@@ -70,7 +70,7 @@ def test_via_points_go_with_their_bones() -> None:
     assert outcome.message == "2 lines, straight, through 2 via-points; no surface"
     low, high = given.fibres.points[20], given.fibres.points[61]  # the middles of both fibres
     for frame in frames:
-        up, down = SWING.pose(frame.number), given.held[0].bone.pose(frame.number)
+        up, down = SWING.pose(frame.number), given.attached[0].bone.pose(frame.number)
         assert_allclose(frame.fibres[20], apply(up, low[None])[0], atol=1e-10)
         assert_allclose(frame.fibres[61], apply(up, high[None])[0], atol=1e-10)
         # A quarter of the way along the straight fibre, which begins at the top, at z = 22.5.
@@ -181,8 +181,8 @@ def test_too_few_points_and_no_attachment_are_refused() -> None:
         InputError, match="via: got fibre 0 of 2 points, want fibres of at least 3 points for 1 via-points"
     ):
         solved(bar(points=2), via=[{"at": 0.5, "bone": "top"}])
-    with pytest.raises(InputError, match="a muscle that no bone holds, want attachments that lines are fixed to"):
-        solved(replace(bar(), held=()))
+    with pytest.raises(InputError, match="a muscle without attachments, want attachments that lines are fixed to"):
+        solved(replace(bar(), attached=()))
 
 
 CANDIDATES = """
@@ -224,7 +224,9 @@ def scene(folder: Path) -> Path:
     reference = 'solver = "mass_spring"\nstiffness = "1 N/mm"\ndensity = "1060 kg/m3"\nframe_time = "20 ms"\n'
     head = head.replace('solver = "fenicsx"\nfirst_step = 5\n', reference + 'damping = "0.01 N s/m"\n')
     expected = EXPECTED.format(metric="surface_deviation", within=5) + EXPECTED.format(metric="fibre_length", within=9)
-    rest = rest.replace('within = "0.5 %"', 'within = "50 %"').replace("[spoil]", expected + "\n[spoil]")
+    rest = rest.replace('within = "0.5 %"', 'within = "50 %"').replace(
+        "[negative_control]", expected + "\n[negative_control]"
+    )
     (folder / "case.toml").write_text(head + CANDIDATES + rest)
     return folder
 
@@ -232,20 +234,22 @@ def scene(folder: Path) -> Path:
 @pytest.fixture(scope="module")
 def compared(tmp_path_factory) -> tuple[dict, Path]:
     folder = tmp_path_factory.mktemp("lines")
-    told = folder / "told.json"
+    printed = folder / "printed.json"
     case = scene(folder / "bar")
     with pytest.MonkeyPatch.context() as patch:  # pictures take seconds, and lines are in none
         patch.setattr(gallery, "_command", lambda _job, _folder: [sys.executable, "-c", "raise SystemExit(3)"])
-        assert main(["compare", str(case), "--out", str(folder / "out"), "--json", str(told), "--quiet"]) == 0
-    return json.loads(told.read_text()), folder / "out"
+        assert main(["compare", str(case), "--out", str(folder / "out"), "--json", str(printed), "--quiet"]) == 0
+    return json.loads(printed.read_text()), folder / "out"
 
 
 def test_lines_are_measured_and_judged_on_their_lengths_alone(compared) -> None:
-    told, _ = compared
-    metrics = {name: {row["metric"] for row in told["measures"] if row["candidate"] == name} for name in told["cost"]}
+    printed, _ = compared
+    metrics = {
+        name: {row["metric"] for row in printed["measures"] if row["candidate"] == name} for name in printed["cost"]
+    }
     assert metrics["line"] == metrics["around"] == {"fibre_length"}
     assert {"fibre_length", "surface_deviation", "volume", "penetration"} <= metrics["springs"]
-    judged = {(row["of"], row["metric"]): row["verdict"] for row in told["verdicts"]}
+    judged = {(row["of"], row["metric"]): row["verdict"] for row in printed["verdicts"]}
     assert judged == {
         ("reference", "volume"): "pass",
         ("springs", "surface_deviation"): "pass",
@@ -253,14 +257,14 @@ def test_lines_are_measured_and_judged_on_their_lengths_alone(compared) -> None:
         ("line", "fibre_length"): "pass",
         ("around", "fibre_length"): "pass",
     }
-    assert {row["candidate"] for row in told["from_rest"] if row["metric"] == "volume"} == {"reference", "springs"}
+    assert {row["candidate"] for row in printed["from_rest"] if row["metric"] == "volume"} == {"reference", "springs"}
 
 
 def test_a_line_is_shorter_than_its_fibre_at_rest_already(compared) -> None:
-    told, out = compared
+    printed, out = compared
     rows = {
         (row["candidate"], row["statistic"]): row["value"]
-        for row in told["measures"]
+        for row in printed["measures"]
         if row["frame"] == 0 and row["metric"] == "fibre_length" and row["value"] is not None
     }
     assert rows["springs", "max"] == pytest.approx(0, abs=1e-9)
@@ -297,8 +301,8 @@ def test_a_reference_of_lines_alone_is_refused(tmp_path, capsys) -> None:
     )
 
 
-def test_the_ends_are_held_by_the_bones_of_the_nearest_attachments() -> None:
+def test_the_ends_are_attached_by_the_bones_of_the_nearest_attachments() -> None:
     given = bar()
-    spare = Body("spare", given.bones[0].surface, Translation((1, 0, 0), (0.0, 10.0), (0.0, 50.0)))
+    spare = RigidBody("spare", given.bones[0].surface, Translation((1, 0, 0), (0.0, 10.0), (0.0, 50.0)))
     _, frames = solved(replace(given, bones=(spare, *given.bones)))
     assert_allclose(frames[-1].fibres, solved(given)[1][-1].fibres, atol=1e-12)

@@ -102,12 +102,12 @@ def test_equal_to_what_octave_computes(tmp_path):
 
 def test_points_and_bounds_are_octaves():
     points, bounds = kernels.square()
-    _, there, held = mesh("plate_square")
+    _, there, fixed = mesh("plate_square")
     assert apart(points, there) <= 1e-15  # a difference of one in the last digit in linspace
-    assert np.array_equal(bounds, held)
-    triangles, there, held = mesh("plate_spiral")
+    assert np.array_equal(bounds, fixed)
+    triangles, there, fixed = mesh("plate_spiral")
     assert apart(kernels.spiral(400), there) <= 1e-15
-    assert np.array_equal(kernels.rim(triangles), np.sort(held[0]))
+    assert np.array_equal(kernels.rim(triangles), np.sort(fixed[0]))
 
 
 def test_triangulation_without_ties_is_octaves():
@@ -190,7 +190,7 @@ def test_operator_on_a_convex_surface_has_six_null_modes():
 # --- Listings 4.3 to 4.5
 
 
-def test_held_values_stay_and_the_rest_is_in_balance():
+def test_fixed_values_stay_and_the_rest_is_in_balance():
     triangles, points, _ = mesh("surface")
     A = kernels.first_derivative(triangles, points) + sparse.eye_array(points.size)
     b = np.random.default_rng(0).normal(size=points.size)
@@ -305,6 +305,6 @@ def test_number_that_is_no_square(n):
         kernels.uniform(n)
 
 
-def test_vertex_held_twice():
+def test_vertex_fixed_twice():
     with pytest.raises(InputError, match="bounds: got a vertex named twice"):
         kernels.dirichlet(sparse.eye_array(4), np.ones(4), 2, np.array([[1, 1], [0.0, 3.0]]))

@@ -139,9 +139,9 @@ def test_moving_the_whole_scene_changes_no_measure(job, tmp_path) -> None:
         assert there["value"] == pytest.approx(here["value"], rel=1e-6, abs=1e-6), here
 
 
-def test_the_spoil_turns_the_verdict(job, tmp_path, monkeypatch) -> None:
-    spoiled = casefile.read(job.case, spoiled=True)
-    monkeypatch.setattr(casefile, "read", lambda _, **__: spoiled)
+def test_the_negative_control_turns_the_verdict(job, tmp_path, monkeypatch) -> None:
+    changed = casefile.read(job.case, with_negative_control=True)
+    monkeypatch.setattr(casefile, "read", lambda _, **__: changed)
     status = cli.main(["run", str(job.case), "--out", str(tmp_path), "--quiet"])
     assert status == cli.VERDICT_FAIL
 
@@ -221,9 +221,9 @@ def tamper(case: Path, *, drop: int = 0, value: float = 0.0) -> None:
 
 @pytest.mark.parametrize("what", BAD)
 def test_bad_input_ends_with_one_message_and_leaves_nothing(what, job, tmp_path, capsys) -> None:
-    name, spoil, message = BAD[what]
+    name, damage, message = BAD[what]
     case = shutil.copytree(job.case, tmp_path / "bar")
-    spoil(case)
+    damage(case)
     status = cli.main(["compare", name or str(case), "--out", str(tmp_path / "out"), "--quiet"])
     printed = capsys.readouterr()
     assert status == cli.BAD_INPUT
@@ -328,7 +328,7 @@ def test_list_and_show(job, capsys) -> None:
     assert any("fenicsx-" in path for path in facts["runs"])
     status, facts = job.call("show", str(job.case))
     assert status == cli.DONE
-    assert facts["attachments"]["origin"].endswith("held by floor exactly")
+    assert facts["attachments"]["origin"].endswith("attached by floor exactly")
     status, facts = job.call("show", str(job.case), "--set", "reference.first_step=4.0")
     assert facts["reference"] == "fenicsx first_step=4.0"
     assert (job.out / "bar" / "tets.vtu").exists()

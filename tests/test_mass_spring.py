@@ -16,13 +16,13 @@ from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
 from fem_reference.geometry.embedding import Locator
 from fem_reference.geometry.rigid_bodies import HalfSpace
-from fem_reference.problems.muscle import Body, Problem
+from fem_reference.problems.muscle import Problem, RigidBody
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import mass_spring
-from fem_reference.solvers.spring_kernels import Course, Network, advance, forces
+from fem_reference.solvers.spring_kernels import Network, PrescribedPath, advance, forces
 
 NOTHING = np.zeros((0, 3))
-FREE = Course(np.zeros(0, np.int64), NOTHING, NOTHING)
+FREE = PrescribedPath(np.zeros(0, np.int64), NOTHING, NOTHING)
 STIFFNESS, MASS = 0.3, 2e-6  # N/mm, tonne
 USUAL = {"stiffness": "1 N/mm", "density": "1060 kg/m3", "frame_time": "20 ms", "damping": "0.02 N s/m"}
 BEND = Rotation((1, 0, 0), (5, 5, 0), (0.0, 10.0), (0.0, 0.3))
@@ -37,8 +37,8 @@ def on_a_line(*places: float) -> np.ndarray:
     return np.column_stack([np.zeros((len(places), 2)), places])
 
 
-def still(points: np.ndarray, *held: int) -> Course:
-    return Course(np.array(held), points[list(held)], points[list(held)])
+def still(points: np.ndarray, *fixed: int) -> PrescribedPath:
+    return PrescribedPath(np.array(fixed), points[list(fixed)], points[list(fixed)])
 
 
 def tangle(seed: int, damping: float = 0.0) -> tuple[np.ndarray, Network]:
@@ -110,23 +110,23 @@ def energy(points: np.ndarray, previous: np.ndarray, springs: Network, time_step
 @pytest.mark.parametrize("damping", [0.0, 1e-4])
 def test_energy_is_kept_without_damping_and_lost_with_it(damping) -> None:
     points, springs = tangle(1, damping)
-    previous, time_step = points.copy(), 0.02 * mass_spring.stable_time_step(springs, FREE.held)
-    course = []
+    previous, time_step = points.copy(), 0.02 * mass_spring.stable_time_step(springs, FREE.fixed)
+    energies = []
     for _ in range(200):
         advance(points, previous, springs, FREE, time_step, 20)
-        course.append(energy(points, previous, springs, time_step))
+        energies.append(energy(points, previous, springs, time_step))
     if damping:
-        assert (np.diff(course) < 0).all()
-        assert course[-1] < 0.5 * course[0]
+        assert (np.diff(energies) < 0).all()
+        assert energies[-1] < 0.5 * energies[0]
     else:  # of second order: a fiftieth of the stable step leaves some 1e-3
-        assert_allclose(course, course[0], rtol=3e-3)
+        assert_allclose(energies, energies[0], rtol=3e-3)
 
 
 def test_momentum_and_angular_momentum_are_kept() -> None:
     points, springs = tangle(2)
     previous = points - np.random.default_rng(3).normal(0, 1e-3, points.shape)
     way, turn = np.sum(points - previous, axis=0), np.sum(np.cross(previous, points), axis=0)
-    advance(points, previous, springs, FREE, 0.5 * mass_spring.stable_time_step(springs, FREE.held), 1000)
+    advance(points, previous, springs, FREE, 0.5 * mass_spring.stable_time_step(springs, FREE.fixed), 1000)
     # Springs pull both ends alike and along themselves: only rounding of 1000 steps of numbers near 10 is left.
     assert_allclose(np.sum(points - previous, axis=0), way, atol=1e-10)
     assert_allclose(np.sum(np.cross(previous, points), axis=0), turn, atol=1e-9)
@@ -147,9 +147,9 @@ def test_forces_are_the_slope_of_the_energy() -> None:
     assert_allclose(forces(points, springs), -np.reshape(slopes, (-1, 3)), atol=1e-7)
 
 
-def settled(points: np.ndarray, springs: Network, *held: int) -> np.ndarray:
-    points, time_step = points.copy(), 0.5 * mass_spring.stable_time_step(springs, np.array(held))
-    advance(points, points.copy(), springs, still(points, *held), time_step, 20_000)
+def settled(points: np.ndarray, springs: Network, *fixed: int) -> np.ndarray:
+    points, time_step = points.copy(), 0.5 * mass_spring.stable_time_step(springs, np.array(fixed))
+    advance(points, points.copy(), springs, still(points, *fixed), time_step, 20_000)
     return points
 
 
@@ -161,7 +161,7 @@ def test_a_hanging_chain_is_stretched_by_what_hangs_below() -> None:
     assert_allclose(-np.diff(points[:, 2]), 10 + carried / STIFFNESS, rtol=1e-9)
 
 
-def test_a_chain_between_two_held_ends_has_one_tension() -> None:
+def test_a_chain_between_two_fixed_ends_has_one_tension() -> None:
     lengths = np.array([4.0, 10, 6, 8])
     springs = network([(j, j + 1) for j in range(4)], lengths, 5, 1e-4)
     points = settled(on_a_line(0, 5, 12, 20, 36), springs, 0, 4)
@@ -175,7 +175,7 @@ def test_ends_that_coincide_pull_nowhere() -> None:
 @pytest.mark.parametrize("damping", [0.0, 5e-4])
 def test_the_stable_time_step_of_two_masses_is_sharp(damping) -> None:
     springs = network([0, 1], [10], 2, damping)
-    limit = mass_spring.stable_time_step(springs, FREE.held)
+    limit = mass_spring.stable_time_step(springs, FREE.fixed)
     if not damping:
         assert_allclose(limit, 2 / math.sqrt(2 * STIFFNESS / MASS), rtol=1e-14)
     grown = []
@@ -193,7 +193,7 @@ def test_the_stable_time_step_is_safe_for_any_shape() -> None:
         steps = 1e-6 * np.eye(points.size).reshape(-1, 12, 3)
         slope = [(forces(points + step, springs) - forces(points - step, springs)).ravel() / 2e-6 for step in steps]
         greatest = np.linalg.eigvalsh(-np.array(slope) / MASS).max()
-        assert mass_spring.stable_time_step(springs, FREE.held) <= 2 / math.sqrt(greatest)
+        assert mass_spring.stable_time_step(springs, FREE.fixed) <= 2 / math.sqrt(greatest)
     assert mass_spring.stable_time_step(springs, np.arange(12)) == math.inf
 
 
@@ -217,10 +217,10 @@ def test_a_muscle_is_its_points_edges_and_mass() -> None:
     assert_allclose(forces(np.array(mesh.points), found), 0, atol=1e-12)
 
 
-def test_held_vertices_follow_their_bones_where_the_tets_do_not_resolve_them() -> None:
+def test_fixed_vertices_follow_their_bones_where_the_tets_do_not_resolve_them() -> None:
     given = bar(BEND)
-    more = replace(given.held[1], vertices=np.flatnonzero(given.surface.points[:, 2] > 20))
-    _, frames = solved(replace(given, held=(given.held[0], more)))
+    more = replace(given.attached[1], vertices=np.flatnonzero(given.surface.points[:, 2] > 20))
+    _, frames = solved(replace(given, attached=(given.attached[0], more)))
     expected = apply(BEND.pose(10), given.surface.points[more.vertices])
     assert_allclose(frames[-1].surface[more.vertices], expected, atol=1e-9)
 
@@ -278,9 +278,11 @@ def test_every_setting_is_felt(change) -> None:
 
 
 def test_bones_keep_masses_out() -> None:
-    """A soft bar that hangs sideways between its ends sags onto a plane that comes up, in the end above where they are held."""
+    """A soft bar that hangs sideways between its ends sags onto a plane that comes up, in the end above where they are fixed."""
     lift = Translation((0, 1, 0), (0.0, 40.0), (0.0, 3.5))
-    floor = Body("floor", Surface(np.eye(3), np.array([[0, 1, 2]])), lift, solid=HalfSpace((5, -3.0, 5), (0, 1, 0)))
+    floor = RigidBody(
+        "floor", Surface(np.eye(3), np.array([[0, 1, 2]])), lift, solid=HalfSpace((5, -3.0, 5), (0, 1, 0))
+    )
     given = replace(bar(None, (0, 40)), bones=(floor,))
     soft = {"stiffness": "0.01 N/mm", "gravity": "0, -40, 0 m/s^2", "damping": "0.001 N s/m"}
     _, sagging = solved(given, **soft)
@@ -288,9 +290,9 @@ def test_bones_keep_masses_out() -> None:
     outcome, frames = solved(given, **soft, collision={"gap": "0.5 mm", "stiffness": 1.0})
     assert outcome.status == "converged"
     # Each step ends with its projection, of a plane exactly: round-off is left.
-    held = np.isin(given.mesh.points[:, 2], (0, 30))
-    assert_allclose(frames[-1].tets[~held, 1].min(), 0.5 + 0.5, atol=1e-9)
-    assert_allclose(frames[-1].tets[held], given.mesh.points[held], atol=1e-12)
+    fixed = np.isin(given.mesh.points[:, 2], (0, 30))
+    assert_allclose(frames[-1].tets[~fixed, 1].min(), 0.5 + 0.5, atol=1e-9)
+    assert_allclose(frames[-1].tets[fixed], given.mesh.points[fixed], atol=1e-12)
 
 
 def test_cost() -> None:
@@ -342,7 +344,7 @@ def test_a_muscle_turned_inside_out_is_an_outcome() -> None:
     assert [frame.number for frame in frames] == [0]
 
 
-def test_single_tetrahedra_inside_out_are_told() -> None:
+def test_single_tetrahedra_inside_out_are_reported() -> None:
     # The upper end is below the middle and above the lower end: all six tetrahedra of the upper cell are inside out.
     outcome, frames = solved(pressed(20.0), **FAST)
     assert outcome.status == "converged"
@@ -373,8 +375,8 @@ def test_steps_in_parts_are_the_steps_at_once() -> None:
     rest = np.array(given.mesh.points)
     points, previous, at_once, before = (rest.copy() for _ in range(4))
     model.move(points, previous, 1, 2e-6, 450)
-    ends = [model._carried(number)[model.held] for number in (0, 1)]
-    advance(at_once, before, model.network, Course(model.held, *ends), 2e-6, 450)
+    ends = [model._carried(number)[model.fixed] for number in (0, 1)]
+    advance(at_once, before, model.network, PrescribedPath(model.fixed, *ends), 2e-6, 450)
     assert np.abs(points - rest).max() > 0.1
     assert_allclose(points, at_once, rtol=0, atol=1e-11)
     assert_allclose(previous, before, rtol=0, atol=1e-11)
@@ -383,11 +385,11 @@ def test_steps_in_parts_are_the_steps_at_once() -> None:
 @pytest.mark.parametrize("damping", [1e-3, 1.0, 1e6, 1e200])
 def test_the_stable_time_step_at_great_damping(damping) -> None:
     # Where c is great, 4 m - 2 c dt = 0: the next term of the root is smaller by 2 k m / c^2, a share of 1.2e-6 of c = 1e-3.
-    found = mass_spring.stable_time_step(network([0, 1], [10], 2, damping), FREE.held)
+    found = mass_spring.stable_time_step(network([0, 1], [10], 2, damping), FREE.fixed)
     assert_allclose(found, 2 * MASS / damping, rtol=max(1e-12, 3 * STIFFNESS * MASS / damping / damping))
 
 
-def test_another_clock_than_the_scenes_is_told() -> None:
+def test_another_clock_than_the_scenes_is_reported() -> None:
     outcome, _ = solved(replace(bar(BEND), interval=0.5))
     assert outcome.message.endswith("; from a frame number to the next it takes 0.02 s, the scene 0.5 s")
     assert "the scene" not in solved(replace(bar(BEND), interval=0.02))[0].message

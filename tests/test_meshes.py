@@ -102,12 +102,12 @@ def test_hip_muscle_ends_half_a_millimetre_before_flat_faces(hip: dict[str, Surf
 def test_hip_attachment_is_the_flat_end_and_no_more(hip: dict[str, Surface], bone: str) -> None:
     muscle = hip["muscle"]
     distance = distances(muscle.points, hip[bone]).distance
-    held = distance <= WITHIN
-    assert distance[held].max() < 0.51
-    assert distance[~held].min() > 2.0
+    attached = distance <= WITHIN
+    assert distance[attached].max() < 0.51
+    assert distance[~attached].min() > 2.0
     # The ends are circles of radius 9.6 mm, 290 mm2; a vertex on the rim also counts thirds of triangles on the side.
     areas = vertex_areas(muscle.points, muscle.triangles)
-    assert 250 < areas[held].sum() < 2 * 290
+    assert 250 < areas[attached].sum() < 2 * 290
 
 
 def test_hip_leaves_the_joint_free(hip: dict[str, Surface]) -> None:

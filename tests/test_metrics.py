@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from fem_reference.assessment.judge import judge
 from fem_reference.foundations.mesh import Polylines, Surface, check_closed
-from fem_reference.metrics import Measure, Yardstick, at_rest, measure
+from fem_reference.metrics import Measure, MeasurementContext, at_rest, measure
 from fem_reference.metrics.fibre_length import extension_error
 from fem_reference.runs.store import Outcome, Run
 
@@ -92,11 +92,11 @@ def _wavy(points: np.ndarray) -> np.ndarray:
 
 
 REFERENCE = _run([SPHERE.points, _wavy(SPHERE.points)], [FIBRES.points, _wavy(FIBRES.points)])
-YARDSTICK = Yardstick.of(REFERENCE, FIBRES, ())
+CONTEXT = MeasurementContext.of(REFERENCE, FIBRES, ())
 
 
-def _values(run: Run, reference: Run, yardstick: Yardstick) -> dict[str, np.ndarray]:
-    return {f"{each.metric}.{each.statistic}": each.values for each in measure(run, reference, yardstick)}
+def _values(run: Run, reference: Run, context: MeasurementContext) -> dict[str, np.ndarray]:
+    return {f"{each.metric}.{each.statistic}": each.values for each in measure(run, reference, context)}
 
 
 def _find(measures: tuple[Measure, ...], name: str) -> Measure:
@@ -105,7 +105,7 @@ def _find(measures: tuple[Measure, ...], name: str) -> Measure:
 
 
 def test_units_and_shapes_are_stated() -> None:
-    measures = measure(REFERENCE, REFERENCE, YARDSTICK)
+    measures = measure(REFERENCE, REFERENCE, CONTEXT)
     for metric, statistics in UNITS.items():
         assert {each.statistic: each.unit for each in measures if each.metric == metric} == statistics
     for each in measures:
@@ -116,18 +116,18 @@ def test_units_and_shapes_are_stated() -> None:
 @pytest.mark.parametrize("interior", [True, False])
 def test_zero_against_itself(interior: bool) -> None:
     run = REFERENCE if interior else replace(REFERENCE, fibres=None, fibre_positions=None)
-    for name, values in _values(run, REFERENCE, YARDSTICK).items():
+    for name, values in _values(run, REFERENCE, CONTEXT).items():
         assert np.abs(values).max() < 1e-12, name
 
 
 def test_a_shift_of_one_mm_is_one_mm() -> None:
     shift = np.array([2.0, -1.0, 2.0]) / 3
     run = replace(REFERENCE, positions=REFERENCE.positions + shift, fibre_positions=REFERENCE.fibre_positions + shift)
-    found = _values(run, REFERENCE, YARDSTICK)
+    found = _values(run, REFERENCE, CONTEXT)
     for statistic in ("rms", "p95", "max"):
         assert_allclose(found[f"surface_deviation.{statistic}"], 1, rtol=1e-12)
     for statistic in ("rms_percent", "max_percent"):
-        assert_allclose(found[f"surface_deviation.{statistic}"], 100 / YARDSTICK.travel, rtol=1e-12)
+        assert_allclose(found[f"surface_deviation.{statistic}"], 100 / CONTEXT.travel, rtol=1e-12)
     assert (found["surface_deviation.hausdorff"] <= 1 + 1e-12).all()
     for name in ("volume.deviation", "fibre_length.max", "fibre_length.max_percent"):
         assert np.abs(found[name]).max() < 1e-9, name  # round-off of 1e5 mm3 and of coordinates near 500 mm
@@ -135,13 +135,13 @@ def test_a_shift_of_one_mm_is_one_mm() -> None:
 
 def test_travel_is_the_greatest_displacement() -> None:
     run = _run([SPHERE.points, SPHERE.points + np.array([3, 4, 0])])
-    assert_allclose(Yardstick.of(run, FIBRES, ()).travel, 5, rtol=1e-12)
+    assert_allclose(MeasurementContext.of(run, FIBRES, ()).travel, 5, rtol=1e-12)
 
 
 def test_nothing_that_travels() -> None:
     still = _run([SPHERE.points, SPHERE.points])
     run = _run([SPHERE.points, SPHERE.points + np.array([1, 0, 0])])
-    found = _values(run, still, Yardstick.of(still, FIBRES, ()))
+    found = _values(run, still, MeasurementContext.of(still, FIBRES, ()))
     assert found["surface_deviation.rms_percent"].tolist() == [0, np.inf]
     assert found["surface_deviation.max_percent"].tolist() == [0, np.inf]
 
@@ -149,7 +149,7 @@ def test_nothing_that_travels() -> None:
 @pytest.mark.parametrize("factor", [0.9, 1.05])
 def test_scaling_changes_the_volume_by_its_cube(factor: float) -> None:
     still = _run([SPHERE.points])
-    found = _values(_run([_scaled(SPHERE.points, factor)]), still, Yardstick.of(still, FIBRES, ()))
+    found = _values(_run([_scaled(SPHERE.points, factor)]), still, MeasurementContext.of(still, FIBRES, ()))
     assert_allclose(found["volume.deviation"], 100 * (factor**3 - 1), rtol=1e-10)
     inscribed = ConvexHull(SPHERE.points).volume
     assert_allclose(found["volume.deviation_volume"], inscribed * (factor**3 - 1), rtol=1e-10)
@@ -161,7 +161,7 @@ def test_concentric_spheres_are_the_difference_of_their_radii_apart() -> None:
     The vertices of the inner are nearer to the outer's facets, by their sagitta at most.
     """
     still = _run([SPHERE.points])
-    found = _values(_run([_scaled(SPHERE.points, 1.1)]), still, Yardstick.of(still, FIBRES, ()))
+    found = _values(_run([_scaled(SPHERE.points, 1.1)]), still, MeasurementContext.of(still, FIBRES, ()))
     assert_allclose(found["surface_deviation.hausdorff"], 4, rtol=1e-10)
     assert 4 - 1.1 * _sagitta() < found["surface_deviation.distance_mean"][0] < 4
     assert found["surface_deviation.distance_mean"][0] <= found["surface_deviation.distance_rms"][0] < 4
@@ -182,7 +182,7 @@ def test_sliding_is_material_and_not_geometric() -> None:
     turn = Rotation.from_rotvec([0, 0, 0.5])
     still = _run([SPHERE.points])
     run = _run([CENTRE + turn.apply(SPHERE.points - CENTRE)])
-    found = _values(run, still, Yardstick.of(still, FIBRES, ()))
+    found = _values(run, still, MeasurementContext.of(still, FIBRES, ()))
     moved = 2 * np.sin(0.25) * RADIUS
     assert_allclose(found["surface_deviation.rms"], moved * np.sqrt(2 / 3), rtol=0.01)  # areas of flat facets: 0.5 %
     assert_allclose(found["surface_deviation.max"], moved, rtol=0.01)
@@ -199,7 +199,7 @@ def test_statistics_are_weighted_by_area() -> None:
     share = (SPHERE.points[:, 2] - CENTRE[2]) / (2 * RADIUS) + 0.5
     still = _run([SPHERE.points])
     run = _run([SPHERE.points + share[:, None] * (1, 0, 0)])
-    found = _values(run, still, Yardstick.of(still, FIBRES, ()))
+    found = _values(run, still, MeasurementContext.of(still, FIBRES, ()))
     assert_allclose(found["surface_deviation.p95"], 0.95, atol=0.01)
     assert_allclose(found["surface_deviation.rms"], np.sqrt(1 / 3), atol=0.01)
     assert np.quantile(share, 0.95) > 0.97  # an unweighted percentile would not pass
@@ -218,7 +218,7 @@ def test_geometric_distances_are_weighted_by_area() -> None:
     raised = rest.points + np.where(rest.points[:, 2:] == height, [0, 0, raise_by], 0)
     still = _run([rest.points], rest=rest)
     inside = Polylines(np.array([[5.0, 6, 1], [7, 6, 2]]), np.array([0, 2]))
-    found = _values(_run([raised], rest=rest), still, Yardstick.of(still, inside, ()))
+    found = _values(_run([raised], rest=rest), still, MeasurementContext.of(still, inside, ()))
     area = 2 * 12**2 + 4 * 12 * height
     top, inner = area / 2, 10 * 10 + 4 * (1 * 10) / 2 + 2 / 3 + 2 / 6
     share = (top + inner) / (2 * area)
@@ -233,7 +233,7 @@ def test_geometric_distances_are_weighted_by_area() -> None:
 def test_a_stretch_of_everything_stretches_every_fibre(factor: float, interior: bool) -> None:
     still = _run([SPHERE.points], [FIBRES.points])
     run = _run([_scaled(SPHERE.points, factor)], [_scaled(FIBRES.points, factor)] if interior else None)
-    found = _values(run, still, Yardstick.of(still, FIBRES, ()))
+    found = _values(run, still, MeasurementContext.of(still, FIBRES, ()))
     lengths, change = FIBRES.lengths(), factor - 1
     assert_allclose(found["fibre_length.max_percent"], 100 * abs(change), rtol=1e-10)
     assert_allclose(found["fibre_length.rms_percent"], 100 * abs(change), rtol=1e-10)
@@ -249,7 +249,7 @@ def test_percent_of_a_fibre_is_of_its_length_at_rest(interior: bool) -> None:
         _run([_scaled(SPHERE.points, factor)], [_scaled(FIBRES.points, factor)] if interior else None)
         for factor in (1.2, 1.5)
     )
-    found = _values(run, reference, Yardstick.of(reference, FIBRES, ()))
+    found = _values(run, reference, MeasurementContext.of(reference, FIBRES, ()))
     assert_allclose(found["fibre_length.mean_percent"], -30, rtol=1e-10)
     for statistic in ("rms_percent", "max_percent"):
         assert_allclose(found[f"fibre_length.{statistic}"], 30, rtol=1e-10)
@@ -258,29 +258,29 @@ def test_percent_of_a_fibre_is_of_its_length_at_rest(interior: bool) -> None:
 def test_a_run_without_fibres_is_compared_like_with_like() -> None:
     """The reference's fibres are not where its surface carries them; a run of the same surface deviates by 0."""
     surface_only = replace(REFERENCE, fibres=None, fibre_positions=None)
-    assert extension_error(REFERENCE, YARDSTICK).values[1] > 0.01
-    assert _values(surface_only, REFERENCE, YARDSTICK)["fibre_length.max"][1] == 0
+    assert extension_error(REFERENCE, CONTEXT).values[1] > 0.01
+    assert _values(surface_only, REFERENCE, CONTEXT)["fibre_length.max"][1] == 0
     others = Polylines(FIBRES.points + 1.0, FIBRES.offsets)
     elsewhere = replace(REFERENCE, fibres=others, fibre_positions=REFERENCE.fibre_positions + 1.0)
-    assert _values(elsewhere, REFERENCE, YARDSTICK)["fibre_length.max"][1] == 0
+    assert _values(elsewhere, REFERENCE, CONTEXT)["fibre_length.max"][1] == 0
 
 
 def test_the_extension_error_is_surface_against_inside() -> None:
     still, affine = SPHERE.points, _scaled(SPHERE.points, 1.2)
     run = _run([still, affine, still], [FIBRES.points, _scaled(FIBRES.points, 1.2), _scaled(FIBRES.points, 1.1)])
-    found = extension_error(run, Yardstick.of(run, FIBRES, ()))
+    found = extension_error(run, MeasurementContext.of(run, FIBRES, ()))
     # Still and affine: exact. Fibres a tenth longer in a surface at rest: a tenth of the longest, which is fibre 2.
     assert_allclose(found.values, [0, 0, 0.1 * FIBRES.lengths().max()], rtol=1e-10, atol=1e-10)
     assert (found.metric, found.statistic, found.unit) == ("fibre_length", "extension_error", "mm")
     assert found.where[2] == "fibre 2"
     bare = replace(run, fibres=None, fibre_positions=None)
-    assert np.isnan(extension_error(bare, Yardstick.of(bare, FIBRES, ())).values).all()
+    assert np.isnan(extension_error(bare, MeasurementContext.of(bare, FIBRES, ())).values).all()
 
 
 def test_rest_carries_the_fibres() -> None:
     """Fibres a tenth longer in a surface at rest: measured against rest directly, not through the surface."""
     run = _run([SPHERE.points, SPHERE.points], [FIBRES.points, _scaled(FIBRES.points, 1.1)])
-    found = _values(run, at_rest(run), Yardstick.of(run, FIBRES, ()))
+    found = _values(run, at_rest(run), MeasurementContext.of(run, FIBRES, ()))
     assert_allclose(found["fibre_length.max_percent"], [0, 10], rtol=1e-10, atol=1e-12)
     bare = at_rest(_run([SPHERE.points]))
     assert bare.fibre_positions is None
@@ -292,7 +292,7 @@ def test_where_names_the_worst() -> None:
     fibres = FIBRES.points.copy()
     fibres[12:24] = _scaled(FIBRES.points, 1.5)[12:24]
     still = _run([SPHERE.points], [FIBRES.points])
-    measures = measure(_run([moved], [fibres]), still, Yardstick.of(still, FIBRES, ()))
+    measures = measure(_run([moved], [fibres]), still, MeasurementContext.of(still, FIBRES, ()))
     x, y, z = SPHERE.points[123]
     place = f"vertex 123 at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
     assert _find(measures, "surface_deviation.max").where == (place,)
@@ -316,8 +316,8 @@ def test_moving_everything_rigidly_changes_nothing(interior: bool) -> None:
     rest, fibres = SPHERE.moved_to(moved(SPHERE.points)), Polylines(moved(FIBRES.points), FIBRES.offsets)
     run = _run([_scaled(SPHERE.points, 0.95)] * 2, [_scaled(FIBRES.points, 0.95)] * 2 if interior else None)
     reference = moved_run(REFERENCE, rest, fibres)
-    before = _values(run, REFERENCE, YARDSTICK)
-    after = _values(moved_run(run, rest, fibres), reference, Yardstick.of(reference, fibres, ()))
+    before = _values(run, REFERENCE, CONTEXT)
+    after = _values(moved_run(run, rest, fibres), reference, MeasurementContext.of(reference, fibres, ()))
     for name, values in before.items():
         assert_allclose(after[name], values, rtol=1e-9, atol=1e-9, err_msg=name)
 
@@ -328,14 +328,14 @@ def test_what_is_not_a_number_never_passes(bad: float, interior: bool) -> None:
     positions, inside = REFERENCE.positions.copy(), REFERENCE.fibre_positions.copy()
     positions[1, 17], inside[1, 30] = bad, bad
     run = replace(REFERENCE, positions=positions, fibre_positions=inside if interior else None)
-    for each in measure(run, REFERENCE, YARDSTICK):
+    for each in measure(run, REFERENCE, CONTEXT):
         name = f"{each.metric}.{each.statistic}"
         assert np.abs(each.values[0]) < 1e-12, name
         assert judge(float(each.values[1]), 0.0, 1e6) == "fail", name
         if np.isnan(bad):
             assert np.isnan(each.values[1]), name
             assert each.worst == 1
-    assert "vertex 17 at" in _find(measure(run, REFERENCE, YARDSTICK), "surface_deviation.max").where[1]
+    assert "vertex 17 at" in _find(measure(run, REFERENCE, CONTEXT), "surface_deviation.max").where[1]
 
 
 def test_of_a_run_of_lines_alone_only_fibres_are_measured() -> None:
@@ -343,11 +343,11 @@ def test_of_a_run_of_lines_alone_only_fibres_are_measured() -> None:
     lines = _run([np.full_like(SPHERE.points, np.nan)] * 2, [_scaled(FIBRES.points, 0.9), _scaled(FIBRES.points, 1.1)])
     lines, still = replace(lines, has_surface=False), _run([SPHERE.points] * 2, [FIBRES.points] * 2)
     for other in (still, at_rest(lines)):
-        found = _values(lines, other, YARDSTICK)
+        found = _values(lines, other, CONTEXT)
         assert set(found) == {f"fibre_length.{name}" for name in UNITS["fibre_length"]}
         assert_allclose(found["fibre_length.mean_percent"], [-10, 10], rtol=1e-10)
-    assert measure(lines, still, YARDSTICK, ["volume"]) == ()
+    assert measure(lines, still, CONTEXT, ["volume"]) == ()
     # A reference that begins a little off the rest state, as overlaps with bones are pushed out first, has the same fibres.
-    relaxed = replace(YARDSTICK, fibres=Polylines(FIBRES.points + [0, 0, 0.2], FIBRES.offsets))
+    relaxed = replace(CONTEXT, fibres=Polylines(FIBRES.points + [0, 0, 0.2], FIBRES.offsets))
     moved = replace(still, fibres=relaxed.fibres)
     assert_allclose(_values(lines, moved, relaxed)["fibre_length.mean_percent"], [-10, 10], rtol=1e-10)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from fem_reference.metrics import Yardstick, find, measure
+from fem_reference.metrics import MeasurementContext, find, measure
 from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
 from fem_reference.studies.execution import Bench
@@ -19,7 +19,7 @@ def test_unrelated_meshes_of_one_size_differ_by_less_than_two_sizes(data, tmp_pa
     assert len({run.origin["mesh"]["tets"] for run in runs.values()}) == 3
     rest = Bench(casefile.read_muscle("gluteus_medius"), tmp_path).setup()
     finest = runs["10 mm"]
-    context = Yardstick.of(finest, finest.fibres, rest.bones, rest.free)
+    context = MeasurementContext.of(finest, finest.fibres, rest.bones, rest.free)
     for metric, statistic in (("surface_deviation", "rms"), ("fibre_length", "rms_percent")):
         alike, apart = (
             abs(find(measure(runs["14 mm"], runs[other], context), metric, statistic).values[-1])

@@ -12,7 +12,7 @@ from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
 from fem_reference.geometry.rigid_bodies import Sphere
 from fem_reference.geometry.signed_distance import build
-from fem_reference.problems.muscle import Body, Held, Problem, Setup
+from fem_reference.problems.muscle import AttachedVertices, Problem, RigidBody, Setup
 from fem_reference.solvers import pbd
 
 USUAL = {
@@ -49,16 +49,16 @@ def spindle():
     return check_closed(Surface(points, np.hstack(triangles).T))
 
 
-def held_setup(low, high, last=10, every=1, pose=None):
-    """The spindle with its ends, a fifth of its half length each, held by bones that move by ``low`` and ``high``."""
+def attached_setup(low, high, last=10, every=1, pose=None):
+    """The spindle with its ends, a fifth of its half length each, attached by bones that move by ``low`` and ``high``."""
     surface = spindle()
     z = surface.points[:, 2]
     ends = np.flatnonzero(z < -24), np.flatnonzero(z > 24)
     if pose is not None:
         surface = surface.moved_to(apply(pose, surface.points))
-    bones = tuple(Body(name, surface, motion) for name, motion in (("low", low), ("high", high)))
-    held = tuple(Held(bone.name, bone, vertices) for bone, vertices in zip(bones, ends, strict=True))
-    return Setup(surface, bones, held, tuple(range(0, last + 1, every)), interval=None)
+    bones = tuple(RigidBody(name, surface, motion) for name, motion in (("low", low), ("high", high)))
+    attached = tuple(AttachedVertices(bone.name, bone, vertices) for bone, vertices in zip(bones, ends, strict=True))
+    return Setup(surface, bones, attached, tuple(range(0, last + 1, every)), interval=None)
 
 
 def run(setup, **changes):
@@ -99,14 +99,14 @@ def test_a_turned_rest_state_stays_put():
 
 
 def test_rest_stays_at_rest():
-    _, frames = run(held_setup(None, None))
+    _, frames = run(attached_setup(None, None))
     assert list(frames) == list(range(11))
     for surface in frames.values():
         np.testing.assert_allclose(surface, spindle().points, rtol=0, atol=1e-12)
 
 
-def test_a_body_held_by_nothing_stays_at_rest():
-    setup = held_setup(None, None)
+def test_a_body_attached_by_nothing_stays_at_rest():
+    setup = attached_setup(None, None)
     outcome, positions = run(Setup(setup.surface, setup.bones, (), setup.frames, None))
     assert outcome.status == "converged"
     assert np.abs(positions[10] - setup.surface.points).max() < 1e-9
@@ -115,7 +115,7 @@ def test_a_body_held_by_nothing_stays_at_rest():
 def test_bones_that_move_as_one_carry_the_body_along():
     # A closed surface that keeps its edges and angles is rigid, so that what is left once the bones rest is what
     # damping has not yet taken: with a tenth of the velocity lost in each of 300 steps, below a thousandth of 60 mm.
-    setup = held_setup(SWING, SWING, last=150)
+    setup = attached_setup(SWING, SWING, last=150)
     outcome, frames = run(setup, damping=0.1)
     assert outcome.status == "converged"
     expected = apply(SWING.pose(150), setup.surface.points)
@@ -123,26 +123,26 @@ def test_bones_that_move_as_one_carry_the_body_along():
     np.testing.assert_allclose(frames[150], expected, atol=0.06)
 
 
-def test_held_vertices_go_with_their_bone():
-    setup = held_setup(None, SWING)
+def test_attached_vertices_go_with_their_bone():
+    setup = attached_setup(None, SWING)
     _, frames = run(setup)
     for number, surface in frames.items():
-        for held in setup.held:
-            expected = apply(held.bone.pose(number), setup.surface.points[held.vertices])
-            np.testing.assert_array_equal(surface[held.vertices], expected)
+        for attached in setup.attached:
+            expected = apply(attached.bone.pose(number), setup.surface.points[attached.vertices])
+            np.testing.assert_array_equal(surface[attached.vertices], expected)
 
 
 def test_independent_of_where_the_world_is():
     # Roundings of 1e-14 in the place of the whole grow over 150 steps; 1e-6 of the size is far below what is looked at.
     x, y, z = TURN[:3, :3] @ SWING.axis
     moved = Rotation((x, y, z), tuple(apply(TURN, np.array([SWING.centre]))[0]), SWING.frames, SWING.angles)
-    _, here = run(held_setup(None, SWING, last=50))
-    _, there = run(held_setup(None, moved, last=50, pose=TURN))
+    _, here = run(attached_setup(None, SWING, last=50))
+    _, there = run(attached_setup(None, moved, last=50, pose=TURN))
     np.testing.assert_allclose(there[50], apply(TURN, here[50]), atol=60e-6)
 
 
 def test_the_same_twice():
-    first, second = (run(held_setup(None, SWING))[1][10] for _ in range(2))
+    first, second = (run(attached_setup(None, SWING))[1][10] for _ in range(2))
     np.testing.assert_array_equal(first, second)
 
 
@@ -150,7 +150,7 @@ def test_volume_is_kept():
     surface = spindle()
     volume = enclosed_volume(surface.points, surface.triangles)
     kept, lost = (
-        enclosed_volume(run(held_setup(None, SWING, last=50), volume=stiffness)[1][50], surface.triangles) / volume
+        enclosed_volume(run(attached_setup(None, SWING, last=50), volume=stiffness)[1][50], surface.triangles) / volume
         for stiffness in (1.0, 0.0)
     )
     assert abs(kept - 1) < 0.02
@@ -158,16 +158,18 @@ def test_volume_is_kept():
 
 
 def ball_against(last, back=None):
-    """The spindle held at its ends, and a ball of 8 mm that gets 10 mm into its side by frame 40, and is gone by ``back``."""
-    setup = held_setup(None, None, last=last)
+    """The spindle attached at its ends, and a ball of 8 mm that gets 10 mm into its side by frame 40, and is gone by ``back``."""
+    setup = attached_setup(None, None, last=last)
     frames, ways = ((0.0, 40.0), (0.0, 12.0)) if back is None else ((0.0, 40.0, float(back)), (0.0, 12.0, 0.0))
-    ball = Body("ball", shapes.sphere(0, 8.0), Translation((-1, 0, 0), frames, ways), solid=Sphere((20, 0, 0), 8.0))
-    return Setup(setup.surface, (ball,), setup.held, setup.frames, None)
+    ball = RigidBody(
+        "ball", shapes.sphere(0, 8.0), Translation((-1, 0, 0), frames, ways), solid=Sphere((20, 0, 0), 8.0)
+    )
+    return Setup(setup.surface, (ball,), setup.attached, setup.frames, None)
 
 
 def deepest(setup, frames):
     """How deep a vertex that nothing holds gets below the surface of a bone, over all frames [mm]."""
-    loose = np.setdiff1d(np.arange(len(setup.surface.points)), setup.held_vertices)
+    loose = np.setdiff1d(np.arange(len(setup.surface.points)), setup.attached_vertices)
     return max(
         -bone.shape.sample(apply(np.linalg.inv(bone.pose(number)), points[loose])).distance.min()
         for number, points in frames.items()
@@ -205,22 +207,22 @@ def test_a_bone_that_is_gone_leaves_the_rest_state():
 
 def test_what_overlaps_at_rest_does_not_jump():
     setup = ball_against(10)
-    ball = Body("ball", shapes.sphere(0, 8.0), None, solid=Sphere((15, 0, 0), 8.0))
-    setup = Setup(setup.surface, (ball,), setup.held, setup.frames, None)
+    ball = RigidBody("ball", shapes.sphere(0, 8.0), None, solid=Sphere((15, 0, 0), 8.0))
+    setup = Setup(setup.surface, (ball,), setup.attached, setup.frames, None)
     assert deepest(setup, {0: setup.surface.points}) > 2
     _, frames = run(setup, collision=CONTACT)
     np.testing.assert_allclose(frames[10], setup.surface.points, atol=1e-12)
 
 
-def test_held_vertices_go_with_their_bone_whatever_pushes():
+def test_attached_vertices_go_with_their_bone_whatever_are_obstacles():
     setup = ball_against(5)
-    everywhere = Body("ball", shapes.sphere(0, 100.0), None, solid=Sphere((0, 0, 0), 100.0))
-    _, frames = run(Setup(setup.surface, (everywhere,), setup.held, setup.frames, None), collision=CONTACT)
-    for held in setup.held:
-        np.testing.assert_array_equal(frames[5][held.vertices], setup.surface.points[held.vertices])
+    everywhere = RigidBody("ball", shapes.sphere(0, 100.0), None, solid=Sphere((0, 0, 0), 100.0))
+    _, frames = run(Setup(setup.surface, (everywhere,), setup.attached, setup.frames, None), collision=CONTACT)
+    for attached in setup.attached:
+        np.testing.assert_array_equal(frames[5][attached.vertices], setup.surface.points[attached.vertices])
 
 
-def test_edges_along_fibres_are_told_from_those_across():
+def test_edges_along_fibres_are_reported_from_those_across():
     # Two fibres: one along z about the origin, of points 40 mm apart, one along x at y = 100. Nearest is the segment, not its ends.
     fibres = Polylines(
         np.array([[0.0, 0, -20], [0, 0, 20], [0, 0, 20], [-20, 100, 0], [20, 100, 0]]), np.array([0, 3, 5])
@@ -231,11 +233,11 @@ def test_edges_along_fibres_are_told_from_those_across():
 
 
 def kinked():
-    """The spindle with its ends held, the upper one moved by ``SWING``, and a fibre that zigzags in it with 21 kinks."""
+    """The spindle with its ends attached, the upper one moved by ``SWING``, and a fibre that zigzags in it with 21 kinks."""
     z = np.linspace(-25, 25, 23)
     fibre = np.column_stack([6 * (-1.0) ** np.arange(23), np.zeros(23), z])
     given = shapes.bar((1, 1, 1), (10, 10, 30), {"bottom": None, "top": None}, (), (0, 50))
-    setup = held_setup(None, SWING, last=50)
+    setup = attached_setup(None, SWING, last=50)
     return Problem(**vars(given) | vars(setup) | {"fibres": Polylines(fibre, np.array([0, 23]))})
 
 
@@ -257,7 +259,7 @@ def test_with_fibres_independent_of_where_the_world_is():
     x, y, z = TURN[:3, :3] @ SWING.axis
     moved = Rotation((x, y, z), tuple(apply(TURN, np.array([SWING.centre]))[0]), SWING.frames, SWING.angles)
     fibres = Polylines(apply(TURN, here.fibres.points), here.fibres.offsets)
-    there = Problem(**vars(here) | vars(held_setup(None, moved, last=50, pose=TURN)) | {"fibres": fibres})
+    there = Problem(**vars(here) | vars(attached_setup(None, moved, last=50, pose=TURN)) | {"fibres": fibres})
     states = [run(given, anisotropy=1.0)[1][50] for given in (here, there)]
     np.testing.assert_allclose(states[1], apply(TURN, states[0]), atol=60e-6)
 
@@ -287,15 +289,15 @@ def test_edges_along_fibres_are_softer():
     ],
 )
 def test_every_setting_is_felt(key, value):
-    usual, changed = (run(held_setup(None, SWING), **changes)[1][10] for changes in ({}, {key: value}))
+    usual, changed = (run(attached_setup(None, SWING), **changes)[1][10] for changes in ({}, {key: value}))
     assert np.abs(changed - usual).max() > 1e-3
 
 
 def test_frames_wanted_and_cost():
-    outcome, frames = run(held_setup(None, SWING, last=10, every=5))
+    outcome, frames = run(attached_setup(None, SWING, last=10, every=5))
     assert list(frames) == [0, 5, 10]
     np.testing.assert_array_equal(frames[0], spindle().points)
-    np.testing.assert_array_equal(frames[5], run(held_setup(None, SWING))[1][5])
+    np.testing.assert_array_equal(frames[5], run(attached_setup(None, SWING))[1][5])
     assert outcome.cost["iterations"] == 10
     assert outcome.cost["threads"] == 1
     assert 0 < outcome.cost["seconds_solve"] == pytest.approx(10 * outcome.cost["seconds_per_iteration"])
@@ -303,7 +305,7 @@ def test_frames_wanted_and_cost():
 
 
 def test_positions_that_are_no_number_are_an_outcome():
-    outcome, frames = run(held_setup(None, Rotation((1, 0, 0), (0, 0, 0), (0.0, 2.0, 3.0), (0.0, 0.01, math.nan))))
+    outcome, frames = run(attached_setup(None, Rotation((1, 0, 0), (0, 0, 0), (0.0, 2.0, 3.0), (0.0, 0.01, math.nan))))
     assert outcome.status == "diverged"
     assert outcome.message.startswith("frame 3: the position of ")
     assert list(frames) == [0, 1, 2]
@@ -313,7 +315,7 @@ def test_positions_that_are_no_number_are_an_outcome():
 
 def test_a_body_torn_apart_is_an_outcome():
     leap = Rotation((1, 0, 0), (0, 1e5, 0), (0.0, 3.0, 4.0), (0.0, 0.0, 1.0))
-    outcome, frames = run(held_setup(leap, leap))
+    outcome, frames = run(attached_setup(leap, leap))
     assert outcome.status == "diverged"
     assert outcome.message.startswith("frame 4: the muscle is spread over ")
     assert list(frames) == [0, 1, 2, 3]
@@ -321,12 +323,13 @@ def test_a_body_torn_apart_is_an_outcome():
 
 def test_a_body_turned_inside_out_is_an_outcome():
     # One bone holds the lower half and one the upper, which goes by a whole length of 60 mm through the lower one.
-    setup = held_setup(None, Translation((0, 0, -1), (0.0, 3.0), (0.0, 60.0)))
+    setup = attached_setup(None, Translation((0, 0, -1), (0.0, 3.0), (0.0, 60.0)))
     upper = setup.surface.points[:, 2] > 0
-    held = tuple(
-        Held(bone.name, bone, np.flatnonzero(mask)) for bone, mask in zip(setup.bones, (~upper, upper), strict=True)
+    attached = tuple(
+        AttachedVertices(bone.name, bone, np.flatnonzero(mask))
+        for bone, mask in zip(setup.bones, (~upper, upper), strict=True)
     )
-    outcome, frames = run(Setup(setup.surface, setup.bones, held, setup.frames, None))
+    outcome, frames = run(Setup(setup.surface, setup.bones, attached, setup.frames, None))
     assert outcome.status == "inverted"
     assert outcome.message.startswith("frame 3: the surface is turned inside out; ")
     assert list(frames) == [0, 1, 2]
@@ -334,13 +337,13 @@ def test_a_body_turned_inside_out_is_an_outcome():
 
 def pressed(pose, spacing):
     """Where a ball of triangles, its distance on a grid along the axes, has pushed the spindle after 16 iterations."""
-    setup = held_setup(None, None, last=16, pose=pose)
+    setup = attached_setup(None, None, last=16, pose=pose)
     surface = shapes.sphere(2, 8.0)
     surface = surface.moved_to(apply(pose, surface.points + [20, 0, 0]))
     x, y, z = -pose[:3, 0]
-    ball = Body("ball", surface, Translation((x, y, z), (0.0, 40.0), (0.0, 12.0)))
+    ball = RigidBody("ball", surface, Translation((x, y, z), (0.0, 40.0), (0.0, 12.0)))
     vars(ball)["shape"] = build(surface, spacing, 6.0)  # as if it had been read from the kept distances
-    _, frames = run(Setup(setup.surface, (ball,), setup.held, setup.frames, None), collision=CONTACT)
+    _, frames = run(Setup(setup.surface, (ball,), setup.attached, setup.frames, None), collision=CONTACT)
     return apply(np.linalg.inv(pose), frames[16])
 
 

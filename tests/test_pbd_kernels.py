@@ -206,7 +206,7 @@ def test_values_feel_no_rigid_motion():
 
 
 @pytest.mark.parametrize("name", ["distance", "volume", "dihedral"])
-def test_held_points_are_not_moved(name):
+def test_attached_points_are_not_moved(name):
     surface = bulky()
     points = surface.points * [1.1, 0.9, 1.2]
     inverse_masses = np.ones(len(points))

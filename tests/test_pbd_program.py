@@ -13,7 +13,7 @@ from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
 from fem_reference.io import files
 from fem_reference.problems import muscle
-from fem_reference.problems.muscle import Body, Held, Setup
+from fem_reference.problems.muscle import AttachedVertices, RigidBody, Setup
 from fem_reference.scenes import casefile
 from fem_reference.solvers import pbd_program
 from fem_reference.solvers.pbd_kernels import dihedral, dihedrals
@@ -48,16 +48,18 @@ def cube(side, lower=(0, 0, 0)):
     return box.moved_to(box.points + lower)
 
 
-def held_setup(low, high, last=10, every=1):
-    """The ball with its ends held by cubes below and above it, of which a vertex is inside from the beginning."""
+def attached_setup(low, high, last=10, every=1):
+    """The ball with its ends attached by cubes below and above it, of which a vertex is inside from the beginning."""
     surface = ball()
     z = surface.points[:, 2]
     ends = np.flatnonzero(z < -18), np.flatnonzero(z > 18)
     plates = cube(30, (-15, -15, -49.9)), cube(30, (-15, -15, 19.9))
     names = ("low", "high")
-    bones = tuple(Body(name, plate, motion) for name, plate, motion in zip(names, plates, (low, high), strict=True))
-    held = tuple(Held(bone.name, bone, vertices) for bone, vertices in zip(bones, ends, strict=True))
-    return Setup(surface, bones, held, tuple(range(0, last + 1, every)), interval=None)
+    bones = tuple(
+        RigidBody(name, plate, motion) for name, plate, motion in zip(names, plates, (low, high), strict=True)
+    )
+    attached = tuple(AttachedVertices(bone.name, bone, vertices) for bone, vertices in zip(bones, ends, strict=True))
+    return Setup(surface, bones, attached, tuple(range(0, last + 1, every)), interval=None)
 
 
 def run(setup, **changes):
@@ -67,7 +69,7 @@ def run(setup, **changes):
     return outcome, {frame.number: frame.surface for frame in frames}
 
 
-def held_in(voxels, points):
+def attached_in(voxels, points):
     """Which of ``points`` lie in a voxel that is inside."""
     return are_inside(voxels.inside, voxels.places(points))
 
@@ -98,7 +100,7 @@ def test_an_edge_is_projected_twice():
     # With a stiffness of 1/2 each projection takes half of the error: a quarter of it is left, shared by both ends.
     points = np.array([[0.0, 0, 0], [14, 0, 0]])
     rest = replace(
-        pbd_program.constraints_of(held_setup(None, None), SETTINGS),
+        pbd_program.constraints_of(attached_setup(None, None), SETTINGS),
         edges=np.array([[0, 1], [1, 0]]),
         lengths=np.full(2, 10.0),
         share=np.full(2, 0.5),
@@ -112,7 +114,7 @@ def test_an_edge_is_projected_twice():
 def test_a_step_takes_a_sixth_of_the_error_in_volume():
     # To first order: grown by e the ball has a relative error of 3 e, and what is of second order is below 10 e of it.
     surface, grown = ball(), 1e-6
-    rest = pbd_program.constraints_of(held_setup(None, None), SETTINGS)
+    rest = pbd_program.constraints_of(attached_setup(None, None), SETTINGS)
     points = (1 + grown) * surface.points
     volumes = [enclosed_volume(surface.points, surface.triangles), enclosed_volume(points, surface.triangles)]
     pbd_program.project(points, replace(rest, share=0 * rest.share), 0.0)
@@ -189,7 +191,7 @@ def test_a_cube_is_inside_from_its_corner_on():
     assert voxels.inside.all()
     assert voxels.size.tolist() == [1, 1, 1]
     points = np.array([[1.0, 1, 1], [4.99, 3, 4.99], [5, 3, 3], [3, 0.99, 3], [math.nan, 3, 3]])
-    assert held_in(voxels, points).tolist() == [True, True, False, False, False]
+    assert attached_in(voxels, points).tolist() == [True, True, False, False, False]
 
 
 def test_voxels_that_a_triangle_marks_by_hand():
@@ -217,7 +219,7 @@ def test_voxels_of_a_ball_hold_it():
     voxels = Voxels.of(ball(), 64)
     points = np.random.default_rng(1).uniform(-24, 24, (20000, 3))
     radius, diagonal = np.linalg.norm(points, axis=1), math.sqrt(3) * 40 / 64
-    inside = held_in(voxels, points)
+    inside = attached_in(voxels, points)
     assert inside[radius < 20 - diagonal].all()
     assert not inside[radius > 20 + 3 * diagonal].any()
 
@@ -241,7 +243,7 @@ def test_marching_past_the_start_is_too_far():
 
 def test_who_marches_too_far_ends_at_its_start():
     # The cube of 4 voxels with a shaft of one, which lies as above.
-    bone = pbd_program.Bone(Body("bone", cube(4.0), None), 4, 0)
+    bone = pbd_program.Bone(RigidBody("bone", cube(4.0), None), 4, 0)
     bone.voxels.inside[2, 2] = False
     start = np.array([[2.05, 2.05, 1.0]])
     np.testing.assert_array_equal(pbd_program.collided(start, start + [0.5, -0.5, 0], [bone]), start)
@@ -249,7 +251,7 @@ def test_who_marches_too_far_ends_at_its_start():
 
 def test_the_motions_of_a_bone_add_up():
     # As the program adds up: 0.9 mm a hundred times are not 90 mm.
-    bone = pbd_program.Bone(Body("bone", cube(8.0), Translation((0, -1, 0), (0.0, 100.0), (0.0, 90.0))), 1, 0)
+    bone = pbd_program.Bone(RigidBody("bone", cube(8.0), Translation((0, -1, 0), (0.0, 100.0), (0.0, 90.0))), 1, 0)
     height = 0.0
     for frame in range(1, 101):
         bone.move(frame)
@@ -259,7 +261,7 @@ def test_the_motions_of_a_bone_add_up():
 
 
 def test_a_bone_takes_along_what_it_has_come_over_and_forgets_nothing():
-    bone = pbd_program.Bone(Body("bone", cube(8.0), Translation((0, 0, 1), (0.0, 2.0), (0.0, 3.0))), 8, 0)
+    bone = pbd_program.Bone(RigidBody("bone", cube(8.0), Translation((0, 0, 1), (0.0, 2.0), (0.0, 3.0))), 8, 0)
     starts, goals = np.array([[4.0, 4, 9], [4, 4, 12]]), np.array([[4.0, 5, 8], [4, 5, 12]])
     bone.move(1)  # now its upper face is at 9.5, and the first vertex inside, wherever it goes
     np.testing.assert_allclose(pbd_program.collided(starts, goals, [bone]), [[4, 4, 10.5], [4, 5, 12]])
@@ -269,8 +271,8 @@ def test_a_bone_takes_along_what_it_has_come_over_and_forgets_nothing():
 
 
 def test_of_two_bones_the_later_wins():
-    lower = pbd_program.Bone(Body("lower", cube(8.0), None), 8, 0)
-    upper = pbd_program.Bone(Body("upper", cube(8.0, (0, 0, 4)), None), 8, 0)
+    lower = pbd_program.Bone(RigidBody("lower", cube(8.0), None), 8, 0)
+    upper = pbd_program.Bone(RigidBody("upper", cube(8.0, (0, 0, 4)), None), 8, 0)
     start, goal = np.array([[-1.0, 4, 6]]), np.array([[2.25, 4, 6]])
     only = pbd_program.collided(start, goal, [upper])
     np.testing.assert_array_equal(pbd_program.collided(start, goal, [lower, upper]), only)
@@ -278,23 +280,23 @@ def test_of_two_bones_the_later_wins():
 
 
 def test_rest_stays_at_rest():
-    setup = held_setup(None, None)
-    assert held_in(Voxels.of(setup.bones[0].surface, 64), setup.surface.points).any()
+    setup = attached_setup(None, None)
+    assert attached_in(Voxels.of(setup.bones[0].surface, 64), setup.surface.points).any()
     for surface in run(setup)[1].values():
         np.testing.assert_allclose(surface, setup.surface.points, rtol=0, atol=1e-12)
 
 
-def test_held_vertices_go_with_their_bone_and_weigh_as_all():
-    setup = held_setup(None, SWING)
+def test_attached_vertices_go_with_their_bone_and_weigh_as_all():
+    setup = attached_setup(None, SWING)
     for number, surface in run(setup)[1].items():
-        for held in setup.held:
-            expected = apply(held.bone.pose(number), setup.surface.points[held.vertices])
-            np.testing.assert_array_equal(surface[held.vertices], expected)
+        for attached in setup.attached:
+            expected = apply(attached.bone.pose(number), setup.surface.points[attached.vertices])
+            np.testing.assert_array_equal(surface[attached.vertices], expected)
     assert (pbd_program.constraints_of(setup, SETTINGS).inverse_masses == 1).all()
 
 
 def test_the_same_twice():
-    first, second = (run(held_setup(None, SWING))[1][10] for _ in range(2))
+    first, second = (run(attached_setup(None, SWING))[1][10] for _ in range(2))
     np.testing.assert_array_equal(first, second)
 
 
@@ -314,12 +316,12 @@ def test_fibres_leave_edges_across_them_stiff():
 def test_every_setting_is_felt(key, value):
     # The cubes are squeezed into the ball.
     squeeze = Translation((0, 0, -1), (0.0, 10.0), (0.0, 10.0))
-    usual, changed = (run(held_setup(None, squeeze), **changes)[1][10] for changes in ({}, {key: value}))
+    usual, changed = (run(attached_setup(None, squeeze), **changes)[1][10] for changes in ({}, {key: value}))
     assert np.abs(changed - usual).max() > 1e-3
 
 
-def test_cost_is_told():
-    outcome, frames = run(held_setup(None, SWING, last=10, every=5))
+def test_cost_is_reported():
+    outcome, frames = run(attached_setup(None, SWING, last=10, every=5))
     assert list(frames) == [0, 5, 10]
     assert (outcome.status, outcome.cost["iterations"], outcome.cost["threads"]) == ("converged", 10, 1)
     assert 0 < outcome.cost["seconds_solve"] == pytest.approx(10 * outcome.cost["seconds_per_iteration"])
@@ -328,7 +330,7 @@ def test_cost_is_told():
 
 
 def test_positions_that_are_no_number_are_an_outcome():
-    outcome, frames = run(held_setup(None, Rotation((1, 0, 0), (0, 0, 0), (0.0, 2.0, 3.0), (0.0, 0.01, math.nan))))
+    outcome, frames = run(attached_setup(None, Rotation((1, 0, 0), (0, 0, 0), (0.0, 2.0, 3.0), (0.0, 0.01, math.nan))))
     assert outcome.status == "diverged"
     assert outcome.message.startswith("frame 3: the position of ")
     assert list(frames) == [0, 1, 2]
@@ -349,7 +351,7 @@ def test_settings_without_which_nothing_runs(key):
         parse(pbd_program.Settings, {name: value for name, value in USUAL.items() if name != key}, "candidate[0]")
 
 
-# What follows is held against what the report's program recorded, every tenth iteration.
+# What follows is compared with what the report's program recorded, every tenth iteration.
 
 
 def recorded(data, name, numbers):
@@ -378,7 +380,7 @@ def merged(parts):
     return Surface(np.vstack([part.points for part in parts]), np.vstack(triangles))
 
 
-def test_voxels_hold_what_the_program_held(data):
+def test_voxels_hold_what_the_program_attached(data):
     # Exactly: every vertex in a voxel of the femur, and of those left every one in a voxel of the pelvis, which was both
     # hip bones and the sacrum in one. So voxels are made as there.
     bones = data / "hip" / "bones"
@@ -390,10 +392,10 @@ def test_voxels_hold_what_the_program_held(data):
     for name, code in names.items():
         points = np.array(files.read_surface(data / "hip" / "muscles" / f"{name}.vtk", 1.0).points)
         table = data / "hip" / "attachments_of_report_program" / f"attach_code_{code}.csv"
-        held = np.loadtxt(table, delimiter=",", dtype=int)
-        found = np.where(held_in(femur, points), 2, held_in(pelvis, points))
+        attached = np.loadtxt(table, delimiter=",", dtype=int)
+        found = np.where(attached_in(femur, points), 2, attached_in(pelvis, points))
         expected = np.zeros(len(points), int)
-        expected[held[:, 0]] = held[:, 1]
+        expected[attached[:, 0]] = attached[:, 1]
         np.testing.assert_array_equal(found, expected)
 
 

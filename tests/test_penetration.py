@@ -14,8 +14,8 @@ from fem_reference.foundations.mesh import Polylines, Surface
 from fem_reference.foundations.motion import Rotation
 from fem_reference.geometry.rigid_bodies import Box, HalfSpace, Sphere
 from fem_reference.io.files import read_surface, write_surface
-from fem_reference.metrics import Measure, Yardstick, at_rest, measure, penetration
-from fem_reference.problems.muscle import Body, Held, Setup
+from fem_reference.metrics import Measure, MeasurementContext, at_rest, measure, penetration
+from fem_reference.problems.muscle import AttachedVertices, RigidBody, Setup
 from fem_reference.runs.store import Outcome, Run
 
 RADIUS = 20.0
@@ -27,9 +27,9 @@ PLATE = shapes.skin(shapes.box((1, 1, 1), (60.0, 60.0, 10.0)))
 LOW = float(BALL.points[:, 2].min())  # [mm]
 
 
-def floor(height: float, motion: Rotation | None = None) -> Body:
+def floor(height: float, motion: Rotation | None = None) -> RigidBody:
     """All below z = ``height`` [mm]."""
-    return Body("floor", PLATE, motion, solid=HalfSpace((0, 0, height), (0, 0, 1)))
+    return RigidBody("floor", PLATE, motion, solid=HalfSpace((0, 0, height), (0, 0, 1)))
 
 
 def run_of(*frames: np.ndarray, numbers: tuple[int, ...] | None = None, rest: Surface = BALL) -> Run:
@@ -38,9 +38,9 @@ def run_of(*frames: np.ndarray, numbers: tuple[int, ...] | None = None, rest: Su
     return Run("run", "test", Outcome("converged", ""), numbers, rest, np.array(frames), FIBRE, inside)
 
 
-def taken(run: Run, *bones: Body, free: np.ndarray | None = None) -> tuple[Measure, Measure]:
+def taken(run: Run, *bones: RigidBody, free: np.ndarray | None = None) -> tuple[Measure, Measure]:
     """``deepest`` and ``volume``."""
-    deepest, volume = penetration.measure(run, run, Yardstick.of(at_rest(run), FIBRE, bones, free))
+    deepest, volume = penetration.measure(run, run, MeasurementContext.of(at_rest(run), FIBRE, bones, free))
     assert (deepest.statistic, deepest.unit, volume.statistic, volume.unit) == ("deepest", "mm", "volume", "mm3")
     return deepest, volume
 
@@ -79,7 +79,9 @@ def test_a_bone_is_where_its_frame_number_takes_it() -> None:
 def test_turning_everything_changes_nothing_but_the_draw() -> None:
     turn = Turn.random(rng=np.random.default_rng(8))
     frames = [turn.apply(BALL.points - [0, 0, depth]) for depth in (2.0, 6.0)]
-    ground = Body("floor", PLATE, None, solid=HalfSpace(tuple(turn.apply([0, 0, LOW])), tuple(turn.apply([0, 0, 1]))))
+    ground = RigidBody(
+        "floor", PLATE, None, solid=HalfSpace(tuple(turn.apply([0, 0, LOW])), tuple(turn.apply([0, 0, 1])))
+    )
     deepest, volume = taken(run_of(*frames), ground)
     assert_allclose(deepest.values, [2, 6], atol=1e-12)
     assert_allclose(volume.values, [cap(2), cap(6)], rtol=0.06)
@@ -89,7 +91,7 @@ def test_a_bone_of_triangles_is_met_in_its_own_frame() -> None:
     # A head of 15 mm at z = 40 mm that a half turn about x takes to z = -40 mm.
     head = shapes.sphere(3, 15.0)
     head = Surface(head.points + [0, 0, 40], head.triangles)
-    bone = Body("head", head, Rotation((1, 0, 0), (0, 0, 0), (0.0, 10.0), (0.0, np.pi)))
+    bone = RigidBody("head", head, Rotation((1, 0, 0), (0, 0, 0), (0.0, 10.0), (0.0, np.pi)))
     lowered = BALL.points - [0, 0, 7.0]
     deepest, volume = taken(run_of(lowered, lowered, numbers=(0, 10)), bone)
     exact = (15 - np.linalg.norm(lowered - [0, 0, -40], axis=1)).max()
@@ -101,7 +103,7 @@ def test_a_bone_of_triangles_is_met_in_its_own_frame() -> None:
 
 
 def test_the_deepest_bone_decides_and_volumes_add() -> None:
-    ground, stone = floor(LOW + 2), Body("stone", PLATE, None, solid=Sphere((0, 0, RADIUS + 5), 10.0))
+    ground, stone = floor(LOW + 2), RigidBody("stone", PLATE, None, solid=Sphere((0, 0, RADIUS + 5), 10.0))
     one, other, both = (taken(run_of(BALL.points), *bones) for bones in ((ground,), (stone,), (ground, stone)))
     assert_allclose(both[0].values, [max(one[0].values[0], other[0].values[0])])
     assert_allclose(both[1].values, one[1].values + other[1].values)
@@ -110,14 +112,14 @@ def test_the_deepest_bone_decides_and_volumes_add() -> None:
 
 def test_what_bones_hold_is_exempt_and_its_neighbours_in_triangles() -> None:
     low = np.flatnonzero(BALL.points[:, 2] < LOW + 4)
-    rest = Setup(BALL, (floor(LOW + 3),), (Held("origin", floor(LOW + 3), low),), (0,), None)
+    rest = Setup(BALL, (floor(LOW + 3),), (AttachedVertices("origin", floor(LOW + 3), low),), (0,), None)
     neighbours = {k for triangle in BALL.triangles.tolist() if set(triangle) & set(low.tolist()) for k in triangle}
     assert set(np.flatnonzero(~rest.free).tolist()) == neighbours > set(low.tolist())
     deepest, volume = taken(run_of(BALL.points), *rest.bones, free=rest.free)
     assert (deepest.values, volume.values) == ([0], [0])
     # Without the springs of the lower left half the right half is met: as deep as before, and half of the volume of the cap.
     left = low[BALL.points[low, 0] < 0]
-    half = Setup(BALL, rest.bones, (Held("origin", rest.bones[0], left),), (0,), None)
+    half = Setup(BALL, rest.bones, (AttachedVertices("origin", rest.bones[0], left),), (0,), None)
     deepest, volume = taken(run_of(BALL.points), *half.bones, free=half.free)
     whole = cap(RADIUS + LOW + 3)
     assert deepest.values < 3
@@ -169,7 +171,7 @@ def test_without_bones_nothing_is_inside() -> None:
 
 def test_a_bone_that_is_not_closed_has_no_inside(tmp_path, caplog) -> None:
     write_surface(tmp_path / "open.vtp", Surface(PLATE.points, PLATE.triangles[1:]), PLATE.points)
-    bone = Body("femur", read_surface(tmp_path / "open.vtp", 1.0), None)
+    bone = RigidBody("femur", read_surface(tmp_path / "open.vtp", 1.0), None)
     with pytest.raises(
         InputError, match=r'bone "femur": .*open\.vtp: got 3 edges of one triangle only, .* closed surface'
     ):
@@ -178,12 +180,12 @@ def test_a_bone_that_is_not_closed_has_no_inside(tmp_path, caplog) -> None:
         assert np.isnan(one.values).all()
         assert one.where[0].startswith('not known: bone "femur": ')
     assert "penetration is not measured" in caplog.text
-    assert measure(run_of(BALL.points), run_of(BALL.points), Yardstick.of(run_of(BALL.points), FIBRE, (bone,)))
+    assert measure(run_of(BALL.points), run_of(BALL.points), MeasurementContext.of(run_of(BALL.points), FIBRE, (bone,)))
 
 
 def test_a_box_that_stands_out_on_both_sides_is_counted_whole() -> None:
     # A rod of 6 x 6 mm through the middle: 36 mm2 times 2 R, less by (x^2 + y^2) / 2 R^2 with means of 3 mm2 each.
-    rod = Body("rod", PLATE, None, solid=Box((0, 0, 0), (60, 6, 6), 0))
+    rod = RigidBody("rod", PLATE, None, solid=Box((0, 0, 0), (60, 6, 6), 0))
     deepest, volume = taken(run_of(BALL.points), rod)
     assert_allclose(volume.values, 36 * 2 * RADIUS * (1 - 6 / (2 * RADIUS**2)), rtol=0.03)
     assert 2 < deepest.values <= 3  # nowhere in the rod is deeper

@@ -1,4 +1,4 @@
-"""Scene -> problem: what is held, what the mesh is like, and fibres that stay where the solution is."""
+"""Scene -> problem: what is attached, what the mesh is like, and fibres that stay where the solution is."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from fem_reference.geometry.skins import Skin
 from fem_reference.geometry.tetrahedra import tetrahedralise
 from fem_reference.io import files
 from fem_reference.problems import fibre_field, muscle
-from fem_reference.problems.muscle_body import as_continuum
+from fem_reference.problems.muscle_body import as_body
 from fem_reference.report.overview import scene_facts
 from fem_reference.runs.store import Frame
 from fem_reference.scenes import casefile
@@ -43,7 +43,10 @@ def built(bar):
 
 def test_attachments_keep_their_names(built) -> None:
     assert set(built.mesh.facets) == {"origin", "insertion"}
-    assert {held.attachment: held.bone.name for held in built.held} == {"origin": "floor", "insertion": "lid"}
+    assert {attached.attachment: attached.bone.name for attached in built.attached} == {
+        "origin": "floor",
+        "insertion": "lid",
+    }
 
 
 @pytest.mark.parametrize("size", [3.5, 4.5, 6.0])
@@ -52,7 +55,7 @@ def test_attachments_keep_their_area_at_every_size(bar, size) -> None:
     built = build_scene(scene.model_copy(update={"muscle": scene.muscle.model_copy(update={"tet_size": size})}))
     for name in ("origin", "insertion"):
         facts = {key.removeprefix(name): value for key, value in built.mesh_facts.items() if key.startswith(name)}
-        # Each end is a square of 10 mm with sharp edges, on which the strip around it is not held.
+        # Each end is a square of 10 mm with sharp edges, on which the strip around it is not attached.
         assert facts["_area_mm2"] == pytest.approx(100)
         # Each of four shifts of its rim leaves about a tenth of what is missing.
         assert facts["_area_on_tets_mm2"] == pytest.approx(100, rel=0.003)
@@ -112,7 +115,7 @@ def test_fibres_and_contact_do_not_depend_on_the_tetrahedra(bar) -> None:
     cells = np.zeros(len(points), int)
     assert np.array_equal(one.fibre(cells, points), other.fibre(cells, points))
     assert len(one.skin.points) > 0
-    for mine, theirs in ((one.skin, other.skin), (one.held_skins["insertion"], other.held_skins["insertion"])):
+    for mine, theirs in ((one.skin, other.skin), (one.attached_skins["insertion"], other.attached_skins["insertion"])):
         assert np.array_equal(mine.points, theirs.points)
         assert np.array_equal(mine.areas, theirs.areas)
 
@@ -132,7 +135,7 @@ def test_given_fibres_are_read(bar) -> None:
 
 def test_a_vertex_has_one_bone(bar) -> None:
     scene = casefile.read(bar, changes={"attachment[1].bone": "floor"})
-    with pytest.raises(InputError, match=r"attachment\[1\]: got vertex \d+, which another attachment holds"):
+    with pytest.raises(InputError, match=r"attachment\[1\]: got vertex \d+, which another attachment has"):
         muscle.setup(scene)
 
 
@@ -155,13 +158,13 @@ FIBRE = """
 [[effect]]
 name = "active_tension"
 tension = "60 kPa"
-course = [{ frame = 0, amount = 0.0 }, { frame = 20, amount = 1.0 }]
+ramp = [{ frame = 0, amount = 0.0 }, { frame = 20, amount = 1.0 }]
 """
 
 
 def test_directions_only_where_an_effect_needs_them(bar, built) -> None:
     assert built.directions is None
-    assert as_continuum(built).fibre is None
+    assert as_body(built).fibre is None
     text = (bar / "case.toml").read_text()
     (bar / "case.toml").write_text(text.replace("[fibres]", f"{FIBRE}\n[fibres]"))
     along = build(bar).directions
@@ -172,28 +175,28 @@ def test_directions_only_where_an_effect_needs_them(bar, built) -> None:
     assert along[:, 2].mean() > 0.95
 
 
-def test_as_a_continuum_its_bones_hold_their_facets_and_the_rest_is_free(built) -> None:
-    body = as_continuum(built)
+def test_as_a_body_its_bones_prescribe_their_facets_and_the_rest_is_free(built) -> None:
+    body = as_body(built)
     skin, _ = boundary(built.mesh.tets)
     parts = [tuple(sorted(facet)) for facets in body.mesh.facets.values() for facet in facets.tolist()]
     assert sorted(parts) == sorted(tuple(sorted(facet)) for facet in skin.tolist())
     assert set(body.mesh.facets) == {"origin", "insertion", "free"}
     points = built.mesh.points[:5]
-    for entry, held in zip(body.prescribed, built.held, strict=True):
+    for entry, attached in zip(body.prescribed, built.attached, strict=True):
         assert (entry.name, entry.on, entry.components, entry.stiffness) == (
-            held.attachment,
-            held.attachment,
+            attached.attachment,
+            attached.attachment,
             (0, 1, 2),
             None,
         )
-        assert entry.course(points, 7.0) == pytest.approx(apply(held.bone.pose(7.0), points) - points)
+        assert entry.path(points, 7.0) == pytest.approx(apply(attached.bone.pose(7.0), points) - points)
 
 
 def test_a_stiffness_of_an_attachment_reaches_the_body(bar) -> None:
     scene = casefile.read(bar)
     soft = scene.attachment[1].model_copy(update={"stiffness": 0.1})
     scene = scene.model_copy(update={"attachment": (scene.attachment[0], soft)})
-    body = as_continuum(muscle.build(scene, muscle.setup(scene)))
+    body = as_body(muscle.build(scene, muscle.setup(scene)))
     assert [entry.stiffness for entry in body.prescribed] == [None, 0.1]
     assert (body.prescribed[0].on, type(body.prescribed[1].on)) == ("origin", Skin)
     # A load may still act on what springs hold, and what is free is free of both.
@@ -256,7 +259,7 @@ within = "90 %"
 kind = "property"
 because = "it is a body"
 
-[spoil]
+[negative_control]
 key = "effect[0].mu"
 value = "9 kPa"
 because = "it is softer"
@@ -281,11 +284,11 @@ def test_bones_of_closed_form_are_their_own_distance(squeezed) -> None:
     assert np.array_equal(floor.pose(50), np.eye(4))
 
 
-def test_a_body_may_be_held_by_nothing(squeezed) -> None:
+def test_a_body_may_be_attached_by_nothing(squeezed) -> None:
     built = build_scene(squeezed)
-    assert built.held == ()
+    assert built.attached == ()
     assert built.mesh.facets == {}
-    body = as_continuum(built)
+    body = as_body(built)
     assert body.prescribed == ()
     assert list(body.mesh.facets) == ["free"]
     assert len(body.mesh.facets["free"]) == len(boundary(built.mesh.tets)[0])
@@ -320,7 +323,7 @@ def test_show_says_what_bones_are_and_how_they_move(squeezed, bar) -> None:
     assert "turns about (5, 5, 30) mm along" in scene_facts(turning, muscle.setup(turning))["bones"]["lid"]
 
 
-def test_a_frame_of_a_body_held_by_nothing_tells_nothing_of_attachments(squeezed) -> None:
+def test_a_frame_of_a_body_attached_by_nothing_states_nothing_of_attachments(squeezed) -> None:
     built = build_scene(squeezed)
     frame = Frame(0, np.array(built.surface.points), scalars={"energy": 1.0})
-    assert fenicsx._with_held(built, frame).scalars == {"energy": 1.0}
+    assert fenicsx._with_attachment_errors(built, frame).scalars == {"energy": 1.0}

@@ -1,4 +1,4 @@
-"""Solvers are ranked as far as error bars tell them apart."""
+"""Solvers are ranked as far as error bars separate them."""
 
 import json
 
@@ -23,7 +23,7 @@ def test_bars_that_reach_each_other_share_ranks() -> None:
     assert [place.rank for place in alone] == ["1", "2", "3"]
 
 
-def test_who_is_lost_comes_last_and_who_has_no_bar_is_told_from_nobody() -> None:
+def test_who_is_lost_comes_last_and_who_has_no_bar_is_reported_from_nobody() -> None:
     places = ranked([Deviation("lost", NAN, NAN), Deviation("a", 1.0, 0.1), Deviation("b", 2.0, 0.1)])
     assert [place.rank for place in places] == ["1", "2", "3"]
     unknown = ranked([Deviation("a", 1.0, NAN), Deviation("b", 9.0, 0.1)])

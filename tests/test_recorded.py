@@ -291,8 +291,8 @@ def test_a_sequence_that_is_shifted_as_a_whole_is_taken(
         save(tmp_path / f"{number}.ply", moved(number) + np.array([0, 0, shift]))
     for frame in read(tmp_path):
         assert np.allclose(frame.surface - moved(frame.number), [0, 0, shift], rtol=0, atol=1e-13)
-    told = f"{tmp_path / '0.ply'}: a first frame (0) that is {shift:.3g} mm (rms) from the rest surface sphere"
-    assert [message.split(",")[0] for message in caplog.messages] == [told] * warnings
+    printed = f"{tmp_path / '0.ply'}: a first frame (0) that is {shift:.3g} mm (rms) from the rest surface sphere"
+    assert [message.split(",")[0] for message in caplog.messages] == [printed] * warnings
 
 
 def test_another_numbering_of_the_vertices_shows_at_rest(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""A candidate is checked against its own past and against the reference: what is noticed, and what is not held against it."""
+"""A candidate is checked against its own past and against the reference: what is noticed, and what is not compared with it."""
 
 import json
 import math
@@ -14,7 +14,7 @@ from fem_reference import metrics
 from fem_reference.assessment import baseline, regression
 from fem_reference.assessment.baseline import Limits
 from fem_reference.assessment.error_bars import ErrorBar, ErrorBars
-from fem_reference.assessment.measured import Today, sample
+from fem_reference.assessment.measured import CurrentMeasures, sample
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines
 from fem_reference.metrics import Measure
@@ -54,8 +54,8 @@ def bars(value: float = BAR) -> ErrorBars:
     return ErrorBars(NUMBERS, (4.0, 8.0), 1.5, tuple(made))
 
 
-def today(ways=WAYS, known: ErrorBars | None = None, **changes) -> Today:
-    return replace(Today.of(SCENE, SETUP, run("mine", ways), REFERENCE, known), **changes)
+def current(ways=WAYS, known: ErrorBars | None = None, **changes) -> CurrentMeasures:
+    return replace(CurrentMeasures.of(SCENE, SETUP, run("mine", ways), REFERENCE, known), **changes)
 
 
 def edited(path, change) -> None:
@@ -64,7 +64,7 @@ def edited(path, change) -> None:
     path.write_text(json.dumps(table))
 
 
-def checked(path, now: Today) -> regression.Check:
+def checked(path, now: CurrentMeasures) -> regression.Check:
     return regression.check(baseline.read(path, SCENE, "mine"), now)
 
 
@@ -75,14 +75,14 @@ def asked(check: regression.Check, question: str, name: str) -> regression.Judge
 
 @pytest.fixture
 def path(tmp_path):
-    """A baseline, made where the reference is known to 0.5 of everything."""
+    """A baseline, made where the reference has an error bar of 0.5 of everything."""
     file = tmp_path / "new" / "ball.json"
-    baseline.update(file, today(known=bars()))
+    baseline.update(file, current(known=bars()))
     return file
 
 
 def test_the_same_run_passes(path) -> None:
-    check = checked(path, today(known=bars()))
+    check = checked(path, current(known=bars()))
     assert {one.word for one in check.judgements} == {"pass"}
     assert check.word == "pass"
     assert check.notes == ()
@@ -91,11 +91,11 @@ def test_the_same_run_passes(path) -> None:
 def test_one_frame_that_is_moved_by_2_mm_fails_at_that_frame(path) -> None:
     ways = np.array(WAYS, float)
     ways[1] += [0, 2, 0]
-    check = checked(path, today(ways, bars()))
+    check = checked(path, current(ways, bars()))
     moved = check.judgements[0]  # the worst first, and positions before all
     assert (check.word, moved.name, moved.word, moved.frame) == ("fail", "positions.moved", "fail", 10)
     # But for the rounding of positions in the file.
-    assert moved.today == pytest.approx(2, abs=baseline.POSITION_ROUNDING)
+    assert moved.current == pytest.approx(2, abs=baseline.POSITION_ROUNDING)
     assert "2" in moved.why
     assert "mm from what it was, 0.1 mm allowed" in moved.why
 
@@ -103,22 +103,22 @@ def test_one_frame_that_is_moved_by_2_mm_fails_at_that_frame(path) -> None:
 def test_a_frame_that_deviates_as_much_as_before_but_elsewhere_fails(path) -> None:
     # 12 mm aside in another direction: a chord of 2 mm of the circle around the reference.
     angle = 2 * math.asin(1 / 12)
-    check = checked(path, today([*WAYS[:2], (12 * math.cos(angle), 12 * math.sin(angle), 10)], bars()))
+    check = checked(path, current([*WAYS[:2], (12 * math.cos(angle), 12 * math.sin(angle), 10)], bars()))
     assert asked(check, "unchanged", "surface_deviation.rms").word == "pass"
     assert asked(check, "unchanged", "surface_deviation.max").word == "pass"
     moved = asked(check, "unchanged", "positions.moved")
     assert (moved.word, moved.frame) == ("fail", 20)
-    assert moved.today == pytest.approx(2, abs=baseline.POSITION_ROUNDING)
+    assert moved.current == pytest.approx(2, abs=baseline.POSITION_ROUNDING)
     assert asked(check, "within", "surface_deviation.rms").word == "pass"
 
 
 def test_a_vertex_that_moves_between_the_sampled_ones_shows_in_the_statistics(path) -> None:
-    now = today(known=bars())
+    now = current(known=bars())
     sampled = baseline.read(path, SCENE, "mine").positions.vertices
     vertex = next(vertex for vertex in range(len(REST.points)) if vertex not in sampled)
     positions = np.array(now.candidate.positions)
     positions[1, vertex] += 2 * REST.points[vertex] / np.linalg.norm(REST.points[vertex])
-    bumped = Today.of(SCENE, SETUP, replace(now.candidate, positions=positions), REFERENCE, bars())
+    bumped = CurrentMeasures.of(SCENE, SETUP, replace(now.candidate, positions=positions), REFERENCE, bars())
     check = checked(path, bumped)
     assert asked(check, "unchanged", "positions.moved").word == "pass"
     assert asked(check, "unchanged", "volume.deviation").word == "fail"
@@ -127,12 +127,12 @@ def test_a_vertex_that_moves_between_the_sampled_ones_shows_in_the_statistics(pa
 
 def test_a_statistic_worse_by_more_than_its_tolerance_fails_at_the_frame_that_is_worst(path) -> None:
     edited(path, lambda table: table["measures"]["surface_deviation.rms"].update(tolerance=0.3))
-    check = checked(path, today([WAYS[0], (6.2, 0, 5), (12.4, 0, 10)], bars()))
+    check = checked(path, current([WAYS[0], (6.2, 0, 5), (12.4, 0, 10)], bars()))
     rms = asked(check, "unchanged", "surface_deviation.rms")
     assert (rms.word, rms.frame, rms.was) == ("fail", 20, 12.0)
-    assert rms.today == pytest.approx(12.4)
+    assert rms.current == pytest.approx(12.4)
     assert rms.used == pytest.approx(0.4 / 0.3)
-    check = checked(path, today([WAYS[0], (6.2, 0, 5), (12.2, 0, 10)], bars()))
+    check = checked(path, current([WAYS[0], (6.2, 0, 5), (12.2, 0, 10)], bars()))
     assert asked(check, "unchanged", "surface_deviation.rms").word == "pass"
 
 
@@ -145,31 +145,31 @@ def test_nothing_is_said_where_the_bar_reaches_both_sides_of_what_is_allowed(pat
         (12 + 1.01 * BAR, "pass"),
     ):
         edited(path, lambda table, within=within: table["measures"][name].update(within=within))
-        check = checked(path, today(known=bars()))
+        check = checked(path, current(known=bars()))
         judged = asked(check, "within", name)
         assert (judged.word, check.word, check.answer("unchanged")) == (word, word, "pass")
     assert (judged.frame, judged.known) == (20, BAR)
     edited(path, lambda table: table["measures"][name].update(within=12.1))
-    why = asked(checked(path, today(known=bars())), "within", name).why
-    assert why == "the reference is known to 0.5 mm, and 12 mm is that near to the 12.1 mm allowed"
+    why = asked(checked(path, current(known=bars())), "within", name).why
+    assert why == "the reference has an error bar of 0.5 mm, and 12 mm is that near to the 12.1 mm allowed"
 
 
 def test_an_edited_tolerance_below_rounding_says_nothing(path) -> None:
     edited(path, lambda table: table["positions"].update(tolerance=0.001))
-    moved = asked(checked(path, today(known=bars())), "unchanged", "positions.moved")
+    moved = asked(checked(path, current(known=bars())), "unchanged", "positions.moved")
     assert moved.word == "inconclusive"
-    assert "the baseline is known to 0.00866 mm" in moved.why
+    assert "the baseline has an error bar of 0.00866 mm" in moved.why
 
 
 def test_without_error_bars_the_past_is_judged_and_the_truth_is_not(tmp_path) -> None:
     path = tmp_path / "ball.json"
-    baseline.update(path, today())
-    check = checked(path, today())
+    baseline.update(path, current())
+    check = checked(path, current())
     assert (check.answer("unchanged"), check.answer("within"), check.word) == ("pass", "inconclusive", "inconclusive")
-    assert "--error-bar tells" in asked(check, "within", "surface_deviation.rms").why
+    assert "--error-bar measures it" in asked(check, "within", "surface_deviation.rms").why
     # What is said of the run itself is known without them.
     assert asked(check, "within", "penetration.deepest").word == "pass"
-    known = today(known=bars())
+    known = current(known=bars())
     assert "--update does" in asked(checked(path, known), "within", "surface_deviation.rms").why
     baseline.update(path, known)
     assert checked(path, known).word == "pass"
@@ -182,7 +182,7 @@ def test_an_update_keeps_what_was_edited_so_that_accuracy_cannot_be_lost_in_smal
         del table["measures"]["volume.deviation"]
 
     edited(path, edit)
-    worse = today([*WAYS[:2], (13.1, 0, 10)], bars())
+    worse = current([*WAYS[:2], (13.1, 0, 10)], bars())
     assert asked(checked(path, worse), "unchanged", "surface_deviation.rms").word == "pass"
     made = baseline.update(path, worse)
     assert (made.measures["surface_deviation.rms"].tolerance, made.positions.tolerance) == (1.2, 5.0)
@@ -195,7 +195,7 @@ def test_an_update_keeps_what_was_edited_so_that_accuracy_cannot_be_lost_in_smal
 
 
 def test_what_comes_nearer_to_the_reference_is_within_and_has_changed(path) -> None:
-    check = checked(path, today([*WAYS[:2], (9, 0, 10)], bars()))
+    check = checked(path, current([*WAYS[:2], (9, 0, 10)], bars()))
     assert (check.answer("within"), check.answer("unchanged")) == ("pass", "fail")
 
 
@@ -206,19 +206,19 @@ def measured(values) -> tuple[Measure, ...]:
 @pytest.mark.parametrize("none", [math.nan, math.inf])
 def test_a_number_that_does_not_exist_passes_nothing(tmp_path, none) -> None:
     path, one, name = tmp_path / "ball.json", [0.0, 1.0, 1.0], "volume.deviation"
-    gap = today(known=bars(), measures=measured([0.0, none, 1.0]))
+    gap = current(known=bars(), measures=measured([0.0, none, 1.0]))
     baseline.update(path, gap)
     assert json.loads(path.read_text())["measures"][name]["values"] == [0.0, None, 1.0]
     for question in ("unchanged", "within"):
         same = asked(checked(path, gap), question, name)
         assert (same.word, same.why) == ("inconclusive", "there is no number, and there was none")
-    appeared = asked(checked(path, today(known=bars(), measures=measured(one))), "unchanged", name)
-    assert (appeared.word, appeared.why) == ("fail", "there is a number today, and there was none")
-    baseline.update(path, today(known=bars(), measures=measured(one)))
-    for lost in (gap, today(known=bars(), measures=())):
+    appeared = asked(checked(path, current(known=bars(), measures=measured(one))), "unchanged", name)
+    assert (appeared.word, appeared.why) == ("fail", "there is a number now, and there was none")
+    baseline.update(path, current(known=bars(), measures=measured(one)))
+    for lost in (gap, current(known=bars(), measures=())):
         for question in ("unchanged", "within"):
             judged = asked(checked(path, lost), question, name)
-            assert (judged.word, judged.why, judged.used) == ("fail", "there is no number today", math.inf)
+            assert (judged.word, judged.why, judged.used) == ("fail", "there is no number now", math.inf)
 
 
 def test_limits_of_a_new_baseline() -> None:
@@ -251,7 +251,7 @@ def test_a_change_of_one_frame_is_a_few_lines_of_the_file(path) -> None:
     assert list(json.loads(path.read_text())) == sorted(json.loads(path.read_text()))
     ways = np.array(WAYS, float)
     ways[1] += [0, 2, 0]
-    baseline.update(path, today(ways, bars()))
+    baseline.update(path, current(ways, bars()))
     after = path.read_text().splitlines()
     assert len(before) == len(after)
     changed = [line for line, other in zip(after, before, strict=True) if line != other]
@@ -262,7 +262,7 @@ def test_a_change_of_one_frame_is_a_few_lines_of_the_file(path) -> None:
 
 def test_a_run_of_lines_alone_is_checked_by_its_fibres(tmp_path) -> None:
     lines = replace(run("mine", WAYS), has_surface=False, positions=np.full((3, *REST.points.shape), np.nan))
-    path, now = tmp_path / "ball.json", Today.of(SCENE, SETUP, lines, REFERENCE, bars())
+    path, now = tmp_path / "ball.json", CurrentMeasures.of(SCENE, SETUP, lines, REFERENCE, bars())
     baseline.update(path, now)
     assert {name.split(".")[0] for name in json.loads(path.read_text())["measures"]} == {"fibre_length"}
     assert checked(path, now).word == "pass"
@@ -275,7 +275,7 @@ def test_notes_say_what_else_is_different(path) -> None:
     edited(path, lambda table: table.update(reference="fenicsx-1", fem_reference="0.0.1"))
     other = replace(REFERENCE, positions=REFERENCE.positions + [3.0, 0, 0])
     check = regression.check(
-        baseline.read(path, SCENE, "mine"), Today.of(SCENE, SETUP, run("mine", WAYS), other, bars())
+        baseline.read(path, SCENE, "mine"), CurrentMeasures.of(SCENE, SETUP, run("mine", WAYS), other, bars())
     )
     assert "measured by fem_reference" in check.notes[0]
     assert check.notes[1] == "the reference is test, that of the baseline was fenicsx-1"
@@ -322,11 +322,11 @@ def test_a_file_that_is_damaged_or_somebody_elses_is_neither_read_nor_written_ov
     with pytest.raises(InputError, match=message):
         baseline.check(path, SCENE, "mine")
     with pytest.raises(InputError, match=message):
-        baseline.update(path, today())
+        baseline.update(path, current())
     assert path.read_text() == text
 
 
-def test_other_frames_are_told(path) -> None:
+def test_other_frames_are_reported(path) -> None:
     path.write_text(path.read_text().replace("[0, 10, 20]", "[0, 10, 30]"))
     with pytest.raises(InputError, match="frames: got 3 others, want the frame numbers of the scene"):
         baseline.read(path, SCENE, "mine")
@@ -337,7 +337,7 @@ def test_another_scene_wants_an_update(path, tmp_path) -> None:
     with pytest.raises(InputError, match=r"scene: got 0123456789abcdef\.\.\., while case.toml is another"):
         baseline.read(path, other, "mine")
     baseline.check(path, other, "mine")
-    baseline.update(path, today(scene=other))
+    baseline.update(path, current(scene=other))
     assert baseline.read(path, other, "mine").scene == "another"
     with pytest.raises(InputError, match="got no file, want the baseline of a candidate"):
         baseline.read(tmp_path / "none.json", SCENE, "mine")
@@ -346,19 +346,19 @@ def test_another_scene_wants_an_update(path, tmp_path) -> None:
 def test_a_vertex_that_is_not_there_is_named(path) -> None:
     edited(path, lambda table: table["positions"]["vertices"].__setitem__(0, 9999))
     with pytest.raises(InputError, match=r"baseline: positions.vertices: got 9999, want 0 to"):
-        checked(path, today())
+        checked(path, current())
 
 
 def test_a_reference_without_an_interior_is_refused() -> None:
     with pytest.raises(InputError, match="reference: fibres: got a run without an interior"):
-        Today.of(SCENE, SETUP, run("mine", WAYS), replace(REFERENCE, fibres=None), None)
+        CurrentMeasures.of(SCENE, SETUP, run("mine", WAYS), replace(REFERENCE, fibres=None), None)
 
 
 @pytest.fixture
 def mixed(path) -> regression.Check:
     """A check with all three verdicts."""
     edited(path, lambda table: table["measures"]["fibre_length.rms"].update(within=0.1))
-    return checked(path, today([*WAYS[:2], (15, 0, 10)], bars()))
+    return checked(path, current([*WAYS[:2], (15, 0, 10)], bars()))
 
 
 def test_junit_has_a_case_for_each_judgement(mixed) -> None:
@@ -374,7 +374,7 @@ def test_junit_has_a_case_for_each_judgement(mixed) -> None:
     assert suite.find("system-out") is None
 
 
-def test_notes_are_in_every_telling(mixed) -> None:
+def test_notes_are_in_every_text(mixed) -> None:
     noted = replace(mixed, notes=("a | b",))
     assert ElementTree.fromstring(regression_texts.junit(noted, 0)).find("testsuite/system-out").text == "a | b"
     assert "- note: a \\| b" in regression_texts.markdown(noted)
@@ -398,10 +398,8 @@ def test_markdown_shows_the_worst_first_and_is_short(mixed) -> None:
 def test_text_names_failures_and_why_nothing_can_be_said(mixed) -> None:
     lines = regression_texts.text(mixed).splitlines()
     assert lines[0] == "fail: positions.moved unchanged at frame 20: 3 mm from what it was, 0.1 mm allowed"
-    assert (
-        "inconclusive: the reference is known to 0.5 mm, and 0 mm is that near to the 0.1 mm allowed (fibre_length.rms within)"
-        in (lines)
-    )
+    unknown = "inconclusive: the reference has an error bar of 0.5 mm, and 0 mm is that near to the 0.1 mm allowed"
+    assert f"{unknown} (fibre_length.rms within)" in lines
     assert lines[-1] == "verdict: fail"
     many = replace(mixed, judgements=mixed.judgements[:1] * 20)
     assert regression_texts.text(many).count("fail: ") == regression_texts.MOST_ROWS

@@ -18,8 +18,8 @@ from fem_reference.foundations.errors import MissingSoftware
 from fem_reference.foundations.mesh import Polylines, Surface
 from fem_reference.geometry.rigid_bodies import HalfSpace
 from fem_reference.geometry.tessellation import tessellated
-from fem_reference.metrics import Measure, Yardstick
-from fem_reference.problems.muscle import Body, Setup
+from fem_reference.metrics import Measure, MeasurementContext
+from fem_reference.problems.muscle import RigidBody, Setup
 from fem_reference.report import gallery, page
 from fem_reference.report.curves import curves
 from fem_reference.report.tables import COLUMNS, seconds_per_frame
@@ -68,7 +68,7 @@ truth = "0 %"
 within = "0.5 %"
 kind = "property"
 because = "It is <nearly> incompressible & closed."
-[spoil]
+[negative_control]
 key = "effect[0].mu"
 value = "1 kPa"
 because = "softer"
@@ -134,13 +134,15 @@ def comparison(tmp_path, monkeypatch) -> Comparison:
         "reference", "fenicsx", moved, scalars={"min_det_F_points": 1 - steps[:, 0, 0] / 8}, origin=origin
     )
     quick, torn = a_run("quick", "pbd", moved + steps * [0, 0, 1.0]), a_run("torn", "recorded", torn, "diverged")
-    plate = Body("plate", Surface(rest.points - [0, 0, 25], rest.triangles), scene.bone[0].motion.poses())
+    plate = RigidBody("plate", Surface(rest.points - [0, 0, 25], rest.triangles), scene.bone[0].motion.poses())
     return Comparison(
         scene=scene,
         setup=Setup(rest, (plate,), (), NUMBERS, None),
         reference=reference,
         candidates=(quick, torn),
-        yardstick=Yardstick.of(reference, Polylines([[0, 0, 0], [5, 0, 0], [0, 1, 0], [5, 1, 0]], [0, 2, 4]), ()),
+        context=MeasurementContext.of(
+            reference, Polylines([[0, 0, 0], [5, 0, 0], [0, 1, 0], [5, 1, 0]], [0, 2, 4]), ()
+        ),
         deviations={run.name: measured(run, moved) for run in (quick, torn)},
         changes={run.name: measured(run, rest.points) for run in (reference, quick, torn)},
         extension_error=Measure("fibre_length", "extension_error", "mm", np.arange(5) / 8, ("fibre 1",) * 5),
@@ -153,8 +155,8 @@ def alone(comparison: Comparison) -> Comparison:
 
 
 def test_summary_has_the_documented_keys_and_survives_json(comparison):
-    told = report.summary(comparison)
-    assert json.loads(json.dumps(told, allow_nan=False)) == told
+    printed = report.summary(comparison)
+    assert json.loads(json.dumps(printed, allow_nan=False)) == printed
     keys = [
         "case",
         "solver",
@@ -168,12 +170,17 @@ def test_summary_has_the_documented_keys_and_survives_json(comparison):
         "error_bars",
         "rankings",
     ]
-    assert list(told) == keys
-    assert told["error_bars"] == []
-    assert (told["case"], told["solver"], told["status"], told["verdict"]) == ("press", "fenicsx", "converged", "pass")
-    assert told["cost"]["quick"] == {"seconds": 12.0, "seconds_solve": 8.0, "iterations": 40.0}
-    assert {row["candidate"] for row in told["from_rest"]} == {"reference", "quick", "torn"}
-    assert told["verdicts"][0]["because"] == "It is <nearly> incompressible & closed."
+    assert list(printed) == keys
+    assert printed["error_bars"] == []
+    assert (printed["case"], printed["solver"], printed["status"], printed["verdict"]) == (
+        "press",
+        "fenicsx",
+        "converged",
+        "pass",
+    )
+    assert printed["cost"]["quick"] == {"seconds": 12.0, "seconds_solve": 8.0, "iterations": 40.0}
+    assert {row["candidate"] for row in printed["from_rest"]} == {"reference", "quick", "torn"}
+    assert printed["verdicts"][0]["because"] == "It is <nearly> incompressible & closed."
 
 
 def value(rows, candidate, metric, statistic, frame):
@@ -186,35 +193,35 @@ def value(rows, candidate, metric, statistic, frame):
 
 
 def test_summary_values_are_the_measures(comparison):
-    told = report.summary(comparison)
+    printed = report.summary(comparison)
     # quick is 1 mm a step from the reference, and sqrt(1 + 2^2) mm a step from rest; rounding is 1e-15.
-    assert value(told["measures"], "quick", "surface_deviation", "max", 30) == pytest.approx(3, abs=1e-12)
-    assert value(told["from_rest"], "quick", "surface_deviation", "max", 30) == pytest.approx(3 * 5**0.5, abs=1e-12)
-    assert value(told["measures"], "reference", "surface_deviation", "max", 30) == pytest.approx(6, abs=1e-12)
-    assert value(told["measures"], "reference", "inversion", "min_det_F_points", 40) == 0.5
+    assert value(printed["measures"], "quick", "surface_deviation", "max", 30) == pytest.approx(3, abs=1e-12)
+    assert value(printed["from_rest"], "quick", "surface_deviation", "max", 30) == pytest.approx(3 * 5**0.5, abs=1e-12)
+    assert value(printed["measures"], "reference", "surface_deviation", "max", 30) == pytest.approx(6, abs=1e-12)
+    assert value(printed["measures"], "reference", "inversion", "min_det_F_points", 40) == 0.5
 
 
 def test_what_is_not_finite_is_null(comparison):
-    told = report.summary(comparison)
-    assert value(told["measures"], "torn", "surface_deviation", "rms", 40) is None
-    assert value(told["measures"], "torn", "surface_deviation", "rms", 30) == pytest.approx(1.5, abs=1e-12)
-    spoilt = replace(comparison.verdicts[0], word="fail", value=float("inf"))
-    assert report.summary(replace(comparison, verdicts=(spoilt,)))["verdicts"][0]["value"] is None
+    printed = report.summary(comparison)
+    assert value(printed["measures"], "torn", "surface_deviation", "rms", 40) is None
+    assert value(printed["measures"], "torn", "surface_deviation", "rms", 30) == pytest.approx(1.5, abs=1e-12)
+    damaged = replace(comparison.verdicts[0], word="fail", value=float("inf"))
+    assert report.summary(replace(comparison, verdicts=(damaged,)))["verdicts"][0]["value"] is None
 
 
 def test_csv_holds_the_same_numbers(comparison, tmp_path):
     report.write(comparison, tmp_path / "out")
     rows = list(csv.DictReader(io.StringIO((tmp_path / "out" / "measures.csv").read_text())))
-    told = json.loads((tmp_path / "out" / "measures.json").read_text())["measures"]
+    printed = json.loads((tmp_path / "out" / "measures.json").read_text())["measures"]
     assert tuple(rows[0]) == COLUMNS
     read = [row | {"frame": int(row["frame"]), "value": float(row["value"]) if row["value"] else None} for row in rows]
-    assert read == told
+    assert read == printed
 
 
 def test_page_names_everything_and_needs_no_network(comparison, tmp_path):
     text = report.write(comparison, tmp_path / "new" / "out").read_text(encoding="utf-8")
-    for told in ("quick", "torn", "press", "torn has ended", "dolfinx", "<td>234</td>"):
-        assert told in text
+    for printed in ("quick", "torn", "press", "torn has ended", "dolfinx", "<td>234</td>"):
+        assert printed in text
     assert "0.500&#8239;" in text
     assert "It is &lt;nearly&gt; incompressible &amp; closed." in text
     assert '<span class="bad">not a number</span>' in text
@@ -278,7 +285,7 @@ def test_shots_are_the_worst_frames_that_can_be_drawn(comparison):
     np.testing.assert_array_equal(quick.outline, comparison.reference.positions[4])
 
 
-def test_a_candidate_without_a_frame_to_draw_is_told(comparison, monkeypatch):
+def test_a_candidate_without_a_frame_to_draw_is_reported(comparison, monkeypatch):
     lost = a_run("torn", "recorded", np.full_like(comparison.reference.positions, np.inf), "diverged")
     changed = replace(comparison, candidates=(comparison.candidates[0], lost))
     monkeypatch.setattr(gallery, "draw", lambda _setup, _surface, wanted: [(b"1", b"2") for _ in wanted])
@@ -293,7 +300,7 @@ def test_cameras_look_at_the_widest_side_away_from_the_bones(comparison, up):
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     body = comparison.setup.surface
     bone = Surface((body.points + np.array([0, 12, -25 * up])) @ turn.T, body.triangles)
-    views = gallery.directions(body.moved_to(body.points @ turn.T), (Body("plate", bone, None),))
+    views = gallery.directions(body.moved_to(body.points @ turn.T), (RigidBody("plate", bone, None),))
     # The body is symmetric, so only rounding is between its axes and the computed ones.
     np.testing.assert_allclose(views @ turn, [[0, 0, up], [0, -1, 0]], atol=1e-9)
 
@@ -301,7 +308,7 @@ def test_cameras_look_at_the_widest_side_away_from_the_bones(comparison, up):
 def test_cameras_look_along_the_coordinates_where_two_axes_are_as_long(comparison):
     body = comparison.setup.surface
     points = body.points / [30, 20, 10] * [20, 8, 20] + np.random.default_rng(4).normal(size=body.points.shape) * 1e-12
-    plate = Body("plate", body.moved_to(body.points - [300, 200, 100]), None)
+    plate = RigidBody("plate", body.moved_to(body.points - [300, 200, 100]), None)
     np.testing.assert_allclose(gallery.directions(body.moved_to(points), (plate,)), [[0, 1, 0], [1, 0, 0]], atol=0.01)
 
 
@@ -309,7 +316,9 @@ def test_cameras_do_not_look_through_plates(comparison):
     # Half axes 30, 20, 10 again, now between plates across z: seen along y and x. With one plate alone, from its other side.
     body = comparison.setup.surface
     floor, lid = (HalfSpace((0, 0, -10 * up), (0, 0, up)) for up in (1, -1))
-    bones = tuple(Body("plate", tessellated(solid, body.points, "plate"), None, solid=solid) for solid in (floor, lid))
+    bones = tuple(
+        RigidBody("plate", tessellated(solid, body.points, "plate"), None, solid=solid) for solid in (floor, lid)
+    )
     np.testing.assert_allclose(np.abs(gallery.directions(body, bones)), [[0, 1, 0], [1, 0, 0]], atol=1e-9)
     np.testing.assert_allclose(gallery.directions(body, bones[:1])[0], [0, 0, 1], atol=1e-9)
     np.testing.assert_allclose(gallery.directions(body, bones[1:])[0], [0, 0, -1], atol=1e-9)
@@ -354,7 +363,7 @@ def with_bars(comparison: Comparison) -> Comparison:
     return replace(comparison, error_bars=ErrorBars(NUMBERS, (2.0, 4.0), 1.5, tuple(bars)))
 
 
-def test_how_well_the_reference_is_known_is_told(comparison):
+def test_how_well_the_reference_is_known_is_reported(comparison):
     assert "With <code>--error-bar</code> the reference is solved" in page.render(comparison)
     text = page.render(with_bars(comparison))
     assert "(4 mm instead of 2 mm)" in text
@@ -389,25 +398,25 @@ def test_candidates_are_ranked_where_the_reference_is_known(comparison):
 
 def test_curves_have_a_band_as_wide_as_the_error_bar(comparison):
     bare, banded = curves(comparison), curves(with_bars(comparison))
-    told = {curve.title: "error bar" in curve.svg for curve in banded}
-    assert told == {curve.title: not curve.title.startswith("Smallest det F") for curve in banded}
+    printed = {curve.title: "error bar" in curve.svg for curve in banded}
+    assert printed == {curve.title: not curve.title.startswith("Smallest det F") for curve in banded}
     assert not any("error bar" in curve.svg for curve in bare)
 
 
-def test_a_scene_that_differs_from_its_file_is_told(comparison):
-    spoilt = replace(comparison, scene=casefile.read(comparison.scene.place, spoiled=True))
+def test_a_scene_that_differs_from_its_file_is_reported(comparison):
+    damaged = replace(comparison, scene=casefile.read(comparison.scene.place, with_negative_control=True))
     assert "effect[0].mu" not in re.sub(r"<pre>.*</pre>", "", page.render(comparison), flags=re.DOTALL)
-    assert "<th>effect[0].mu</th><td>0.01 in the file, 0.001 here</td>" in page.render(spoilt)
+    assert "<th>effect[0].mu</th><td>0.01 in the file, 0.001 here</td>" in page.render(damaged)
 
 
-def test_a_reference_turned_inside_out_is_told(comparison):
+def test_a_reference_turned_inside_out_is_reported(comparison):
     assert "inside out. At" not in page.render(alone(comparison))
     scalars = {"min_det_F_points": np.array([1, 0.5, -0.25, 0.5, NAN])}
     turned = replace(alone(comparison), reference=replace(comparison.reference, scalars=scalars))
     assert re.search(r"at points falls to \N{MINUS SIGN}0.250: there the reference is turned", page.render(turned))
 
 
-def test_a_reference_that_is_unstable_is_told(comparison):
+def test_a_reference_that_is_unstable_is_reported(comparison):
     def rendered(modes):
         scalars = {"negative_modes": np.array(modes)}
         return page.render(replace(alone(comparison), reference=replace(comparison.reference, scalars=scalars)))
@@ -422,7 +431,7 @@ def test_least_of_nothing_known_is_not_a_number():
     assert np.isnan(page.least(Measure("inversion", "min_det_F", "1", np.array([NAN, NAN]))))
 
 
-def test_effects_are_told_with_their_units(comparison):
+def test_effects_are_reported_with_their_units(comparison):
     assert comparison.scene.effects[0].parameters == [("mu", 0.01, "MPa")]
     assert "<tr><th>NeoHooke</th><td>mu = 0.01 MPa</td></tr>" in page.render(comparison)
 

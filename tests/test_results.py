@@ -104,7 +104,7 @@ def test_a_turned_body_has_no_stress() -> None:
     assert found["fibre_stretch"] == pytest.approx(np.ones(40), rel=1e-13)
 
 
-# The amount of what has a course is 0.5 at frame 30.
+# The amount of what has a ramp is 0.5 at frame 30.
 LAWS = {
     "neo_hooke": laws.neo_hooke(MU),
     "mooney_rivlin": laws.MooneyRivlin(0.01, 0.004),

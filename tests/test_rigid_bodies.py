@@ -109,7 +109,7 @@ def test_gradient_and_curvature_are_the_slopes_of_the_distance(body: Obstacle) -
     slopes = np.stack([(after.distance - before.distance) / (2 * step) for after, before in steps], axis=1)
     bends = np.stack([(after.gradient - before.gradient) / (2 * step) for after, before in steps], axis=2)
     # Central differences are wrong by step^2 / curvature radius^3; on 4000 points few radii are below 0.02: 1e-5.
-    # A ridge or an edge within a step of a point spoils that point alone: the chance is some 1e-5 per point.
+    # A ridge or an edge within a step of a point harms that point alone: the chance is some 1e-5 per point.
     smooth = np.abs(bends - found.curvature).max(axis=(1, 2)) < 1e-5 * (
         1 + np.abs(found.curvature).max(axis=(1, 2)) ** 3
     )
@@ -170,7 +170,7 @@ def test_bodies_travel_between_processes(body: Obstacle) -> None:
 
 
 @pytest.mark.parametrize(
-    ("make", "told"),
+    ("make", "printed"),
     [
         (lambda: HalfSpace((0, 0, 0), (0, 0, 0)), r"half space: normal: got \(0, 0, 0\), want a direction"),
         (lambda: Sphere((0, 0, 0), 0.0), "sphere: radius: got 0.0, want a length above 0 mm"),
@@ -184,6 +184,6 @@ def test_bodies_travel_between_processes(body: Obstacle) -> None:
         (lambda: Box(START, (1.0, 2.0, 1.0), np.nan), "box: rounding: got nan"),
     ],
 )
-def test_what_is_no_body(make, told: str) -> None:
-    with pytest.raises(InputError, match=told):
+def test_what_is_no_body(make, printed: str) -> None:
+    with pytest.raises(InputError, match=printed):
         make()

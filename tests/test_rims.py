@@ -10,16 +10,16 @@ from fem_reference.geometry.coarsening import coarsen
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.intersections import self_intersections
 from fem_reference.geometry.rims import with_rims
-from fem_reference.geometry.sectors import held_area, held_shares
+from fem_reference.geometry.sectors import attached_area, attached_shares
 
 BOX = shapes.skin(shapes.box((32, 24, 32), (80.0, 60.0, 80.0)))
 BALL = shapes.sphere(4, 30.0)
 SIZES = (8.0, 10.0, 12.5)
 
 
-def _rimmed(fine: Surface, held: dict[str, Ints], size: float) -> tuple[Surface, Ints, dict[str, float]]:
+def _rimmed(fine: Surface, attached: dict[str, Ints], size: float) -> tuple[Surface, Ints, dict[str, float]]:
     """A coarse surface with rims, its labels and the areas wanted; what every such surface is like is asserted."""
-    shares = {name: held_shares(fine, vertices) for name, vertices in held.items()}
+    shares = {name: attached_shares(fine, vertices) for name, vertices in attached.items()}
     count = int(triangle_areas(fine.points, fine.triangles).sum() / (size**2 * np.sqrt(3) / 4))
     surface, labels = with_rims(coarsen(fine, count), fine, shares, size)
     assert_array_equal(check_closed(surface).triangles, surface.triangles)
@@ -31,7 +31,7 @@ def _rimmed(fine: Surface, held: dict[str, Ints], size: float) -> tuple[Surface,
     areas = triangle_areas(surface.points, surface.triangles)
     assert (4 * np.sqrt(3) * areas / np.sum(sides**2, axis=(1, 2))).min() > 0.1
     assert len(surface.triangles) < 1.4 * count
-    return surface, labels, {name: held_area(fine, share) for name, share in shares.items()}
+    return surface, labels, {name: attached_area(fine, share) for name, share in shares.items()}
 
 
 def _area(surface: Surface, labels: Ints, label: int) -> float:
@@ -78,9 +78,9 @@ def test_the_rim_of_a_face_is_its_sharp_edges(size: float) -> None:
     surface, labels, wanted = _rimmed(BOX, {"end": np.flatnonzero(BOX.points[:, 2] == 0)}, size)
     assert_allclose(wanted["end"], 80 * 60)
     assert_allclose(_area(surface, labels, 1), 80 * 60, rtol=1e-3)
-    held = surface.points[np.unique(surface.triangles[labels == 1])]
+    attached = surface.points[np.unique(surface.triangles[labels == 1])]
     # How much the inversion in coarsening bends a plane over one triangle, and what makes good the area and the volume.
-    assert np.abs(held[:, 2]).max() < 0.15
+    assert np.abs(attached[:, 2]).max() < 0.15
     rim = _rim(surface, labels, 1)
     assert np.abs(np.minimum(np.abs(np.abs(rim[:, 0] - 40) - 40), np.abs(np.abs(rim[:, 1] - 30) - 30))).max() < 0.15
 
@@ -89,9 +89,9 @@ def test_the_rim_of_a_face_is_its_sharp_edges(size: float) -> None:
 def test_two_attachments_side_by_side_share_their_rim() -> None:
     x, y, z = BOX.points.T
     on_top = (z == 80) & (np.abs(x - 40) <= 25) & (np.abs(y - 30) <= 20)
-    held = {"left": np.flatnonzero(on_top & (x < 40)), "right": np.flatnonzero(on_top & (x >= 40))}
-    surface, labels, wanted = _rimmed(BOX, held, 10.0)
-    for label, name in enumerate(held, start=1):
+    attached = {"left": np.flatnonzero(on_top & (x < 40)), "right": np.flatnonzero(on_top & (x >= 40))}
+    surface, labels, wanted = _rimmed(BOX, attached, 10.0)
+    for label, name in enumerate(attached, start=1):
         assert_allclose(_area(surface, labels, label), wanted[name], rtol=1e-2)
     left, right = (np.unique(surface.triangles[labels == label]) for label in (1, 2))
     assert len(np.intersect1d(left, right)) >= 4  # 40 mm in sides of 10 mm
@@ -136,5 +136,5 @@ def test_a_strip_narrower_than_a_triangle_is_kept() -> None:
     strip = np.flatnonzero((z == 80) & (np.abs(x - 40) <= 25) & (np.abs(y - 30) <= 2.5))
     surface, labels, wanted = _rimmed(BOX, {"strip": strip}, 12.5)
     assert_allclose(_area(surface, labels, 1), wanted["strip"], rtol=1e-2)
-    held = distances(BOX.points[strip], Surface(surface.points, surface.triangles[labels == 1])).distance
-    assert np.mean(held < 12.5 / 4) > 0.9
+    attached = distances(BOX.points[strip], Surface(surface.points, surface.triangles[labels == 1])).distance
+    assert np.mean(attached < 12.5 / 4) > 0.9

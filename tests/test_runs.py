@@ -64,14 +64,14 @@ def test_progress_is_logged_with_how_far_and_how_long(tmp_path, caplog) -> None:
     assert "frame 5 (2 of 2), well, " in caplog.text
 
 
-@pytest.mark.parametrize(("quiet", "told"), [(3600.0, [0, 3]), (0.0, [0, 1, 2, 3])])
-def test_progress_is_told_now_and_then(tmp_path, caplog, monkeypatch, quiet, told) -> None:
+@pytest.mark.parametrize(("quiet", "printed"), [(3600.0, [0, 3]), (0.0, [0, 1, 2, 3])])
+def test_progress_is_reported_now_and_then(tmp_path, caplog, monkeypatch, quiet, printed) -> None:
     caplog.set_level(logging.INFO, logger="fem_reference")
     monkeypatch.setattr(store, "QUIET", quiet)
     writer = Writer(tmp_path / "run", IDENTITY | {"frames": (0, 1, 2, 3)}, SURFACE, None, None)
     for number in range(4):
         writer.add(Frame(number, SURFACE.points))
-    assert [number for number in range(4) if f"frame {number} (" in caplog.text] == told
+    assert [number for number in range(4) if f"frame {number} (" in caplog.text] == printed
 
 
 def test_a_run_that_was_cut_off_is_no_result(tmp_path) -> None:

@@ -87,7 +87,7 @@ within = "1 %"
 kind = "property"
 because = "it is nearly incompressible"
 
-[spoil]
+[negative_control]
 key = "effect[1].bulk"
 value = "10 kPa"
 because = "it is compressible then"
@@ -103,8 +103,8 @@ TURN = {
     "keyframes": [{"frame": 0, "angle": "0 deg"}, {"frame": 9, "angle": "1 deg"}],
 }
 SLIDE = {"direction": [0, -3, 0], "keyframes": [{"frame": 0, "distance": "0 mm"}, {"frame": 9, "distance": "1 cm"}]}
-COURSE = [{"frame": 0, "amount": 0}, {"frame": 10, "amount": 1}]
-PRESSURE = {"name": "pressure", "on": "free", "pressure": "1 kPa", "course": COURSE}
+RAMP = [{"frame": 0, "amount": 0}, {"frame": 10, "amount": 1}]
+PRESSURE = {"name": "pressure", "on": "free", "pressure": "1 kPa", "ramp": RAMP}
 POLYLINES = {"file": "fibres.vtk", "unit": "mm"}
 OUTLINE = {"file": "marks.csv", "unit": "mm", "clouds": ["a", "b"], "reach": "3 mm"}
 
@@ -242,8 +242,8 @@ WRONG = [
     ("effect[1]", PRESSURE | {"on": "top"}, 'effect[1].on: got "top", want one of start, end, free'),
     (
         "effect[0]",
-        PRESSURE | {"course": [{"frame": 0, "amount": 0.5}]},
-        "effect[0].course: got an amount of 0.5 at frame 0, the first, want 0 there, where the muscle rests",
+        PRESSURE | {"ramp": [{"frame": 0, "amount": 0.5}]},
+        "effect[0].ramp: got an amount of 0.5 at frame 0, the first, want 0 there, where the muscle rests",
     ),
     ("effect", [PRESSURE, PRESSURE], 'effect[1].name: got "pressure" on "free" a second time, want every effect once'),
     ("attachment[0].name", "free", 'attachment: got the name "free" twice, want every name once'),
@@ -393,15 +393,31 @@ WRONG = [
     ("expect[0].frame", "last", 'expect[0].frame: got "last", want'),
     ("expect[0].frame", True, "expect[0].frame: got True, want"),
     ("expect", [], "expect: got [], want"),
-    ("spoil.key", "nonsense.key", 'spoil.key: got "nonsense.key", want a key of this scene'),
-    ("spoil.key", "", 'spoil.key: got "", want a key of this scene'),
-    ("spoil.key", "effect[\u00b2].bulk", "want a key of this scene"),
-    ("spoil.key", "spoil.because", 'spoil.value: got "10 kPa", want a value that changes spoil.because'),
-    ("spoil.value", "30000 kPa", 'spoil.value: got "30000 kPa", want a value that changes effect[1].bulk'),
-    ("spoil.value", "5 mm", 'spoil.value: got "5 mm", want a value that can be read (effect[1].bulk: got "5 mm", want'),
-    ("spoil.value", 5, "spoil.value: got 5, want a value that can be read (effect[1].bulk: got 5, want a pressure"),
-    ("spoil.value", True, "spoil.value: got True, want"),
-    ("spoil.value", NAN, "spoil.value: got nan, want"),
+    ("negative_control.key", "nonsense.key", 'negative_control.key: got "nonsense.key", want a key of this scene'),
+    ("negative_control.key", "", 'negative_control.key: got "", want a key of this scene'),
+    ("negative_control.key", "effect[\u00b2].bulk", "want a key of this scene"),
+    (
+        "negative_control.key",
+        "negative_control.because",
+        'negative_control.value: got "10 kPa", want a value that changes negative_control.because',
+    ),
+    (
+        "negative_control.value",
+        "30000 kPa",
+        'negative_control.value: got "30000 kPa", want a value that changes effect[1].bulk',
+    ),
+    (
+        "negative_control.value",
+        "5 mm",
+        'negative_control.value: got "5 mm", want a value that can be read (effect[1].bulk: got "5 mm", want',
+    ),
+    (
+        "negative_control.value",
+        5,
+        "negative_control.value: got 5, want a value that can be read (effect[1].bulk: got 5, want a pressure",
+    ),
+    ("negative_control.value", True, "negative_control.value: got True, want"),
+    ("negative_control.value", NAN, "negative_control.value: got nan, want"),
 ]
 
 
@@ -425,7 +441,7 @@ def test_every_key_is_needed(bar: Path, line: str) -> None:
         (
             'title = "A bar"\n',
             "colour",
-            "attachment, bone, candidate, effect, expect, fibres, frames, muscle, proves, reference, spoil, title",
+            "attachment, bone, candidate, effect, expect, fibres, frames, muscle, negative_control, proves, reference, title",
         ),
         ("[muscle]\n", "muscle.colour", "mesher, refinements, surface, tet_size, unit"),
         (
@@ -438,10 +454,10 @@ def test_every_key_is_needed(bar: Path, line: str) -> None:
         ("[fibres.traced]\n", "fibres.traced.colour", "count, end, start"),
         ("[frames]\n", "frames.colour", "every, first, interval, last"),
         ("[[expect]]\n", "expect[0].colour", "because, frame, kind, metric, of, statistic, truth, within"),
-        ("[spoil]\n", "spoil.colour", "because, key, value"),
+        ("[negative_control]\n", "negative_control.colour", "because, key, value"),
     ],
 )
-def test_unknown_key_is_told_the_known_ones(bar: Path, table: str, place: str, known: str) -> None:
+def test_unknown_key_is_reported_the_known_ones(bar: Path, table: str, place: str, known: str) -> None:
     with pytest.raises(InputError) as caught:
         casefile.read(edited(bar, table, table + 'colour = "red"\n'))
     assert f"case.toml: {place}: got an unknown key, want one of {known}" in str(caught.value)
@@ -453,9 +469,9 @@ def test_what_the_folder_says_is_no_key(bar: Path, key: str) -> None:
         casefile.read(edited(bar, 'title = "A bar"\n', f'title = "A bar"\n{key} = "hip_flexion"\n'))
 
 
-@pytest.mark.parametrize(("number", "told"), [("nan", "nan"), ("inf", "inf"), ("-inf", "-inf")])
-def test_numbers_of_a_file_are_finite(bar: Path, number: str, told: str) -> None:
-    with pytest.raises(InputError, match=rf"axis\[2\]: got {told}, want a finite number"):
+@pytest.mark.parametrize(("number", "printed"), [("nan", "nan"), ("inf", "inf"), ("-inf", "-inf")])
+def test_numbers_of_a_file_are_finite(bar: Path, number: str, printed: str) -> None:
+    with pytest.raises(InputError, match=rf"axis\[2\]: got {printed}, want a finite number"):
         casefile.read(edited(bar, "axis = [0, 0, 2]", f"axis = [0, 0, {number}]"))
 
 
@@ -471,7 +487,7 @@ def test_case_that_is_not_there() -> None:
         casefile.read("nowhere")
 
 
-# Changes and the spoil
+# Changes and the negative control
 
 
 def test_changes_replace_values(bar: Path) -> None:
@@ -491,30 +507,30 @@ def test_change_of_a_key_that_is_not_there(bar: Path, key: str) -> None:
         casefile.read(bar, changes={key: 1})
 
 
-def test_spoil_changes_one_key(bar: Path) -> None:
-    assert casefile.read(bar, spoiled=True) == casefile.read(bar, changes={"effect[1].bulk": "10 kPa"})
+def test_negative_control_changes_one_key(bar: Path) -> None:
+    assert casefile.read(bar, with_negative_control=True) == casefile.read(bar, changes={"effect[1].bulk": "10 kPa"})
 
 
-def test_spoil_that_is_missing(bar: Path) -> None:
-    with pytest.raises(InputError, match=r"case.toml: spoil: got None"):
-        casefile.read(edited(bar, SCENE[SCENE.index("[spoil]") :], ""), spoiled=True)
+def test_negative_control_that_is_missing(bar: Path) -> None:
+    with pytest.raises(InputError, match=r"case.toml: negative_control: got None"):
+        casefile.read(edited(bar, SCENE[SCENE.index("[negative_control]") :], ""), with_negative_control=True)
 
 
-def test_spoil_is_tried_on_reading(bar: Path) -> None:
-    with pytest.raises(InputError, match=r"case\.toml: spoil\.key: got .*want a key of this scene"):
+def test_negative_control_is_tried_on_reading(bar: Path) -> None:
+    with pytest.raises(InputError, match=r"case\.toml: negative_control\.key: got .*want a key of this scene"):
         casefile.read(edited(bar, 'key = "effect[1].bulk"', 'key = "effect[2].bulk"'))
 
 
-def test_spoil_may_be_a_number(bar: Path) -> None:
+def test_negative_control_may_be_a_number(bar: Path) -> None:
     file = edited(bar, 'key = "effect[1].bulk"\nvalue = "10 kPa"', 'key = "frames.last"\nvalue = 15')
-    assert casefile.read(file, spoiled=True).frames.last == 15
+    assert casefile.read(file, with_negative_control=True).frames.last == 15
 
 
-def test_changes_may_take_away_what_the_spoil_changes(bar: Path) -> None:
+def test_changes_may_take_away_what_the_negative_control_changes(bar: Path) -> None:
     changes = {"effect": [{"name": "neo_hooke", "mu": "1 kPa"}]}
     assert len(casefile.read(bar, changes=changes).effects) == 1
-    with pytest.raises(InputError, match=r"spoil\.key: got .*, want a key of this scene"):
-        casefile.read(bar, changes=changes, spoiled=True)
+    with pytest.raises(InputError, match=r"negative_control\.key: got .*, want a key of this scene"):
+        casefile.read(bar, changes=changes, with_negative_control=True)
 
 
 @pytest.mark.parametrize("inside", [True, False])
@@ -623,10 +639,10 @@ def test_shipped_case_reads_and_its_files_exist(case: str) -> None:
     scene = casefile.read(case)
     assert scene.name == case
     if isinstance(scene, FieldScene):
-        assert len(build_field(scene).held) == len(build_field(casefile.read(case, spoiled=True)).held)
+        assert len(build_field(scene).fixed) == len(build_field(casefile.read(case, with_negative_control=True)).fixed)
         return
     assert len(scene.key) == 64
-    assert casefile.read(case, spoiled=True).key != scene.key
+    assert casefile.read(case, with_negative_control=True).key != scene.key
     for i, candidate in enumerate(scene.candidate):
         if "folder" in candidate.settings:
             assert scene.file(candidate.settings["folder"], f"candidate[{i}].folder").is_dir()
@@ -635,6 +651,6 @@ def test_shipped_case_reads_and_its_files_exist(case: str) -> None:
 def test_every_folder_of_cases_is_a_case() -> None:
     assert casefile.cases() == sorted(path.name for path in (HOME / "cases").iterdir() if path.is_dir())
     assert all(
-        tomllib.loads((HOME / "cases" / name / "case.toml").read_text(encoding="utf-8"))["spoil"]
+        tomllib.loads((HOME / "cases" / name / "case.toml").read_text(encoding="utf-8"))["negative_control"]
         for name in casefile.cases()
     )

@@ -8,7 +8,7 @@ from fem_reference import effects, solvers
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import parse
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Cells, Continuum, Prescribed, reference_nodes
+from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed, reference_nodes
 from fem_reference.runs.solved import Solved
 from fem_reference.solvers.scikit_fem import BodySettings, solve_body
 from fem_reference.solvers.scikit_fem.body import _March
@@ -18,7 +18,7 @@ from fem_reference.solvers.scikit_fem.spaces import Space
 MU, BULK = 0.5, 20.0
 FACES = ("x0", "x1", "y0", "y1", "z0", "z1")
 ALL = (0, 1, 2)
-COURSE = [{"frame": 0.0, "amount": 0.0}, {"frame": 1.0, "amount": 1.0}]
+RAMP = [{"frame": 0.0, "amount": 0.0}, {"frame": 1.0, "amount": 1.0}]
 
 
 def effect(name: str, **keys) -> effects.Effect:
@@ -56,7 +56,7 @@ def moved(name: str, on: str, components: tuple[int, ...], by=nowhere, **keys) -
 SLIDING = (moved("x", "x0", (0,)), moved("y", "y0", (1,)), moved("z", "z0", (2,)))
 
 
-def solved(body: Continuum, element: str, **settings) -> Solved:
+def solved(body: Body, element: str, **settings) -> Solved:
     solution = solve_body(body, BodySettings(element=element, **settings))
     assert solution.outcome.status == "converged", solution.outcome.message
     return solution
@@ -74,7 +74,7 @@ def test_it_is_a_solver_of_bodies() -> None:
 def test_a_uniaxial_stretch_is_that_of_the_scalar_equation(element) -> None:
     stretch = 1.4
     pull = moved("pull", "z1", (2,), lambda points, frame: points * 0 + [0, 0, 4.0 * (stretch - 1) * frame])
-    given = Continuum(box(element), law(element), (*SLIDING, pull), (0.0, 0.5, 1.0))
+    given = Body(box(element), law(element), (*SLIDING, pull), (0.0, 0.5, 1.0))
     solution = solved(given, element, residual=1e-11)
     across = brentq(lambda a: slopes(stretch, a)[1], 0.5, 1.5, xtol=1e-14)
     state = solution.last
@@ -97,8 +97,8 @@ def test_a_uniaxial_stretch_is_that_of_the_scalar_equation(element) -> None:
 def test_patch_test_on_crooked_cells(element, degree) -> None:
     gradient = np.array([[0.2, 0.1, 0.0], [-0.1, 0.1, 0.3], [0.05, 0.0, -0.2]])
     mesh = shapes.warped_box((2, 2, 2), (2.0, 3.0, 4.0), ELEMENTS[element][0], degree)
-    held = tuple(moved(face, face, ALL, lambda points, frame: frame * points @ gradient.T) for face in FACES)
-    state = solved(Continuum(mesh, law(element), held, (0.0, 1.0)), element).last
+    fixed = tuple(moved(face, face, ALL, lambda points, frame: frame * points @ gradient.T) for face in FACES)
+    state = solved(Body(mesh, law(element), fixed, (0.0, 1.0)), element).last
     # An affine field is in the space of isoparametric elements; the forces are in balance to 1e-8 N at 0.5 N/mm.
     assert state.points == pytest.approx(mesh.points + mesh.points @ gradient.T, abs=1e-7)
     assert state.scalars["volume_ratio"] == pytest.approx(np.linalg.det(np.eye(3) + gradient), abs=1e-8)
@@ -113,17 +113,17 @@ def test_rotating_costs_nothing_and_holding_is_in_balance(element) -> None:
     def place(points, frame, shift=0.0):
         return points @ turn(0.6 * frame).T - points + shift * frame * np.array([0.3, 0.2, 0.5])
 
-    def held(shift: float) -> tuple[Prescribed, ...]:
+    def fixed(shift: float) -> tuple[Prescribed, ...]:
         return (
             moved("bottom", "z0", ALL, place),
             moved("top", "z1", ALL, lambda points, frame: place(points, frame, shift)),
         )
 
-    rigid = solved(Continuum(box(element, 2), law(element), held(0.0), (0.0, 1.0)), element).last
+    rigid = solved(Body(box(element, 2), law(element), fixed(0.0), (0.0, 1.0)), element).last
     assert rigid.points == pytest.approx(box(element, 2).points @ turn(0.6).T, abs=1e-7)
     assert rigid.forces["top"] == pytest.approx(np.zeros(3), abs=1e-7)
     assert rigid.scalars["energy"] == pytest.approx(0, abs=1e-9)
-    pulled = solved(Continuum(box(element, 2), law(element), held(1.0), (0.0, 1.0)), element).last
+    pulled = solved(Body(box(element, 2), law(element), fixed(1.0), (0.0, 1.0)), element).last
     assert np.linalg.norm(pulled.forces["top"]) > 0.1
     # Rigid velocities are in the space, so that forces and moments are in balance as far as Newton's residual goes.
     assert pulled.forces["top"] + pulled.forces["bottom"] == pytest.approx(np.zeros(3), abs=1e-6)
@@ -132,8 +132,8 @@ def test_rotating_costs_nothing_and_holding_is_in_balance(element) -> None:
 
 @pytest.mark.parametrize("element", ["P2/P1", "Q1"])
 def test_the_ground_carries_the_weight(element) -> None:
-    weight = effect("gravity", course=COURSE, density="1000 kg/m^3", acceleration="0, 0, -1000 m/s^2")
-    given = Continuum(box(element, 2), (*law(element), weight), (moved("ground", "z0", ALL),), (0.0, 0.5, 1.0))
+    weight = effect("gravity", ramp=RAMP, density="1000 kg/m^3", acceleration="0, 0, -1000 m/s^2")
+    given = Body(box(element, 2), (*law(element), weight), (moved("ground", "z0", ALL),), (0.0, 0.5, 1.0))
     states = solved(given, element).states
     # 1e-9 tonne/mm3 x 24 mm3 x 1e6 mm/s2.
     assert states[1].forces["ground"] == pytest.approx([0, 0, 0.012], abs=1e-7)
@@ -143,8 +143,8 @@ def test_the_ground_carries_the_weight(element) -> None:
 
 @pytest.mark.parametrize(("element", "degree"), [("P2/P1", 1), ("Q1/P0", 1), ("P2", 2), ("Q2/Q1", 2)])
 def test_a_fluid_all_around_compresses_by_its_pressure_over_the_bulk_modulus(element, degree) -> None:
-    pressure = [effect("pressure", course=COURSE, on=face, pressure="2 MPa") for face in FACES]
-    given = Continuum(box(element, 1, degree), (*law(element), *pressure), SLIDING, (0.0, 1.0))
+    pressure = [effect("pressure", ramp=RAMP, on=face, pressure="2 MPa") for face in FACES]
+    given = Body(box(element, 1, degree), (*law(element), *pressure), SLIDING, (0.0, 1.0))
     state = solved(given, element, residual=1e-10).last
     assert state.scalars["volume_ratio"] == pytest.approx(1 - 2 / BULK, abs=1e-10)
     assert state.points == pytest.approx(given.mesh.points * np.cbrt(1 - 2 / BULK), abs=1e-9)
@@ -153,9 +153,9 @@ def test_a_fluid_all_around_compresses_by_its_pressure_over_the_bulk_modulus(ele
 
 
 def test_a_dead_load_stretches_springs_and_body() -> None:
-    pull = effect("traction", course=COURSE, on="z1", force="0, 0, 0.4 MPa")
+    pull = effect("traction", ramp=RAMP, on="z1", force="0, 0, 0.4 MPa")
     springs = moved("springs", "z0", (2,), lambda points, frame: points * 0 + frame, stiffness=0.8)
-    given = Continuum(box("P2/P1"), (*law("P2/P1"), pull), (*SLIDING[:2], springs), (0.0, 1.0))
+    given = Body(box("P2/P1"), (*law("P2/P1"), pull), (*SLIDING[:2], springs), (0.0, 1.0))
     state = solved(given, "P2/P1", residual=1e-11).last
 
     def across(along: float) -> float:
@@ -169,7 +169,7 @@ def test_a_dead_load_stretches_springs_and_body() -> None:
     assert state.forces["springs"] == pytest.approx([0, 0, -2.4], abs=1e-8)
 
 
-def loaded(element: str) -> Continuum:
+def loaded(element: str) -> Body:
     """Everything at once: weight, fluid, springs, and taut fibres that pull and turn from place to place."""
 
     def fibre(_, points):
@@ -177,13 +177,13 @@ def loaded(element: str) -> Continuum:
 
     acting = (
         *law(element),
-        effect("active_tension", course=COURSE, tension="0.1 MPa"),
-        effect("prestretch", course=COURSE, stretch=1.1),
-        effect("gravity", course=COURSE, density="1000 kg/m^3", acceleration="0, 90, 9 m/s^2"),
-        effect("pressure", course=COURSE, on="x1", pressure="0.1 MPa"),
+        effect("active_tension", ramp=RAMP, tension="0.1 MPa"),
+        effect("prestretch", ramp=RAMP, stretch=1.1),
+        effect("gravity", ramp=RAMP, density="1000 kg/m^3", acceleration="0, 90, 9 m/s^2"),
+        effect("pressure", ramp=RAMP, on="x1", pressure="0.1 MPa"),
     )
-    held = (moved("ground", "z0", ALL), moved("springs", "z1", (0, 2), stiffness=0.3))
-    return Continuum(box(element), acting, held, (0.0, 1.0), fibre)
+    fixed = (moved("ground", "z0", ALL), moved("springs", "z1", (0, 2), stiffness=0.3))
+    return Body(box(element), acting, fixed, (0.0, 1.0), fibre)
 
 
 @pytest.mark.parametrize("element", ["P1", "P2/P1", "Q1/P0"])
@@ -201,7 +201,7 @@ def test_the_tangent_is_the_slope_of_the_forces(element) -> None:
 @pytest.mark.parametrize("element", ["P2", "P2/P0", "Q2/Q1"])
 def test_forces_are_the_slope_of_the_energy(element) -> None:
     given = loaded(element)
-    equations = Equations(Continuum(given.mesh, given.effects[:-1], (), (0.0, 1.0), given.fibre), element, None)
+    equations = Equations(Body(given.mesh, given.effects[:-1], (), (0.0, 1.0), given.fibre), element, None)
     random = np.random.default_rng(2)
     here, way = 0.03 * random.normal(size=(2, equations.space.size))
     step = 1e-5
@@ -212,12 +212,12 @@ def test_forces_are_the_slope_of_the_energy(element) -> None:
 def test_newton_converges_quadratically(monkeypatch) -> None:
     sizes: list[float] = []
     march = _March(loaded("P2/P1"), BodySettings(newton_iterations=20))
-    held, _ = march._held(1.0)
+    fixed, _ = march._fixed(1.0)
     assembled = march.equations.assembled
 
     def noted(unknowns, frame):
         residual, tangent = assembled(unknowns, frame)
-        sizes.append(np.linalg.norm(np.delete(residual, held)))
+        sizes.append(np.linalg.norm(np.delete(residual, fixed)))
         return residual, tangent
 
     monkeypatch.setattr(march.equations, "assembled", noted)
@@ -229,7 +229,7 @@ def test_newton_converges_quadratically(monkeypatch) -> None:
 
 def test_a_load_step_that_fails_is_cut_back() -> None:
     push = moved("push", "z1", ALL, lambda points, frame: points * 0 + [0, 0, -2.4 * frame])
-    given = Continuum(box("Q1/P0", 2), law("Q1/P0"), (moved("ground", "z0", ALL), push), (0.0, 1.0))
+    given = Body(box("Q1/P0", 2), law("Q1/P0"), (moved("ground", "z0", ALL), push), (0.0, 1.0))
     state = solved(given, "Q1/P0", newton_iterations=3).last
     assert state.scalars["cut_backs"] >= 1
     whole = solved(given, "Q1/P0", newton_iterations=30, first_step=0.1).last
@@ -239,7 +239,7 @@ def test_a_load_step_that_fails_is_cut_back() -> None:
 def test_cells_turned_inside_out_are_a_status() -> None:
     # All eight corners are prescribed, so that there is nothing to solve: past half a step the top is below the bottom.
     push = moved("push", "z1", ALL, lambda points, frame: points * 0 + [0, 0, -8.0 * frame])
-    given = Continuum(box("Q1"), law("Q1"), (moved("ground", "z0", ALL), push), (0.0, 0.25, 1.0))
+    given = Body(box("Q1"), law("Q1"), (moved("ground", "z0", ALL), push), (0.0, 0.25, 1.0))
     solution = solve_body(given, BodySettings(element="Q1"))
     assert solution.outcome.status == "inverted"
     assert "det F fell to -" in solution.outcome.message
@@ -248,8 +248,8 @@ def test_cells_turned_inside_out_are_a_status() -> None:
 
 def test_equations_without_a_solution_are_a_status() -> None:
     # Nothing holds a body on which a force pulls.
-    pull = effect("traction", course=COURSE, on="z1", force="0, 0, 0.4 MPa")
-    given = Continuum(box("P1"), (*law("P1"), pull), (), (0.0, 1.0))
+    pull = effect("traction", ramp=RAMP, on="z1", force="0, 0, 0.4 MPa")
+    given = Body(box("P1"), (*law("P1"), pull), (), (0.0, 1.0))
     solution = solve_body(given, BodySettings(element="P1"))
     assert solution.outcome.status == "diverged"
     assert len(solution.states) == 1
@@ -288,17 +288,17 @@ def test_what_cannot_be_solved_is_named() -> None:
         InputError,
         match='element: got "P1", want one for curved tetrahedron cells without a pressure, which no effect brings: P2',
     ):
-        solve_body(Continuum(curved, law("P1"), (), (0.0, 1.0)), settings)
+        solve_body(Body(curved, law("P1"), (), (0.0, 1.0)), settings)
     with pytest.raises(InputError, match='on: got "lid", want a region of the body: x0, x1'):
-        solve_body(Continuum(straight, law("P1"), (moved("lid", "lid", ALL),), (0.0, 1.0)), settings)
-    pulling = effect("active_tension", course=COURSE, tension="0.1 MPa")
+        solve_body(Body(straight, law("P1"), (moved("lid", "lid", ALL),), (0.0, 1.0)), settings)
+    pulling = effect("active_tension", ramp=RAMP, tension="0.1 MPa")
     with pytest.raises(InputError, match="fibre: got nothing, want fibre directions"):
-        solve_body(Continuum(straight, (*law("P1"), pulling), (), (0.0, 1.0)), settings)
+        solve_body(Body(straight, (*law("P1"), pulling), (), (0.0, 1.0)), settings)
     corners = reference_nodes("tetrahedron", 1)
     strange = Cells(corners, np.arange(4)[None], "tetrahedron", 1, {"lid": np.array([[0, 1, 5]])})
     with pytest.raises(InputError, match=r"facets\.lid: got facets that are not of one cell each"):
-        solve_body(Continuum(strange, law("P1"), (moved("lid", "lid", ALL),), (0.0, 1.0)), settings)
+        solve_body(Body(strange, law("P1"), (moved("lid", "lid", ALL),), (0.0, 1.0)), settings)
     with pytest.raises(InputError, match=r"facets\.lid: got facets that are not of one cell each"):
         Space(strange, "P1", 2).sides("lid")
     with pytest.raises(InputError, match="element: got"):
-        solve_body(Continuum(straight, law("P1"), (), (0.0, 1.0)), BodySettings(element="P2/P1"))
+        solve_body(Body(straight, law("P1"), (), (0.0, 1.0)), BodySettings(element="P2/P1"))

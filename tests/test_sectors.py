@@ -6,7 +6,7 @@ import shapes
 from numpy.testing import assert_allclose
 
 from fem_reference.foundations.mesh import vertex_areas
-from fem_reference.geometry.sectors import held_area, held_shares, sectors, shares_at
+from fem_reference.geometry.sectors import attached_area, attached_shares, sectors, shares_at
 
 BLOCK = shapes.skin(shapes.box((10, 8, 2), (20.0, 16.0, 4.0)))
 
@@ -25,28 +25,28 @@ def test_a_smooth_surface_has_one_sector_for_each_vertex() -> None:
 
 def test_the_vertices_of_a_face_hold_that_face_and_nothing_beside() -> None:
     face = np.flatnonzero(BLOCK.points[:, 2] == 0)
-    shares = held_shares(BLOCK, face)
+    shares = attached_shares(BLOCK, face)
     on_face = (BLOCK.points[BLOCK.triangles][:, :, 2] == 0).all(axis=1)
     assert np.array_equal(shares, np.repeat(on_face[:, None], 3, axis=1))
-    assert_allclose(held_area(BLOCK, shares), 20 * 16)
+    assert_allclose(attached_area(BLOCK, shares), 20 * 16)
 
 
 @pytest.mark.parametrize("point", [(0, 0, 0), (10, 0, 0), (10, 8, 0)])
 def test_a_vertex_that_holds_no_whole_triangle_holds_all_around_it(point: tuple[float, ...]) -> None:
     alone = np.flatnonzero((BLOCK.points == point).all(axis=1))
     areas = vertex_areas(BLOCK.points, BLOCK.triangles)
-    assert_allclose(held_area(BLOCK, held_shares(BLOCK, alone)), areas[alone])
+    assert_allclose(attached_area(BLOCK, attached_shares(BLOCK, alone)), areas[alone])
 
 
 def test_on_a_smooth_surface_every_vertex_holds_all_around_it() -> None:
     ball = shapes.sphere(3, 30.0)
     cap = np.flatnonzero(ball.points[:, 2] > 20)
     areas = vertex_areas(ball.points, ball.triangles)
-    assert_allclose(held_area(ball, held_shares(ball, cap)), areas[cap].sum())
+    assert_allclose(attached_area(ball, attached_shares(ball, cap)), areas[cap].sum())
 
 
 def test_nothing_holds_nothing() -> None:
-    assert not held_shares(BLOCK, np.zeros(0, np.int64)).any()
+    assert not attached_shares(BLOCK, np.zeros(0, np.int64)).any()
 
 
 def test_shares_are_linear_in_a_triangle_and_those_of_the_nearest_one() -> None:

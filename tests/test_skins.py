@@ -4,7 +4,7 @@ import numpy as np
 from numpy.testing import assert_allclose
 
 from fem_reference.foundations.mesh import Surface, TetMesh, boundary, triangle_areas
-from fem_reference.geometry.skins import free_skin, held_skin, spacing
+from fem_reference.geometry.skins import attached_skin, free_skin, spacing
 
 
 def unit_tet() -> tuple[Surface, TetMesh]:
@@ -19,7 +19,7 @@ def test_it_stands_for_the_whole_area() -> None:
     assert_allclose(skin.areas.sum(), 1.5 + np.sqrt(3) / 2, rtol=1e-14)
 
 
-def test_what_is_held_is_left_out_and_squares_are_exact() -> None:
+def test_what_is_attached_is_left_out_and_squares_are_exact() -> None:
     # On the face z = 0: 1/2, 1/12 and 1/24 for 1, x^2 and x y.
     surface, mesh = unit_tet()
     free = np.array([True, True, True, False])
@@ -43,18 +43,18 @@ def test_long_triangles_are_cut() -> None:
     assert_allclose(fine.areas @ fine.points[:, 0] ** 2, 1 / 12, rtol=1e-14)
 
 
-def test_what_springs_pull_at_has_the_area_that_is_held() -> None:
+def test_what_springs_pull_at_has_the_area_that_is_attached() -> None:
     # On the face z = 0 with shares 1, 0, 0 of its corners, so 1 - x - y inside: a third of the area, and 1/24 of x.
     surface, mesh = unit_tet()
     below = np.flatnonzero((surface.points[surface.triangles][:, :, 2] == 0).all(axis=1))
     shares = np.zeros(surface.triangles.shape)
     shares[below] = surface.triangles[below] == 0
     for apart in (2.0, 0.4):
-        skin = held_skin(surface, shares, mesh, apart)
+        skin = attached_skin(surface, shares, mesh, apart)
         assert_allclose(skin.points[:, 2], 0)
         assert_allclose(skin.areas.sum(), 1 / 6, rtol=1e-14)
         assert_allclose(skin.areas @ skin.points[:, 0], 1 / 24, rtol=1e-14)
-    assert len(held_skin(surface, np.zeros(shares.shape), mesh, 2.0).points) == 0
+    assert len(attached_skin(surface, np.zeros(shares.shape), mesh, 2.0).points) == 0
 
 
 def test_the_spacing_goes_with_the_surface() -> None:

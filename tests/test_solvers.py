@@ -9,7 +9,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines, Surface, TetMesh
 from fem_reference.foundations.motion import Rotation, apply
 from fem_reference.io import files
-from fem_reference.problems.muscle import Held, Problem
+from fem_reference.problems.muscle import AttachedVertices, Problem
 from fem_reference.runs.store import Frame
 from fem_reference.scenes.muscle import SolverChoice
 
@@ -97,13 +97,13 @@ def test_nothing_that_moves_moves_nothing(name, tmp_path) -> None:
 
 
 @pytest.mark.parametrize("name", ["arap", "arap_pbd", "fenicsx", "mass_spring", "pbd", "pbd_program", "xpbd"])
-def test_held_vertices_follow_their_bones(name, tmp_path) -> None:
+def test_attached_vertices_follow_their_bones(name, tmp_path) -> None:
     given = problem()
     _, frames = solved(name, given, tmp_path)
     for frame in frames:
-        for held in given.held:
-            expected = apply(held.bone.pose(frame.number), given.surface.points[held.vertices])
-            assert frame.surface[held.vertices] == pytest.approx(expected, abs=1e-9)
+        for attached in given.attached:
+            expected = apply(attached.bone.pose(frame.number), given.surface.points[attached.vertices])
+            assert frame.surface[attached.vertices] == pytest.approx(expected, abs=1e-9)
 
 
 def shuffled(given: Problem, seed: int) -> tuple[Problem, np.ndarray]:
@@ -113,10 +113,12 @@ def shuffled(given: Problem, seed: int) -> tuple[Problem, np.ndarray]:
     point_at, vertex_at = np.argsort(points), np.argsort(vertices)
     tets = point_at[given.mesh.tets][random.permutation(len(given.mesh.tets))]
     facets = {name: point_at[facet] for name, facet in given.mesh.facets.items()}
-    held = tuple(Held(one.attachment, one.bone, np.sort(vertex_at[one.vertices])) for one in given.held)
+    attached = tuple(
+        AttachedVertices(one.attachment, one.bone, np.sort(vertex_at[one.vertices])) for one in given.attached
+    )
     surface = Surface(given.surface.points[vertices], vertex_at[given.surface.triangles])
     mesh = TetMesh(given.mesh.points[points], tets, facets)
-    return Problem(**(vars(given) | {"surface": surface, "held": held, "mesh": mesh})), vertex_at
+    return Problem(**(vars(given) | {"surface": surface, "attached": attached, "mesh": mesh})), vertex_at
 
 
 def test_the_reference_does_not_depend_on_the_order_of_nodes(tmp_path) -> None:

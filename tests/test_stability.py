@@ -13,8 +13,8 @@ from fem_reference.effects import Effect
 from fem_reference.foundations.motion import Translation
 from fem_reference.foundations.records import parse
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
-from fem_reference.problems.courses import Affine, Rest
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed
+from fem_reference.problems.paths import Affine, Rest
 from fem_reference.runs.store import Frame
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import BodySettings, Settings
@@ -44,7 +44,7 @@ def flesh(element: str) -> tuple[Effect, ...]:
     return effect("neo_hooke", mu="10 kPa"), effect(resistance, bulk=bulk)
 
 
-def modes(session, body: Continuum, element: str, **changes) -> list[float]:
+def modes(session, body: Body, element: str, **changes) -> list[float]:
     settings = BodySettings(element=element, first_step=100.0, residual=1e-11, **changes)
     solved = session.solve(body, settings)
     assert solved.outcome.status == "converged", solved.outcome.message
@@ -59,13 +59,13 @@ def critical(width: float) -> float:
     return float(euler / (1 + 3 * 1.2 * euler))
 
 
-def column(element: str, cells: tuple[int, int, int], shortenings: list[float], size=(THIN, WIDE, LENGTH)) -> Continuum:
+def column(element: str, cells: tuple[int, int, int], shortenings: list[float], size=(THIN, WIDE, LENGTH)) -> Body:
     """Shortened at frame i by ``shortenings[i - 1]`` of its length."""
     mesh = shapes.box(cells, size, ELEMENTS[element][0])
     knots = tuple(enumerate([0.0, *shortenings]))
     push = Affine(STILL, (0.0, 0.0, -size[2]), knots)
-    held = Prescribed("foot", "z0", (0, 1, 2), Rest()), Prescribed("head", "z1", (2,), push)
-    return Continuum(mesh, flesh(element), held, tuple(float(frame) for frame, _ in knots))
+    fixed = Prescribed("foot", "z0", (0, 1, 2), Rest()), Prescribed("head", "z1", (2,), push)
+    return Body(mesh, flesh(element), fixed, tuple(float(frame) for frame, _ in knots))
 
 
 def test_a_column_buckles_in_one_plane_and_then_in_the_other(session) -> None:
@@ -85,7 +85,7 @@ def test_tetrahedra_count_alike(session) -> None:
 def test_a_block_at_rest_or_stretched_is_stable(element, session) -> None:
     stretch = Affine(STILL, (0.0, 0.0, 0.5))
     mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), ELEMENTS[element][0])
-    body = Continuum(mesh, flesh(element), (*SYMMETRY, Prescribed("z1", "z1", (2,), stretch)), (0.0, 1.0))
+    body = Body(mesh, flesh(element), (*SYMMETRY, Prescribed("z1", "z1", (2,), stretch)), (0.0, 1.0))
     assert modes(session, body, element) == [0, 0]
 
 
@@ -94,7 +94,7 @@ HALF, HEIGHT = 2.0, 10.0  # mm
 
 def _surplus(stretch: float, waves: int) -> float:
     """What vanishes where a slab of half-thickness ``HALF`` and height ``HEIGHT`` between smooth plates, in plane strain and of
-    incompressible neo-Hookean matter, begins to bend by so many half waves (Sawyers and Rivlin 1974, doi
+    incompressible neo-Hookean material, begins to bend by so many half waves (Sawyers and Rivlin 1974, doi
     10.1016/0020-7683(74)90012-7): Biot's exponentials of k x and stretch^2 k x, without traction on the sides. For thin slabs it
     is Euler's shortening, k^2 HALF^2 / 3; for thick ones Biot's 0.5437 for a wrinkling half-space.
     """
@@ -110,28 +110,28 @@ def test_a_squeezed_slab_bends_when_it_should(element, session) -> None:
     shares = (0.0, 0.05, 0.1, 1 - stretch - 0.005, 1 - stretch + 0.005)
     mesh = shapes.box((2, 1, 5), (2 * HALF, 1.0, HEIGHT), ELEMENTS[element][0])
     knots = tuple((float(i), float(share)) for i, share in enumerate(shares))
-    held = (
+    fixed = (
         *(Prescribed(face, face, ("xyz".index(face[0]),), Rest()) for face in ("y0", "y1", "z0")),
         Prescribed("z1", "z1", (2,), Affine(STILL, (0.0, 0.0, -HEIGHT), knots)),
         Prescribed("slides", "z0", (0,), Rest(), 1e-9),
     )
-    body = Continuum(mesh, flesh(element), held, tuple(frame for frame, _ in knots))
+    body = Body(mesh, flesh(element), fixed, tuple(frame for frame, _ in knots))
     assert modes(session, body, element) == [0, 0, 0, 0, 1]
 
 
-def test_it_is_told_where_a_run_is_unstable(session) -> None:
+def test_it_is_reported_where_a_run_is_unstable(session) -> None:
     body = column("Q2/Q1", (1, 1, 10), [0.9 * critical(THIN), 1.1 * critical(THIN), 1.1 * critical(WIDE)])
     solved = session.solve(body, BodySettings(element="Q2/Q1", first_step=100.0))
-    told = "in 2 of them the equilibrium is unstable, first at frame 2 (negative modes: up to 2)"
-    assert solved.outcome.message == f"all 4 frames reached; {told}"
+    printed = "in 2 of them the equilibrium is unstable, first at frame 2 (negative modes: up to 2)"
+    assert solved.outcome.message == f"all 4 frames reached; {printed}"
     assert solved.outcome.cost["factorisations"] >= len(solved.states)
     assert solved.outcome.cost["seconds_stability"] > 0
 
 
 def test_nobody_counts_where_a_load_may_have_no_energy(session) -> None:
-    course = [{"frame": 0, "amount": 0.0}, {"frame": 1, "amount": 1.0}]
+    ramp = [{"frame": 0, "amount": 0.0}, {"frame": 1, "amount": 1.0}]
     body = column("Q2/Q1", (1, 1, 2), [0.0])
-    pressed = effect("pressure", on="x1", pressure="0.01 kPa", course=course)
+    pressed = effect("pressure", on="x1", pressure="0.01 kPa", ramp=ramp)
     solved = session.solve(replace(body, effects=(*body.effects, pressed)), BodySettings(element="Q2/Q1"))
     assert solved.outcome.status == "converged"
     assert not any("negative_modes" in state.scalars for state in solved.states)

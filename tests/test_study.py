@@ -11,7 +11,7 @@ from fem_reference.assessment import error_bars
 from fem_reference.assessment.error_bars import Orders, Pair, typical
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines
-from fem_reference.metrics import Yardstick
+from fem_reference.metrics import MeasurementContext
 from fem_reference.runs.store import Outcome, Run
 
 REST = shapes.sphere(2, 10.0)
@@ -52,7 +52,7 @@ def pair(coarse: float, *, order: float = 1.0, varied: float = 0.0, exact: float
 def bars(**given: float) -> error_bars.ErrorBars:
     """Of a growth that is 0.01 more on the larger tetrahedra."""
     found = pair(0.11, **given)
-    return error_bars.error_bars(found, Yardstick.of(found.fine, FIBRE, ()))
+    return error_bars.error_bars(found, MeasurementContext.of(found.fine, FIBRE, ()))
 
 
 @pytest.mark.parametrize("of", ["change", "deviation"])
@@ -80,7 +80,9 @@ def test_the_fibres_of_other_meshes_are_not_mistaken_for_those_of_the_reference(
     # Runs that all carry the measured fibre, but unmoved: were it used, no length would change.
     given = pair(0.11)
     still = [replace(one, fibre_positions=np.stack([FIBRE.points] * 3)) for one in (given.fine, given.coarse)]
-    found = error_bars.error_bars(replace(given, fine=still[0], coarse=still[1]), Yardstick.of(still[0], FIBRE, ()))
+    found = error_bars.error_bars(
+        replace(given, fine=still[0], coarse=still[1]), MeasurementContext.of(still[0], FIBRE, ())
+    )
     assert found.find("deviation", "fibre_length", "mean").values[1] == pytest.approx(0.125, abs=1e-9)
 
 
@@ -105,7 +107,7 @@ def test_the_worst_places_of_two_runs_need_not_be_the_same() -> None:
         return replace(run(0.0), positions=np.stack([REST.points + time * outwards for time in TIMES]))
 
     given = replace(pair(0.1), fine=half(1), coarse=half(-1))
-    found = error_bars.error_bars(given, Yardstick.of(given.fine, FIBRE, ()))
+    found = error_bars.error_bars(given, MeasurementContext.of(given.fine, FIBRE, ()))
     bar = found.find("change", "surface_deviation", "max")
     assert bar.values == pytest.approx(1.25 / (2**0.5 - 1) * TIMES, abs=1e-6)
 

@@ -24,7 +24,7 @@ from fem_reference.foundations.mesh import (
 from fem_reference.geometry import tetrahedra
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.intersections import self_intersections
-from fem_reference.geometry.sectors import held_area, held_shares
+from fem_reference.geometry.sectors import attached_area, attached_shares
 from fem_reference.geometry.tetrahedra import tetrahedralise
 from fem_reference.io import files
 
@@ -80,8 +80,8 @@ def test_the_mesh_moves_with_the_surface(mesh: TetMesh) -> None:
 
 
 def _cap(surface: Surface) -> dict[str, np.ndarray]:
-    """How far the corners of triangles are held by the vertices of one side of a body."""
-    return {"cap": held_shares(surface, np.flatnonzero(_bumpy().points @ np.array([0.6, 0.0, 0.8]) > 20))}
+    """How far the corners of triangles are attached by the vertices of one side of a body."""
+    return {"cap": attached_shares(surface, np.flatnonzero(_bumpy().points @ np.array([0.6, 0.0, 0.8]) > 20))}
 
 
 def test_facets_keep_the_area_of_attachments_and_move_with_the_surface() -> None:
@@ -90,7 +90,7 @@ def test_facets_keep_the_area_of_attachments_and_move_with_the_surface() -> None
     mesh, moved = (tetrahedralise(body, 8.0, _cap(body)) for body in (surface, moved_surface))
     _check(mesh, surface, 8.0)
     area = triangle_areas(mesh.points, mesh.facets["cap"]).sum()
-    assert_allclose(area, held_area(surface, _cap(surface)["cap"]), rtol=1e-3)
+    assert_allclose(area, attached_area(surface, _cap(surface)["cap"]), rtol=1e-3)
     assert {tuple(facet) for facet in np.sort(mesh.facets["cap"], axis=1).tolist()} < {
         tuple(facet) for facet in np.sort(boundary(mesh.tets)[0], axis=1).tolist()
     }

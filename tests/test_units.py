@@ -121,12 +121,12 @@ def test_three_names_its_kind(kind: str, want: str) -> None:
 
 
 def test_types_say_their_unit() -> None:
-    told = {
+    printed = {
         name: unit_of(kind.__metadata__)
         for name, kind in vars(units).items()
         if hasattr(kind, "__metadata__") and kind is not units.LengthUnit
     }
-    assert told == {
+    assert printed == {
         "Length": "mm",
         "PositiveLength": "mm",
         "Angle": "rad",

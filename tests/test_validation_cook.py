@@ -87,15 +87,15 @@ def test_a_stretched_strip_thins_as_a_single_equation_says() -> None:
 
 def test_what_holds_is_what_pulls() -> None:
     found = cook.solve(plane_strain.neo_hooke(80.194), 400889.8, 6.25, order=3, layers=1, steps=2)
-    np.testing.assert_allclose(found.held, (0, -100), atol=1e-6)
+    np.testing.assert_allclose(found.fixed, (0, -100), atol=1e-6)
 
 
-def test_a_load_too_large_for_one_step_is_told() -> None:
+def test_a_load_too_large_for_one_step_is_reported() -> None:
     with pytest.raises(ArithmeticError, match="got a cell turned inside out, want smaller steps"):
         cook.solve(plane_strain.neo_hooke(1.0), 1000.0, -3.0, order=2, layers=1)
 
 
-def test_a_newton_without_end_is_told() -> None:
+def test_a_newton_without_end_is_reported() -> None:
     """A law that answers every question with a stress of the other sign of its tangent drives Newton away."""
     right = plane_strain.small_strain(1.0)
 

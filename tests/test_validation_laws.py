@@ -173,8 +173,8 @@ def test_a_prestretched_body_is_free_where_its_fibres_are_slack_again() -> None:
     ("mode", "pulling"),
     [("uniaxial", [(0, 0)]), ("equibiaxial", [(0, 0), (1, 1)]), ("planar", [(0, 0)]), ("simple_shear", [(0, 1)])],
 )
-def test_the_work_of_the_held_stresses_is_the_energy(law: MooneyRivlin, mode: str, pulling: list) -> None:
-    """What is free does no work, so the energy along the path has the held stress as its slope; a wrong free stretch shows."""
+def test_the_work_of_the_fixed_stresses_is_the_energy(law: MooneyRivlin, mode: str, pulling: list) -> None:
+    """What is free does no work, so the energy along the path has the fixed stress as its slope; a wrong free stretch shows."""
 
     def energy(amount: float) -> float:
         F = getattr(homogeneous, mode)(law, 5.0, amount).F
@@ -236,7 +236,7 @@ def test_fibres_that_a_stretch_would_turn_are_refused() -> None:
         homogeneous.uniaxial(MUSCLE, 5.0, 1.2, FIBRE)
 
 
-def test_a_body_that_cannot_hold_the_pull_is_told() -> None:
+def test_a_body_that_cannot_hold_the_pull_is_reported() -> None:
     with pytest.raises(ArithmeticError, match="no homogeneous state found"):
         homogeneous.pulled(ACTIVE, 1.0, 0.5)  # a fibre alone, that pulls with 0.19 MPa at most
 

@@ -52,7 +52,7 @@ def test_with_the_pressure_found_the_outer_face_is_free(power: int, inner_stretc
 
 
 def incompressible_tube(inner: float, outer: float, stretch: float) -> tuple[float, float]:
-    """Pressure [MPa] and force in the wall [N] of a neo-Hookean tube held at its length, ``r^2 = R^2 + k`` (Rivlin 1949; Ogden
+    """Pressure [MPa] and force in the wall [N] of a neo-Hookean tube fixed at its length, ``r^2 = R^2 + k`` (Rivlin 1949; Ogden
     1984, ch. 5.3.3): ``p = mu (log(a B / (A b)) + k/2 (1/a^2 - 1/b^2))`` and ``pi a^2 p - pi mu k log(a B / (A b))``.
     """
     a, k = stretch * inner, inner**2 * (stretch**2 - 1)
@@ -62,7 +62,7 @@ def incompressible_tube(inner: float, outer: float, stretch: float) -> tuple[flo
     return pressure, np.pi * a**2 * pressure - np.pi * MU * k * thinned
 
 
-def test_a_stiffer_bulk_tends_to_incompressible_matter_as_one_over_it() -> None:
+def test_a_stiffer_bulk_tends_to_incompressible_material_as_one_over_it() -> None:
     law, radii = neo_hooke(MU), (4.0, 7.0)
     truth = [Sphere(MU, *radii).pressure(1.4), *incompressible_tube(*radii, 1.4)]
     off = []
@@ -81,6 +81,6 @@ def test_a_wall_at_rest_needs_nothing() -> None:
     assert found == pytest.approx((0, 0, 0), abs=1e-14)
 
 
-def test_a_wall_without_balance_is_told() -> None:
+def test_a_wall_without_balance_is_reported() -> None:
     with pytest.raises(ArithmeticError, match="no balance found"):
         radial.sphere_pressure(neo_hooke(MU), 0.0, (4.0, 7.0), 1.4)  # nothing resists a change of volume

@@ -1,4 +1,4 @@
-"""Viscous matter, against the balance of its power and an equation integrated by scipy."""
+"""Viscous material, against the balance of its power and an equation integrated by scipy."""
 
 import numpy as np
 import pytest

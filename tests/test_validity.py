@@ -13,8 +13,8 @@ from fem_reference.foundations.limits import Limit
 from fem_reference.foundations.motion import Translation
 from fem_reference.foundations.records import parse
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, ByCell, Continuum, Prescribed
-from fem_reference.problems.courses import Affine, Along, Rest
+from fem_reference.problems.body import ELEMENTS, Body, ByCell, Prescribed
+from fem_reference.problems.paths import Affine, Along, Rest
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import BodySettings, Settings
 from fem_reference.verification import squeeze
@@ -41,7 +41,7 @@ def effect(name: str, **parameters) -> Effect:
     return parse(effects.find(name), parameters, name)
 
 
-ACTIVE = effect("fibre_active", stress="10 kPa", optimal_stretch=1.1, course=ONCE)
+ACTIVE = effect("fibre_active", stress="10 kPa", optimal_stretch=1.1, ramp=ONCE)
 PASSIVE = effect("fibre_passive", stress="10 kPa", p1=0.05, p2=6.6, optimal_stretch=1.1, linear_from=1.4)
 
 
@@ -130,7 +130,7 @@ def test_a_body_that_collapses_ends_as_collapsed(element, session) -> None:
     gradient = ((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0))
     flesh = (effect("neo_hooke", mu="10 kPa"), resistance(element, 1.0))
     mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), ELEMENTS[element][0])
-    body = Continuum(mesh, flesh, everywhere(gradient), (0.0, 0.2, 0.3, 0.4, 0.5))
+    body = Body(mesh, flesh, everywhere(gradient), (0.0, 0.2, 0.3, 0.4, 0.5))
     solved = session.solve(body, BodySettings(element=element, first_step=0.1, smallest_step=1e-3, residual=1e-11))
     message = solved.outcome.message
     assert solved.outcome.status == "collapsed"
@@ -157,7 +157,7 @@ def test_a_low_determinant_at_a_vertex_is_no_collapse(fem_lab) -> None:
 
 @pytest.mark.parametrize(("layer", "status"), [(0.004, "converged"), (0.02, "collapsed")])
 def test_next_to_nothing_of_a_body_may_collapse(layer, status, session) -> None:
-    """A bottom layer of a cube of 1 mm, flattened to a tenth and held at its sides: it is named, and it counts from a hundredth."""
+    """A bottom layer of a cube of 1 mm, flattened to a tenth and fixed at its sides: named, and it counts from a hundredth."""
     mesh = shapes.box((1, 1, 3), (1.0, 1.0, 1.0), "hexahedron")
     levels = np.array([0.0, layer, 0.5, 1.0])
     points = np.column_stack([mesh.points[:, :2], levels[np.rint(3 * mesh.points[:, 2]).astype(int)]])
@@ -165,9 +165,9 @@ def test_next_to_nothing_of_a_body_may_collapse(layer, status, session) -> None:
     low = sides[(points[sides, 2] <= layer).all(axis=1)]
     mesh = replace(mesh, points=points, facets=mesh.facets | {"low": low})
     flat = Affine(((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, -0.9)))
-    held = Prescribed("low", "low", (0, 1, 2), flat), Prescribed("top", "z1", (0, 1, 2), Rest())
+    fixed = Prescribed("low", "low", (0, 1, 2), flat), Prescribed("top", "z1", (0, 1, 2), Rest())
     flesh = (effect("neo_hooke", mu="10 kPa"), resistance("Q1/P0", 1.0))
-    body = Continuum(mesh, flesh, held, (0.0, 1.0))
+    body = Body(mesh, flesh, fixed, (0.0, 1.0))
     solved = session.solve(body, BodySettings(element="Q1/P0", first_step=0.1, smallest_step=1e-2, residual=1e-10))
     assert solved.outcome.status == status, solved.outcome.message
     assert "incompressible is outside the range that it is meant for" in solved.outcome.message
@@ -184,7 +184,7 @@ def drawn(session, acting: tuple[Effect, ...], stretch: float):
     gradient = ((stretch - 1, 0.0, 0.0), (0.0, across - 1, 0.0), (0.0, 0.0, across - 1))
     flesh = (effect("neo_hooke", mu="10 kPa"), resistance("Q1/P0", 1.0), *acting)
     mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), "hexahedron")
-    body = Continuum(mesh, flesh, everywhere(gradient), (0.0, 1.0), Along((1.0, 0.0, 0.0)))
+    body = Body(mesh, flesh, everywhere(gradient), (0.0, 1.0), Along((1.0, 0.0, 0.0)))
     return session.solve(body, BodySettings(element="Q1/P0", first_step=0.25, residual=1e-11))
 
 
@@ -201,14 +201,14 @@ def test_fibres_outside_their_range_are_named(stretch, beyond, session) -> None:
 
 
 def test_only_laws_that_act_have_a_range(session) -> None:
-    resting = ACTIVE.model_copy(update={"course": (effects.Knot(frame=0, amount=0.0),)})
+    resting = ACTIVE.model_copy(update={"ramp": (effects.RampPoint(frame=0, amount=0.0),)})
     solved = drawn(session, (resting,), 1.8)
     assert solved.last.scalars["outside_law"] == 0
     assert solved.outcome.message == "all 2 frames reached"
 
 
 def test_fibres_are_as_long_as_their_prestretch_has_them(session) -> None:
-    prestretch = effect("prestretch", stretch=1.5, course=ONCE)
+    prestretch = effect("prestretch", stretch=1.5, ramp=ONCE)
     solved = drawn(session, (PASSIVE, prestretch), 1.2)
     assert solved.last.scalars["max_cell_fibre_stretch"] == pytest.approx(1.2 * 1.5, abs=1e-9)
     assert "fibre_passive is outside the range" in solved.outcome.message

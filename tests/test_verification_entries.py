@@ -1,4 +1,4 @@
-"""The catalogue itself: every entry finds its truth, and with its spoil misses it clearly."""
+"""The catalogue itself: every entry finds its truth, and with its negative control misses it clearly."""
 
 from collections import defaultdict
 from collections.abc import Callable
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fem_reference.assessment.catalogue import Entry, Lab, result
-from fem_reference.problems.body import Continuum
+from fem_reference.problems.body import Body
 from fem_reference.runs.solved import Reached, Solved
 from fem_reference.runs.store import Outcome
 from fem_reference.verification import runner
@@ -42,7 +42,7 @@ SLOW = {
     "torsion_moment_hexahedra",
     "torsion_axial_force",
 }
-SLOW_SPOILS = {
+SLOW_NEGATIVE_CONTROLS = {
     "hertz_force",
     "hertz_radius",
     "hertz_pressure",
@@ -64,7 +64,7 @@ SLOW_SPOILS = {
 }
 # Quadratic elements promise order 4 for the work of stresses; less is room for meshes that are not fine enough yet.
 FOURTH_ORDER = {"torsion", "inflation", "flexure"}
-# Where rounding alone is left, a spoil misses by far more than what is allowed; where a mesh is judged, clearly.
+# Where rounding alone is left, a negative control misses by far more than what is allowed; where a mesh is judged, clearly.
 ROUNDING = {"homogeneous", "fibres", "loads", "patch tests", "rigid motion"}
 
 
@@ -74,17 +74,17 @@ def measured(name: str) -> bool:
 
 @pytest.mark.parametrize("entry", [e for e in ENTRIES.values() if measured(e.name)], ids=lambda entry: entry.name)
 def test_an_entry_finds_its_truth(entry: Entry, fem_lab) -> None:
-    found = result(entry, entry.measure(fem_lab), 0.0, spoiled=False)
+    found = result(entry, entry.measure(fem_lab), 0.0, with_negative_control=False)
     assert found.word == "pass", (found.finding, found.truth, found.within)
     if entry.family in FOURTH_ORDER:
         assert found.finding.order is None or found.finding.order > 3.5
 
 
 @pytest.mark.parametrize(
-    "entry", [e for e in ENTRIES.values() if e.name not in SLOW_SPOILS], ids=lambda entry: entry.name
+    "entry", [e for e in ENTRIES.values() if e.name not in SLOW_NEGATIVE_CONTROLS], ids=lambda entry: entry.name
 )
-def test_with_its_spoil_it_misses_clearly(entry: Entry, fem_lab) -> None:
-    found = result(entry, entry.spoiled(fem_lab), 0.0, spoiled=True)
+def test_with_its_negative_control_it_misses_clearly(entry: Entry, fem_lab) -> None:
+    found = result(entry, entry.with_negative_control(fem_lab), 0.0, with_negative_control=True)
     assert found.word == "fail", (found.finding, found.truth, found.within)
     assert found.error > (1000 if entry.family in ROUNDING else 1.5) * found.within
 
@@ -95,7 +95,7 @@ class Reading:
     def __init__(self) -> None:
         self.cells = defaultdict[str, list[int]](list)
 
-    def solve(self, body: Continuum, element: str, **settings: float) -> Solved:  # noqa: ARG002
+    def solve(self, body: Body, element: str, **settings: float) -> Solved:  # noqa: ARG002
         self.cells[body.mesh.kind].append(len(body.mesh.cells))
         around = {entry.name: np.ones(3) for entry in (*body.prescribed, *body.obstructions)}
         points = body.mesh.points + 1.0
@@ -114,10 +114,10 @@ def finest(measure: Callable[[Lab], object]) -> dict[str, int]:
 
 
 @pytest.mark.parametrize("entry", ENTRIES.values(), ids=lambda entry: entry.name)
-def test_a_spoil_is_measured_on_the_finest_mesh(entry: Entry) -> None:
-    # On a coarser one the right body may miss too, and the spoil would not be what fails.
-    assert finest(entry.spoiled) == finest(entry.measure)
+def test_a_negative_control_is_measured_on_the_finest_mesh(entry: Entry) -> None:
+    # On a coarser one the right body may miss too, and the negative control would not be what fails.
+    assert finest(entry.with_negative_control) == finest(entry.measure)
 
 
 def test_what_is_left_out_is_there() -> None:
-    assert ENTRIES.keys() >= SLOW | SLOW_SPOILS
+    assert ENTRIES.keys() >= SLOW | SLOW_NEGATIVE_CONTROLS

@@ -22,10 +22,16 @@ from fem_reference.verification import runner, truths
 
 def entry(name, measure=1.0, family="blocks", **changes) -> Entry:
     """An entry whose truth is 1, within 0.1; ``measure`` is its value, or what is done with the lab."""
-    told = {"title": f"The {name}", "unit": "mm", "because": "rounding", "source": "by hand", "spoil": "twice as much"}
+    printed = {
+        "title": f"The {name}",
+        "unit": "mm",
+        "because": "rounding",
+        "source": "by hand",
+        "negative_control": "twice as much",
+    }
     numbers = {"truth": lambda: 1.0, "within": 0.1, "relative": False, "kind": "closed form"}
     measure = measure if callable(measure) else lambda _, value=measure: Finding(value)
-    table = told | numbers | {"measure": measure, "spoiled": lambda _: Finding(2.0)} | changes
+    table = printed | numbers | {"measure": measure, "with_negative_control": lambda _: Finding(2.0)} | changes
     return Entry(name=name, family=family, **table)
 
 
@@ -77,7 +83,9 @@ def test_every_entry_there_is_says_what_a_reader_needs() -> None:
         assert one.name == name
         assert one.kind in get_args(Kind)
         assert one.within > 0, name
-        assert all(getattr(one, key).strip() for key in ("family", "title", "because", "source", "spoil")), name
+        assert all(getattr(one, key).strip() for key in ("family", "title", "because", "source", "negative_control")), (
+            name
+        )
 
 
 @pytest.mark.parametrize(
@@ -97,7 +105,7 @@ def test_names_families_and_patterns_choose_in_the_order_of_the_catalogue(wanted
     assert runner.choose(known, wanted, "NAME") == tuple(names.split())
 
 
-def test_a_name_that_is_not_there_is_told_with_those_that_are() -> None:
+def test_a_name_that_is_not_there_is_reported_with_those_that_are() -> None:
     known = catalogue(entry("bar"), entry("tip", family="beams"))
     want = r'NAME: got "Bar", want an entry \(such as bar\), a family \(blocks, beams\) or a pattern of them'
     with pytest.raises(InputError, match=want):
@@ -225,10 +233,10 @@ def test_a_lab_that_cannot_be_made_closes_the_others(monkeypatch) -> None:
     assert (labs.made, labs.open) == (1, 0)
 
 
-def test_a_spoiled_entry_is_measured_with_its_spoil() -> None:
+def test_an_entry_with_negative_control_is_measured_with_its_negative_control() -> None:
     good, bad = runner.run([entry("good"), entry("bad")], Labs(), frozenset({"bad"}))
-    assert (good.word, good.spoiled, good.finding.value) == ("pass", False, 1.0)
-    assert (bad.word, bad.spoiled, bad.finding.value) == ("fail", True, 2.0)
+    assert (good.word, good.with_negative_control, good.finding.value) == ("pass", False, 1.0)
+    assert (bad.word, bad.with_negative_control, bad.finding.value) == ("fail", True, 2.0)
 
 
 def test_progress_says_how_far_it_is(caplog, monkeypatch) -> None:
@@ -261,9 +269,9 @@ def verify(monkeypatch, tmp_path, capsys):
 
 def test_all_pass(verify) -> None:
     target = verify.folder / "below" / "facts.json"
-    status, told, facts = verify("bars", "--json", str(target))
+    status, printed, facts = verify("bars", "--json", str(target))
     assert status == cli.DONE
-    head, *lines, summary, page = told.out.splitlines()
+    head, *lines, summary, page = printed.out.splitlines()
     assert head.split() == ["entry", "value", "truth", "unit", "error", "within", "order", "seconds", "verdict"]
     assert [line.split() for line in lines] == [
         [name, "1", "1", unit, "0", "0.1", "0.0", "pass"] for name, unit in (("bar", "mm"), ("rod", "N"))
@@ -280,43 +288,48 @@ def test_all_pass(verify) -> None:
 
 
 def test_without_names_all_are_measured_and_one_that_fails_tells(verify) -> None:
-    status, told, facts = verify()
+    status, printed, facts = verify()
     assert status == cli.VERDICT_FAIL
     assert [row["name"] for row in facts["entries"]] == ["bar", "rod", "tip"]
-    assert "verdict: fail, 2 of 3 pass" in told.out
+    assert "verdict: fail, 2 of 3 pass" in printed.out
 
 
 @pytest.mark.parametrize(
-    ("words", "names"), [(["--spoil", "bar"], ["bar"]), (["rod", "--spoil", "b*r"], ["bar", "rod"])]
+    ("words", "names"),
+    [(["--negative-control", "bar"], ["bar"]), (["rod", "--negative-control", "b*r"], ["bar", "rod"])],
 )
-def test_what_is_spoiled_is_measured_and_fails(verify, words, names) -> None:
-    status, told, facts = verify(*words)
+def test_a_negative_control_is_measured_and_fails(verify, words, names) -> None:
+    status, printed, facts = verify(*words)
     assert status == cli.VERDICT_FAIL
     assert [row["name"] for row in facts["entries"]] == names
-    assert [row["spoiled"] for row in facts["entries"]] == [name == "bar" for name in names]
-    assert "fail (spoiled)" in told.out
-    assert f"verdict: fail, {len(names) - 1} of {len(names)} pass, 1 measured with their spoil" in told.out
+    assert [row["with_negative_control"] for row in facts["entries"]] == [name == "bar" for name in names]
+    assert "fail (negative control)" in printed.out
+    assert (
+        f"verdict: fail, {len(names) - 1} of {len(names)} pass, 1 measured with their negative control" in printed.out
+    )
 
 
-@pytest.mark.parametrize(("words", "place"), [(["nobody"], "NAME"), (["--spoil", "nobody"], "--spoil")])
+@pytest.mark.parametrize(
+    ("words", "place"), [(["nobody"], "NAME"), (["--negative-control", "nobody"], "--negative-control")]
+)
 def test_an_unknown_name_is_bad_input(verify, words, place) -> None:
-    status, told, facts = verify(*words)
+    status, printed, facts = verify(*words)
     assert status == cli.BAD_INPUT
-    assert f'{place}: got "nobody", want an entry, a family (bars, beams)' in told.err
+    assert f'{place}: got "nobody", want an entry, a family (bars, beams)' in printed.err
     assert facts is None
     assert verify.made.lab.made == 0
 
 
-def test_a_page_that_cannot_be_written_leaves_what_was_measured_told(verify, monkeypatch) -> None:
+def test_a_page_that_cannot_be_written_leaves_what_was_measured_reported(verify, monkeypatch) -> None:
     def full(*_):
         raise OSError("no space left")
 
     target = verify.folder / "facts.json"
     monkeypatch.setattr(report, "write_verification", full)
-    status, told, _ = verify("bars", "--json", str(target))
+    status, printed, _ = verify("bars", "--json", str(target))
     assert status == cli.BAD_INPUT
-    assert "no space left" in told.err
-    assert "verdict: pass, 2 of 2 pass" in told.out
+    assert "no space left" in printed.err
+    assert "verdict: pass, 2 of 2 pass" in printed.out
     assert json.loads(target.read_text())["verdict"] == "pass"
 
 
@@ -371,9 +384,9 @@ def test_without_fenicsx_it_says_so(verify) -> None:
         raise MissingSoftware("FEniCSx is not installed")
 
     verify.made.lab = lab
-    status, told, _ = verify("bar")
+    status, printed, _ = verify("bar")
     assert status == cli.SOLVER_FAILED
-    assert "FEniCSx is not installed" in told.err
+    assert "FEniCSx is not installed" in printed.err
 
 
 # Truths

@@ -1,4 +1,4 @@
-"""Twisting in the catalogue is only told of until it is measured, on ladders that end with their finest mesh."""
+"""Twisting in the catalogue is only printed of until it is measured, on ladders that end with their finest mesh."""
 
 from functools import partial
 
@@ -6,7 +6,7 @@ from fem_reference.verification import parts, torsion
 
 
 def test_importing_makes_nothing() -> None:
-    # Entries are only told of: matter, meshes and truths are made as they are measured.
+    # Entries are only described: materials, meshes and truths are made as they are measured.
     for entry in torsion.ENTRIES:
         assert isinstance(entry.measure, partial)
         assert isinstance(entry.truth, partial) or entry.truth.__name__.startswith("_true")

@@ -17,13 +17,19 @@ NAN = float("nan")
 LADDER = ((1.0, 2.16), (0.5, 2.04), (0.25, 2.01))
 
 
-def made(name="bar", value=2.01, *, spoiled=False, truth=2.0, family="long_blocks", **changes) -> Result:
+def made(name="bar", value=2.01, *, with_negative_control=False, truth=2.0, family="long_blocks", **changes) -> Result:
     """A result whose bound is 2 % of a truth of 2: 0.04."""
     given = {key: changes.pop(key) for key in ("order", "ladder", "note") if key in changes}
-    told = {"title": f"The <{name}>", "unit": "N mm", "because": "because & so", "source": "Ogden 1984, section 5.2"}
-    numbers = {"truth": lambda: truth, "within": 0.02, "relative": True, "kind": "closed form", "spoil": "mu twice"}
-    entry = Entry(name=name, family=family, measure=None, spoiled=None, **(told | numbers | changes))
-    return result(entry, Finding(value, **given), 1.25, spoiled=spoiled)
+    printed = {"title": f"The <{name}>", "unit": "N mm", "because": "because & so", "source": "Ogden 1984, section 5.2"}
+    numbers = {
+        "truth": lambda: truth,
+        "within": 0.02,
+        "relative": True,
+        "kind": "closed form",
+        "negative_control": "mu twice",
+    }
+    entry = Entry(name=name, family=family, measure=None, with_negative_control=None, **(printed | numbers | changes))
+    return result(entry, Finding(value, **given), 1.25, with_negative_control=with_negative_control)
 
 
 def verification(*results: Result) -> Verification:
@@ -39,16 +45,23 @@ def test_page_shows_everything_and_needs_no_network() -> None:
     assert [heading.strip() for heading in tags.headings[1:]] == ["Long blocks", "Beams", "Convergence", "Made with"]
     assert '<span class="badge fail">fail</span> 1 of 2 pass, in 2 families; 12.5 s.' in text
     # The error 0.01 is a quarter of the bound 0.04.
-    for told in (
+    for printed in (
         "The &lt;bar&gt;",
         "2.01&#8239;",
         "0.0100<small>0.250</small>",
         "± 0.0400<small>2 %</small>",
         "1.25 s",
     ):
-        assert told in text
-    for told in ("because &amp; so", "Ogden 1984", "mu twice", "4 iterations &lt;at most&gt;", "2.9.1", "1 published"):
-        assert told in text
+        assert printed in text
+    for printed in (
+        "because &amp; so",
+        "Ogden 1984",
+        "mu twice",
+        "4 iterations &lt;at most&gt;",
+        "2.9.1",
+        "1 published",
+    ):
+        assert printed in text
     assert text.count("<svg ") == 2
     assert not re.search(r"<script|<link|<iframe|@import|url\((?!#)|http", text)
 
@@ -65,7 +78,7 @@ def test_every_id_is_unique_and_every_reference_meets_one() -> None:
     assert 'href="#bar"' not in text
 
 
-def test_what_is_not_a_number_fails_and_is_told() -> None:
+def test_what_is_not_a_number_fails_and_is_reported() -> None:
     lost = made(value=NAN, note="ValueError: no root", ladder=((1.0, NAN), (0.5, 2.0)))
     text = verify_page.render(verification(lost))
     read(text)
@@ -77,7 +90,7 @@ def test_what_is_not_a_number_fails_and_is_told() -> None:
     assert (row["value"], row["error"], row["ladder"]) == (None, None, [[1.0, None], [0.5, 2.0]])
 
 
-def test_an_entry_without_a_truth_is_told() -> None:
+def test_an_entry_without_a_truth_is_reported() -> None:
     lost = Result(made().entry, Finding(2.0, note="no truth, ValueError: no root"), NAN, NAN, 1.0)
     text = verify_page.render(verification(lost))
     read(text)
@@ -89,12 +102,12 @@ def test_an_entry_without_a_truth_is_told() -> None:
     assert (row["value"], row["truth"], row["error"], row["within"]) == (2.0, None, None, None)
 
 
-def test_spoiled_entries_are_marked() -> None:
-    text = verify_page.render(verification(made(value=4.0, spoiled=True), made("tip")))
-    assert "1 entry is spoiled on purpose" in text
-    assert text.count('<small class="bad">spoiled</small>') == 1
-    assert '<p class="alarm"><b>Spoiled:</b> mu twice</p>' in text
-    assert text.count("<b>Its spoil:</b>") == 1
+def test_negative_controls_are_marked() -> None:
+    text = verify_page.render(verification(made(value=4.0, with_negative_control=True), made("tip")))
+    assert "1 entry is measured with one thing wrong on purpose" in text
+    assert text.count('<small class="bad">negative control</small>') == 1
+    assert '<p class="alarm"><b>Negative control:</b> mu twice</p>' in text
+    assert text.count("<b>Its negative control:</b>") == 1
 
 
 def test_numbers_have_six_digits_where_value_and_truth_stand_beside_each_other() -> None:
@@ -106,12 +119,12 @@ def test_numbers_have_six_digits_where_value_and_truth_stand_beside_each_other()
 
 
 def test_files_hold_the_same_numbers(tmp_path) -> None:
-    told = verification(made(order=2.0, ladder=LADDER), made("tip", NAN))
-    page = report.write_verification(told, tmp_path / "new" / "reports", "verify")
+    printed = verification(made(order=2.0, ladder=LADDER), made("tip", NAN))
+    page = report.write_verification(printed, tmp_path / "new" / "reports", "verify")
     assert page == tmp_path / "new" / "reports" / "verify.html"
     assert page.read_text().count("badge pass") == 1
     stored = json.loads(page.with_name("verify.json").read_text())
-    assert stored == json.loads(json.dumps(verify_page.facts(told)))
+    assert stored == json.loads(json.dumps(verify_page.facts(printed)))
     assert (stored["verdict"], stored["passed"], stored["of"], stored["seconds"]) == ("fail", 1, 2, 12.5)
     row = stored["entries"][0]
     assert (row["name"], row["family"], row["verdict"], row["kind"]) == ("bar", "long_blocks", "pass", "closed form")
@@ -132,7 +145,7 @@ def test_share_is_the_error_over_its_bound(value, within, expected) -> None:
 
 def test_the_overview_names_every_result_whatever_its_value() -> None:
     values = [2.0, 2.01, 2.0 + 1e-14, 3.0, 1e9, math.inf, NAN]
-    odd = [made(f"bar_{i}", value, spoiled=i % 2 == 1) for i, value in enumerate(values)]
+    odd = [made(f"bar_{i}", value, with_negative_control=i % 2 == 1) for i, value in enumerate(values)]
     svg = verify_figures.overview({"long_blocks": odd, "beams": [made("rod", 2.0)]}).svg
     assert all(name in svg for name in ("rod", "long blocks", "beams", *(one.entry.name for one in odd)))
     assert "nan" not in svg.lower()

@@ -15,7 +15,7 @@ import shapes
 import test_report
 from browser import PROGRAM, Browser
 
-from fem_reference.problems.muscle import Body
+from fem_reference.problems.muscle import RigidBody
 from fem_reference.report import page, viewer
 
 pytestmark = pytest.mark.slow
@@ -29,9 +29,9 @@ def unpacked(text: str, kind: str) -> np.ndarray:
     return np.frombuffer(gzip.decompress(base64.b64decode(text)), kind).astype(np.int64)
 
 
-def positions(told: dict, box: dict, frames: int) -> np.ndarray:
+def positions(printed: dict, box: dict, frames: int) -> np.ndarray:
     """The positions (frames, n, 3) [mm] of a run, unpacked as the module's text says."""
-    low, high = unpacked(told["positions"], "u1").reshape(2, -1)
+    low, high = unpacked(printed["positions"], "u1").reshape(2, -1)
     zigzag = low + 256 * high
     steps = np.where(zigzag % 2, -(zigzag + 1) // 2, zigzag // 2).reshape(frames, -1, 3)
     return box["low"] + box["step"] * (np.cumsum(steps, axis=0) % 65536)
@@ -53,12 +53,12 @@ def test_what_is_packed_is_every_frame_of_every_run(comparison):
     np.testing.assert_array_equal(
         unpacked(data["triangles"], "<u4").reshape(-1, 3), comparison.reference.surface.triangles
     )
-    for run, told in zip([comparison.reference, *comparison.candidates], data["runs"], strict=True):
+    for run, printed in zip([comparison.reference, *comparison.candidates], data["runs"], strict=True):
         known = np.isfinite(run.positions).all(axis=(1, 2))
-        assert told["reached"] == known.tolist()
-        assert told["off"] == [0] * 5
+        assert printed["reached"] == known.tolist()
+        assert printed["off"] == [0] * 5
         # Rounding is half a step, and of numbers of 60 mm 1e-14.
-        off = np.abs(positions(told, data, 5) - run.positions)[known].max()
+        off = np.abs(positions(printed, data, 5) - run.positions)[known].max()
         assert off <= seen.error + 1e-12
     # From -30 - 0 to 30 + 8 mm along x, in 65535 steps.
     assert seen.error == pytest.approx(68 / 65535 / 2, rel=1e-9)
@@ -77,7 +77,7 @@ def test_bones_have_a_pose_for_each_frame_and_few_triangles(comparison):
     np.testing.assert_allclose(bone["poses"], [body.pose(number).ravel() for number in test_report.NUMBERS], atol=0)
     points = positions(bone, bone, 1)[0]
     assert np.abs(points - body.surface.points).max() <= bone["step"] / 2 + 1e-12
-    fine = Body("fine", shapes.sphere(5, 20.0), None)
+    fine = RigidBody("fine", shapes.sphere(5, 20.0), None)
     assert len(fine.surface.triangles) > viewer.BONE_TRIANGLES
     changed = replace(comparison, setup=replace(comparison.setup, bones=(fine,)))
     (bone,) = json.loads(viewer.view(changed).data)["bones"]
@@ -153,7 +153,7 @@ def test_a_muscle_of_the_report_fits_into_the_page_whatever_it_does(comparison):
     assert len(seen.data) < 4 / 3 * positions_alone + 1e6 < 4 / 3 * viewer.BUDGET + 1e6 < 15e6
 
 
-def test_fewer_frames_are_told(comparison, monkeypatch):
+def test_fewer_frames_are_reported(comparison, monkeypatch):
     assert "is drawn here" not in page.render(comparison)
     monkeypatch.setattr(page, "view", lambda it: viewer.view(it, 3 * FRAME))
     assert "<b>one frame in 2 is drawn here</b>" in page.render(comparison)
@@ -203,7 +203,7 @@ def labels(browser: Browser) -> dict[str, tuple[str, list[float]]]:
         "[...document.querySelectorAll('.viewer-label:not([hidden])')]"
         ".map((it) => [it.firstChild.textContent, it.lastChild.textContent, it.dataset.mean])"
     )
-    return {name: (told, [float(value) for value in mean.split()]) for name, told, mean in found}
+    return {name: (printed, [float(value) for value in mean.split()]) for name, printed, mean in found}
 
 
 def click(browser: Browser, name: str) -> None:
@@ -218,7 +218,7 @@ def test_it_loads_without_a_request_or_a_complaint(opened):
     opened.ask(
         "new Promise((go) => { const it = new Image(); it.onerror = go; it.src = 'https://example.org/a.png'; })"
     )
-    assert any("Content Security Policy" in told for told in opened.complaints())
+    assert any("Content Security Policy" in printed for printed in opened.complaints())
 
 
 def body_of_reference(picture: np.ndarray) -> np.ndarray:
@@ -239,12 +239,12 @@ def test_the_slider_moves_the_mesh(opened, comparison):
         middles.append(np.argwhere(body_of_reference(picture)).mean(axis=0))
         assert opened.ask("document.getElementById('viewer-number').textContent") == str(test_report.NUMBERS[i])
         for run in (comparison.reference, *comparison.candidates):
-            told, mean = labels(opened)[run.name]
+            printed, mean = labels(opened)[run.name]
             if np.isfinite(run.positions[i]).all():
-                # Each coordinate is rounded by half a step at most, and held in 32 bits: 30 mm times 6e-8.
+                # Each coordinate is rounded by half a step at most, and attached in 32 bits: 30 mm times 6e-8.
                 np.testing.assert_allclose(mean, run.positions[i].mean(axis=0), rtol=0, atol=error + 2e-6)
             else:
-                assert (told, mean) == ("no frame", [])
+                assert (printed, mean) == ("no frame", [])
     # The picture moves with it: 2 mm a frame, across the camera's way. Its half height at the target is half / cos(9 degrees);
     # the middle of the body is a few percents off that where it is not the middle of the picture.
     pixels = np.linalg.norm(np.diff(middles, axis=0), axis=1)
@@ -260,9 +260,9 @@ def yellow(browser: Browser) -> float:
     return float(((right[:, :, 0] > right[:, :, 2] + 80) & (right[:, :, 1] > right[:, :, 2] + 80)).mean())
 
 
-def test_the_worst_vertex_is_told_and_has_the_colour_at_the_end_of_the_bar(opened):
-    told = {name: text for name, (text, _) in labels(opened).items()}
-    assert told == {"reference": "", "quick": "worst vertex 4 mm", "torn": "no frame"}
+def test_the_worst_vertex_is_reported_and_has_the_colour_at_the_end_of_the_bar(opened):
+    printed = {name: text for name, (text, _) in labels(opened).items()}
+    assert printed == {"reference": "", "quick": "worst vertex 4 mm", "torn": "no frame"}
     assert opened.ask("document.getElementById('viewer-full').textContent") == "4 mm"
     opened.ask("document.querySelector('input[name=viewer-candidate][value=\"2\"]').click()")
     # Viridis ends in yellow; all vertices are 4 mm away. Half axes 30 and 20 in a window of half height 1.06 x 34 or so.

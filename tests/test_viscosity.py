@@ -10,8 +10,8 @@ from test_stability import STILL, THIN, column, critical, effect, flesh, session
 from fem_reference.effects import total_energy
 from fem_reference.foundations.errors import InputError
 from fem_reference.problems import shapes
-from fem_reference.problems.body import Continuum, Prescribed, check
-from fem_reference.problems.courses import Affine, Turn
+from fem_reference.problems.body import Body, Prescribed, check
+from fem_reference.problems.paths import Affine, Turn
 from fem_reference.scenes import casefile
 from fem_reference.solvers.fenicsx import BodySettings
 from fem_reference.solvers.scikit_fem import BodySettings as OtherSettings
@@ -39,7 +39,7 @@ def test_turning_a_body_costs_nothing() -> None:
     assert effect.stored is False
 
 
-def test_viscosity_does_not_see_which_way_matter_lies_or_what_it_was_at_rest() -> None:
+def test_viscosity_does_not_see_which_way_material_lies_or_what_it_was_at_rest() -> None:
     effect, at = make("viscosity"), state(np.eye(3))
     for F, other in zip(deformations(), deformations()[1:], strict=False):
         # Per volume before the step, of which f = F F_before^-1 is the only deformation.
@@ -88,7 +88,7 @@ def test_the_time_from_frame_to_frame_must_be_known() -> None:
         InputError, match=r"frames.interval: got nothing, want the time .* effect\[0\] \(Viscosity\) needs"
     ):
         casefile.read("hip_flexion", changes={"effect[0]": thick})
-    body = Continuum(shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron"), (*flesh("P2/P1"), THICK), (), (0.0, 1.0))
+    body = Body(shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron"), (*flesh("P2/P1"), THICK), (), (0.0, 1.0))
     with pytest.raises(InputError, match="interval: got nothing, want the time from a frame number to the next"):
         check(body, "P2/P1")
     with pytest.raises(
@@ -97,14 +97,14 @@ def test_the_time_from_frame_to_frame_must_be_known() -> None:
         solve_body(replace(body, interval=1.0), OtherSettings())
 
 
-def pulled(acting, interval: float | None = None) -> Continuum:
-    """A block stretched by a half until frame 1, free to thin, and then held for 40 frames."""
-    held = *SYMMETRY, Prescribed("z1", "z1", (2,), Affine(STILL, (0.0, 0.0, 0.5)))
+def pulled(acting, interval: float | None = None) -> Body:
+    """A block stretched by a half until frame 1, free to thin, and then fixed for 40 frames."""
+    fixed = *SYMMETRY, Prescribed("z1", "z1", (2,), Affine(STILL, (0.0, 0.0, 0.5)))
     mesh = shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
-    return Continuum(mesh, acting, held, (0.0, 1.0, 41.0), interval=interval)
+    return Body(mesh, acting, fixed, (0.0, 1.0, 41.0), interval=interval)
 
 
-def test_speed_costs_force_and_what_is_held_long_enough_ends_where_it_would_without(session) -> None:  # noqa: F811
+def test_speed_costs_force_and_what_is_fixed_long_enough_ends_where_it_would_without(session) -> None:  # noqa: F811
     settings = BodySettings(first_step=1.0, residual=1e-12)
     still, thick = (
         session.solve(body, settings)
@@ -114,7 +114,7 @@ def test_speed_costs_force_and_what_is_held_long_enough_ends_where_it_would_with
     more = thick.states[1].forces["z1"][2] - still.states[1].forces["z1"][2]
     assert more == pytest.approx(2 * 0.02 / 10 * (1.25 / 2 * 1.5 + 1 / 6 / 1.5**2), rel=3e-3)
     assert thick.states[1].scalars["energy"] == pytest.approx(still.states[1].scalars["energy"], rel=3e-3)
-    # What is held still has no viscous stress.
+    # What is fixed still has no viscous stress.
     assert thick.last.points == pytest.approx(still.last.points, abs=1e-9)
     assert thick.last.scalars["energy"] == pytest.approx(still.last.scalars["energy"], rel=1e-9)
     assert thick.last.forces["z1"] == pytest.approx(still.last.forces["z1"], abs=1e-9)
@@ -123,8 +123,8 @@ def test_speed_costs_force_and_what_is_held_long_enough_ends_where_it_would_with
 def test_turning_costs_nothing_however_fast(session) -> None:  # noqa: F811
     mesh = shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
     turn = Turn((1.0, 2.0, 3.0), 1.0)
-    held = tuple(Prescribed(face, face, (0, 1, 2), turn) for face in ("x0", "x1", "y0", "y1", "z0", "z1"))
-    body = Continuum(mesh, (*flesh("P2/P1"), THICK), held, (0.0, 1.0), interval=1e-3)
+    fixed = tuple(Prescribed(face, face, (0, 1, 2), turn) for face in ("x0", "x1", "y0", "y1", "z0", "z1"))
+    body = Body(mesh, (*flesh("P2/P1"), THICK), fixed, (0.0, 1.0), interval=1e-3)
     solved = session.solve(body, BodySettings(first_step=0.5, residual=1e-11))
     assert solved.outcome.status == "converged", solved.outcome.message
     for force in solved.last.forces.values():

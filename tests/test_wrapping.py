@@ -73,7 +73,7 @@ def test_what_misses_is_straight(obstacle) -> None:
 
 
 @pytest.mark.parametrize("obstacle", [BALL, ROLL])
-def test_sampled_paths_stay_outside_and_are_as_long_as_told(obstacle) -> None:
+def test_sampled_paths_stay_outside_and_are_as_long_as_reported(obstacle) -> None:
     starts, ends = outside(obstacle, 40, 3), outside(obstacle, 40, 4)
     paths = obstacle.around(starts, ends)
     for path in range(len(starts)):

@@ -13,7 +13,7 @@ from fem_reference.foundations.mesh import Surface, enclosed_volume
 from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
 from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere
-from fem_reference.problems.muscle import Body, Held, Setup
+from fem_reference.problems.muscle import AttachedVertices, RigidBody, Setup
 from fem_reference.solvers import pbd, xpbd
 from fem_reference.solvers.collision_kernels import Obstacle
 from fem_reference.solvers.xpbd import Constraints, Step
@@ -55,7 +55,7 @@ def graph(inverse_masses, edges, lengths, softness) -> Constraints:
 
 
 def settle(points, constraints, step, seconds, contacts=(), still=True):
-    """Where the points come to rest; a body that nothing holds may keep turning slowly, as its sweeps are not symmetric."""
+    """Where the points come to rest; a free body may keep turning slowly, as its sweeps are not symmetric."""
     points, velocities = np.array(points, float), np.zeros(np.shape(points))
     for _ in range(round(seconds / step.seconds)):
         points, velocities = xpbd.advance(points, velocities, constraints, step, contacts)
@@ -203,7 +203,7 @@ def test_a_balloon_is_as_large_as_membrane_and_filling_agree():
 
 @pytest.mark.parametrize(("seconds", "sweeps"), [(1e-3, 20), (2e-3, 40)])
 def test_a_flap_hangs_where_its_weight_and_its_hinge_agree(seconds, sweeps):
-    # One triangle is held in the plane z = 0; the free corner of the other, 10 mm from the edge on stiff springs, sinks by the
+    # One triangle is attached in the plane z = 0; the free corner of the other, 10 mm from the edge on stiff springs, sinks by the
     # angle t at which the hinge's moment k (change of angle) is the weight's m g 10 cos(t). It rests lifted by 0.5 rad. Directions
     # are those on the way to the end of a step: 0.0003 off with a step of 1 ms, four times that with 2 ms.
     lift, stiffness, mass = 0.5, 2.0, 5e-6
@@ -217,7 +217,7 @@ def test_a_flap_hangs_where_its_weight_and_its_hinge_agree(seconds, sweeps):
     flap = Constraints(**(vars(springs) | hinge))
     end = settle(points, flap, Step(seconds, sweeps, 100.0, (0, 0, -GRAVITY)), 1.0)
     angle = brentq(lambda t: stiffness * (lift - t) - mass * GRAVITY * 10 * math.cos(t), -1.5, 1.5)
-    assert 0.1 < angle < lift - 0.1  # dihedral angles cannot tell the two sides of a fold
+    assert 0.1 < angle < lift - 0.1  # dihedral angles cannot distinguish the two sides of a fold
     assert math.atan2(end[3, 2], end[3, 0]) == pytest.approx(angle, rel=2e-3)
 
 
@@ -225,7 +225,7 @@ def test_a_flap_hangs_where_its_weight_and_its_hinge_agree(seconds, sweeps):
 def test_a_weight_lies_as_deep_as_the_bone_gives_way(seconds, sweeps):
     # The bone pushes with its gap's depth over the softness: alone on it, one mass is solved by one projection.
     weight = graph([1 / MASS], [], 0, 0)
-    bone = Body("floor", icosahedron(), None, solid=HalfSpace((0, 0, 0), (0, 0, 1)))
+    bone = RigidBody("floor", icosahedron(), None, solid=HalfSpace((0, 0, 0), (0, 0, 1)))
     contact = xpbd.Contact(Obstacle(bone, np.array([[0.0, 0, 1]]), np.ones(1, bool), 0.0), np.array([2.0]))
     end = settle([[0.0, 0, 1]], weight, Step(seconds, sweeps, 300.0, (0, 0, -GRAVITY)), 0.5, [contact])
     assert end[0, 2] == pytest.approx(-2.0 * MASS * GRAVITY, rel=1e-6)
@@ -233,7 +233,7 @@ def test_a_weight_lies_as_deep_as_the_bone_gives_way(seconds, sweeps):
 
 def test_bones_never_pull():
     weight = graph([1 / MASS], [], 0, 0)
-    bone = Body("floor", icosahedron(), None, solid=HalfSpace((0, 0, 0), (0, 0, 1)))
+    bone = RigidBody("floor", icosahedron(), None, solid=HalfSpace((0, 0, 0), (0, 0, 1)))
     points = np.array([[0.0, 0, 1]])
     contact = xpbd.Contact(Obstacle(bone, points, np.ones(1, bool), 0.0), np.array([1e-3]))
     velocities = np.array([[0.0, 0, -2000]])
@@ -259,11 +259,14 @@ def muscle(motion, last=10, ball=None) -> Setup:
     surface = sphere.moved_to(sphere.points * [10, 10, 30])
     z = surface.points[:, 2]
     bones = tuple(
-        Body(name, surface, moves, solid=Sphere((0, 0, far), 1.0))
+        RigidBody(name, surface, moves, solid=Sphere((0, 0, far), 1.0))
         for name, moves, far in (("low", None, -99), ("high", motion, 99))
     )
-    held = (Held("low", bones[0], np.flatnonzero(z < -22)), Held("high", bones[1], np.flatnonzero(z > 22)))
-    return Setup(surface, bones if ball is None else (ball,), held, tuple(range(last + 1)), None)
+    attached = (
+        AttachedVertices("low", bones[0], np.flatnonzero(z < -22)),
+        AttachedVertices("high", bones[1], np.flatnonzero(z > 22)),
+    )
+    return Setup(surface, bones if ball is None else (ball,), attached, tuple(range(last + 1)), None)
 
 
 def run(setup, **changes):
@@ -285,9 +288,9 @@ def test_bones_carry_what_they_hold_and_the_volume_is_kept():
     outcome, frames = run(setup)
     assert outcome.status == "converged"
     for number, points in frames.items():
-        for held in setup.held:
+        for attached in setup.attached:
             np.testing.assert_array_equal(
-                points[held.vertices], apply(held.bone.pose(number), setup.surface.points[held.vertices])
+                points[attached.vertices], apply(attached.bone.pose(number), setup.surface.points[attached.vertices])
             )
     volumes = [enclosed_volume(frames[number], setup.surface.triangles) for number in (0, 20)]
     assert volumes[1] == pytest.approx(volumes[0], rel=0.01)  # a bulk modulus of 10 MPa in a membrane of 0.4 N/mm
@@ -303,7 +306,7 @@ def test_the_state_in_the_end_knows_neither_steps_nor_sweeps():
     # Measured: apart by 0.002 mm where the muscle moved by 3 mm; 1 % is allowed.
     soft = {"volume": "100 kPa", "collision": None, "damping": "60 1/s", "density": "100000 kg/m3"}
     setup = muscle(Translation((0, 0, 1), (0.0, 20.0), (0.0, 3.0)), last=60)
-    loose = np.setdiff1d(np.arange(len(setup.surface.points)), setup.held_vertices)
+    loose = np.setdiff1d(np.arange(len(setup.surface.points)), setup.attached_vertices)
     ends = [
         run(setup, sub_steps=steps, sweeps=sweeps, **soft)[1][60][loose] for steps, sweeps in ((4, 8), (8, 8), (4, 16))
     ]
@@ -314,9 +317,11 @@ def test_the_state_in_the_end_knows_neither_steps_nor_sweeps():
 
 
 def test_bones_push():
-    ball = Body("ball", icosahedron(), Translation((-1, 0, 0), (0.0, 20.0), (0.0, 12.0)), solid=Sphere((20, 0, 0), 8.0))
+    ball = RigidBody(
+        "ball", icosahedron(), Translation((-1, 0, 0), (0.0, 20.0), (0.0, 12.0)), solid=Sphere((20, 0, 0), 8.0)
+    )
     setup = muscle(None, last=20, ball=ball)
-    loose = np.setdiff1d(np.arange(len(setup.surface.points)), setup.held_vertices)
+    loose = np.setdiff1d(np.arange(len(setup.surface.points)), setup.attached_vertices)
     depths = []
     for collision in (USUAL["collision"], None):
         _, frames = run(setup, collision=collision)
@@ -347,10 +352,10 @@ def test_every_setting_is_felt(key, value):
     assert np.abs(changed - usual).max() > 1e-3
 
 
-def test_another_clock_than_the_scenes_is_told():
+def test_another_clock_than_the_scenes_is_reported():
     setup = muscle(None, last=2)
-    told = [run(replace(setup, interval=interval))[0].message for interval in (None, 0.01, 0.05)]
-    assert told == ["2 iterations"] * 2 + [
+    printed = [run(replace(setup, interval=interval))[0].message for interval in (None, 0.01, 0.05)]
+    assert printed == ["2 iterations"] * 2 + [
         "2 iterations; from a frame number to the next it takes 0.01 s, the scene 0.05 s"
     ]
 

@@ -1,4 +1,4 @@
-"""Matter that the ground brakes, by ``-coefficient v`` per rest volume, without inertia: derived here from the balance of forces.
+"""Tissue that the ground brakes, by ``-coefficient v`` per rest volume, without inertia: derived here from the balance of forces.
 
 ``coefficient`` c [MPa s/mm^2], ``mu`` and ``bulk`` [MPa], lengths [mm].
 """
@@ -12,7 +12,7 @@ def terminal_velocity(force: float, coefficient: float) -> float:
 
 
 def relaxation_rate(mu: float, bulk: float, coefficient: float, length: float) -> float:
-    """Of the slowest mode of a bar that cannot widen, held at one end and free at the other, in small strain [1/s]:
+    """Of the slowest mode of a bar that cannot widen, fixed at one end and free at the other, in small strain [1/s]:
     ``c du/dt = M d2u/dx2`` with ``M = bulk + 4/3 mu`` has ``u = sin(k x) exp(-M k^2 t / c)``, ``k = pi / (2 length)``.
     """
     return (bulk + 4 / 3 * mu) * (np.pi / (2 * length)) ** 2 / coefficient

@@ -1,7 +1,7 @@
 """Homogeneous states of a body of a law (``validation/laws.py``) and a finite bulk modulus, ``W(F) + K/2 (J - 1)^2``.
 
-Stretches that no stress holds are found by root finding, to 1e-13 of the bulk modulus in what remains of the stress. The mixed
-form ``p (J - 1) - p^2 / (2 K)`` has the same states, with ``p = K (J - 1)``.
+Stretches along which no stress acts are found by root finding, to 1e-13 of the bulk modulus in what remains of the stress. The
+mixed form ``p (J - 1) - p^2 / (2 K)`` has the same states, with ``p = K (J - 1)``.
 
 Source: Ogden 1984, Non-linear Elastic Deformations, ch. 4.3 (the homogeneous deformations). No reading error.
 """
@@ -37,21 +37,21 @@ def nominal_stress(law: Law, bulk: float, F: Floats, fibre: Floats) -> Floats:
 
 def uniaxial(law: Law, bulk: float, stretch: float, fibre: Floats = X) -> Homogeneous:
     """Stretched along x, free along y and z (whose stretches may differ); the stress is ``P[0, 0]``."""
-    return _held(law, bulk, fibre, (stretch, FREE, FREE))
+    return _fixed(law, bulk, fibre, (stretch, FREE, FREE))
 
 
 def equibiaxial(law: Law, bulk: float, stretch: float, fibre: Floats = X) -> Homogeneous:
     """Stretched alike along x and y, free along z; the stresses are ``P[0, 0]`` and ``P[1, 1]``."""
-    return _held(law, bulk, fibre, (stretch, stretch, FREE))
+    return _fixed(law, bulk, fibre, (stretch, stretch, FREE))
 
 
 def planar(law: Law, bulk: float, stretch: float, fibre: Floats = X) -> Homogeneous:
-    """Pure shear: stretched along x, held along y, free along z."""
-    return _held(law, bulk, fibre, (stretch, 1.0, FREE))
+    """Pure shear: stretched along x, fixed along y, free along z."""
+    return _fixed(law, bulk, fibre, (stretch, 1.0, FREE))
 
 
 def simple_shear(law: Law, bulk: float, amount: float, fibre: Floats = X) -> Homogeneous:
-    """``x = X + amount Y``, everything held: no volume changes, nothing is free; the shear stress is ``P[0, 1]``."""
+    """``x = X + amount Y``, everything fixed: no volume changes, nothing is free; the shear stress is ``P[0, 1]``."""
     F = np.eye(3)
     F[0, 1] = amount
     return Homogeneous(F, nominal_stress(law, bulk, F, fibre))
@@ -62,13 +62,13 @@ def pulled(law: Law, bulk: float, nominal: float, fibre: Floats = X) -> Homogene
 
     Where several states carry the same stress, that which is reached from none by pulling more and more.
     """
-    state = _held(law, bulk, fibre, (FREE, FREE, FREE))
+    state = _fixed(law, bulk, fibre, (FREE, FREE, FREE))
     for share in np.linspace(0, 1, 33)[1:] if nominal else ():
-        state = _held(law, bulk, fibre, (FREE, FREE, FREE), share * nominal, np.log(state.stretches))
+        state = _fixed(law, bulk, fibre, (FREE, FREE, FREE), share * nominal, np.log(state.stretches))
     return state
 
 
-def _held(
+def _fixed(
     law: Law,
     bulk: float,
     fibre: Floats,

@@ -57,12 +57,12 @@ class Grid:
 
 @dataclass(frozen=True, eq=False)
 class Rested:
-    """Where a body comes to rest: ``displacement`` (n, 2) [mm] of the nodes, and ``held`` (2,) [N/mm], what holds the clamped
+    """Where a body comes to rest: ``displacement`` (n, 2) [mm] of the nodes, and ``fixed`` (2,) [N/mm], the force on the clamped
     side.
     """
 
     displacement: Floats
-    held: Floats
+    fixed: Floats
 
 
 def _outer(a: Floats, b: Floats) -> Floats:

@@ -1,7 +1,7 @@
 """Inflation of a sphere and of a tube, of any law with a finite bulk modulus.
 
-What ``validation/rivlin.py`` has in closed form for incompressible matter, without its part of the order of mu / K. The radius
-now is ``r(R)`` of incompressible matter plus a polynomial, such that the virtual work, the integral of ``P : dF R^n``, vanishes
+What ``validation/rivlin.py`` has in closed form for incompressible material, without its part of the order of mu / K. The radius
+now is ``r(R)`` of incompressible material plus a polynomial, such that the virtual work, the integral of ``P : dF R^n``, vanishes
 for every polynomial of its degree (Galerkin, Gauss quadrature, root finding). Source: the deformations are those of Ogden 1984,
 ch. 5.2 and 5.3. The error falls exponentially with the degree: below 1e-11 of what is found, for a wall as thick as its
 inner radius.
@@ -25,7 +25,7 @@ Gradient = Callable[[float, float, float], Floats]
 
 @dataclass(frozen=True, eq=False)
 class Wall:
-    """At radii at rest ``R`` (q,) [mm] with ``weights`` (q,) of their quadrature: where they are in incompressible matter,
+    """At radii at rest ``R`` (q,) [mm] with ``weights`` (q,) of their quadrature: where they are in incompressible material,
     ``start`` (q,) [mm], and its ``steepness`` (q,); polynomials that may be added to it, ``shapes`` (q, k), and their
     ``slopes`` (q, k).
     """
@@ -52,7 +52,7 @@ def sphere_pressure(law: Law, bulk: float, radii: tuple[float, float], inner_str
 
 
 def tube(law: Law, bulk: float, radii: tuple[float, float], inner_stretch: float) -> tuple[float, float]:
-    """Pressure [MPa] in a tube that is held at its length, and force along the axis in its wall [N], the integral of
+    """Pressure [MPa] in a tube that is fixed at its length, and force along the axis in its wall [N], the integral of
     ``2 pi R P_zz``; arguments as of :func:`sphere_pressure`, a fibre runs along the axis.
     """
 
@@ -66,7 +66,7 @@ def tube(law: Law, bulk: float, radii: tuple[float, float], inner_stretch: float
 
 
 def _hollow(radii: tuple[float, float], inner_stretch: float, power: int) -> Wall:
-    """A wall whose inner face is held: ``start^(n+1) - a^(n+1) = R^(n+1) - A^(n+1)``, shapes that vanish at the inner face."""
+    """A wall whose inner face is fixed: ``start^(n+1) - a^(n+1) = R^(n+1) - A^(n+1)``, shapes that vanish at the inner face."""
     ticks, weights = legendre.leggauss(DEGREE + 8)
     half = (radii[1] - radii[0]) / 2
     R, inner = radii[0] + half * (ticks + 1), inner_stretch * radii[0]

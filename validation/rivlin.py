@@ -1,4 +1,4 @@
-"""Closed forms for bodies of incompressible matter: torsion of a cylinder, inflation of a sphere, flexure of a block.
+"""Closed forms for bodies of incompressible material: torsion of a cylinder, inflation of a sphere, flexure of a block.
 
 Neo-Hooke ``mu/2 (I1 - 3)`` or Mooney-Rivlin ``c1 (I1 - 3) + c2 (I2 - 3)`` with J = 1. A body of bulk modulus K differs from it by
 a part of the order of mu / K. No reading error: closed forms, and root finding to rounding where a docstring says so.
@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Torsion:
-    """A solid cylinder of ``radius`` A [mm] held at its length, each section turned by ``twist`` [rad/mm] times its height:
+    """A solid cylinder of ``radius`` A [mm] fixed at its length, each section turned by ``twist`` [rad/mm] times its height:
     ``r = R, theta = Theta + twist Z, z = Z``; c1, c2 [MPa].
 
     Source: Rivlin 1949, Phil. Trans. R. Soc. A 242, 173, doi 10.1098/rsta.1949.0009; Ogden 1984, ch. 5.3.

@@ -1,4 +1,4 @@
-"""Incompressible neo-Hookean matter with a viscosity in parallel (Kelvin and Voigt), without inertia: Cauchy stress
+"""Incompressible neo-Hookean material with a viscosity in parallel (Kelvin and Voigt), without inertia: Cauchy stress
 ``mu B + 2 eta D - p``. Derived here.
 
 ``mu`` [MPa], ``eta`` [MPa s].

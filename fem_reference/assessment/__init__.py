@@ -1,1 +1,1 @@
-"""What is made of measures: error bars, comparisons, verdicts, rankings, baselines."""
+"""Assessment of measures: error bars, comparisons, verdicts, rankings, baselines."""

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from fem_reference import __version__, metrics
-from fem_reference.assessment.measured import Today, sample
+from fem_reference.assessment.measured import CurrentMeasures, sample
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import Record, parse
@@ -55,8 +55,8 @@ class Stored(Record):
 
 
 class Positions(Record):
-    """Where the sampled ``vertices`` (s,) of ``Today.points`` are in each frame, ``values`` (f, s, 3) [mm], and how far [mm] from
-    there they may be, ``tolerance``.
+    """Where the sampled ``vertices`` (s,) of ``CurrentMeasures.points`` are in each frame, ``values`` (f, s, 3) [mm], and how far
+    [mm] from there they may be, ``tolerance``.
     """
 
     tolerance: float = Field(ge=0)
@@ -65,7 +65,7 @@ class Positions(Record):
 
 
 class Baseline(Record):
-    """What the file holds: whose it is (``case``, ``scene`` key, ``candidate``), what it was made with (``reference`` run and
+    """The contents of the file: whose it is (``case``, ``scene`` key, ``candidate``), what it was made with (``reference`` run and
     version of ``fem_reference``), the ``frames`` (f,), and the measures by ``metric.statistic``.
     """
 
@@ -93,20 +93,20 @@ def read(path: Path, scene: Scene, candidate: str) -> Baseline:
     _check_whose(path, baseline, scene, candidate)
     if baseline.scene != scene.key:
         got = f"{baseline.scene[:16]}..., while {scene.place} is {scene.key[:16]}..."
-        want = "the key of this scene (it was changed since; --update takes today's measures)"
+        want = "the key of this scene (it was changed since; --update takes the current measures)"
         raise InputError(f"{path}: scene", got, want)
     if baseline.frames != scene.frames.numbers:
         raise InputError(f"{path}: frames", f"{len(baseline.frames)} others", "the frame numbers of the scene")
     return baseline
 
 
-def update(path: Path, today: Today) -> Baseline:
-    """Write today's values into ``path``. Every tolerance, and every ``within`` that has a number, stays as the file has it, so
+def update(path: Path, current: CurrentMeasures) -> Baseline:
+    """Write the current values into ``path``. Every tolerance, and every ``within`` that has a number, stays as the file has it, so
     that accuracy cannot be lost in small steps; statistics removed from the file stay out of it.
     """
-    check(path, today.scene, today.candidate.name)
+    check(path, current.scene, current.candidate.name)
     before = _read(path) if path.exists() else None
-    baseline = _made(today, before)
+    baseline = _made(current, before)
     path.parent.mkdir(parents=True, exist_ok=True)
     files.write_text(path, text(baseline.model_dump(mode="json")) + "\n")
     log.info("baseline: %s, %d statistics of %d frames", path, len(baseline.measures), len(baseline.frames))
@@ -153,29 +153,29 @@ def _check_whose(path: Path, baseline: Baseline, scene: Scene, candidate: str) -
             raise InputError(f"{path}: {key}", f'"{got}"', f'"{want}", which is what is checked')
 
 
-def _made(today: Today, before: Baseline | None) -> Baseline:
+def _made(current: CurrentMeasures, before: Baseline | None) -> Baseline:
     kept = {} if before is None else before.measures
-    vertices = sample(today.rest, SAMPLED)
+    vertices = sample(current.rest, SAMPLED)
     positions = Positions(
         tolerance=MOVED if before is None else before.positions.tolerance,
-        values=tuple(tuple(_rounded(point) for point in frame[vertices]) for frame in today.points),
+        values=tuple(tuple(_rounded(point) for point in frame[vertices]) for frame in current.points),
         vertices=tuple(int(vertex) for vertex in vertices),
     )
     return Baseline(
-        candidate=today.candidate.name,
-        case=today.scene.name,
+        candidate=current.candidate.name,
+        case=current.scene.name,
         fem_reference=__version__,
         format=1,
-        frames=today.candidate.numbers,
+        frames=current.candidate.numbers,
         measures={
-            name: _stored(one, today.bars(one.metric, one.statistic), kept.get(name))
-            for name, one in today.by_name.items()
+            name: _stored(one, current.bars(one.metric, one.statistic), kept.get(name))
+            for name, one in current.by_name.items()
             if before is None or name in kept
         },
         positions=positions,
         readme=README,
-        reference=today.reference_name,
-        scene=today.scene.key,
+        reference=current.reference_name,
+        scene=current.scene.key,
     )
 
 

@@ -1,4 +1,4 @@
-"""Problems whose answers are known: what an entry of the verification catalogue is, and what came of one."""
+"""Problems whose answers are known: entries of the verification catalogue and their results."""
 
 import math
 from collections.abc import Callable
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from fem_reference.assessment.judge import judge
-from fem_reference.problems.body import Continuum
+from fem_reference.problems.body import Body
 from fem_reference.runs.solved import Solved
 
 Kind = Literal["closed form", "published", "second solver", "property"]
@@ -15,12 +15,12 @@ Kind = Literal["closed form", "published", "second solver", "property"]
 class Lab(Protocol):
     """Where entries are measured."""
 
-    def solve(self, body: Continuum, element: str, **settings: float) -> Solved:
-        """The states of ``body`` by the reference, FEniCSx, with an element of ``continuum.ELEMENTS``; settings as in
+    def solve(self, body: Body, element: str, **settings: float) -> Solved:
+        """The states of ``body`` by the reference, FEniCSx, with an element of ``body.ELEMENTS``; settings as in
         ``BodySettings`` (first_step, smallest_step, newton_iterations, residual [N, mm3]).
         """
 
-    def second(self, body: Continuum, element: str, **settings: float) -> Solved:
+    def second(self, body: Body, element: str, **settings: float) -> Solved:
         """The same by the second opinion, scikit-fem."""
 
 
@@ -42,7 +42,7 @@ class Entry:
 
     ``measure`` finds the number that ``truth`` gives, both in ``unit``; it must come within ``within`` (of the truth's size where
     ``relative``, else in ``unit``), ``because`` says why so far and no further. ``source`` is where the truth is from, ``kind``
-    what it is. ``spoiled`` measures the same with one thing wrong, which ``spoil`` names: it must fail.
+    what it is. ``with_negative_control`` measures the same with one thing wrong, which ``negative_control`` names: it must fail.
     """
 
     name: str
@@ -56,8 +56,8 @@ class Entry:
     kind: Kind
     source: str
     measure: Callable[[Lab], Finding]
-    spoil: str
-    spoiled: Callable[[Lab], Finding]
+    negative_control: str
+    with_negative_control: Callable[[Lab], Finding]
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,7 @@ class Result:
     truth: float
     within: float
     seconds: float
-    spoiled: bool = False
+    with_negative_control: bool = False
 
     @property
     def error(self) -> float:
@@ -85,11 +85,11 @@ class Result:
         return judge(self.finding.value, self.truth, self.within)
 
 
-def result(entry: Entry, finding: Finding, seconds: float, *, spoiled: bool) -> Result:
+def result(entry: Entry, finding: Finding, seconds: float, *, with_negative_control: bool) -> Result:
     """The finding of an entry beside its truth."""
     truth = entry.truth()
     within = entry.within * (abs(truth) if entry.relative else 1.0)
-    return Result(entry, finding, truth, within, seconds, spoiled)
+    return Result(entry, finding, truth, within, seconds, with_negative_control)
 
 
 def order(ladder: tuple[tuple[float, float], ...], truth: float) -> float | None:

@@ -1,4 +1,6 @@
-"""Claimed against true: every error bar of a reference beside what a finer solution, which the bar does not know, differs by."""
+"""Claimed error bars against true errors: every error bar of a reference beside what a finer solution, which the bar does not
+know, differs by.
+"""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -9,7 +9,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.markup import table
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import join
-from fem_reference.metrics import Measure, Yardstick, at_rest, find, measure
+from fem_reference.metrics import Measure, MeasurementContext, at_rest, find, measure
 from fem_reference.metrics.fibre_length import extension_error
 from fem_reference.problems.muscle import Setup
 from fem_reference.runs.store import Run
@@ -35,7 +35,7 @@ class Comparison:
     setup: Setup
     reference: Run
     candidates: tuple[Run, ...]
-    yardstick: Yardstick
+    context: MeasurementContext
     deviations: dict[str, tuple[Measure, ...]]
     changes: dict[str, tuple[Measure, ...]]
     extension_error: Measure
@@ -70,7 +70,7 @@ class Comparison:
 
     @property
     def rankings(self) -> tuple[Ranking, ...]:
-        """Which candidates are nearer, as far as the error bars tell them apart; nothing without these."""
+        """Which candidates are nearer, as far as the error bars separate them; nothing without these."""
         return rankings(self.deviations, self.error_bars.of_deviations) if self.error_bars else ()
 
     @property
@@ -91,9 +91,9 @@ def compare(
         raise InputError(
             f"{reference.name}: fibres", "a run without an interior", "a reference that carries the fibres"
         )
-    yardstick = Yardstick.of(reference, reference.fibres, setup.bones, setup.free)
-    deviations = {run.name: measure(run, reference, yardstick) for run in candidates}
-    changes = {run.name: measure(run, at_rest(run), yardstick) for run in (reference, *candidates)}
+    context = MeasurementContext.of(reference, reference.fibres, setup.bones, setup.free)
+    deviations = {run.name: measure(run, reference, context) for run in candidates}
+    changes = {run.name: measure(run, at_rest(run), context) for run in (reference, *candidates)}
     measured = {"reference": changes["reference"]} | deviations
     _check_expected(scene, measured)
     verdicts = tuple(
@@ -107,8 +107,8 @@ def compare(
         for name in (deviations if expectation.of == "candidates" else [expectation.of])
         if _is_measured(expectation, measured.get(name, ()))
     )
-    error = extension_error(reference, yardstick)
-    return Comparison(scene, setup, reference, candidates, yardstick, deviations, changes, error, verdicts, error_bars)
+    error = extension_error(reference, context)
+    return Comparison(scene, setup, reference, candidates, context, deviations, changes, error, verdicts, error_bars)
 
 
 def _check_expected(scene: Scene, measured: dict[str, tuple[Measure, ...]]) -> None:

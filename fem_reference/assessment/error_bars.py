@@ -18,7 +18,7 @@ import numpy as np
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.io import files
-from fem_reference.metrics import Measure, Yardstick, at_rest, find, measure, names, of_itself
+from fem_reference.metrics import Measure, MeasurementContext, at_rest, find, measure, names, of_itself
 from fem_reference.runs.store import Run
 
 Of = Literal["change", "deviation"]
@@ -126,7 +126,7 @@ class Pair:
         return float(SAFETY / ((self.sizes[1] / self.sizes[0]) ** order - 1))
 
 
-def error_bars(pair: Pair, yardstick: Yardstick) -> ErrorBars:
+def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
     """The bars of every statistic of every metric, of changes and of deviations: what the tetrahedra and the variations add. What
     is said of a run itself has none: it is known.
     """
@@ -134,7 +134,7 @@ def error_bars(pair: Pair, yardstick: Yardstick) -> ErrorBars:
 
     @cache
     def measured(run: Run, other: Run | None) -> tuple[Measure, ...]:
-        return measure(run, at_rest(run) if other is None else other, yardstick, comparing)
+        return measure(run, at_rest(run) if other is None else other, context, comparing)
 
     def apart(run: Run, other: Run) -> Floats:
         found = find(measured(run, other), "surface_deviation", "rms")
@@ -191,7 +191,7 @@ def typical(differences: Floats, apart: Floats) -> Floats:
 
 
 def _surface(run: Run) -> Run:
-    """The run as candidates are: a surface without an interior, so that lengths go through the yardstick's extension."""
+    """The run as candidates are: a surface without an interior, so that lengths go through the measurement context's extension."""
     return replace(run, fibres=None, fibre_positions=None)
 
 

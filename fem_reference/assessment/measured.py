@@ -8,14 +8,14 @@ from fem_reference import metrics
 from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints
-from fem_reference.metrics import Measure, Yardstick
+from fem_reference.metrics import Measure, MeasurementContext
 from fem_reference.problems.muscle import Setup
 from fem_reference.runs.store import Run
 from fem_reference.scenes.muscle import Scene
 
 
 @dataclass(frozen=True, eq=False)
-class Today:
+class CurrentMeasures:
     """A candidate, measured now against the ``reference``; ``error_bars``: how well that is known, None without any."""
 
     scene: Scene
@@ -27,13 +27,13 @@ class Today:
     @classmethod
     def of(
         cls, scene: Scene, setup: Setup, candidate: Run, reference: Run, error_bars: ErrorBars | None = None
-    ) -> "Today":
+    ) -> "CurrentMeasures":
         """Measure a candidate and its reference, which both have the frames of the scene."""
         if reference.fibres is None:
             got, want = "a run without an interior", "a reference that carries the fibres"
             raise InputError(f"{reference.name}: fibres", got, want)
-        yardstick = Yardstick.of(reference, reference.fibres, setup.bones, setup.free)
-        return cls(scene, candidate, reference, metrics.measure(candidate, reference, yardstick), error_bars)
+        context = MeasurementContext.of(reference, reference.fibres, setup.bones, setup.free)
+        return cls(scene, candidate, reference, metrics.measure(candidate, reference, context), error_bars)
 
     @property
     def points(self) -> Floats:

@@ -1,4 +1,4 @@
-"""Who is nearer to the reference: what differs by less than the reference is known to is not told apart."""
+"""Ranking of solvers by their distance to the reference; differences within the error bars are not ranked."""
 
 import math
 from collections.abc import Iterable
@@ -25,7 +25,9 @@ class Deviation:
 
 @dataclass(frozen=True)
 class Place:
-    """A deviation with the ranks that it may have, ``first`` to ``last``, and the names that it cannot be told from, ``alike``."""
+    """A deviation with the ranks that it may have, ``first`` to ``last``, and the names that it is not distinguishable from,
+    ``alike``.
+    """
 
     deviation: Deviation
     first: int
@@ -48,7 +50,7 @@ class Ranking:
 
     @property
     def pairs(self) -> tuple[int, int]:
-        """How many pairs can be told apart, of how many."""
+        """How many pairs can be distinguished, of how many."""
         count = len(self.places)
         alike = sum(len(place.alike) for place in self.places) // 2
         return count * (count - 1) // 2 - alike, count * (count - 1) // 2

@@ -1,4 +1,4 @@
-"""Today's measures against a baseline and against the reference: a verdict on every statistic, from the frame that decides it."""
+"""Current measures against a baseline and against the reference: a verdict on every statistic, from the frame that decides it."""
 
 import math
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ from fem_reference import __version__
 from fem_reference.assessment import judge
 from fem_reference.assessment.baseline import PLACES, POSITION_ROUNDING, Baseline, Positions, Stored
 from fem_reference.assessment.judge import Word
-from fem_reference.assessment.measured import Today
+from fem_reference.assessment.measured import CurrentMeasures
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 
@@ -24,8 +24,9 @@ WORST_FIRST: tuple[Word, ...] = ("fail", "inconclusive", "pass")
 class Judgement:
     """What came of one ``question`` on the statistic ``name``, all numbers in ``unit`` and of the ``frame`` that decides.
 
-    ``was`` and ``today`` are its values, NaN where there is none; ``allowed`` how far it may be from what it was (``unchanged``) or
-    from the reference (``within``), NaN where that is not known; ``known`` how well what it is compared with is known.
+    ``was`` and ``current`` are its values, NaN where there is none; ``allowed`` how far it may be from what it was
+    (``unchanged``) or from the reference (``within``), NaN where that is not known; ``known`` how well what it is compared with
+    is known.
     """
 
     question: Question
@@ -34,14 +35,14 @@ class Judgement:
     word: Word
     frame: int
     was: float
-    today: float
+    current: float
     allowed: float
     known: float
 
     @property
     def away(self) -> float:
-        """How far today's value is from what it is compared with."""
-        return abs(self.today - self.was if self.question == "unchanged" else self.today)
+        """How far the current value is from what it is compared with."""
+        return abs(self.current - self.was if self.question == "unchanged" else self.current)
 
     @property
     def used(self) -> float:
@@ -52,27 +53,27 @@ class Judgement:
     @property
     def why(self) -> str:
         """The reason in words."""
-        if math.isnan(self.was) and math.isnan(self.today):
+        if math.isnan(self.was) and math.isnan(self.current):
             return "there is no number, and there was none"
-        if math.isnan(self.today):
-            return "there is no number today"
+        if math.isnan(self.current):
+            return "there is no number now"
         if self.question == "unchanged" and math.isnan(self.was):
-            return "there is a number today, and there was none"
+            return "there is a number now, and there was none"
         if self.word == "inconclusive":
             return self._why_silent
         much = f"{self.away:.4g} {self.unit}"
-        told = f"{much} from what it was" if self.question == "unchanged" else f"{much} from the reference"
-        return f"{told}, {self.allowed:.4g} {self.unit} allowed"
+        text = f"{much} from what it was" if self.question == "unchanged" else f"{much} from the reference"
+        return f"{text}, {self.allowed:.4g} {self.unit} allowed"
 
     @property
     def _why_silent(self) -> str:
         if math.isnan(self.known):
-            return "nobody knows how well the reference is known; --error-bar tells"
+            return "the error bar of the reference is unknown; --error-bar measures it"
         if math.isnan(self.allowed):
             return "the baseline does not say how far from the reference is allowed; --update does, now that the error bar is known"
         known = "the reference" if self.question == "within" else "the baseline"
-        told = f"{known} is known to {self.known:.4g} {self.unit}"
-        return f"{told}, and {self.away:.4g} {self.unit} is that near to the {self.allowed:.4g} {self.unit} allowed"
+        text = f"{known} has an error bar of {self.known:.4g} {self.unit}"
+        return f"{text}, and {self.away:.4g} {self.unit} is that near to the {self.allowed:.4g} {self.unit} allowed"
 
 
 @dataclass(frozen=True)
@@ -98,59 +99,61 @@ class Check:
         return sum(one.word == word for one in self.judgements)
 
 
-def check(baseline: Baseline, today: Today) -> Check:
-    """Judge ``today`` by a baseline of the same case, scene and candidate."""
-    found = [_moved(baseline.positions, today)]
+def check(baseline: Baseline, current: CurrentMeasures) -> Check:
+    """Judge ``current`` by a baseline of the same case, scene and candidate."""
+    found = [_moved(baseline.positions, current)]
     for name, stored in baseline.measures.items():
-        now = today.values(*name.split("."))
-        found += [_unchanged(name, stored, now, today), _within(name, stored, now, today)]
+        now = current.values(*name.split("."))
+        found += [_unchanged(name, stored, now, current), _within(name, stored, now, current)]
     found.sort(key=lambda one: (WORST_FIRST.index(one.word), one.name != MOVED, -one.used, one.name, one.question))
-    return Check(today.scene.name, today.candidate.name, tuple(found), tuple(_notes(baseline, today, found)))
+    return Check(current.scene.name, current.candidate.name, tuple(found), tuple(_notes(baseline, current, found)))
 
 
 class _Frames(NamedTuple):
-    """Of each frame (f,): its value in the baseline and today, what is right today, and how well that is known."""
+    """Of each frame (f,): its value in the baseline and now, what is right now, and how well that is known."""
 
     was: Floats
-    today: Floats
+    current: Floats
     truth: Floats
     bars: Floats
 
 
-def _moved(positions: Positions, today: Today) -> Judgement:
+def _moved(positions: Positions, current: CurrentMeasures) -> Judgement:
     """Whether the sampled vertices are where they were: the greatest distance [mm] of each frame."""
     was = np.array([[(math.nan,) * 3 if point is None else point for point in frame] for frame in positions.values])
-    if max(positions.vertices) >= len(today.rest):
-        raise InputError("baseline: positions.vertices", max(positions.vertices), f"0 to {len(today.rest) - 1}")
-    away = np.linalg.norm(today.points[:, list(positions.vertices)] - was, axis=2).max(axis=1)
+    if max(positions.vertices) >= len(current.rest):
+        raise InputError("baseline: positions.vertices", max(positions.vertices), f"0 to {len(current.rest) - 1}")
+    away = np.linalg.norm(current.points[:, list(positions.vertices)] - was, axis=2).max(axis=1)
     still = np.where(np.isnan(was).any(axis=(1, 2)), np.nan, 0.0)
     frames = _Frames(still, away, still, np.full(len(away), POSITION_ROUNDING))
-    return _judged("unchanged", (MOVED, "mm"), frames, positions.tolerance, today)
+    return _judged("unchanged", (MOVED, "mm"), frames, positions.tolerance, current)
 
 
-def _unchanged(name: str, stored: Stored, now: Floats, today: Today) -> Judgement:
+def _unchanged(name: str, stored: Stored, now: Floats, current: CurrentMeasures) -> Judgement:
     """Whether a statistic is what it was: the baseline is known but for rounding."""
     was = _numbers(stored)
     known = np.full(len(was), 0.5 * 10.0 ** -PLACES[stored.unit])
-    return _judged("unchanged", (name, stored.unit), _Frames(was, now, was, known), stored.tolerance, today)
+    return _judged("unchanged", (name, stored.unit), _Frames(was, now, was, known), stored.tolerance, current)
 
 
-def _within(name: str, stored: Stored, now: Floats, today: Today) -> Judgement:
+def _within(name: str, stored: Stored, now: Floats, current: CurrentMeasures) -> Judgement:
     """Whether a statistic is as near to the reference as it should be: that is known to its error bar."""
     was, within = _numbers(stored), math.nan if stored.within is None else stored.within
-    frames = _Frames(was, now, np.zeros(len(was)), today.bars(*name.split(".")))
-    return _judged("within", (name, stored.unit), frames, within, today)
+    frames = _Frames(was, now, np.zeros(len(was)), current.bars(*name.split(".")))
+    return _judged("within", (name, stored.unit), frames, within, current)
 
 
-def _judged(question: Question, what: tuple[str, str], frames: _Frames, allowed: float, today: Today) -> Judgement:
+def _judged(
+    question: Question, what: tuple[str, str], frames: _Frames, allowed: float, current: CurrentMeasures
+) -> Judgement:
     """The judgement by the frame that decides: of those with the word that counts, the one furthest off, or known worst."""
     words = [_word(*map(float, row), allowed=allowed) for row in zip(*frames, strict=True)]
     word = judge.overall(words)
-    deciding = frames.bars if word == "inconclusive" else np.abs(frames.today - frames.truth)
+    deciding = frames.bars if word == "inconclusive" else np.abs(frames.current - frames.truth)
     furthest = np.where(np.isnan(deciding), np.inf, deciding)
     k = int(np.argmax(np.where([each == word for each in words], furthest, -1.0)))
     was, value, _, bar = (float(column[k]) for column in frames)
-    return Judgement(question, *what, word, today.candidate.numbers[k], was, value, allowed, bar)
+    return Judgement(question, *what, word, current.candidate.numbers[k], was, value, allowed, bar)
 
 
 def _word(was: float, value: float, truth: float, bar: float, *, allowed: float) -> Word:
@@ -166,18 +169,18 @@ def _numbers(stored: Stored) -> Floats:
     return np.array([math.nan if value is None else value for value in stored.values])
 
 
-def _notes(baseline: Baseline, today: Today, found: list[Judgement]) -> Iterator[str]:
+def _notes(baseline: Baseline, current: CurrentMeasures, found: list[Judgement]) -> Iterator[str]:
     """What explains the judgements, and what was not judged."""
     if baseline.fem_reference != __version__:
         yield f"measured by fem_reference {__version__}, the baseline by {baseline.fem_reference}"
-    if baseline.reference != today.reference_name:
-        yield f"the reference is {today.reference_name}, that of the baseline was {baseline.reference}"
+    if baseline.reference != current.reference_name:
+        yield f"the reference is {current.reference_name}, that of the baseline was {baseline.reference}"
     changed = any(one.word == "fail" and one.question == "unchanged" for one in found if one.name != MOVED)
     if changed and all(one.word == "pass" for one in found if one.name == MOVED):
         yield (
             "no sampled vertex moved and yet measures changed: either the reference is another, or the candidate moved "
             "between the sampled vertices"
         )
-    left = sorted(today.by_name.keys() - baseline.measures.keys())
+    left = sorted(current.by_name.keys() - baseline.measures.keys())
     if left:
         yield f"not in the baseline and not judged: {', '.join(left)}"

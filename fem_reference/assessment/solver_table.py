@@ -1,4 +1,4 @@
-"""The families of solvers in Table 5.1 of the report, and how a solver of each stands on scenes, in numbers."""
+"""The families of models in Table 5.1 of the report, and the results of their solvers on scenes."""
 
 import tomllib
 from dataclasses import dataclass
@@ -59,7 +59,7 @@ def _file() -> _File:
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
+class SolverResult:
     """How ``solver`` (``family``, ``name``) did on a ``case``: its outcome, its time for a frame [s] where that is known, and its
     ``measures`` against the reference; those of the reference itself are its error bars, none where nobody asked.
     """
@@ -83,8 +83,8 @@ class Standing:
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """A scene that solvers stood on: its ``title``, ``triangles`` of the muscle, the reference's greatest displacement ``travel``
-    [mm], and how the reference ended.
+    """A scene that solvers were run on: its ``title``, ``triangles`` of the muscle, the reference's greatest displacement
+    ``travel`` [mm], and how the reference ended.
     """
 
     case: str
@@ -109,42 +109,42 @@ class Overall:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """What was measured: ``standings`` of all on every of the ``scenarios``; ``missing``, by case, why it was left out; the
+    """What was measured: ``results`` of all solvers on all of the ``scenarios``; ``missing``, by case, why it was left out; the
     ``machines`` that runs were made on.
     """
 
     families: tuple[Family, ...]
     scenarios: tuple[Scenario, ...]
-    standings: tuple[Standing, ...]
+    results: tuple[SolverResult, ...]
     missing: dict[str, str]
     versions: dict[str, str]
     machines: tuple[str, ...]
 
-    def of(self, family: str, case: str) -> list[Standing]:
-        """The standings of a family on a case."""
-        return [one for one in self.standings if (one.family, one.case) == (family, case)]
+    def of(self, family: str, case: str) -> list[SolverResult]:
+        """The results of a family on a case."""
+        return [one for one in self.results if (one.family, one.case) == (family, case)]
 
     def names(self, family: str) -> list[str]:
-        """Who stands for a family, in order."""
-        return list(dict.fromkeys(one.name for one in self.standings if one.family == family))
+        """The solvers of a family, in order."""
+        return list(dict.fromkeys(one.name for one in self.results if one.family == family))
 
     def over(self, family: str, name: str, metric: str, statistic: str) -> "Overall | None":
         """The worst frames of ``name`` over all scenarios; None where it was measured on none."""
         found = [
             (value[0], one.case)
-            for one in self.standings
+            for one in self.results
             if (one.family, one.name) == (family, name) and (value := one.worst(metric, statistic)) is not None
         ]
-        told = [(value, case) for value, case in found if not np.isnan(value)]
+        finite = [(value, case) for value, case in found if not np.isnan(value)]
         lost = tuple(case for value, case in found if np.isnan(value))
-        if not told:
+        if not finite:
             return Overall(np.nan, np.nan, "", 0, lost) if lost else None
-        worst, case = max(told, key=lambda entry: abs(entry[0]))
-        return Overall(float(np.median([abs(value) for value, _ in told])), worst, case, len(told), lost)
+        worst, case = max(finite, key=lambda entry: abs(entry[0]))
+        return Overall(float(np.median([abs(value) for value, _ in finite])), worst, case, len(finite), lost)
 
     def rankings(self, case: str) -> tuple[Ranking, ...]:
-        """Who is nearer on a case, as far as the reference's error bars tell them apart; nothing without these."""
-        here = [one for one in self.standings if one.case == case]
+        """Who is nearer on a case, as far as the reference's error bars separate them; nothing without these."""
+        here = [one for one in self.results if one.case == case]
         bars = [measure for one in here if one.of_reference for measure in one.measures]
         return rankings({one.name: one.measures for one in here if not one.of_reference}, bars)
 
@@ -152,7 +152,7 @@ class Table:
         """The scenario of the most triangles on which the time for a frame [s] of ``name`` is known, and that time."""
         times = {
             one.case: one.seconds_per_frame
-            for one in self.standings
+            for one in self.results
             if (one.family, one.name) == (family, name) and one.seconds_per_frame is not None
         }
         largest = max((one for one in self.scenarios if one.case in times), key=lambda one: one.triangles, default=None)

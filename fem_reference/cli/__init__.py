@@ -9,7 +9,7 @@ from pathlib import Path
 
 from fem_reference.cli import verbs
 from fem_reference.cli.parser import parser
-from fem_reference.cli.telling import (
+from fem_reference.cli.printing import (
     BAD_INPUT,
     DONE,
     INTERRUPTED,

@@ -3,7 +3,7 @@
 import argparse
 import os
 
-from fem_reference.cli.telling import DONE, SOLVER_FAILED, out, tell
+from fem_reference.cli.printing import DONE, SOLVER_FAILED, out, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import DATA_SETTING
@@ -48,7 +48,7 @@ def benchmark(options: argparse.Namespace) -> int:
         candidates.check(bench.scene)
         bench.setup()  # what is missing shows before anything is timed
     timings, machine = candidates.measure(benches)
-    tell(candidates.facts(timings, machine), candidates.text(timings, machine), options)
+    write_output(candidates.facts(timings, machine), candidates.text(timings, machine), options)
     return DONE
 
 
@@ -57,5 +57,5 @@ def _time_reference(options: argparse.Namespace) -> int:
     against = None if options.against is None else checkout.find(options.against)
     timings = reference.measure(reference.bodies(names, options.repeats, options.ranks), against)
     facts = reference_table.facts(timings, against, left_out)
-    tell(facts, reference_table.text(timings, against, left_out), options)
+    write_output(facts, reference_table.text(timings, against, left_out), options)
     return DONE if all(timing.converged for timing in timings) else SOLVER_FAILED

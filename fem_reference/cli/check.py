@@ -1,7 +1,7 @@
 """The verb ``check``: a candidate against its own past and against the reference, for the pipeline of whoever writes it.
 
 Where nothing can be said the exit status is 0: what the reference lacks is no fault of the change that is checked, and should
-not hold it up; the text, the Markdown and the JUnit file (as skipped) tell it.
+not hold it up; the text, the Markdown and the JUnit file (as skipped) say so.
 """
 
 import argparse
@@ -9,9 +9,9 @@ import time
 from pathlib import Path
 
 from fem_reference.assessment import baseline, regression
-from fem_reference.assessment.measured import Today
+from fem_reference.assessment.measured import CurrentMeasures
 from fem_reference.cli.choosing import check_names, checked_bench, choose, scene_of
-from fem_reference.cli.telling import DONE, SOLVER_FAILED, VERDICT_FAIL, tell
+from fem_reference.cli.printing import DONE, SOLVER_FAILED, VERDICT_FAIL, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.io import files
 from fem_reference.report import regression_texts
@@ -28,7 +28,7 @@ def add_options(parser: argparse.ArgumentParser, unit: str) -> None:
     parser.add_argument("--unit", help=unit)
     past = "its measures as they were, JSON"
     parser.add_argument("--baseline", type=Path, required=True, metavar="FILE", help=past)
-    anew = "write the baseline anew from today's measures; its tolerances and limits stay"
+    anew = "write the baseline anew from the current measures; its tolerances and limits stay"
     parser.add_argument("--update", action="store_true", help=anew)
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write the judgements as JUnit XML")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the worst of them for a pull request")
@@ -52,10 +52,10 @@ def check(options: argparse.Namespace) -> int:
         facts = {"case": scene.name, "candidate": run.name, "verdict": "failed", "notes": why, "judgements": []}
         lost = regression_texts.lost(scene.name, run.name, why)
         _write({options.junit: lost.junit, options.markdown: lost.markdown})
-        tell(facts, "\n".join([*why, "verdict: failed"]), options)
+        write_output(facts, "\n".join([*why, "verdict: failed"]), options)
         return SOLVER_FAILED
     bars = refinement.obtain(bench, reference) if options.error_bar else refinement.offered(bench, reference)
-    return _told(Today.of(scene, bench.setup(), run, reference, bars), options, begin)
+    return _printed(CurrentMeasures.of(scene, bench.setup(), run, reference, bars), options, begin)
 
 
 def _runs(bench: Bench, chosen: tuple[Candidate, str]) -> tuple[Run, Run]:
@@ -65,18 +65,18 @@ def _runs(bench: Bench, chosen: tuple[Candidate, str]) -> tuple[Run, Run]:
     return run, bench.obtain("reference", bench.scene.reference, "reference")
 
 
-def _told(today: Today, options: argparse.Namespace, begin: float) -> int:
+def _printed(current: CurrentMeasures, options: argparse.Namespace, begin: float) -> int:
     """Judge, write what is wanted, and return the exit status."""
     if options.update:
-        baseline.update(options.baseline, today)
-    result = regression.check(baseline.read(options.baseline, today.scene, today.candidate.name), today)
+        baseline.update(options.baseline, current)
+    result = regression.check(baseline.read(options.baseline, current.scene, current.candidate.name), current)
     _write(
         {
             options.junit: regression_texts.junit(result, time.perf_counter() - begin),
             options.markdown: regression_texts.markdown(result),
         }
     )
-    tell(regression_texts.facts(result), regression_texts.text(result), options)
+    write_output(regression_texts.facts(result), regression_texts.text(result), options)
     return VERDICT_FAIL if result.word == "fail" else DONE
 
 

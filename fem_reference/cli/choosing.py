@@ -1,10 +1,10 @@
-"""What a command line chooses: a scene, candidates of it, and the bench that they are solved on."""
+"""Choices of the command line: a scene, candidates of it, and the bench that they are solved on."""
 
 import argparse
 from pathlib import Path
 
 from fem_reference.assessment import judge
-from fem_reference.cli.telling import out
+from fem_reference.cli.printing import out
 from fem_reference.foundations.errors import InputError
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import Candidate, Scene

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from fem_reference.cli.telling import DONE, lines, out, tell
+from fem_reference.cli.printing import DONE, lines, out, write_output
 from fem_reference.export import FORMATS
 from fem_reference.export import export as write
 from fem_reference.foundations.errors import InputError
@@ -13,7 +13,7 @@ from fem_reference.studies.execution import Bench
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """What the verb is told: where to, and in which formats."""
+    """Options of the verb: where to, and in which formats."""
     parser.add_argument(
         "--to", type=Path, required=True, metavar="DIR", help="a folder that is not there yet, or empty"
     )
@@ -29,5 +29,5 @@ def export(options: argparse.Namespace) -> int:
     bench = Bench(scene, out(options) / "runs")
     written = write(scene, bench.problem, options.to, options.format)
     facts = {"case": scene.name, "folder": str(options.to), "files": written}
-    tell(facts, "\n".join(lines(facts)), options)
+    write_output(facts, "\n".join(lines(facts)), options)
     return DONE

@@ -59,8 +59,8 @@ def parser() -> argparse.ArgumentParser:
     catalogue = add("verify", verbs.verify, "measure problems whose answers are known and write the page", case=False)
     known = "an entry, a family or a shell pattern of them (default: all)"
     catalogue.add_argument("names", metavar="NAME", nargs="*", help=known)
-    spoil = "measure this entry with its one thing wrong, named or not: it must fail; may be repeated"
-    catalogue.add_argument("--spoil", action="append", default=[], metavar="NAME", help=spoil)
+    control = "measure this entry with its one thing wrong, named or not: it must fail; may be repeated"
+    catalogue.add_argument("--negative-control", action="append", default=[], metavar="NAME", help=control)
     add("list", verbs.list_all, "what there is: cases, solvers, metrics, stored runs", case=False)
     exporting = add("export", export.export, "write all that a solver needs which is not ours, in open formats")
     export.add_options(exporting)

@@ -1,4 +1,4 @@
-"""What the verbs do with scalar cases; the command line prints it."""
+"""The verbs for scalar cases; they return their output."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,8 +21,8 @@ PAGES = {
 
 
 @dataclass(frozen=True)
-class Told:
-    """What is to be told: ``facts`` as JSON, ``text`` for people, and the ``word`` that the exit status follows (``"failed"``
+class Printed:
+    """What is to be printed: ``facts`` as JSON, ``text`` for people, and the ``word`` that the exit status follows (``"failed"``
     where a solver did, else the verdict).
     """
 
@@ -31,7 +31,7 @@ class Told:
     word: str
 
 
-def run(scene: FieldScene, solver: str | None, out: Path) -> Told:
+def run(scene: FieldScene, solver: str | None, out: Path) -> Printed:
     """A scalar case by its reference, with a page, or by another ``solver`` or the candidate of that name: what can be measured
     without another run, judged.
     """
@@ -47,10 +47,10 @@ def run(scene: FieldScene, solver: str | None, out: Path) -> Told:
     made = bench.obtain(name, choice)
     measures = scalar.measure(scene, made, None)
     facts = field_facts(scene, [made], measures, scalar.judged(scene, measures))
-    return Told(facts, field_text(facts), _word([facts]))
+    return Printed(facts, field_text(facts), _word([facts]))
 
 
-def compare(scene: FieldScene, candidates: list[str] | None, out: Path) -> Told:
+def compare(scene: FieldScene, candidates: list[str] | None, out: Path) -> Printed:
     """A scalar case with its reference, ``candidates`` (None for all) and convergence, on a page of its own."""
     known = [candidate.name for candidate in scene.candidate]
     for name in candidates or []:
@@ -59,10 +59,10 @@ def compare(scene: FieldScene, candidates: list[str] | None, out: Path) -> Told:
     example = scalar.example(scene, out / "runs", candidates)
     facts, path = field_example_facts(example), out / scene.name / "report.html"
     report.write_examples(scene.title, (example,), path, differences=False)
-    return Told(facts, f"{field_text(facts)}\npage: {path}", _word([facts]))
+    return Printed(facts, f"{field_text(facts)}\npage: {path}", _word([facts]))
 
 
-def page(name: str, out: Path) -> Told:
+def page(name: str, out: Path) -> Printed:
     """The page ``name`` over several cases."""
     title, names = PAGES[name]
     scenes = [scene for scene in map(casefile.read, names) if isinstance(scene, FieldScene)]
@@ -70,7 +70,7 @@ def page(name: str, out: Path) -> Told:
     facts, path = [field_example_facts(example) for example in examples], out / f"{name}.html"
     report.write_examples(title, examples, path, differences=True)
     text = "\n\n".join([*map(field_text, facts), f"page: {path}"])
-    return Told({"page": str(path), "cases": facts}, text, _word(facts))
+    return Printed({"page": str(path), "cases": facts}, text, _word(facts))
 
 
 def _word(facts: list[dict[str, Any]]) -> str:

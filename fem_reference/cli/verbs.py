@@ -1,4 +1,4 @@
-"""What each verb does; it prints what came of it and returns the exit status."""
+"""The verbs: each prints its results and returns the exit status."""
 
 import argparse
 from pathlib import Path
@@ -8,20 +8,20 @@ from fem_reference.assessment import comparison
 from fem_reference.assessment.claims import Cover
 from fem_reference.cli import scalar, verification
 from fem_reference.cli.choosing import check_names, checked_bench, choose, own_candidates, scene_of
-from fem_reference.cli.scalar import Told
-from fem_reference.cli.telling import DONE, SOLVER_FAILED, VERDICT_FAIL, lines, out, tell
+from fem_reference.cli.printing import DONE, SOLVER_FAILED, VERDICT_FAIL, lines, out, write_output
+from fem_reference.cli.scalar import Printed
 from fem_reference.foundations.errors import InputError
 from fem_reference.io import files
 from fem_reference.report.claims_page import facts as claims_facts
 from fem_reference.report.overview import (
     comparison_text,
     field_scene_facts,
+    ranking_text,
     run_facts,
     run_text,
     scene_facts,
-    standings_text,
 )
-from fem_reference.report.standings_page import facts as standings_facts
+from fem_reference.report.ranking_page import facts as ranking_facts
 from fem_reference.runs import store
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import Candidate, Scene, SolverChoice
@@ -47,7 +47,7 @@ def compare(options: argparse.Namespace) -> int:
     scene = scene_of(options)
     if isinstance(scene, FieldScene):
         _refuse_error_bar(options)
-        return _told(scalar.compare(scene, options.candidate, out(options)), options)
+        return _printed(scalar.compare(scene, options.candidate, out(options)), options)
     wanted = options.candidate or [candidate.name for candidate in scene.candidate]
     return _judge(scene, options, [choose(scene, text, options.unit) for text in wanted])
 
@@ -57,13 +57,13 @@ def run(options: argparse.Namespace) -> int:
     scene = scene_of(options)
     if isinstance(scene, FieldScene):
         _refuse_error_bar(options)
-        return _told(scalar.run(scene, options.solver, out(options)), options)
+        return _printed(scalar.run(scene, options.solver, out(options)), options)
     if options.solver is None or options.solver == scene.reference.solver:
         return _judge(scene, options, [])
     _refuse_error_bar(options)
     bench = Bench(scene, out(options) / "runs", options.ranks)
     run = bench.obtain(options.solver, _choice(scene, options.solver), f"--solver {options.solver}")
-    tell(run_facts(scene, run), run_text(run), options)
+    write_output(run_facts(scene, run), run_text(run), options)
     return DONE if run.outcome.status == "converged" else SOLVER_FAILED
 
 
@@ -77,12 +77,12 @@ def _choice(scene: Scene, solver: str) -> SolverChoice:
     return next((entry for entry in scene.candidate if entry.solver == solver), SolverChoice(solver=solver))
 
 
-def _told(told: Told, options: argparse.Namespace) -> int:
-    """Tell what came of scalar cases or of a verification; returns the exit status."""
-    tell(told.facts, told.text, options)
-    if told.word == "failed":
+def _printed(printed: Printed, options: argparse.Namespace) -> int:
+    """Print the results of scalar cases or of a verification; returns the exit status."""
+    write_output(printed.facts, printed.text, options)
+    if printed.word == "failed":
         return SOLVER_FAILED
-    return VERDICT_FAIL if told.word == "fail" else DONE
+    return VERDICT_FAIL if printed.word == "fail" else DONE
 
 
 def page(options: argparse.Namespace) -> int:
@@ -94,7 +94,7 @@ def page(options: argparse.Namespace) -> int:
     if options.case or options.candidate or options.unit:
         given = "--candidate or --unit" if options.name == CLAIMS else "--case, --candidate or --unit"
         raise InputError("page", f"{given} for {options.name}", f"them for {TABLE} only")
-    return _told(scalar.page(options.name, out(options)), options)
+    return _printed(scalar.page(options.name, out(options)), options)
 
 
 def _table(options: argparse.Namespace) -> int:
@@ -104,8 +104,8 @@ def _table(options: argparse.Namespace) -> int:
     for name in scenes if options.case else foreign:
         Bench(scenes[name], out(options)).setup()  # only what nobody asked for by name may be missing
     table = table_5_1.stand(scenes.values(), out(options) / "runs", foreign)
-    path = report.write_standings(table, out(options), TABLE)
-    tell(standings_facts(table), f"{standings_text(table)}\npage: {path}", options)
+    path = report.write_ranking(table, out(options), TABLE)
+    write_output(ranking_facts(table), f"{ranking_text(table)}\npage: {path}", options)
     return DONE if all(one.reference.status == "converged" for one in table.scenarios) else SOLVER_FAILED
 
 
@@ -116,9 +116,9 @@ def _claims(options: argparse.Namespace) -> int:
     path = report.write_claims(found, out(options), CLAIMS)
     whole = Cover.of(found.claims)
     holding = f"{100 * whole.share:.1f} % hold the difference from a finer solution, median ratio {whole.median:.2f}"
-    told = [f"{whole.count} error bars: {holding}"]
-    told += [f"left out: {case}: {why}" for case, why in found.missing.items()]
-    tell(claims_facts(found), "\n".join([*told, f"page: {path}"]), options)
+    printed = [f"{whole.count} error bars: {holding}"]
+    printed += [f"left out: {case}: {why}" for case, why in found.missing.items()]
+    write_output(claims_facts(found), "\n".join([*printed, f"page: {path}"]), options)
     return SOLVER_FAILED if found.missing else DONE
 
 
@@ -145,9 +145,10 @@ def _recorded(text: str, unit: str | None) -> Candidate:
 
 def verify(options: argparse.Namespace) -> int:
     """Measure problems whose answers are known."""
-    measured = verification.verify(options.names, options.spoil)
-    status = _told(verification.told(measured), options)  # what took so long to measure is told whatever the page does
-    name = "verify_part" if options.names or options.spoil else "verify"  # a part does not stand in the whole's place
+    measured = verification.verify(options.names, options.negative_control)
+    status = _printed(verification.printed(measured), options)  # measurements are printed even if the page fails
+    part = options.names or options.negative_control
+    name = "verify_part" if part else "verify"  # a part does not replace the whole
     print(f"page: {report.write_verification(measured, out(options), name)}")
     return status
 
@@ -166,7 +167,7 @@ def _judge(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candida
     candidates = tuple(complete((read | solved)[entry.name], numbers) for entry, _ in chosen)
     result = comparison.compare(scene, bench.setup(), complete(reference, numbers), candidates, bars)
     page = report.write(result, out(options) / scene.name)
-    tell(report.summary(result), comparison_text(result, page), options)
+    write_output(report.summary(result), comparison_text(result, page), options)
     if any(run.outcome.status != "converged" for run in (reference, *candidates)):
         return SOLVER_FAILED
     return VERDICT_FAIL if result.word == "fail" else DONE
@@ -181,7 +182,7 @@ def list_all(options: argparse.Namespace) -> int:
     lines = ["cases:", *(f"  {name:{width}}  {title}" for name, title in scenes.items())]
     lines += [f"solvers: {', '.join(facts['solvers'])}", f"metrics: {', '.join(facts['metrics'])}"]
     lines += ["stored runs:", *(f"  {path}" for path in stored)] if stored else []
-    tell(facts, "\n".join(lines), options)
+    write_output(facts, "\n".join(lines), options)
     return DONE
 
 
@@ -196,7 +197,7 @@ def show(options: argparse.Namespace) -> int:
     scene = scene_of(options)
     if isinstance(scene, FieldScene):
         facts = field_scene_facts(scene, FieldBench(scene, out(options)).problem)
-        tell(facts, "\n".join(lines(facts)), options)
+        write_output(facts, "\n".join(lines(facts)), options)
         return DONE
     bench = checked_bench(scene, options, own_candidates(scene))
     facts = scene_facts(scene, bench.setup())
@@ -207,5 +208,5 @@ def show(options: argparse.Namespace) -> int:
         files.write_polylines(folder / "fibres.vtp", built.fibres, built.fibres.points)
         files.write_tets(folder / "tets.vtu", built.mesh, built.mesh.points)
         facts |= {"mesh": built.mesh_facts, "folder": str(folder)}
-    tell(facts, "\n".join(lines(facts)), options)
+    write_output(facts, "\n".join(lines(facts)), options)
     return DONE

@@ -1,10 +1,10 @@
-"""What the verb ``verify`` does; the command line prints it."""
+"""The verb ``verify``; it returns its output."""
 
 import time
 
 from fem_reference import __version__
 from fem_reference.assessment.catalogue import Result
-from fem_reference.cli.scalar import Told
+from fem_reference.cli.scalar import Printed
 from fem_reference.report.verify_page import Verification, facts
 from fem_reference.runs.key import versions
 from fem_reference.verification import runner
@@ -12,12 +12,12 @@ from fem_reference.verification import runner
 _HEADS = ("entry", "value", "truth", "unit", "error", "within", "order", "seconds", "verdict")
 
 
-def verify(names: list[str], spoiled: list[str]) -> Verification:
-    """What came of the entries that ``names`` and ``spoiled`` mean (all where there are none), the latter with their spoils."""
+def verify(names: list[str], with_negative_control: list[str]) -> Verification:
+    """The results of the entries meant by ``names`` and ``with_negative_control`` (all where both are empty)."""
     from fem_reference.verification.lab import lab  # loads the solvers
 
     catalogue = runner.entries()
-    wrong = frozenset(runner.choose(catalogue, spoiled, "--spoil"))
+    wrong = frozenset(runner.choose(catalogue, with_negative_control, "--negative-control"))
     meant = {*runner.choose(catalogue, names, "NAME"), *wrong}
     wanted = [entry for name, entry in catalogue.items() if name in meant or not meant]
     begin = time.perf_counter()
@@ -26,10 +26,10 @@ def verify(names: list[str], spoiled: list[str]) -> Verification:
     return Verification(results, time.perf_counter() - begin, made_with)
 
 
-def told(verification: Verification) -> Told:
-    """What to tell of a verification."""
+def printed(verification: Verification) -> Printed:
+    """The output of a verification."""
     text = [*_lines(verification.results), verification.summary]
-    return Told(facts(verification), "\n".join(text), verification.word)
+    return Printed(facts(verification), "\n".join(text), verification.word)
 
 
 def _lines(results: tuple[Result, ...]) -> list[str]:
@@ -48,4 +48,10 @@ def _lines(results: tuple[Result, ...]) -> list[str]:
 def _cells(one: Result) -> tuple[str, ...]:
     order = "" if one.finding.order is None else f"{one.finding.order:.2f}"
     numbers = (f"{one.finding.value:.6g}", f"{one.truth:.6g}", one.entry.unit, f"{one.error:.2g}", f"{one.within:.2g}")
-    return (one.entry.name, *numbers, order, f"{one.seconds:.1f}", one.word + (" (spoiled)" if one.spoiled else ""))
+    return (
+        one.entry.name,
+        *numbers,
+        order,
+        f"{one.seconds:.1f}",
+        one.word + (" (negative control)" if one.with_negative_control else ""),
+    )

@@ -1,4 +1,4 @@
-"""What acts: one file per effect, named as in scene files. A problem sums its effects and adds nothing else.
+"""Effects: one file each, named as in scene files. A problem sums its effects and adds nothing else.
 
 Contract (tests/test_effects.py): an effect is a frozen record of its parameters, and one expression written once, with operators
 and the few functions of ``Functions`` only, so that a solver can take it symbolically and a test can evaluate it in numpy. What
@@ -130,7 +130,7 @@ class State:
         return above(x, high, high, above(x, low, x, low))
 
 
-class Knot(Record):
+class RampPoint(Record):
     """How much of an effect acts at a frame number."""
 
     frame: float
@@ -151,7 +151,7 @@ class Effect(Record):
     needs: ClassVar[tuple[str, ...]] = ()
 
     def amount(self, frame: float) -> float:  # noqa: ARG002
-        """How much of it acts at a frame: all of it, unless it has a course."""
+        """How much of it acts at a frame: all of it, unless it has a ramp."""
         return 1.0
 
     def limits(self) -> tuple[Limit, ...]:
@@ -169,21 +169,21 @@ class Effect(Record):
         return [(name, getattr(self, name), unit_of(entry.metadata)) for name, entry in type(self).model_fields.items()]
 
 
-class Coursed(Effect):
-    """An effect that comes and goes: ``course`` says how much of it acts, linearly between its knots, constant beyond them."""
+class Ramped(Effect):
+    """An effect with a ramp: ``ramp`` says how much of it acts, linearly between its knots, constant beyond them."""
 
-    course: tuple[Knot, ...] = Field(min_length=1)
+    ramp: tuple[RampPoint, ...] = Field(min_length=1)
 
-    @field_validator("course")
+    @field_validator("ramp")
     @classmethod
-    def _check_course(cls, course: tuple[Knot, ...]) -> tuple[Knot, ...]:
-        if any(late.frame <= early.frame for early, late in pairwise(course)):
+    def _check_ramp(cls, ramp: tuple[RampPoint, ...]) -> tuple[RampPoint, ...]:
+        if any(late.frame <= early.frame for early, late in pairwise(ramp)):
             raise ValueError("knots whose frames are each later than the one before")
-        return course
+        return ramp
 
     def amount(self, frame: float) -> float:
         """How much of it acts at a frame."""
-        frames, amounts = zip(*((knot.frame, knot.amount) for knot in self.course), strict=True)
+        frames, amounts = zip(*((knot.frame, knot.amount) for knot in self.ramp), strict=True)
         return float(np.interp(frame, frames, amounts))
 
 
@@ -198,7 +198,7 @@ class Energy(Effect):
 
 
 class Load(Effect):
-    """An effect that pushes or pulls on a part of the surface; ``on`` names it."""
+    """A load on a part of the surface; ``on`` names it."""
 
     on: str
 
@@ -235,7 +235,7 @@ def elastic_state(acting: Sequence[tuple[Effect, Any]], state: State) -> State:
 
 def total_energy(acting: Sequence[tuple[Effect, Any]], state: State) -> Any:
     """The sum of the energies per rest volume [MPa] of ``acting``, (effect, amount) each, at ``state``, whose F is the whole
-    deformation gradient. A prestrain changes F before the step as it does F now: its own course moves nothing.
+    deformation gradient. A prestrain changes F before the step as it does F now: its own ramp moves nothing.
     """
     state = elastic_state(acting, state)
     energies = [(effect, amount) for effect, amount in acting if isinstance(effect, Energy)]

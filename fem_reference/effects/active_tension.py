@@ -2,15 +2,15 @@
 
 from typing import Any, ClassVar
 
-from fem_reference.effects import Coursed, Energy, State
+from fem_reference.effects import Energy, Ramped, State
 from fem_reference.foundations.units import PositivePressure
 
 
-class ActiveTension(Coursed, Energy):
+class ActiveTension(Ramped, Energy):
     """``amount T/2 (J^(-2/3) fibre . C fibre - 1)``: at constant volume a second Piola-Kirchhoff stress of ``amount T`` along the
     fibre and a pressure, which the resistance to volume change takes.
 
-    ``tension``: T [MPa]. Source: Land et al. 2015, problem 3, doi 10.1098/rspa.2015.0641, of incompressible matter.
+    ``tension``: T [MPa]. Source: Land et al. 2015, problem 3, doi 10.1098/rspa.2015.0641, of incompressible material.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)

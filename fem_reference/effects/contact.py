@@ -1,4 +1,4 @@
-"""Bones push the muscle out of their way, without friction and with any sliding; what they hold of it is exempt."""
+"""Frictionless contact of bones with the muscle, with any sliding; attached vertices are exempt."""
 
 from collections.abc import Iterable
 
@@ -20,10 +20,10 @@ class Contact(Interaction):
     bones: tuple[str, ...] | None = Field(default=None, min_length=1)
 
     def is_by(self, bone: str) -> bool:
-        """Whether the bone of this name pushes."""
+        """Whether the bone of this name is in contact."""
         return self.bones is None or bone in self.bones
 
 
 def among(acting: Iterable[Effect]) -> Contact | None:
-    """The contact among the effects of a scene, None where bones do not push."""
+    """The contact among the effects of a scene, None where there is none."""
     return next((effect for effect in acting if isinstance(effect, Contact)), None)

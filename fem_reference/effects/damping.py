@@ -1,4 +1,4 @@
-"""Drag of the ground on matter that moves: what nothing holds does not run away, and an unstable state is left in time."""
+"""Drag of the ground on tissue that moves: a body that is not fixed does not drift away, and an unstable state is left in time."""
 
 from typing import Any, ClassVar
 
@@ -10,7 +10,7 @@ class Damping(Energy):
     """A force per rest volume of ``-coefficient v``, v the velocity relative to the ground.
 
     Over a load step v is ``rate (u - before)`` (implicit Euler), which is the slope of ``coefficient / 2 rate |u - before|^2``:
-    a potential of the step, which no matter stores.
+    a potential of the step, which no material stores.
 
     ``coefficient``: [MPa s/mm^2].
     """
@@ -22,5 +22,5 @@ class Damping(Energy):
 
     def energy(self, state: State) -> Any:
         """The potential of the step per rest volume [MPa]."""
-        way = sum((now - before) ** 2 for now, before in zip(state.displacement, state.before, strict=True))
-        return self.coefficient / 2 * state.rate * way
+        square = sum((now - before) ** 2 for now, before in zip(state.displacement, state.before, strict=True))
+        return self.coefficient / 2 * state.rate * square

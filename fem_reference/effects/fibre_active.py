@@ -4,16 +4,16 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
-from fem_reference.effects import Coursed, Energy, State
+from fem_reference.effects import Energy, Ramped, State
 from fem_reference.foundations.limits import Limit
 from fem_reference.foundations.units import PositivePressure
 
 
-class FibreActive(Coursed, Energy):
+class FibreActive(Ramped, Energy):
     """``dW/dl = amount stress g(l)`` of ``l``, the isochoric fibre stretch over the optimal one: ``g = 9 (l - 0.4)^2`` from 0.4,
     ``1 - 4 (1 - l)^2`` from 0.6, ``9 (l - 1.6)^2`` from 1.4, and 0 below 0.4 and above 1.6.
 
-    ``stress`` [MPa]: the peak active stress; ``optimal_stretch``: the fibre stretch at optimal length; ``course``: the activation.
+    ``stress`` [MPa]: the peak active stress; ``optimal_stretch``: the fibre stretch at optimal length; ``ramp``: the activation.
     Source: Blemker, Pinsky and Delp 2005, doi 10.1016/j.jbiomech.2004.04.009.
 
     Meant for ``l`` from 0.4 to 1.6, where that source gives fibres a tension: beyond them an activation does nothing.

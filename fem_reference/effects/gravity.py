@@ -2,11 +2,11 @@
 
 from typing import Any
 
-from fem_reference.effects import Coursed, Energy, State
+from fem_reference.effects import Energy, Ramped, State
 from fem_reference.foundations.units import AccelerationVector, Density
 
 
-class Gravity(Coursed, Energy):
+class Gravity(Ramped, Energy):
     """``-amount rho g . u``, with u the displacement.
 
     ``density``: rho at rest [tonne/mm^3]; ``acceleration``: g (3,) [mm/s^2].

@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from typing import Any
 
-from fem_reference.effects import Coursed, Load, State
+from fem_reference.effects import Load, Ramped, State
 from fem_reference.foundations import units
 
 
-class Pressure(Coursed, Load):
+class Pressure(Ramped, Load):
     """``-amount p J F^-T N``, with N the outward normal at rest: a pressure on the surface as it is now, by Nanson's formula.
 
     ``on``: the part of the surface; ``pressure``: p [MPa], which pushes inwards where it is positive.

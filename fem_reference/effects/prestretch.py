@@ -5,10 +5,10 @@ from typing import Any, ClassVar
 
 from pydantic import Field, model_validator
 
-from fem_reference.effects import Coursed, Prestrain, State
+from fem_reference.effects import Prestrain, Ramped, State
 
 
-class Prestretch(Coursed, Prestrain):
+class Prestretch(Ramped, Prestrain):
     """The energies see ``F Fp``, ``Fp = l f f^T + l^(-1/2) (1 - f f^T)``: stretched by ``l = 1 + amount (stretch - 1)`` along the
     fibre f, at the same volume.
 
@@ -20,8 +20,8 @@ class Prestretch(Coursed, Prestrain):
 
     @model_validator(mode="after")
     def _check_stretch(self) -> "Prestretch":
-        if any(1 + knot.amount * (self.stretch - 1) <= 0 for knot in self.course):
-            raise ValueError("a course whose stretches 1 + amount (stretch - 1) are above zero")
+        if any(1 + knot.amount * (self.stretch - 1) <= 0 for knot in self.ramp):
+            raise ValueError("a ramp whose stretches 1 + amount (stretch - 1) are above zero")
         return self
 
     def elastic(self, state: State) -> Sequence[Sequence[Any]]:

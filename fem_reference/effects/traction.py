@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from typing import Any
 
-from fem_reference.effects import Coursed, Load, State
+from fem_reference.effects import Load, Ramped, State
 from fem_reference.foundations.units import PressureVector
 
 
-class Traction(Coursed, Load):
+class Traction(Ramped, Load):
     """``amount t``.
 
     ``on``: the part of the surface; ``force``: t, the force per area at rest (3,) [MPa].

@@ -27,7 +27,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.motion import Rotation
 from fem_reference.foundations.records import join
 from fem_reference.io import files
-from fem_reference.problems.muscle import Body, Problem
+from fem_reference.problems.muscle import Problem, RigidBody
 from fem_reference.scenes.muscle import Scene
 
 # What FEBio has in the same form.
@@ -118,7 +118,7 @@ def _domains(root: Element, problem: Problem) -> None:
     kind = "three-field-solid" if mixed else "elastic-solid"
     SubElement(domains, "SolidDomain", name="muscle", mat="muscle", type=kind)
     shells = {bone_id(bone): bone for bone in problem.bones}
-    shells |= {springs_id(held): held.bone for held in by_springs(problem)}
+    shells |= {springs_id(attached): attached.bone for attached in by_springs(problem)}
     for name, bone in shells.items():
         shell = SubElement(domains, "ShellDomain", name=name, mat=bone_id(bone))
         leaf(shell, "shell_thickness", "0.01")
@@ -127,9 +127,9 @@ def _domains(root: Element, problem: Problem) -> None:
 def _motions(root: Element, problem: Problem) -> None:
     if exactly(problem):
         boundaries = SubElement(root, "Boundary")
-        for held in exactly(problem):
-            name = f"held_{held.attachment}"
-            leaf(SubElement(boundaries, "bc", name=name, type="rigid", node_set=name), "rb", bone_id(held.bone))
+        for attached in exactly(problem):
+            name = f"held_{attached.attachment}"
+            leaf(SubElement(boundaries, "bc", name=name, type="rigid", node_set=name), "rb", bone_id(attached.bone))
     rigid = SubElement(root, "Rigid")
     curves = _curve_numbers(problem)
     for bone in problem.bones:
@@ -149,7 +149,7 @@ def _motions(root: Element, problem: Problem) -> None:
             leaf(entry, "value", repr(share), lc=str(curves[bone.name]))
 
 
-def axis(bone: Body) -> list[float]:
+def axis(bone: RigidBody) -> list[float]:
     """The unit vector that a bone turns about or slides along; none where it rests."""
     if bone.motion is None:
         return []

@@ -1,13 +1,13 @@
-"""What acts between surfaces in FEBio's input file: bones that push, springs that hold.
+"""Contact with bones and springs of attachments in FEBio's input file.
 
 FEBio's ``tied-elastic`` pulls with a traction: its penalty times the vector from a point of the first surface to the point of the
-second that was nearest at rest. It integrates over the first surface as that is now: a rigid copy of the area held, which keeps
+second that was nearest at rest. It integrates over the first surface as that is now: a rigid copy of the area attached, which keeps
 its rest area. So it is the springs of an attachment: their stiffness per rest area, the same in all directions.
 """
 
 from xml.etree.ElementTree import Element, SubElement
 
-from fem_reference.export.febio_mesh import bone_id, by_springs, leaf, pushing, springs_id
+from fem_reference.export.febio_mesh import bone_id, by_springs, leaf, obstacles, springs_id
 from fem_reference.problems.muscle import Problem
 
 SEARCH_RADIUS = 5.0  # [mm]: contact is not looked for deeper than this inside a bone
@@ -18,7 +18,7 @@ PENALTY = {"laugon": 0, "two_pass": 0, "auto_penalty": 0, "symmetric_stiffness":
 
 def has_contact(problem: Problem) -> bool:
     """Whether the file has a section ``Contact``, whose tangent is not symmetric."""
-    return bool(pushing(problem) or by_springs(problem))
+    return bool(obstacles(problem) or by_springs(problem))
 
 
 def add_contact(root: Element, problem: Problem) -> None:
@@ -26,11 +26,11 @@ def add_contact(root: Element, problem: Problem) -> None:
     if not has_contact(problem):
         return
     contacts = SubElement(root, "Contact")
-    for held in by_springs(problem):
-        settings = {"penalty": held.stiffness, "search_radius": SPRING_SEARCH_RADIUS}
-        _pair(contacts, "tied-elastic", springs_id(held), settings)
-    for bone in pushing(problem):
-        assert problem.contact is not None  # or no bone pushes
+    for attached in by_springs(problem):
+        settings = {"penalty": attached.stiffness, "search_radius": SPRING_SEARCH_RADIUS}
+        _pair(contacts, "tied-elastic", springs_id(attached), settings)
+    for bone in obstacles(problem):
+        assert problem.contact is not None  # or there is no contact
         settings = {"penalty": problem.contact.stiffness, "search_radius": SEARCH_RADIUS, "fric_coeff": 0.0}
         _pair(contacts, "sliding-elastic", bone_id(bone), settings)
 

@@ -15,7 +15,7 @@ from fem_reference.effects.neo_hooke import NeoHooke
 from fem_reference.export.febio_mesh import bone_id, leaf, vector
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.motion import Rotation
-from fem_reference.problems.muscle import Body, Problem
+from fem_reference.problems.muscle import Problem, RigidBody
 
 VOLUME_LAW = 2  # FEBio's pressure_model whose energy is K/2 (J - 1)^2
 
@@ -82,7 +82,7 @@ def fibre_constants(effect: FibrePassive) -> dict[str, float]:
     return off | toe | {"lam_max": effect.linear_from * effect.optimal_stretch}
 
 
-def _centre(bone: Body) -> Floats:
+def _centre(bone: RigidBody) -> Floats:
     """The point [mm] that FEBio turns a bone about: that of its motion."""
     return np.asarray(bone.motion.centre if isinstance(bone.motion, Rotation) else bone.surface.points.mean(axis=0))
 

@@ -7,7 +7,7 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, boundary, enclosed_volume
-from fem_reference.problems.muscle import Body, Held, Problem
+from fem_reference.problems.muscle import AttachedVertices, Problem, RigidBody
 
 # Corners between which the last six nodes of a tet10 are; the first three pairs are those of a tri6 too.
 EDGES = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
@@ -24,24 +24,24 @@ def vector(values: Iterable[float]) -> str:
     return ",".join(repr(float(value)) for value in values)
 
 
-def bone_id(bone: Body) -> str:
+def bone_id(bone: RigidBody) -> str:
     """What a bone is called in the file: its material, its elements."""
     return f"bone_{bone.name}"
 
 
-def springs_id(held: Held) -> str:
+def springs_id(attached: AttachedVertices) -> str:
     """What the springs of an attachment are called in the file: their shells on the bone, their surfaces."""
-    return f"springs_{held.attachment}"
+    return f"springs_{attached.attachment}"
 
 
-def by_springs(problem: Problem) -> list[Held]:
-    """The attachments that springs hold."""
-    return [held for held in problem.held if held.stiffness is not None]
+def by_springs(problem: Problem) -> list[AttachedVertices]:
+    """The attachments by springs."""
+    return [attached for attached in problem.attached if attached.stiffness is not None]
 
 
-def exactly(problem: Problem) -> list[Held]:
+def exactly(problem: Problem) -> list[AttachedVertices]:
     """The attachments whose nodes move with their bone."""
-    return [held for held in problem.held if held.stiffness is None]
+    return [attached for attached in problem.attached if attached.stiffness is None]
 
 
 def quadratic(mesh: TetMesh) -> tuple[Floats, Ints]:
@@ -52,8 +52,8 @@ def quadratic(mesh: TetMesh) -> tuple[Floats, Ints]:
     return np.vstack([mesh.points, mesh.points[edges].mean(axis=1)]), np.hstack([mesh.tets, middles])
 
 
-def pushing(problem: Problem) -> list[Body]:
-    """The bones that push on the muscle."""
+def obstacles(problem: Problem) -> list[RigidBody]:
+    """The bones in contact with the muscle."""
     contact = problem.contact
     return [bone for bone in problem.bones if contact is not None and contact.is_by(bone.name)]
 
@@ -80,17 +80,17 @@ class Mesh:
         for bone in self.problem.bones:
             surface = outward(bone.surface)
             groups.append((bone_id(bone), "tri3", surface.points, surface.triangles))
-        groups += [(springs_id(held), "tri6", *self._copy(held)) for held in by_springs(self.problem)]
+        groups += [(springs_id(attached), "tri6", *self._copy(attached)) for attached in by_springs(self.problem)]
         before = np.cumsum([0, *(len(points) for _, _, points, _ in groups[:-1])])
         cells = {name: own + first for (name, _, _, own), first in zip(groups, before, strict=True)}
         for (name, _, points, _), first in zip(groups, before.tolist(), strict=True):
             self._nodes(mesh, f"{name}_nodes", points, first)
         self._elements(mesh, {name: kind for name, kind, _, _ in groups}, cells)
-        self._held(mesh)
+        self._attached(mesh)
         if self.problem.contact is not None:
-            self._pushed(mesh, cells)
-        for held in by_springs(self.problem):
-            self._tied(mesh, held, cells[springs_id(held)])
+            self._contact_surface(mesh, cells)
+        for attached in by_springs(self.problem):
+            self._tied(mesh, attached, cells[springs_id(attached)])
 
     @staticmethod
     def _nodes(mesh: Element, name: str, points: Floats, before: int) -> None:
@@ -113,40 +113,40 @@ class Mesh:
         middles = [self.middles[a, b] for a, b in ends]
         return np.hstack([facets, np.reshape(np.array(middles, np.int64), (-1, 3))])
 
-    def _area(self, held: Held) -> Ints:
-        """The triangles (m, 6) that an attachment holds, outward."""
-        own = set(map(tuple, np.sort(self.problem.mesh.facets[held.attachment], axis=1).tolist()))
+    def _area(self, attached: AttachedVertices) -> Ints:
+        """The triangles (m, 6) of an attachment, outward."""
+        own = set(map(tuple, np.sort(self.problem.mesh.facets[attached.attachment], axis=1).tolist()))
         mine = [tuple(facet) in own for facet in np.sort(self.outer, axis=1).tolist()]
         return self._curved(self.outer[mine])
 
-    def _copy(self, held: Held) -> tuple[Floats, Ints]:
-        """Points (n, 3) [mm] and triangles (m, 6) that coincide with the area held and face it, as FEBio's pairs must."""
-        used, triangles = np.unique(self._area(held)[:, FACING], return_inverse=True)
+    def _copy(self, attached: AttachedVertices) -> tuple[Floats, Ints]:
+        """Points (n, 3) [mm] and triangles (m, 6) that coincide with the area attached and face it, as FEBio's pairs must."""
+        used, triangles = np.unique(self._area(attached)[:, FACING], return_inverse=True)
         return self.points[used], triangles.reshape(-1, 6)
 
-    def _held(self, mesh: Element) -> None:
+    def _attached(self, mesh: Element) -> None:
         taken: set[int] = set()
-        for held in exactly(self.problem):
-            nodes = set(self._curved(self.problem.mesh.facets[held.attachment]).ravel().tolist()) - taken
+        for attached in exactly(self.problem):
+            nodes = set(self._curved(self.problem.mesh.facets[attached.attachment]).ravel().tolist()) - taken
             taken |= nodes
-            name = f"held_{held.attachment}"
+            name = f"held_{attached.attachment}"
             SubElement(mesh, "NodeSet", name=name).text = ",".join(str(node + 1) for node in sorted(nodes))
 
-    def _pushed(self, mesh: Element, cells: dict[str, Ints]) -> None:
-        """The surface that bones push on: none of what is held, nor its neighbours."""
-        held = np.concatenate([np.zeros((0, 3), np.int64), *self.problem.mesh.facets.values()])
-        free = self.outer[~np.isin(self.outer, held).any(axis=1)]
+    def _contact_surface(self, mesh: Element, cells: dict[str, Ints]) -> None:
+        """The contact surface: none of what is attached, nor its neighbours."""
+        attached = np.concatenate([np.zeros((0, 3), np.int64), *self.problem.mesh.facets.values()])
+        free = self.outer[~np.isin(self.outer, attached).any(axis=1)]
         self._surface(mesh, "muscle_free", "tri6", self._curved(free))
-        names = [bone_id(bone) for bone in pushing(self.problem)]
+        names = [bone_id(bone) for bone in obstacles(self.problem)]
         for name in names:
             self._surface(mesh, f"{name}_surface", "tri3", cells[name])
         for name in names:
             self._pair(mesh, f"{name}_pair", "muscle_free", f"{name}_surface")
 
-    def _tied(self, mesh: Element, held: Held, copy: Ints) -> None:
-        """The area held and its rigid copy, the primary one: FEBio integrates over that."""
-        name = springs_id(held)
-        self._surface(mesh, f"{name}_muscle", "tri6", self._area(held))
+    def _tied(self, mesh: Element, attached: AttachedVertices, copy: Ints) -> None:
+        """The area attached and its rigid copy, the primary one: FEBio integrates over that."""
+        name = springs_id(attached)
+        self._surface(mesh, f"{name}_muscle", "tri6", self._area(attached))
         self._surface(mesh, f"{name}_bone", "tri6", copy)
         self._pair(mesh, f"{name}_pair", f"{name}_bone", f"{name}_muscle")
 

@@ -53,11 +53,11 @@ def _write_tables(problem: Problem, folder: Path) -> None:
     ]
     entries = [f"m{row}{column}" for row in range(4) for column in range(4)]
     _write_csv(folder / "poses.csv", ("bone", "frame", *entries), poses)
-    held = [(one.attachment, one.bone.name, vertex) for one in problem.held for vertex in one.vertices.tolist()]
-    _write_csv(folder / "attachments.csv", ("attachment", "bone", "vertex"), held)
+    attached = [(one.attachment, one.bone.name, vertex) for one in problem.attached for vertex in one.vertices.tolist()]
+    _write_csv(folder / "attachments.csv", ("attachment", "bone", "vertex"), attached)
     facets = [
         (one.attachment, one.bone.name, *facet)
-        for one in problem.held
+        for one in problem.attached
         for facet in problem.mesh.facets[one.attachment].tolist()
     ]
     _write_csv(folder / "attachment_facets.csv", ("attachment", "bone", "a", "b", "c"), facets)
@@ -79,7 +79,7 @@ def facts(scene: Scene, problem: Problem) -> dict[str, Any]:
     """What no mesh file says: units, conventions, frames, bones, attachments, effects with the unit of every parameter."""
     bones = [
         entry.model_dump(mode="json", exclude_none=True, exclude={"surface", "unit"}) | {"file": name, "pushes": pushes}
-        for entry, name, pushes in zip(scene.bone, bone_files(problem), _pushes(problem), strict=True)
+        for entry, name, pushes in zip(scene.bone, bone_files(problem), _are_obstacles(problem), strict=True)
     ]
     return {
         "case": scene.name,
@@ -91,15 +91,15 @@ def facts(scene: Scene, problem: Problem) -> dict[str, Any]:
         "interval": {"value": problem.interval, "unit": "s", "of": "a frame number to the next"},
         "bones": bones,
         "attachments": [
-            {"name": held.attachment, "bone": held.bone.name, "stiffness": held.stiffness, "unit": "MPa/mm"}
-            for held in problem.held
+            {"name": attached.attachment, "bone": attached.bone.name, "stiffness": attached.stiffness, "unit": "MPa/mm"}
+            for attached in problem.attached
         ],
         "effects": [_effect(effect) for effect in problem.effects],
         "mesh": problem.mesh_facts,
     }
 
 
-def _pushes(problem: Problem) -> list[bool]:
+def _are_obstacles(problem: Problem) -> list[bool]:
     contact = problem.contact
     return [contact is not None and contact.is_by(bone.name) for bone in problem.bones]
 

@@ -1,4 +1,4 @@
-"""What stands beside exported data: how to read it, how to hand frames back. The texts are files of this folder."""
+"""The texts beside exported data: how to read it, how to return frames. The texts are files of this folder."""
 
 from pathlib import Path
 from string import Template

@@ -1,1 +1,1 @@
-"""What everything stands on: errors, units, records, formulas, meshes as arrays, rigid motions, subprocesses."""
+"""Foundations of all packages: errors, units, records, formulas, meshes as arrays, rigid motions, subprocesses."""

@@ -29,14 +29,14 @@ def parse[R: Record](record: type[R], table: object, place: str) -> R:
 
 
 def _frozen(value: Any) -> Any:
-    """Lists as the tuples that records hold."""
+    """Lists as the tuples of records."""
     if isinstance(value, dict):
         return {key: _frozen(inside) for key, inside in value.items()}
     return tuple(_frozen(inside) for inside in value) if isinstance(value, list) else value
 
 
 def _as_written(value: Any) -> Any:
-    """Tuples as the lists that files hold."""
+    """Tuples as the lists of files."""
     if isinstance(value, dict):
         return {key: _as_written(inside) for key, inside in value.items()}
     return [_as_written(inside) for inside in value] if isinstance(value, tuple) else value

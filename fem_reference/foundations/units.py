@@ -1,6 +1,6 @@
 """Text with a unit -> a number in mm, N, MPa, s, rad, tonne: the only place where a unit is text.
 
-The annotated types are what scene records are made of: a field of type ``Pressure`` takes ``"30 kPa"`` and holds 0.03.
+The annotated types are what scene records are made of: a field of type ``Pressure`` takes ``"30 kPa"`` and stores 0.03.
 """
 
 import math
@@ -61,7 +61,7 @@ def quantity(text: object, kind: str) -> float:
         same = read.to_root_units().units == _registry().Quantity(1.0, _INSIDE[kind]).to_root_units().units
     except Exception as error:  # pint raises its own errors, tokenizer errors and TypeError for text that is no unit
         raise wrong from error
-    if not math.isfinite(value) or not same:  # to pint an angle has no dimension, its root unit tells it apart
+    if not math.isfinite(value) or not same:  # to pint an angle has no dimension, its root unit distinguishes it
         raise wrong
     return value
 

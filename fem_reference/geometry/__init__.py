@@ -1,1 +1,1 @@
-"""What is pure geometry: distances, intersections, tetrahedra, attachments, embedding, fibres, extension."""
+"""Geometry: distances, intersections, tetrahedra, attachments, embedding, fibres, extension."""

@@ -1,4 +1,4 @@
-"""Grids of boxes, each cut into Kuhn's six tetrahedra, all the same way: they nest where one grid refines another.
+"""Grids of boxes, each cut into Kuhn's six tetrahedra, all in the same directions: they nest where one grid refines another.
 
 A cell is cut along the diagonal from its lowest to its highest corner, and so is every face of it.
 """
@@ -35,9 +35,9 @@ def kuhn(counts: Counts) -> tuple[Ints, Ints]:
     lowest = np.indices(counts).reshape(3, -1).T @ strides
     tets = []
     for order in permutations(range(3)):
-        way = np.cumsum([0, *strides[list(order)]])
+        path = np.cumsum([0, *strides[list(order)]])
         upright = np.linalg.det(np.eye(3)[list(order)]) > 0
-        tets.append(lowest[:, None] + (way if upright else way[[0, 2, 1, 3]]))
+        tets.append(lowest[:, None] + (path if upright else path[[0, 2, 1, 3]]))
     return nodes, np.stack(tets, axis=1).reshape(-1, 4)
 
 

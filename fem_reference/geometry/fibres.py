@@ -20,7 +20,7 @@ from fem_reference.geometry.embedding import Locator
 
 _POINTS = 40  # of each line
 _NEAR = 1e-3  # the field this close to 0 or 1 counts as having arrived
-# Seeds that differ by less, relatively, are told apart by their number, so that a turned mesh gives the same lines.
+# Seeds that differ by less, relatively, are distinguished by their number, so that a turned mesh gives the same lines.
 _TIES = 1e-6
 _HALFWAY = 0.5 - _TIES  # where the field is 1/2 but for round-off it is above
 

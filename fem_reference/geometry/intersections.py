@@ -64,8 +64,8 @@ def _pierces(surface: Surface, edges: Ints, triangles: Ints) -> NDArray[np.bool_
     a, b, c = (surface.points[triangles[apart, corner]] for corner in range(3))
     normal = np.cross(b - a, c - a)
     crosses = _dot(normal, begin - a) * _dot(normal, end - a) < 0
-    way = end - begin
-    turns = np.stack([_dot(way, np.cross(p - begin, q - begin)) for p, q in ((a, b), (b, c), (c, a))])
+    direction = end - begin
+    turns = np.stack([_dot(direction, np.cross(p - begin, q - begin)) for p, q in ((a, b), (b, c), (c, a))])
     inside = (turns >= 0).all(axis=0) | (turns <= 0).all(axis=0)
     result = np.zeros(len(edges), bool)
     result[apart] = crosses & inside

@@ -79,9 +79,13 @@ def _along_rims(parts: Parts) -> Floats:
     before, after = parts.points[neighbours[:, 0]] - points[inner], parts.points[neighbours[:, 1]] - points[inner]
     lengths = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
     straight = -np.einsum("ij,ij->i", before, after) > _STRAIGHT * lengths
-    way = after - before
-    share = np.einsum("ij,ij->i", before + after, way) / np.maximum(np.einsum("ij,ij->i", way, way), _TINY) / 2
-    points[inner] += np.where(straight, share, 0.0)[:, None] * way
+    direction = after - before
+    share = (
+        np.einsum("ij,ij->i", before + after, direction)
+        / np.maximum(np.einsum("ij,ij->i", direction, direction), _TINY)
+        / 2
+    )
+    points[inner] += np.where(straight, share, 0.0)[:, None] * direction
     return points
 
 
@@ -173,9 +177,9 @@ def widened(parts: Parts, areas: list[float], volume: float, most: float) -> Flo
     for _ in range(_ROUNDS):
         points = np.array(parts.points)
         for label, area in enumerate(areas, start=1):
-            ways, length = _outwards(parts, label)
+            directions, length = _outwards(parts, label)
             if length > 0:
-                points += ways * np.clip((area - parts.area(label)) / length, -most, most)
+                points += directions * np.clip((area - parts.area(label)) / length, -most, most)
         parts = replace(parts, points=inflate(points, parts.triangles, volume))
     return parts.points
 
@@ -190,8 +194,8 @@ def _outwards(parts: Parts, label: int) -> tuple[Floats, float]:
     _, which, count = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
     alone = count[which.ravel()] == 1
     along = parts.points[ends[alone, 1]] - parts.points[ends[alone, 0]]
-    ways = np.zeros_like(parts.points)
+    directions = np.zeros_like(parts.points)
     for end in ends[alone].T:
-        np.add.at(ways, end, np.cross(along, normals[alone]))
-    ways /= np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), _TINY)
-    return ways, float(np.linalg.norm(along, axis=1).sum())
+        np.add.at(directions, end, np.cross(along, normals[alone]))
+    directions /= np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), _TINY)
+    return directions, float(np.linalg.norm(along, axis=1).sum())

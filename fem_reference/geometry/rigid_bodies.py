@@ -197,9 +197,9 @@ def _over(tensors: Floats, length: Floats) -> Floats:
 
 def _axis(start: Vector, end: Vector) -> tuple[NDArray[np.float64], float]:
     """The unit vector from ``start`` to ``end`` and the length between them."""
-    way = np.subtract(end, start, dtype=float)
-    extent = float(np.linalg.norm(way))
-    return way / extent, extent
+    direction = np.subtract(end, start, dtype=float)
+    extent = float(np.linalg.norm(direction))
+    return direction / extent, extent
 
 
 def _check_length(place: str, length: float) -> None:

@@ -1,4 +1,4 @@
-"""Rims of attachments as edges of a coarse surface: where a bone's hold ends, so do the triangles that it holds."""
+"""Rims of attachments as edges of a coarse surface: the triangles end where the attachment ends."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -13,7 +13,7 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, enclosed_volum
 from fem_reference.geometry.coarsening import flip_edges, free_part
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.parts import Parts, between, relaxed, widened
-from fem_reference.geometry.sectors import held_area, sectors, shares_at
+from fem_reference.geometry.sectors import attached_area, sectors, shares_at
 
 Bools = NDArray[np.bool_]
 
@@ -33,23 +33,23 @@ _TRIALS = 10  # of the level whose area is nearest
 
 
 def with_rims(coarse: Surface, fine: Surface, shares: Mapping[str, Floats], size: float) -> tuple[Surface, Ints]:
-    """``coarse`` with edges along the rim of each attachment, and the label (m,) of each of its triangles: 0 free, i + 1 held by
-    attachment i.
+    """``coarse`` with edges along the rim of each attachment, and the label (m,) of each of its triangles: 0 free, i + 1 attached
+    by attachment i.
 
-    ``shares`` (k, 3) say how far the corners of the triangles of ``fine`` are held. They are smoothed over a tenth of ``size``
+    ``shares`` (k, 3) say how far the corners of the triangles of ``fine`` are attached. They are smoothed over a tenth of ``size``
     [mm], which drops single vertices and pinholes; the rim is the level of them that encloses the area they have. Vertices near
     it move onto it and edges across it are cut there (Labelle and Shewchuk 2007, doi 10.1145/1276377.1276448, for surfaces).
     """
     parts = Parts(
         coarse.points, coarse.triangles, np.zeros(len(coarse.triangles), np.int64), np.zeros(len(coarse.points), bool)
     )
-    for label, held in enumerate(shares.values(), start=1):
-        area = held_area(fine, held)
-        smooth = _smoothed(fine, held, _SMOOTHED * size)
+    for label, attached in enumerate(shares.values(), start=1):
+        area = attached_area(fine, attached)
+        smooth = _smoothed(fine, attached, _SMOOTHED * size)
         parts = _seeded(parts, fine, smooth, _ISLAND * size**2)
         parts = _best(parts, fine, smooth, label, area)
     parts = relaxed(parts, fine, size)
-    areas = [held_area(fine, held) for held in shares.values()]
+    areas = [attached_area(fine, attached) for attached in shares.values()]
     points = widened(parts, areas, enclosed_volume(fine.points, fine.triangles), _WIDENED * size)
     return Surface(points, parts.triangles, coarse.place), parts.labels
 
@@ -80,9 +80,9 @@ def _smoothed(surface: Surface, shares: Floats, length: float) -> Floats:
 def _seeded(parts: Parts, fine: Surface, shares: Floats, least: float) -> Parts:
     """The parts with a point in the middle of each island of an attachment, of at least ``least`` [mm2], that has none."""
     number = _islands(fine, shares)
-    held = number >= 0
+    attached = number >= 0
     sizes = np.bincount(
-        number[held], np.repeat(triangle_areas(fine.points, fine.triangles) / 3, 3).reshape(-1, 3)[held]
+        number[attached], np.repeat(triangle_areas(fine.points, fine.triangles) / 3, 3).reshape(-1, 3)[attached]
     )
     nearest = distances(parts.points, fine)
     corner = nearest.barycentric.argmax(axis=1)
@@ -102,11 +102,11 @@ def _seeded(parts: Parts, fine: Surface, shares: Floats, least: float) -> Parts:
 
 def _islands(fine: Surface, shares: Floats) -> Ints:
     """The number (m, 3) of the connected island of shares above a half that each corner is in, -1 outside all."""
-    held = np.zeros(len(fine.points), bool)
-    held[fine.triangles[shares > 1 / 2]] = True
+    attached = np.zeros(len(fine.points), bool)
+    attached[fine.triangles[shares > 1 / 2]] = True
     ends = fine.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    ends = ends[held[ends].all(axis=1)]
-    links = coo_array((np.ones(len(ends), bool), tuple(ends.T)), shape=(len(held), len(held)))
+    ends = ends[attached[ends].all(axis=1)]
+    links = coo_array((np.ones(len(ends), bool), tuple(ends.T)), shape=(len(attached), len(attached)))
     part = connected_components(links, directed=False)[1][fine.triangles]
     return np.where(shares > 1 / 2, part, -1)
 
@@ -215,8 +215,8 @@ def _snapped(parts: Parts, fine: Surface, crossings: _Crossings) -> tuple[Floats
     ends, fractions = crossings.ends[across], crossings.fractions[across]
     point = np.concatenate([ends[:, 0], ends[:, 1]])
     share = np.concatenate([fractions[:, 0], 1 - fractions[:, 1]])
-    way = parts.points[ends[:, 1]] - parts.points[ends[:, 0]]
-    shift = np.concatenate([way, -way]) * share[:, None]
+    direction = parts.points[ends[:, 1]] - parts.points[ends[:, 0]]
+    shift = np.concatenate([direction, -direction]) * share[:, None]
     free = free_part(parts.points, parts.triangles, point, shift)
     stuck = parts.rim[point] | (np.linalg.norm(shift - free, axis=1) > np.linalg.norm(shift, axis=1) / 3)
     near = share < np.where(stuck, np.where(parts.rim[point], _NEAR, _THERE), _NEAR)

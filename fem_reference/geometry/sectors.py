@@ -1,4 +1,4 @@
-"""Smooth sectors around the vertices of a surface, and how far an attachment's vertices hold its triangles."""
+"""Smooth sectors around the vertices of a surface, and how far its triangles are attached."""
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -30,11 +30,11 @@ def sectors(surface: Surface) -> Ints:
     return np.asarray(connected_components(links, directed=False)[1], np.int64).reshape(-1, 3)
 
 
-def held_shares(surface: Surface, vertices: Ints) -> Floats:
-    """Whether each corner (m, 3) of the triangles of ``surface`` is held by attached ``vertices`` (k,): 1 or 0.
+def attached_shares(surface: Surface, vertices: Ints) -> Floats:
+    """Whether each corner (m, 3) of the triangles of ``surface`` is attached by attached ``vertices`` (k,): 1 or 0.
 
-    A vertex on a sharp edge holds only the sides of the edge on which it holds a whole triangle, if there is one: the end of a
-    muscle, and not a strip of the belly around it that has no width of its own.
+    A vertex on a sharp edge attaches only the sides of the edge on which it attaches a whole triangle, if there is one: the end
+    of a muscle, and not a strip of the belly around it that has no width of its own.
     """
     attached = np.zeros(len(surface.points), bool)
     attached[vertices] = True
@@ -48,8 +48,8 @@ def held_shares(surface: Surface, vertices: Ints) -> Floats:
     return np.where(attached[triangles] & (sector_whole[number] | ~vertex_whole[triangles]), 1.0, 0.0)
 
 
-def held_area(surface: Surface, shares: Floats) -> float:
-    """The area [mm2] that the ``shares`` (m, 3) of the corners hold of ``surface``."""
+def attached_area(surface: Surface, shares: Floats) -> float:
+    """The area [mm2] that the ``shares`` (m, 3) of the corners attach of ``surface``."""
     return float(triangle_areas(surface.points, surface.triangles) @ shares.mean(axis=1))
 
 

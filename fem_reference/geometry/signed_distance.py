@@ -264,6 +264,6 @@ def _around(surface: Surface, reach: float) -> Floats:
     random = np.random.default_rng(1)
     areas = triangle_areas(surface.points, surface.triangles)
     corners = surface.points[surface.triangles[random.choice(len(areas), _PROBES, p=areas / areas.sum())]]
-    way = random.normal(size=(_PROBES, 3))
-    way *= reach * random.uniform(size=(_PROBES, 1)) / np.linalg.norm(way, axis=1, keepdims=True)
-    return np.asarray(np.einsum("nk,nkd->nd", random.dirichlet(np.ones(3), _PROBES), corners) + way)
+    shift = random.normal(size=(_PROBES, 3))
+    shift *= reach * random.uniform(size=(_PROBES, 1)) / np.linalg.norm(shift, axis=1, keepdims=True)
+    return np.asarray(np.einsum("nk,nkd->nd", random.dirichlet(np.ones(3), _PROBES), corners) + shift)

@@ -35,9 +35,9 @@ def free_skin(surface: Surface, free: NDArray[np.bool_], mesh: TetMesh, apart: f
     return _skin(surface.points[triangles], np.ones(triangles.shape), mesh, apart)
 
 
-def held_skin(surface: Surface, shares: Floats, mesh: TetMesh, apart: float) -> Skin:
-    """The part of a ``surface`` whose triangles are held to the ``shares`` (m, 3) of their corners, linearly between them: the
-    areas are those held.
+def attached_skin(surface: Surface, shares: Floats, mesh: TetMesh, apart: float) -> Skin:
+    """The part of a ``surface`` whose triangles are attached to the ``shares`` (m, 3) of their corners, linearly between them: the
+    areas are those attached.
     """
     some = shares.any(axis=1)
     return _skin(surface.points[surface.triangles[some]], shares[some], mesh, apart)

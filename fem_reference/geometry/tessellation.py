@@ -16,7 +16,7 @@ _REACH, _THICKNESS = 1.5, 0.1
 
 
 def tessellated(solid: Obstacle, beside: Floats, place: str, turn: int = TURN) -> Surface:
-    """The outward surface of a ``solid`` with ``turn`` sides a full turn; errors in it are told of ``place``.
+    """The outward surface of a ``solid`` with ``turn`` sides a full turn; errors in it name ``place``.
 
     A half-space has no end: it is a slab, closed as every other body is, that reaches past the points ``beside`` (n, 3) [mm]; of
     its vertices only those in the plane lie on the body.
@@ -57,9 +57,9 @@ def _rounded(size: Vector, rounding: float, turn: int) -> tuple[Floats, Ints]:
     """A box about the origin of outer ``size`` whose edges and corners have the radius ``rounding``."""
     corners = [_ticks(length / 2 - rounding, rounding, turn // 8) for length in size]
     lattice, triangles = lattice_skin(tuple(len(tangents) - 1 for tangents, _ in corners))  # type: ignore[arg-type]
-    way = np.stack([tangents[lattice[:, axis]] for axis, (tangents, _) in enumerate(corners)], axis=1)
+    direction = np.stack([tangents[lattice[:, axis]] for axis, (tangents, _) in enumerate(corners)], axis=1)
     middle = np.stack([centres[lattice[:, axis]] for axis, (_, centres) in enumerate(corners)], axis=1)
-    return middle + rounding * way / np.linalg.norm(way, axis=1)[:, None], triangles
+    return middle + rounding * direction / np.linalg.norm(direction, axis=1)[:, None], triangles
 
 
 def _ticks(half: float, rounding: float, count: int) -> tuple[Floats, Floats]:
@@ -95,9 +95,9 @@ def _placed(start: Vector, end: Vector) -> tuple[Floats, Floats]:
     return np.add(start, end) / 2, _frame(np.subtract(end, start, dtype=float))
 
 
-def _frame(way: Floats) -> Floats:
-    """Three right-handed unit vectors in rows (3, 3), the last along ``way`` (3,)."""
-    third = way / np.linalg.norm(way)
+def _frame(direction: Floats) -> Floats:
+    """Three right-handed unit vectors in rows (3, 3), the last along ``direction`` (3,)."""
+    third = direction / np.linalg.norm(direction)
     first = np.cross(np.eye(3)[np.abs(third).argmin()], third)
     first /= np.linalg.norm(first)
     return np.stack([first, np.cross(third, first), third])

@@ -14,7 +14,7 @@ def outer_windings(surface: Surface) -> Floats:
     """How often the surface winds round a place just outside each triangle (m,): 0 on the skin of a sound body, above 0 inside
     another part of the body, below 0 where the triangle faces a part that is inside out; NaN where a triangle has no normal.
 
-    "Just outside" is 1e-5 of the surface's diagonal away; thinner folds are not told apart. Winding numbers by Barill et al.
+    "Just outside" is 1e-5 of the surface's diagonal away; thinner folds are not distinguished. Winding numbers by Barill et al.
     2018, doi 10.1145/3197517.3201337, a few thousandths from the whole numbers they are rounded to.
     """
     points, triangles = surface.points - surface.points.mean(axis=0), surface.triangles

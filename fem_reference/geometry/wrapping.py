@@ -39,11 +39,11 @@ class Paths:
     def at(self, which: Ints, shares: Floats) -> Floats:
         """The points (m, 3) of paths ``which`` (m,) after ``shares`` (m,) of their lengths, from 0 to 1."""
         before, along, behind = self.parts[which].T
-        way = shares * (before + along + behind)
-        on = _clipped(way - before, along)
-        straight = _between(self.starts[which], self.touches[0][which], _clipped(way, before))
-        last = _between(self.touches[1][which], self.ends[which], _clipped(way - before - along, behind))
-        beyond, wraps = way > before + along, (along > 0) & (way > before)
+        path = shares * (before + along + behind)
+        on = _clipped(path - before, along)
+        straight = _between(self.starts[which], self.touches[0][which], _clipped(path, before))
+        last = _between(self.touches[1][which], self.ends[which], _clipped(path - before - along, behind))
+        beyond, wraps = path > before + along, (along > 0) & (path > before)
         return np.where(beyond[:, None], last, np.where(wraps[:, None], self._on_obstacle(which, on), straight))
 
     def _on_obstacle(self, which: Ints, share: Floats) -> Floats:
@@ -171,9 +171,9 @@ def _units(normals: Floats, arms: Floats) -> Floats:
     return np.asarray(chosen / np.linalg.norm(chosen, axis=1)[:, None])
 
 
-def _clipped(way: Floats, length: Floats) -> Floats:
-    """``way`` as a share of ``length``, from 0 to 1; 0 where there is no length."""
-    return np.clip(way / np.where(length > 0, length, 1.0), 0.0, 1.0)
+def _clipped(path: Floats, length: Floats) -> Floats:
+    """``path`` as a share of ``length``, from 0 to 1; 0 where there is no length."""
+    return np.clip(path / np.where(length > 0, length, 1.0), 0.0, 1.0)
 
 
 def _between(one: Floats, other: Floats, shares: Floats) -> Floats:

@@ -249,9 +249,9 @@ def _vtk_data(path: Path) -> Any:
     reader.SetFileName(str(path))
     with _vtk_messages() as messages:
         reader.Update()
-    told = messages.GetOutput()
-    if "error" in told.lower():
-        words = re.sub(r"^.*: In .*\n|^vtk\w+ \(0x\w+\): | for file: .*", "", told, flags=re.MULTILINE)
+    printed = messages.GetOutput()
+    if "error" in printed.lower():
+        words = re.sub(r"^.*: In .*\n|^vtk\w+ \(0x\w+\): | for file: .*", "", printed, flags=re.MULTILINE)
         raise ValueError(words.split("\n")[0])
     return reader.GetOutput()
 

@@ -104,7 +104,7 @@ def read_ply(path: Path) -> Soup:
 
 
 def _ply_element(body: bytes, count: int, properties: list[list[str]], types: dict[str, str]) -> tuple[Any, bytes]:
-    """The table of an element and what follows it; the first row tells how long its lists are."""
+    """The table of an element and what follows it; the first row states how long its lists are."""
     fields: list[tuple[Any, ...]] = []
     for *kind, name in properties:
         if kind[0] == "list":

@@ -1,4 +1,4 @@
-"""What is measured: one file per metric, named as in scene files and JSON. A metric cannot tell who made a run.
+"""Metrics: one file each, named as in scene files and JSON. A metric does not know the solver of a run.
 
 Contract (tests/test_metrics.py): zero against itself, a known change gives a known value, NaN stays NaN, units stated. One
 metric, penetration, is of the run alone: against itself too it is what it is.
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Polylines, vertex_areas
 from fem_reference.geometry.extension import Extension
-from fem_reference.problems.muscle import Body
+from fem_reference.problems.muscle import RigidBody
 from fem_reference.runs.store import Run
 
 
@@ -36,7 +36,7 @@ class Measure:
 
 
 @dataclass(frozen=True, eq=False)
-class Yardstick:
+class MeasurementContext:
     """What every run of a scene is measured with, the same for all: ``areas`` (n,) [mm2] around the surface's vertices at rest,
     the ``fibres`` at rest and the ``extension`` that carries a surface's displacement to their points, ``travel`` [mm], the
     greatest displacement of the reference's surface over its frames, and the ``bones``, with the vertices that are ``free`` (n,)
@@ -47,14 +47,14 @@ class Yardstick:
     fibres: Polylines
     extension: Extension
     travel: float
-    bones: tuple[Body, ...]
+    bones: tuple[RigidBody, ...]
     free: NDArray[np.bool_]
 
     @classmethod
     def of(
-        cls, reference: Run, fibres: Polylines, bones: tuple[Body, ...], free: NDArray[np.bool_] | None = None
-    ) -> "Yardstick":
-        """The yardstick of a reference run; without ``free`` (n,), nothing is held."""
+        cls, reference: Run, fibres: Polylines, bones: tuple[RigidBody, ...], free: NDArray[np.bool_] | None = None
+    ) -> "MeasurementContext":
+        """The measurement context of a reference run; without ``free`` (n,), every vertex is free."""
         rest = reference.surface
         return cls(
             areas=vertex_areas(rest.points, rest.triangles),
@@ -87,13 +87,15 @@ def of_lines(name: str) -> bool:
     return getattr(importlib.import_module(f"{__name__}.{name}"), "OF_LINES", False)
 
 
-def measure(run: Run, reference: Run, yardstick: Yardstick, wanted: Iterable[str] | None = None) -> tuple[Measure, ...]:
+def measure(
+    run: Run, reference: Run, context: MeasurementContext, wanted: Iterable[str] | None = None
+) -> tuple[Measure, ...]:
     """Every statistic of every metric (or of those ``wanted``) of ``run`` against ``reference``, frame by frame; both must have
     the same frames. Of a run without a surface only what needs none.
     """
     chosen = [name for name in (names() if wanted is None else wanted) if run.has_surface or of_lines(name)]
     modules = (importlib.import_module(f"{__name__}.{name}") for name in chosen)
-    return tuple(statistic for module in modules for statistic in module.measure(run, reference, yardstick))
+    return tuple(statistic for module in modules for statistic in module.measure(run, reference, context))
 
 
 def find(measures: Iterable[Measure], metric: str, statistic: str) -> Measure | None:
@@ -102,7 +104,7 @@ def find(measures: Iterable[Measure], metric: str, statistic: str) -> Measure | 
 
 
 def at_rest(run: Run) -> Run:
-    """The rest state of ``run``, fibres too, repeated over its frames: against it, a run tells its change from rest."""
+    """The rest state of ``run``, fibres too, repeated over its frames: against it, a run reports its change from rest."""
     frames = len(run.numbers)
     still = np.broadcast_to(run.surface.points, (frames, *run.surface.points.shape))
     fibres = None if run.fibres is None else np.broadcast_to(run.fibres.points, (frames, *run.fibres.points.shape))

@@ -7,14 +7,14 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.edges import Edges
-from fem_reference.metrics import Measure, Yardstick, percentile, rms
+from fem_reference.metrics import Measure, MeasurementContext, percentile, rms
 from fem_reference.metrics.edge_extension import worst_edges
 from fem_reference.runs.store import Run
 
 UNITS = dict.fromkeys(("mean", "mean_magnitude", "rms", "p95", "max", "mean_magnitude_of_edges"), "deg")
 
 
-def measure(run: Run, reference: Run, _yardstick: Yardstick) -> tuple[Measure, ...]:
+def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Measure, ...]:
     """Over the edges, of the angle less that of the reference [deg], in (-180, 180]: the signed ``mean`` (above zero: more
     convex), the ``rms``, and of the magnitude the mean ``mean_magnitude``, the 95th percentile ``p95`` and the greatest ``max``.
 

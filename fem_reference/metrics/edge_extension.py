@@ -7,14 +7,14 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.edges import Edges
-from fem_reference.metrics import Measure, Yardstick, percentile, rms
+from fem_reference.metrics import Measure, MeasurementContext, percentile, rms
 from fem_reference.runs.store import Run
 
 UNITS = dict.fromkeys(("mean", "rms", "p95", "max", "mean_of_edges"), "%")
 
 
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")
-def measure(run: Run, reference: Run, _yardstick: Yardstick) -> tuple[Measure, ...]:
+def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Measure, ...]:
     """Over the edges, of (l - l_reference) / L with the length L at rest [%]: the signed ``mean``, the ``rms``, and of the
     magnitude the 95th percentile ``p95`` and the greatest ``max``.
 

@@ -1,7 +1,7 @@
 """How much longer or shorter each fibre of a run is than the same fibre of the reference, frame by frame.
 
-Two runs that both carry the yardstick's fibres inside themselves are measured on those; otherwise the surfaces of
-both go through the yardstick's extension, so that like is compared with like. A run of lines alone (a line of action)
+Two runs that both carry the measurement context's fibres inside themselves are measured on those; otherwise the surfaces of
+both go through the measurement context's extension, so that like is compared with like. A run of lines alone (a line of action)
 puts its own points in the place of the fibres': its whole length is compared, so that it deviates at rest already where
 a straight line is shorter than the fibre. That is its error, and no change of length from its own rest makes up for it.
 """
@@ -9,26 +9,26 @@ a straight line is shorter than the fibre. That is its error, and no change of l
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats
-from fem_reference.metrics import Measure, Yardstick
+from fem_reference.metrics import Measure, MeasurementContext
 from fem_reference.runs.store import Run
 
 UNITS = {"mean": "mm", "rms": "mm", "max": "mm", "mean_percent": "%", "rms_percent": "%", "max_percent": "%"}
-# Fibre points of a run this close [mm] to the yardstick's are the same points, after a file of single precision.
+# Fibre points of a run this close [mm] to the measurement context's are the same points, after a file of single precision.
 _SAME = 1e-3
-# And where a run has its lines alone: a reference whose overlaps with bones were pushed out begins that far from the rest state.
+# And where a run has its lines alone: a reference whose overlaps with bones were removed begins that far from the rest state.
 _RELAXED = 5.0
 OF_LINES = True
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def measure(run: Run, reference: Run, yardstick: Yardstick) -> tuple[Measure, ...]:
+def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
     """Over the fibres, of L - L_reference: the signed ``mean``, the ``rms`` and the greatest magnitude ``max`` [mm].
 
     And ``mean_percent``, ``rms_percent`` and ``max_percent`` of it in per cent of each fibre's length at rest.
     """
-    lengths = _direct if _carries(run, yardstick) and _carries(reference, yardstick) else _extended
-    longer = lengths(run, yardstick) - lengths(reference, yardstick)
-    percent = 100 * longer / yardstick.fibres.lengths()
+    lengths = _direct if _carries(run, context) and _carries(reference, context) else _extended
+    longer = lengths(run, context) - lengths(reference, context)
+    percent = 100 * longer / context.fibres.lengths()
     statistics = (
         ("mean", longer.mean(axis=1), longer),
         ("rms", _rms(longer), longer),
@@ -44,36 +44,36 @@ def measure(run: Run, reference: Run, yardstick: Yardstick) -> tuple[Measure, ..
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def extension_error(reference: Run, yardstick: Yardstick) -> Measure:
+def extension_error(reference: Run, context: MeasurementContext) -> Measure:
     """The greatest error [mm] over the fibres that the extension makes on the reference's own surface.
 
-    The error is L by extension less L inside; NaN where the reference does not carry the yardstick's fibres.
+    The error is L by extension less L inside; NaN where the reference does not carry the measurement context's fibres.
     """
-    if _carries(reference, yardstick):
-        errors = _extended(reference, yardstick) - _direct(reference, yardstick)
+    if _carries(reference, context):
+        errors = _extended(reference, context) - _direct(reference, context)
     else:
-        errors = np.full((len(reference.positions), len(yardstick.fibres)), np.nan)
+        errors = np.full((len(reference.positions), len(context.fibres)), np.nan)
     return Measure("fibre_length", "extension_error", "mm", np.abs(errors).max(axis=1), _worst(errors))
 
 
-def _carries(run: Run, yardstick: Yardstick) -> bool:
-    """Whether the fibres of ``run`` are those of the yardstick."""
-    if run.fibres is None or run.fibre_positions is None or run.fibres.points.shape != yardstick.fibres.points.shape:
+def _carries(run: Run, context: MeasurementContext) -> bool:
+    """Whether the fibres of ``run`` are those of the measurement context."""
+    if run.fibres is None or run.fibre_positions is None or run.fibres.points.shape != context.fibres.points.shape:
         return False
-    same_lines = np.array_equal(run.fibres.offsets, yardstick.fibres.offsets)
+    same_lines = np.array_equal(run.fibres.offsets, context.fibres.offsets)
     within = _SAME if run.has_surface else _RELAXED
-    return same_lines and np.allclose(run.fibres.points, yardstick.fibres.points, rtol=0, atol=within)
+    return same_lines and np.allclose(run.fibres.points, context.fibres.points, rtol=0, atol=within)
 
 
-def _direct(run: Run, yardstick: Yardstick) -> Floats:
+def _direct(run: Run, context: MeasurementContext) -> Floats:
     """Length of each fibre in each frame (f, k) [mm], on the run's own fibre points."""
     assert run.fibre_positions is not None  # the caller asked _carries
-    return np.array([yardstick.fibres.lengths(points) for points in run.fibre_positions])
+    return np.array([context.fibres.lengths(points) for points in run.fibre_positions])
 
 
-def _extended(run: Run, yardstick: Yardstick) -> Floats:
+def _extended(run: Run, context: MeasurementContext) -> Floats:
     """Length of each fibre in each frame (f, k) [mm], on points that the surface carries along."""
-    return np.array([yardstick.fibres.lengths(yardstick.extension.apply(points)) for points in run.positions])
+    return np.array([context.fibres.lengths(context.extension.apply(points)) for points in run.positions])
 
 
 def _rms(deviations: Floats) -> Floats:

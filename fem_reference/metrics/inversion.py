@@ -1,6 +1,6 @@
 """How much of a run's surface is turned inside out or lies within another part of the body, against the reference.
 
-It is told from the surface alone, so of every run; where a solver has an interior, its smallest det F says more.
+It is computed from the surface alone, so of every run; where a solver has an interior, its smallest det F says more.
 """
 
 from functools import lru_cache
@@ -9,13 +9,13 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats, triangle_areas
 from fem_reference.geometry.windings import outer_windings
-from fem_reference.metrics import Measure, Yardstick
+from fem_reference.metrics import Measure, MeasurementContext
 from fem_reference.runs.store import Run
 
 UNITS = {"inside_out": "%", "overlapping": "%"}
 
 
-def measure(run: Run, reference: Run, _yardstick: Yardstick) -> tuple[Measure, ...]:
+def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Measure, ...]:
     """Shares of the surface, by its area at rest, less those of the reference [%]: ``inside_out``, triangles whose outer side
     faces a part of the body that is turned inside out, and ``overlapping``, those that lie inside another part of it.
 

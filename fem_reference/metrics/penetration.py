@@ -1,6 +1,6 @@
 """How far a run's surface is inside the bones, and how much of the muscle; of the run alone, whatever the reference does.
 
-Asked of the same field of distances that contact pushes with. Attached vertices are exempt, and their neighbours: bones hold
+Asked of the same field of distances that contact uses. Attached vertices are exempt, and their neighbours: bones hold
 them.
 """
 
@@ -14,8 +14,8 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Surface, enclosed_volume
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.overlap import shared_volume
-from fem_reference.metrics import Measure, Yardstick
-from fem_reference.problems.muscle import Body
+from fem_reference.metrics import Measure, MeasurementContext
+from fem_reference.problems.muscle import RigidBody
 from fem_reference.runs.store import Run
 
 UNITS = {"deepest": "mm", "volume": "mm3"}
@@ -31,7 +31,7 @@ class _Worst(NamedTuple):
     where: str
 
 
-def measure(run: Run, _reference: Run, yardstick: Yardstick) -> tuple[Measure, ...]:
+def measure(run: Run, _reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
     """``deepest`` [mm], the greatest depth of a free vertex below the surface of a bone, and ``volume`` [mm3] of the muscle inside
     bones, without what is nearest to a triangle with a vertex that is not free; 0 where nothing is inside.
 
@@ -40,15 +40,15 @@ def measure(run: Run, _reference: Run, yardstick: Yardstick) -> tuple[Measure, .
     fifty times the points, smaller ones within 6 %. NaN in a frame whose surface encloses no finite volume, and in all where a
     bone is not closed: it has no inside.
     """
-    return _measured(run, yardstick)
+    return _measured(run, context)
 
 
 @lru_cache(maxsize=8)
-def _measured(run: Run, yardstick: Yardstick) -> tuple[Measure, ...]:
+def _measured(run: Run, context: MeasurementContext) -> tuple[Measure, ...]:
     """The same for every reference, so once for all of them."""
-    lost = _without_inside(yardstick.bones)
+    lost = _without_inside(context.bones)
     frames = [
-        [_Worst(np.nan, lost)] * 2 if lost or not _is_body(surface) else _frame(surface, number, yardstick)
+        [_Worst(np.nan, lost)] * 2 if lost or not _is_body(surface) else _frame(surface, number, context)
         for number, surface in zip(run.numbers, map(run.surface.moved_to, run.positions), strict=True)
     ]
     return tuple(
@@ -60,12 +60,12 @@ def _measured(run: Run, yardstick: Yardstick) -> tuple[Measure, ...]:
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def _frame(surface: Surface, number: int, yardstick: Yardstick) -> list[_Worst]:
+def _frame(surface: Surface, number: int, context: MeasurementContext) -> list[_Worst]:
     """Depth and volume of one frame."""
-    counts = yardstick.free[surface.triangles].all(axis=1)
+    counts = context.free[surface.triangles].all(axis=1)
     deepest, volume, largest = _Worst(0.0, ""), 0.0, _Worst(0.0, "")
-    for bone in yardstick.bones:
-        depth = np.where(yardstick.free, -_distance(bone, number, surface.points), 0.0)
+    for bone in context.bones:
+        depth = np.where(context.free, -_distance(bone, number, surface.points), 0.0)
         vertex = int(np.argmax(depth))
         if depth[vertex] > deepest.value:
             x, y, z = surface.points[vertex]
@@ -77,7 +77,7 @@ def _frame(surface: Surface, number: int, yardstick: Yardstick) -> list[_Worst]:
     return [deepest, _Worst(volume, largest.where)]
 
 
-def _distance(bone: Body, number: int, points: Floats) -> Floats:
+def _distance(bone: RigidBody, number: int, points: Floats) -> Floats:
     """Distance (n,) [mm] of ``points`` (n, 3) to ``bone`` where it is at frame ``number``, negative inside."""
     return bone.shape.sample(apply(np.linalg.inv(bone.pose(number)), points)).distance
 
@@ -87,7 +87,7 @@ def _is_body(surface: Surface) -> bool:
     return bool(np.isfinite(enclosed_volume(surface.points, surface.triangles)))
 
 
-def _without_inside(bones: tuple[Body, ...]) -> str:
+def _without_inside(bones: tuple[RigidBody, ...]) -> str:
     """Which bone has no inside, and why; nothing where all have."""
     for bone in bones:
         try:

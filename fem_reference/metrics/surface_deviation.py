@@ -8,7 +8,7 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.distance import distances
-from fem_reference.metrics import Measure, Yardstick, percentile, rms
+from fem_reference.metrics import Measure, MeasurementContext, percentile, rms
 from fem_reference.runs.store import Run
 
 _STATISTICS = ("rms", "p95", "max", "distance_mean", "distance_rms", "hausdorff")
@@ -16,7 +16,7 @@ UNITS = dict.fromkeys(_STATISTICS, "mm") | {f"{name}_percent": "%" for name in _
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def measure(run: Run, reference: Run, yardstick: Yardstick) -> tuple[Measure, ...]:
+def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
     """Material: ``rms``, ``p95`` (area-weighted 95th percentile) and ``max`` of the distance of the same vertex [mm].
 
     Geometric: ``distance_mean``, ``distance_rms`` and ``hausdorff`` [mm] of the distances from the vertices of each surface to
@@ -25,7 +25,7 @@ def measure(run: Run, reference: Run, yardstick: Yardstick) -> tuple[Measure, ..
     """
     material = np.linalg.norm(run.positions - reference.positions, axis=2)
     geometric = np.array([_both_ways(run, reference, frame) for frame in range(len(reference.positions))])
-    areas, twice = yardstick.areas, np.concatenate([yardstick.areas, yardstick.areas])
+    areas, twice = context.areas, np.concatenate([context.areas, context.areas])
     values = {
         "rms": rms(material, areas),
         "p95": np.array([percentile(each, areas, 0.95) for each in material]),
@@ -34,7 +34,7 @@ def measure(run: Run, reference: Run, yardstick: Yardstick) -> tuple[Measure, ..
         "distance_rms": rms(geometric, twice),
         "hausdorff": geometric.max(axis=1),
     }
-    values |= {f"{name}_percent": _percent(each, yardstick.travel) for name, each in values.items()}
+    values |= {f"{name}_percent": _percent(each, context.travel) for name, each in values.items()}
     worst = [_worst(deviations, reference) for deviations in (material, geometric)]
     return tuple(
         Measure("surface_deviation", name, UNITS[name], each, worst[name.startswith(("distance", "hausdorff"))])

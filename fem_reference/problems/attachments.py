@@ -1,4 +1,4 @@
-"""Which part of a muscle a bone holds: vertices of its surface, and boundary triangles of its tetrahedra below."""
+"""The attached part of a muscle: vertices of its surface, and boundary triangles of its tetrahedra below."""
 
 import re
 from pathlib import Path
@@ -49,10 +49,10 @@ def pick(scene: Scene, i: int, surface: Surface, bone_surface: Surface) -> Ints:
 
 
 def facets_under(mesh: TetMesh, surface: Surface, shares: Floats) -> Ints:
-    """The boundary triangles (m, 3) of ``mesh``, outward, that lie under the held part of ``surface``, where the tets do not follow
-    its rim.
+    """The boundary triangles (m, 3) of ``mesh``, outward, that lie under the attached part of ``surface``, where the tets do not
+    follow its rim.
 
-    A triangle does where the held share at the closest point of the surface, averaged over seven samples, is above a half;
+    A triangle does where the attached share at the closest point of the surface, averaged over seven samples, is above a half;
     ``shares`` (k, 3) are those of the corners of the triangles of ``surface``.
     """
     triangles, _ = boundary(mesh.tets)

@@ -1,4 +1,4 @@
-"""A deformable body as finite elements see it: cells straight or curved, what is prescribed where, and what acts.
+"""A body as finite elements see it: cells straight or curved, what is prescribed where, and what acts.
 
 It knows no solver.
 """
@@ -30,15 +30,15 @@ ELEMENTS: dict[str, tuple[Kind, int, int | None]] = {
 }
 
 
-def check(body: "Continuum", element: str) -> None:
+def check(body: "Body", element: str) -> None:
     """InputError unless ``element`` suits the cells and effects of ``body``, which has every region and fibre direction that it
-    speaks of, and prescribes what can be told apart and be solved.
+    speaks of, and prescribes what can be distinguished and solved.
     """
     check_element(element, body.mesh.kind, body.mesh.degree, body.effects, "element")
     _check_prescribed(body.prescribed)
-    held = [entry.on for entry in body.prescribed if isinstance(entry.on, str)]
+    fixed = [entry.on for entry in body.prescribed if isinstance(entry.on, str)]
     pushed = [body.contact.on] if body.contact and isinstance(body.contact.on, str) else []
-    used = dict.fromkeys([*held, *pushed, *(effect.on for effect in body.effects if isinstance(effect, Load))])
+    used = dict.fromkeys([*fixed, *pushed, *(effect.on for effect in body.effects if isinstance(effect, Load))])
     for on in used:
         if on not in body.mesh.facets:
             raise InputError("on", f'"{on}"', f"a region of the body: {', '.join(body.mesh.facets)}")
@@ -50,7 +50,7 @@ def check(body: "Continuum", element: str) -> None:
 
 
 def _check_prescribed(prescribed: tuple["Prescribed", ...]) -> None:
-    """InputError where two share a name, by which their forces are told, or springs would push away."""
+    """InputError where two share a name, by which their forces are reported, or springs would push away."""
     names = [entry.name for entry in prescribed]
     for entry in prescribed:
         if names.count(entry.name) > 1:
@@ -137,14 +137,14 @@ class Cells:
 @dataclass(frozen=True, eq=False)
 class Prescribed:
     """What is prescribed on the facets ``on``, or on a skin: along each of ``components`` (0, 1, 2 for x, y, z) the displacement
-    that ``course`` gives for rest points (n, 3) [mm] at a frame number, (n, 3) [mm]; a picklable callable. With a ``stiffness``
+    that ``path`` gives for rest points (n, 3) [mm] at a frame number, (n, 3) [mm]; a picklable callable. With a ``stiffness``
     [MPa/mm] it is not exact: springs over the area pull towards it; a skin has no unknowns that could be prescribed exactly.
     """
 
     name: str
     on: str | Skin
     components: tuple[int, ...]
-    course: Callable[[Floats, float], Floats]
+    path: Callable[[Floats, float], Floats]
     stiffness: float | None = None
 
 
@@ -160,9 +160,9 @@ class ByCell:
 
 
 @dataclass(frozen=True, eq=False)
-class Continuum:
+class Body:
     """A body of ``mesh`` with its ``effects``; at ``frames[0]`` it rests. A load acts on the facets that its ``on`` names; by
-    ``contact``, where there is one, every obstruction pushes. ``interval`` [s]: from a frame number to the next, where time
+    ``contact``, where there is one, with every obstruction. ``interval`` [s]: from a frame number to the next, where time
     matters.
     """
 

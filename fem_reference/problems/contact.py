@@ -1,4 +1,4 @@
-"""Rigid bodies that push: what is in the way of a deformable body, and the law of the pressure between them."""
+"""Contact with rigid bodies: the obstacles of a body, and the law of the contact pressure."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,13 +24,13 @@ class Obstruction:
 
 @dataclass(frozen=True)
 class Contact:
-    """Obstructions push without friction, with any sliding, on ``on``: the facets of a region, by name, or a skin. They push by a
+    """Frictionless contact of obstructions, with any sliding, on ``on``: the facets of a region, by name, or a skin. They push by a
     pressure of the gap g, the signed distance (negative inside), that is zero beyond ``smoothing`` d [mm], ``k (d - g)^2 / (4 d)``
     from d to -d, and ``-k g`` deeper: the slope of an energy per rest area, twice differentiable. ``stiffness``: k [MPa/mm];
     pressed by p, a surface gets p / k deep.
 
     With ``relaxed``, two frame numbers, a point that is too near at the first of them for no pressure feels as much less depth
-    there, and all of its depth from the second on: what overlaps at rest is pushed out gradually.
+    there, and all of its depth from the second on: an overlap at rest is removed gradually.
     """
 
     on: str | Skin
@@ -73,17 +73,17 @@ class Nearby:
         self.gap[near], self.asked[near], self.touched[near] = np.minimum(gap, self.shape.reach), local[near], True
 
 
-def nearest_on_way(obstruction: Obstruction, starts: Floats, ways: Floats, least: float) -> Floats:
-    """The smallest gap (n,) [mm] on straight ``ways`` (n, 3) from ``starts`` (n, 3): each is walked in strides as long as the gap
+def nearest_on_path(obstruction: Obstruction, starts: Floats, paths: Floats, least: float) -> Floats:
+    """The smallest gap (n,) [mm] on straight ``paths`` (n, 3) from ``starts`` (n, 3): each is walked in strides as long as the gap
     allows without missing anything, at least ``least`` [mm].
     """
     smallest = np.full(len(starts), np.inf)
-    lengths = np.linalg.norm(ways, axis=1)
+    lengths = np.linalg.norm(paths, axis=1)
     walked = np.zeros(len(starts))
     going = np.arange(len(starts))
     while len(going):
         shares = walked[going] / np.maximum(lengths[going], least)
-        gaps = obstruction.shape.sample(starts[going] + shares[:, None] * ways[going]).distance
+        gaps = obstruction.shape.sample(starts[going] + shares[:, None] * paths[going]).distance
         smallest[going] = np.minimum(smallest[going], gaps)
         # The gradient of a sampled distance is a unit vector but for a tenth; beyond its grid strides are short.
         walked[going] += np.where(gaps < FAR, np.maximum(0.9 * np.abs(gaps), least), 1.0)

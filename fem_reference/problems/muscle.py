@@ -1,4 +1,4 @@
-"""Scene -> everything a solver needs, as arrays: bodies, what is held, effects, fibres, frames. It knows no solver."""
+"""Scene -> everything a solver needs, as arrays: bodies, what is attached, effects, fibres, frames. It knows no solver."""
 
 import logging
 import os
@@ -35,9 +35,9 @@ from fem_reference.geometry.fibres import Directions
 from fem_reference.geometry.intersections import self_intersections
 from fem_reference.geometry.nested import refined
 from fem_reference.geometry.rigid_bodies import CLOSED_FORMS, Obstacle
-from fem_reference.geometry.sectors import held_area, held_shares
+from fem_reference.geometry.sectors import attached_area, attached_shares
 from fem_reference.geometry.signed_distance import Grid, cached, signed_distances
-from fem_reference.geometry.skins import Skin, free_skin, held_skin, spacing
+from fem_reference.geometry.skins import Skin, attached_skin, free_skin, spacing
 from fem_reference.geometry.tessellation import tessellated
 from fem_reference.geometry.tetrahedra import tetrahedralise
 from fem_reference.io import files
@@ -59,7 +59,7 @@ def kept_distances() -> Path:
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class RigidBody:
     """A rigid bone: its ``surface`` at rest, its ``motion``, None where it rests, and how its distance shall be known, as
     ``scene.Bone`` has it [mm]; or the ``solid`` of closed form whose vertices the surface has.
     """
@@ -85,50 +85,53 @@ class Body:
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
-    """An attachment: the ``vertices`` (k,) of the muscle surface that ``bone`` holds, by springs of ``stiffness`` [MPa/mm] or
+class AttachedVertices:
+    """An attachment: the ``vertices`` (k,) of the muscle surface attached to ``bone``, by springs of ``stiffness`` [MPa/mm] or
     (None) exactly.
     """
 
     attachment: str
-    bone: Body
+    bone: RigidBody
     vertices: Ints
     stiffness: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """What a surface solver needs: the muscle ``surface`` at rest, the bones, what they hold, and the frames wanted;
+    """What a surface solver needs: the muscle ``surface`` at rest, the bones, the attached vertices, and the frames wanted;
     ``interval`` [s] from a frame number to the next where the scene says it.
     """
 
     surface: Surface
-    bones: tuple[Body, ...]
-    held: tuple[Held, ...]
+    bones: tuple[RigidBody, ...]
+    attached: tuple[AttachedVertices, ...]
     frames: tuple[int, ...]
     interval: float | None
 
     @cached_property
-    def held_vertices(self) -> Ints:
-        """The vertices (k,) of the surface that bones hold, attachment by attachment."""
-        return np.concatenate([np.zeros(0, np.int64), *(entry.vertices for entry in self.held)])
+    def attached_vertices(self) -> Ints:
+        """The vertices (k,) of the surface that are attached to bones, attachment by attachment."""
+        return np.concatenate([np.zeros(0, np.int64), *(entry.vertices for entry in self.attached)])
 
     @cached_property
     def free(self) -> NDArray[np.bool_]:
-        """Which vertices (n,) of the surface bones may push on: those that none holds, nor any of their neighbours."""
+        """Which vertices (n,) of the surface may be in contact with bones: those that are not attached, nor any of their
+        neighbours.
+        """
         triangles = self.surface.triangles
-        held = np.zeros(len(self.surface.points), bool)
-        held[self.held_vertices] = True
-        free = ~held
-        free[triangles[held[triangles].any(axis=1)]] = False
+        attached = np.zeros(len(self.surface.points), bool)
+        attached[self.attached_vertices] = True
+        free = ~attached
+        free[triangles[attached[triangles].any(axis=1)]] = False
         return free
 
 
 @dataclass(frozen=True, eq=False)
 class Problem(Setup):
     """A setup filled with tetrahedra (``mesh.facets`` by attachment), with its effects and fibres; ``fibre``, the direction of the
-    fibres at any point, where an effect needs it; ``skin``, what bones push on, where they do; ``held_skins``, by attachment that
-    holds by springs, what these pull at; ``mesh_facts`` are what the mesh is like, ``seconds`` how long it took to make.
+    fibres at any point, where an effect needs it; ``skin``, the contact surface, where there is contact; ``attached_skins``, by
+    attachment that holds by springs, what these pull at; ``mesh_facts`` are what the mesh is like, ``seconds`` how long it took
+    to make.
     """
 
     mesh: TetMesh
@@ -138,7 +141,7 @@ class Problem(Setup):
     seconds: float
     fibre: Directions | None = None
     skin: Skin | None = None
-    held_skins: dict[str, Skin] = field(default_factory=dict)
+    attached_skins: dict[str, Skin] = field(default_factory=dict)
 
     @cached_property
     def directions(self) -> Floats | None:
@@ -148,7 +151,7 @@ class Problem(Setup):
 
     @property
     def contact(self) -> ContactEffect | None:
-        """The effect by which bones push, None where they do not."""
+        """The effect of contact, None where there is none."""
         return among(self.effects)
 
 
@@ -158,7 +161,7 @@ def setup(scene: Scene) -> Setup:
     surface = files.read_surface(scene.file(scene.muscle.surface, "muscle.surface"), scene.muscle.unit)
     surface = check_closed(Surface(surface.points, surface.triangles, f"{place}: {surface.place}"))
     bones = tuple(_body(scene, i, surface) for i in range(len(scene.bone)))
-    return Setup(surface, bones, _held(scene, surface, bones), scene.frames.numbers, scene.frames.interval)
+    return Setup(surface, bones, _attached(scene, surface, bones), scene.frames.numbers, scene.frames.interval)
 
 
 def build(scene: Scene, rest: Setup) -> Problem:
@@ -169,11 +172,11 @@ def build(scene: Scene, rest: Setup) -> Problem:
     if contact is not None:
         _check_outside(scene, rest, contact)
     mesh = _filled(scene, rest, scene.muscle.tet_size)
-    exact = tuple(held.attachment for held in rest.held if held.stiffness is None)
+    exact = tuple(attached.attachment for attached in rest.attached if attached.stiffness is None)
     for _ in range(scene.muscle.refinements):
         mesh = refined(mesh, rest.surface, exact)
-    for i, held in enumerate(rest.held):
-        if len(mesh.facets[held.attachment]) == 0:
+    for i, attached in enumerate(rest.attached):
+        if len(mesh.facets[attached.attachment]) == 0:
             place = join(scene.place, f"attachment[{i}]")
             raise InputError(place, "an area smaller than the tetrahedra resolve", "a smaller muscle.tet_size")
     fibres, fibre = fibre_field.of(scene, rest.surface, partial(_filled, scene, rest))
@@ -181,7 +184,7 @@ def build(scene: Scene, rest: Setup) -> Problem:
     return Problem(
         rest.surface,
         rest.bones,
-        rest.held,
+        rest.attached,
         rest.frames,
         rest.interval,
         mesh=mesh,
@@ -191,16 +194,18 @@ def build(scene: Scene, rest: Setup) -> Problem:
         seconds=time.perf_counter() - begin,
         fibre=fibre if any("fibre" in effect.needs for effect in scene.effects) else None,
         skin=None if contact is None else free_skin(rest.surface, rest.free, mesh, apart),
-        held_skins={
-            held.attachment: held_skin(rest.surface, held_shares(rest.surface, held.vertices), mesh, apart)
-            for held in rest.held
-            if held.stiffness is not None
+        attached_skins={
+            attached.attachment: attached_skin(
+                rest.surface, attached_shares(rest.surface, attached.vertices), mesh, apart
+            )
+            for attached in rest.attached
+            if attached.stiffness is not None
         },
     )
 
 
 def _check_outside(scene: Scene, rest: Setup, contact: ContactEffect) -> None:
-    """InputError where a bone that pushes is wholly inside the muscle: there is no way out of it."""
+    """InputError where a bone in contact is wholly inside the muscle: there is no way out of it."""
     for i, bone in enumerate(rest.bones):
         if contact.is_by(bone.name) and signed_distances(bone.surface.points, rest.surface).max() < 0:
             raise InputError(join(scene.place, f"bone[{i}]"), "a bone wholly inside the muscle", "one that is not")
@@ -218,34 +223,34 @@ def _distance_facts(rest: Setup) -> dict[str, float | str]:
 
 
 def _filled(scene: Scene, rest: Setup, size: float) -> TetMesh:
-    """Tets of a ``size`` [mm], with the facets that each attachment holds: up to its rim where the mesher keeps it, else those
+    """Tets of a ``size`` [mm], with the facets of each attachment: up to its rim where the mesher keeps it, else those
     under it.
     """
-    shares = {held.attachment: held_shares(rest.surface, held.vertices) for held in rest.held}
+    shares = {attached.attachment: attached_shares(rest.surface, attached.vertices) for attached in rest.attached}
     blocks = scene.muscle.mesher == "block"
     mesh = block.fill(rest.surface, size) if blocks else tetrahedralise(rest.surface, size, shares)
     if set(mesh.facets) == set(shares):
         return mesh
-    return replace(mesh, facets={name: facets_under(mesh, rest.surface, held) for name, held in shares.items()})
+    return replace(mesh, facets={name: facets_under(mesh, rest.surface, attached) for name, attached in shares.items()})
 
 
-def _body(scene: Scene, i: int, muscle: Surface) -> Body:
+def _body(scene: Scene, i: int, muscle: Surface) -> RigidBody:
     bone, form = scene.bone[i], solid(scene.bone[i])
     motion = bone.motion.poses() if bone.motion else None
     if form is not None:
         surface = tessellated(form, muscle.points, join(scene.place, f"bone[{i}]"))
-        return Body(bone.name, surface, motion, solid=form)
+        return RigidBody(bone.name, surface, motion, solid=form)
     assert bone.surface is not None  # a Bone record has a closed form or a surface with its unit
     assert bone.unit is not None
     surface = files.read_surface(scene.file(bone.surface, f"bone[{i}].surface"), bone.unit)
     check_finite(surface)
-    return Body(bone.name, surface, motion, bone.distance_error, bone.distance_rounding)
+    return RigidBody(bone.name, surface, motion, bone.distance_error, bone.distance_rounding)
 
 
-def _held(scene: Scene, surface: Surface, bones: tuple[Body, ...]) -> tuple[Held, ...]:
+def _attached(scene: Scene, surface: Surface, bones: tuple[RigidBody, ...]) -> tuple[AttachedVertices, ...]:
     by_name = {bone.name: bone for bone in bones}
     taken = np.zeros(len(surface.points), bool)
-    held = []
+    attached = []
     for i, attachment in enumerate(scene.attachment):
         place = join(scene.place, f"attachment[{i}]")
         vertices = pick(scene, i, surface, by_name[attachment.bone].surface)
@@ -253,16 +258,16 @@ def _held(scene: Scene, surface: Surface, bones: tuple[Body, ...]) -> tuple[Held
             raise InputError(place, "no vertex of the muscle", "an attachment that selects some")
         if taken[vertices].any():
             raise InputError(
-                place, f"vertex {vertices[taken[vertices]][0]}, which another attachment holds", "each vertex once"
+                place, f"vertex {vertices[taken[vertices]][0]}, which another attachment has", "each vertex once"
             )
         taken[vertices] = True
-        held.append(Held(attachment.name, by_name[attachment.bone], vertices, attachment.stiffness))
-    return tuple(held)
+        attached.append(AttachedVertices(attachment.name, by_name[attachment.bone], vertices, attachment.stiffness))
+    return tuple(attached)
 
 
 def _mesh_facts(rest: Setup, mesh: TetMesh, far: float) -> dict[str, float | str]:
-    """Who made the mesh, its size and quality, and for each attachment the area held on the surface and on the tets and how many
-    of its vertices are more than ``far`` [mm] from the facets held: islands that tets do not resolve.
+    """Who made the mesh, its size and quality, and for each attachment the area attached on the surface and on the tets and how
+    many of its vertices are more than ``far`` [mm] from the facets attached: islands that tets do not resolve.
     """
     qualities = tet_qualities(mesh.points, mesh.tets)
     facts: dict[str, float | str] = {
@@ -275,10 +280,10 @@ def _mesh_facts(rest: Setup, mesh: TetMesh, far: float) -> dict[str, float | str
         "quality_5_percent": float(np.percentile(qualities, 5)),
         "volume_mm3": float(tet_volumes(mesh.points, mesh.tets).sum()),
     }
-    for held in rest.held:
-        name, facets = held.attachment, mesh.facets[held.attachment]
-        off = distances(rest.surface.points[held.vertices], Surface(mesh.points, facets)).distance
-        facts[f"{name}_area_mm2"] = held_area(rest.surface, held_shares(rest.surface, held.vertices))
+    for attached in rest.attached:
+        name, facets = attached.attachment, mesh.facets[attached.attachment]
+        off = distances(rest.surface.points[attached.vertices], Surface(mesh.points, facets)).distance
+        facts[f"{name}_area_mm2"] = attached_area(rest.surface, attached_shares(rest.surface, attached.vertices))
         facts[f"{name}_area_on_tets_mm2"] = float(triangle_areas(mesh.points, facets).sum())
         facts[f"{name}_vertices_beside_facets"] = float((off > far).sum())
     return facts

@@ -1,4 +1,4 @@
-"""The muscle of a problem as a body that finite elements deform: held by bones, and pushed by them."""
+"""The muscle of a problem as a body that finite elements deform: attached to bones, and in contact with them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -9,11 +9,11 @@ from fem_reference.effects import Interaction
 from fem_reference.effects.contact import Contact as ContactEffect
 from fem_reference.foundations.mesh import Floats, boundary
 from fem_reference.foundations.motion import apply
-from fem_reference.problems.body import Cells, Continuum, Prescribed
+from fem_reference.problems.body import Body, Cells, Prescribed
 from fem_reference.problems.contact import Contact, Obstruction
 from fem_reference.problems.muscle import Problem
 
-# Frame numbers before the first one over which what overlaps at rest is pushed out of the bones.
+# Frame numbers before the first one over which an overlap at rest is removed.
 RELAXING = 10.0
 
 
@@ -31,7 +31,7 @@ class From:
 
 @dataclass(frozen=True)
 class Follows:
-    """The displacement of what a bone holds that has a ``pose`` by frame number."""
+    """The displacement of what is attached to a bone that has a ``pose`` by frame number."""
 
     pose: Callable[[float], Floats]
 
@@ -40,34 +40,34 @@ class Follows:
         return apply(self.pose(frame), points) - points
 
 
-def as_continuum(problem: Problem) -> Continuum:
-    """The muscle as a body: its bones prescribe where the facets that they hold exactly are, or pull at what they hold by springs;
+def as_body(problem: Problem) -> Body:
+    """The muscle as a body: its bones prescribe where exactly attached facets are, or pull by springs;
     the rest of its skin is ``"free"``.
     """
     mesh = problem.mesh
-    held = np.concatenate([np.zeros((0, 3), int), *(mesh.facets[entry.attachment] for entry in problem.held)])
+    attached = np.concatenate([np.zeros((0, 3), int), *(mesh.facets[entry.attachment] for entry in problem.attached)])
     skin, _ = boundary(mesh.tets)
-    taken = {tuple(facet) for facet in np.sort(held, axis=1).tolist()}
+    taken = {tuple(facet) for facet in np.sort(attached, axis=1).tolist()}
     free = skin[[tuple(facet) not in taken for facet in np.sort(skin, axis=1).tolist()]]
     cells = Cells(mesh.points, mesh.tets, "tetrahedron", 1, {**mesh.facets, "free": free})
     first = problem.frames[0]
     prescribed = tuple(
         Prescribed(
             entry.attachment,
-            problem.held_skins.get(entry.attachment, entry.attachment),
+            problem.attached_skins.get(entry.attachment, entry.attachment),
             (0, 1, 2),
             Follows(From(first, entry.bone.pose)),
             entry.stiffness,
         )
-        for entry in problem.held
+        for entry in problem.attached
     )
     acting = tuple(effect for effect in problem.effects if not isinstance(effect, Interaction))
-    body = Continuum(cells, acting, prescribed, problem.frames, problem.fibre, interval=problem.interval)
+    body = Body(cells, acting, prescribed, problem.frames, problem.fibre, interval=problem.interval)
     return body if problem.contact is None else _among_bones(body, problem, problem.contact)
 
 
-def _among_bones(body: Continuum, problem: Problem, effect: ContactEffect) -> Continuum:
-    """The body with the bones that push on it; where they overlap it at rest, it is relaxed before the first frame."""
+def _among_bones(body: Body, problem: Problem, effect: ContactEffect) -> Body:
+    """The body with the bones in contact with it; where they overlap it at rest, it is relaxed before the first frame."""
     assert problem.skin is not None  # built with the effect
     bones = [bone for bone in problem.bones if effect.is_by(bone.name)]
     first, points = body.frames[0], problem.skin.points

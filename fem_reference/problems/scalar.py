@@ -1,4 +1,4 @@
-"""Scalar scene -> everything a solver needs, as arrays: mesh, effects, what is held, what flows in. It knows no solver."""
+"""Scalar scene -> everything a solver needs, as arrays: mesh, effects, what is fixed, what flows in. It knows no solver."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ class Flux:
 class FieldProblem:
     """What a solver of scalar fields needs.
 
-    ``order`` of the Lagrange elements; ``held`` (N,) the value at each node of them (the vertices, then for order 2 the middles of
+    ``order`` of the Lagrange elements; ``fixed`` (N,) the value at each node of them (the vertices, then for order 2 the middles of
     ``mesh.edges``), NaN where it is free; ``upper`` (m,) the share of each cell above the mean y; ``tau`` (m,) of the stabilised
     form, None for the plain one; ``peclet`` the greatest mesh Peclet number; ``exact`` the formula of the solution where known.
     """
@@ -42,7 +42,7 @@ class FieldProblem:
     mesh: FieldMesh
     order: int
     effects: tuple[FieldEffect, ...]
-    held: Floats
+    fixed: Floats
     fluxes: tuple[Flux, ...]
     upper: Floats
     tau: Floats | None
@@ -74,13 +74,13 @@ def build(scene: FieldScene, refinements: int = 0) -> FieldProblem:
     flow = np.zeros(mesh.points.shape[1]) if velocity is None else np.array(velocity)
     peclet, tau = stabilisation(mesh, diffusion, flow, scene.element.order)
     form = scene.element.form
-    held = _held(scene, mesh, given)
-    _check_unique(scene, held)
+    fixed = _fixed(scene, mesh, given)
+    _check_unique(scene, fixed)
     return FieldProblem(
         mesh,
         scene.element.order,
         scene.effects,
-        held,
+        fixed,
         tuple(_flux(entry, mesh) for entry in scene.boundary if entry.slope is not None),
         share_above(mesh, average) if mesh.points.shape[1] > 1 else np.zeros(len(mesh.cells)),
         tau if form == "supg" or (form == "auto" and peclet > 1) else None,
@@ -195,7 +195,7 @@ def at(formula: str, points: Floats) -> Floats:
 
 
 def _given(scene: FieldScene, mesh: FieldMesh) -> Floats:
-    """The values (n,) that files of bounds hold vertices at, NaN where they hold none."""
+    """The values (n,) that files of bounds prescribe at vertices, NaN where they prescribe none."""
     values = np.full(len(mesh.points), np.nan)
     for i, entry in enumerate(scene.boundary):
         if entry.bounds is not None:
@@ -224,9 +224,9 @@ def _between(mesh: FieldMesh, values: Floats) -> Floats:
     return middles
 
 
-def _held(scene: FieldScene, mesh: FieldMesh, given: Floats) -> Floats:
+def _fixed(scene: FieldScene, mesh: FieldMesh, given: Floats) -> Floats:
     """The value at each node, NaN where it is free; InputError where two conditions disagree on one."""
-    held = given if scene.element.order == 1 else np.concatenate([given, _between(mesh, given)])
+    fixed = given if scene.element.order == 1 else np.concatenate([given, _between(mesh, given)])
     nodes, sloped = mesh.nodes[scene.element.order], np.empty(0, np.int64)
     for i, entry in enumerate(scene.boundary):
         place = join(scene.place, f"boundary[{i}]")
@@ -247,13 +247,13 @@ def _held(scene: FieldScene, mesh: FieldMesh, given: Floats) -> Floats:
         if entry.value is not None:
             which = _nodes_of(facets, mesh, scene.element.order)
             values = at(entry.value, nodes[which])
-            clash = np.flatnonzero(np.abs(held[which] - values) > 1e-12 * (1 + np.abs(values)))
+            clash = np.flatnonzero(np.abs(fixed[which] - values) > 1e-12 * (1 + np.abs(values)))
             if len(clash):
-                got = f"{values[clash[0]]:g} where another condition has {held[which][clash[0]]:g}"
+                got = f"{values[clash[0]]:g} where another condition has {fixed[which][clash[0]]:g}"
                 raise InputError(f"{place}.value", got, "one value for each node")
-            held = held.copy()
-            held[which] = values
-    return held
+            fixed = fixed.copy()
+            fixed[which] = values
+    return fixed
 
 
 def _facets(entry: Boundary, mesh: FieldMesh) -> Ints:
@@ -290,9 +290,9 @@ def _flux(entry: Boundary, mesh: FieldMesh) -> Flux:
     return Flux(_facets(entry, mesh), entry.slope)
 
 
-def _check_unique(scene: FieldScene, held: Floats) -> None:
+def _check_unique(scene: FieldScene, fixed: Floats) -> None:
     """InputError where a constant can be added to the solution."""
-    if np.isnan(held).all() and not any(isinstance(effect, Reaction) and effect.rate for effect in scene.effects):
+    if np.isnan(fixed).all() and not any(isinstance(effect, Reaction) and effect.rate for effect in scene.effects):
         raise InputError(
             join(scene.place, "boundary"), "no value anywhere and no reaction", "a value somewhere, or a reaction"
         )

@@ -157,10 +157,10 @@ def sphere_octant(inner: float, outer: float, n: int, layers: int, kind: Kind, d
         one, other = (other for other in range(3) if other != axis)
 
         def place(unit: Floats) -> Floats:
-            way = np.ones_like(unit)
-            way[:, [one, other]] = np.tan(np.pi / 4 * unit[:, :2])
+            direction = np.ones_like(unit)
+            direction[:, [one, other]] = np.tan(np.pi / 4 * unit[:, :2])
             radius = inner + (outer - inner) * unit[:, 2]
-            return np.asarray(way * (radius / np.linalg.norm(way, axis=1))[:, None])
+            return np.asarray(direction * (radius / np.linalg.norm(direction, axis=1))[:, None])
 
         faces = {"x0": f"{'xyz'[one]}0", "y0": f"{'xyz'[other]}0", "z0": "inner", "z1": "outer"}
         return Block(place, (n, n, layers), faces)
@@ -260,9 +260,9 @@ def ball_octant(core: float, outer: float, n: int, layers: int, kind: Kind, degr
         def place(unit: Floats) -> Floats:
             face = np.ones_like(unit)
             face[:, [one, other]] = unit[:, :2]
-            way = np.ones_like(unit)
-            way[:, [one, other]] = np.tan(np.pi / 4 * unit[:, :2])
-            sphere = outer * way / np.linalg.norm(way, axis=1)[:, None]
+            direction = np.ones_like(unit)
+            direction[:, [one, other]] = np.tan(np.pi / 4 * unit[:, :2])
+            sphere = outer * direction / np.linalg.norm(direction, axis=1)[:, None]
             share = (growth ** (layers * unit[:, 2:]) - 1) / (growth**layers - 1)
             return np.asarray(core * face + share * (sphere - core * face))
 

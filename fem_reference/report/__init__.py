@@ -1,4 +1,4 @@
-"""A comparison as something to read: one page that holds everything itself, and the same numbers as JSON and CSV."""
+"""A comparison as something to read: one page that contains everything itself, and the same numbers as JSON and CSV."""
 
 import json
 from pathlib import Path
@@ -8,11 +8,11 @@ from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.scalar_example import Example
 from fem_reference.assessment.solver_table import Table
 from fem_reference.io import files
-from fem_reference.report import claims_page, field_page, page, standings_page, verify_page
+from fem_reference.report import claims_page, field_page, page, ranking_page, verify_page
 from fem_reference.report.tables import as_csv, summary
 from fem_reference.report.verify_page import Verification
 
-__all__ = ["summary", "write", "write_claims", "write_examples", "write_standings", "write_verification"]
+__all__ = ["summary", "write", "write_claims", "write_examples", "write_ranking", "write_verification"]
 
 
 def write(comparison: Comparison, folder: Path) -> Path:
@@ -47,11 +47,11 @@ def write_verification(verification: Verification, folder: Path, name: str) -> P
     return folder / f"{name}.html"
 
 
-def write_standings(table: Table, folder: Path, name: str) -> Path:
-    """Write the page ``name`` over families of solvers and its numbers as JSON into ``folder``; the path of the page."""
+def write_ranking(table: Table, folder: Path, name: str) -> Path:
+    """Write the page ``name`` over families of models and its numbers as JSON into ``folder``; the path of the page."""
     texts = {
-        f"{name}.json": json.dumps(standings_page.facts(table), indent=1, allow_nan=False),
-        f"{name}.html": standings_page.render(table),
+        f"{name}.json": json.dumps(ranking_page.facts(table), indent=1, allow_nan=False),
+        f"{name}.html": ranking_page.render(table),
     }
     _write(texts, folder)
     return folder / f"{name}.html"

@@ -76,13 +76,15 @@ def curves(comparison: Comparison) -> list[Curve]:
     drawn.append(_inversion(comparison, smallest, "Smallest det F of the reference (inside out below 0)"))
     drawn.append(_of_runs(comparison, "edges", "Extension of the surface's edges from rest, mean by area", edges))
     drawn.append(_of_runs(comparison, "angles", "Bending at the edges from rest, mean magnitude by area", angles))
-    drawn.append(_of_runs(comparison, "depth", "Depth inside a bone of the deepest vertex that none holds", depths))
-    drawn.append(_of_runs(comparison, "inside", "Volume inside bones, but for what they hold", inside))
+    drawn.append(
+        _of_runs(comparison, "depth", "Depth inside a bone of the deepest vertex that is not attached", depths)
+    )
+    drawn.append(_of_runs(comparison, "inside", "Volume inside bones, without attached parts", inside))
     return [curve for curve in drawn if curve is not None]
 
 
 def label_of(inverted: Measure) -> str:
-    """What tells an inversion measure from the others, in words: where det F is smallest."""
+    """What distinguishes an inversion measure from the others, in words: where det F is smallest."""
     return words(inverted.statistic.removeprefix("min_det_F").lstrip("_"))
 
 
@@ -135,14 +137,14 @@ def _inversion(comparison: Comparison, measures: tuple[Measure, ...], title: str
 def _band(
     axes: Axes, comparison: Comparison, of: Of, measure: Measure, middle: Floats, linestyle: str | None = None
 ) -> None:
-    """How well the reference is known, around ``middle`` (f,), where that is stated; with a ``linestyle`` its upper edge too."""
+    """Error bars of the reference, around ``middle`` (f,), where that is stated; with a ``linestyle`` its upper edge too."""
     bars = comparison.error_bars
     bar = bars and bars.find(of, measure.metric, measure.statistic)
     if not bar:
         return
     numbers, upper = np.asarray(comparison.reference.numbers), middle + bar.values
-    told = _KNOWN in axes.get_legend_handles_labels()[1]
-    axes.fill_between(numbers, middle - bar.values, upper, color=BAND, linewidth=0, label="_" if told else _KNOWN)
+    labelled = _KNOWN in axes.get_legend_handles_labels()[1]
+    axes.fill_between(numbers, middle - bar.values, upper, color=BAND, linewidth=0, label="_" if labelled else _KNOWN)
     if linestyle:
         axes.plot(numbers, upper, color="#888888", linewidth=1.0, linestyle=linestyle)
 
@@ -154,8 +156,8 @@ def _line(axes: Axes, numbers: tuple[int, ...], measure: Measure, label: str, **
     axes.plot(frames, np.where(bad, np.nan, values), label=label, **look)  # type: ignore[arg-type]
     if bad.any():
         low = axes.get_xaxis_transform()
-        told = _NOT_A_NUMBER in axes.get_legend_handles_labels()[1]
-        mark = {"color": look["color"], "label": "_" if told else _NOT_A_NUMBER}
+        labelled = _NOT_A_NUMBER in axes.get_legend_handles_labels()[1]
+        mark = {"color": look["color"], "label": "_" if labelled else _NOT_A_NUMBER}
         axes.plot(frames[bad], np.zeros(bad.sum()), "x", transform=low, clip_on=False, **mark)  # type: ignore[arg-type]
 
 

@@ -233,7 +233,7 @@ def _windows(points: Floats, anchors: Floats) -> list[_Window]:
     if len(anchors):
         room = np.array([0.06, 0.06, 1.0]) * extent
         windows.append(
-            _Window("detail about the held vertices", anchors.min(axis=0) - room, anchors.max(axis=0) + room, 0.3)
+            _Window("detail about the fixed vertices", anchors.min(axis=0) - room, anchors.max(axis=0) + room, 0.3)
         )
     return windows
 
@@ -241,7 +241,7 @@ def _windows(points: Floats, anchors: Floats) -> list[_Window]:
 def _body(figure: Figure, example: Example, values: Floats, colours: str) -> None:
     """A surface in space seen along z from the side of its anchors, y up, every window with its own colours."""
     mesh = example.problem.mesh
-    anchors = mesh.points[~np.isnan(example.problem.held[: len(mesh.points)])]
+    anchors = mesh.points[~np.isnan(example.problem.fixed[: len(mesh.points)])]
     behind = len(anchors) > 0 and anchors[:, 2].mean() < mesh.points[:, 2].mean()
     side = np.array([-1.0, 1.0, -1.0]) if behind else np.ones(3)
     turned = FieldMesh(mesh.points * side, mesh.cells, mesh.place)

@@ -1,4 +1,4 @@
-"""The page of the scalar examples beside the report's section 4.6. It holds everything itself, and reads without a network."""
+"""The page of the scalar examples beside the report's section 4.6. It contains everything itself, and reads without a network."""
 
 import tomllib
 from pathlib import Path

@@ -16,7 +16,7 @@ from fem_reference.foundations.errors import MissingSoftware
 from fem_reference.foundations.mesh import Floats, Surface
 from fem_reference.foundations.subprocesses import command, environment
 from fem_reference.metrics import find
-from fem_reference.problems.muscle import Body, Setup
+from fem_reference.problems.muscle import RigidBody, Setup
 from fem_reference.report import pictures
 from fem_reference.runs.store import Run
 
@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 
 PACKAGES = "libegl1 libegl-mesa0 libgl1-mesa-dri"
 _SECONDS = 600
-# Where a surface is as wide along two axes, those of the coordinates are taken: this tells them apart, far above round-off.
+# Where a surface is as wide along two axes, those of the coordinates are taken: this distinguishes them, far above round-off.
 _TIES = 1e-11
 
 
@@ -65,7 +65,7 @@ def draw(setup: Setup, surface: Surface, wanted: list[Shot]) -> list[tuple[bytes
         return [(first.read_bytes(), second.read_bytes()) for first, second in names]
 
 
-def directions(surface: Surface, bones: tuple[Body, ...]) -> Floats:
+def directions(surface: Surface, bones: tuple[RigidBody, ...]) -> Floats:
     """Unit vectors (2, 3) towards the cameras: along the smallest and the middle principal axis of the surface.
 
     From the first its silhouette is largest, the second is a quarter turn about its long axis from there. Both cameras
@@ -83,12 +83,12 @@ def directions(surface: Surface, bones: tuple[Body, ...]) -> Floats:
     return np.asarray(views[np.argsort(hidden, kind="stable")[:2]])
 
 
-def _hidden(points: Floats, way: Floats, bones: tuple[Body, ...]) -> bool:
-    """Whether most of ``points`` (n, 3) have a bone of closed form before them within four times the ``way`` (3,) to the camera."""
+def _hidden(points: Floats, view: Floats, bones: tuple[RigidBody, ...]) -> bool:
+    """Whether most of ``points`` (n, 3) have a bone of closed form before them within four times ``view`` (3,) to the camera."""
     behind = np.zeros(len(points), bool)
     for solid in (bone.solid for bone in bones if bone.solid is not None):
         for step in np.arange(1, 17) / 4:
-            behind |= solid.sample(points + step * way).distance < 0
+            behind |= solid.sample(points + step * view).distance < 0
     return bool(behind.mean() > 0.5)
 
 

@@ -1,4 +1,4 @@
-"""What a case is made of and what came of a scalar one, in words and numbers: what ``show``, ``run`` and ``compare`` tell."""
+"""The contents of a case and the results of scalar ones, in words and numbers: what ``show``, ``run`` and ``compare`` print."""
 
 import math
 from collections.abc import Iterable
@@ -13,9 +13,9 @@ from fem_reference.assessment.solver_table import Table
 from fem_reference.effects import Effect
 from fem_reference.foundations.mesh import Surface, enclosed_volume
 from fem_reference.foundations.motion import RigidMotion, Translation
-from fem_reference.geometry.sectors import held_area, held_shares
+from fem_reference.geometry.sectors import attached_area, attached_shares
 from fem_reference.metrics import find
-from fem_reference.problems.muscle import Body, Held, Setup
+from fem_reference.problems.muscle import AttachedVertices, RigidBody, Setup
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.report.words import exact
 from fem_reference.runs.scalar import FieldRun
@@ -51,9 +51,9 @@ def scene_facts(scene: Scene, setup: Setup) -> dict[str, Any]:
         },
         "bones": {bone.name: f"{_shape(bone)}, {_motion(bone.motion)}" for bone in setup.bones},
         "attachments": {
-            held.attachment: f"{len(held.vertices)} vertices, {_area(surface, held):.0f} mm2, held by {held.bone.name} "
-            + ("exactly" if held.stiffness is None else f"by springs of {held.stiffness:g} MPa/mm")
-            for held in setup.held
+            one.attachment: f"{len(one.vertices)} vertices, {_area(surface, one):.0f} mm2, attached to {one.bone.name} "
+            + ("exactly" if one.stiffness is None else f"by springs of {one.stiffness:g} MPa/mm")
+            for one in setup.attached
         },
         "effects": {effect.title: _parameters(effect) for effect in scene.effects},
         "frames": f"{scene.frames.first} to {scene.frames.last}, every {scene.frames.every}",
@@ -66,15 +66,15 @@ def scene_facts(scene: Scene, setup: Setup) -> dict[str, Any]:
     }
 
 
-def _area(surface: Surface, held: Held) -> float:
-    return held_area(surface, held_shares(surface, held.vertices))
+def _area(surface: Surface, attached: AttachedVertices) -> float:
+    return attached_area(surface, attached_shares(surface, attached.vertices))
 
 
 def _parameters(effect: Effect) -> dict[str, str]:
     return {name: f"{exact(value)} {unit}".rstrip() for name, value, unit in effect.parameters}
 
 
-def _shape(bone: Body) -> str:
+def _shape(bone: RigidBody) -> str:
     """How fine the surface of a bone is, or what its closed form is."""
     if bone.solid is None:
         return f"{len(bone.surface.triangles)} triangles"
@@ -106,7 +106,7 @@ def field_scene_facts(scene: FieldScene, problem: FieldProblem) -> dict[str, Any
         "title": scene.title,
         "proves": scene.proves,
         "domain": f"{len(problem.mesh.cells)} cells, {len(problem.mesh.points)} vertices, size {problem.mesh.sizes.sum():.6g}",
-        "element": f"P{problem.order}, {len(problem.held)} nodes, {_held(problem)} held",
+        "element": f"P{problem.order}, {len(problem.fixed)} nodes, {_fixed(problem)} fixed",
         "form": f"{'galerkin' if problem.tau is None else 'supg'}, mesh Peclet number up to {problem.peclet:.3g}",
         "effects": {
             type(effect).__name__: {name: str(value) for name, value in effect.model_dump().items()}
@@ -118,8 +118,8 @@ def field_scene_facts(scene: FieldScene, problem: FieldProblem) -> dict[str, Any
     }
 
 
-def _held(problem: FieldProblem) -> int:
-    return sum(not math.isnan(value) for value in problem.held)
+def _fixed(problem: FieldProblem) -> int:
+    return sum(not math.isnan(value) for value in problem.fixed)
 
 
 def field_facts(
@@ -206,29 +206,27 @@ def _worst(result: Comparison) -> list[str]:
     """A line a candidate: how far it is off where it is worst, in the statistics of the page's first table."""
     lines = []
     for name, measures in result.deviations.items():
-        told = [
+        text = [
             f"{' '.join(key).replace('_', ' ')} {measure.values[measure.worst]:.4g} {measure.unit}"
             f" (frame {result.reference.numbers[measure.worst]})"
             for key in TOLD
             if (measure := find(measures, *key)) is not None
         ]
-        lines.append(f"{name} at its worst: {', '.join(told)}")
+        lines.append(f"{name} at its worst: {', '.join(text)}")
     return lines
 
 
 def _known(result: Comparison) -> list[str]:
-    """How well the reference is known, a line a statistic; nothing without them."""
+    """Error bars of the reference, a line a statistic; nothing without them."""
     if result.error_bars is None:
         return []
-    lines = [
-        "how well the reference is known (its greatest change from rest; the error bar of it, where that is widest):"
-    ]
+    lines = ["error bars of the reference (its greatest change from rest; the error bar of it, where that is widest):"]
     for measure in result.changes[result.reference.name]:
         bar = result.error_bars.find("change", measure.metric, measure.statistic)
         if bar is not None:
             value = f"{measure.values[measure.worst]:.4g} {measure.unit}"
             lines.append(f"  {measure.metric} {measure.statistic}: {value}, {_bar(result, bar)}")
-    lines.append("how well deviations from it are known (the error bar, where that is widest):")
+    lines.append("error bars of deviations from it (the error bar, where that is widest):")
     deviations = [bar for bar in result.error_bars.bars if bar.of == "deviation"]
     return lines + [f"  {bar.metric} {bar.statistic}: {_bar(result, bar)}" for bar in deviations]
 
@@ -258,18 +256,18 @@ def run_text(run: Run) -> str:
     return f"{run.name}: {run.outcome.status}, {run.outcome.message}\nstored in {run.folder}"
 
 
-def standings_text(table: Table) -> str:
+def ranking_text(table: Table) -> str:
     """Who stands how on which scene, a line each."""
     lines = []
-    for one in table.standings:
+    for one in table.results:
         found = (one.worst("surface_deviation", "rms"), one.worst("volume", "deviation"))
-        told = [
+        text = [
             f"{name} {value[0]:.3g} {unit}"
             for name, unit, value in zip(("surface rms", "volume"), ("mm", "%"), found, strict=True)
             if value is not None
         ]
         if one.seconds_per_frame:
-            told.insert(0, f"{1 / one.seconds_per_frame:.3g} frames/s")
+            text.insert(0, f"{1 / one.seconds_per_frame:.3g} frames/s")
         known = " (its error bar)" if one.of_reference and one.measures else ""
-        lines.append(f"{one.case}: {one.family}, {one.name}: {one.outcome.status}, {', '.join(told)}{known}")
+        lines.append(f"{one.case}: {one.family}, {one.name}: {one.outcome.status}, {', '.join(text)}{known}")
     return "\n".join([*lines, *(f"{case}: left out, {reason}" for case, reason in table.missing.items())])

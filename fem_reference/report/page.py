@@ -1,4 +1,4 @@
-"""The page: what the template is filled with. It holds everything itself, and reads without a network."""
+"""The page: what the template is filled with. It contains everything itself, and reads without a network."""
 
 import base64
 import json
@@ -151,8 +151,8 @@ def ticks(top: float) -> list[tuple[float, float]]:
 def _sentence(comparison: Comparison) -> str:
     numbers, names = comparison.reference.numbers, [run.name for run in comparison.candidates]
     over = f"over {len(numbers)} frames ({numbers[0]} to {numbers[-1]})"
-    told = [verdict.word for verdict in comparison.verdicts]
-    judged = f"{told.count('pass')} of {len(told)} expectations met"
+    outcomes = [verdict.word for verdict in comparison.verdicts]
+    judged = f"{outcomes.count('pass')} of {len(outcomes)} expectations met"
     if names and all(verdict.expectation.of == "reference" for verdict in comparison.verdicts):
         solver = comparison.reference.solver
         what = f"{listed(names)} compared with the reference computed by {solver}, {over}"

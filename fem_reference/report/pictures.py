@@ -2,7 +2,7 @@
 
 Without an OpenGL library VTK ends the process that draws, with no exception, hence the process of its own.
 
-The job holds ``triangles`` (m, 3), ``directions`` (2, 3) towards the two cameras, ``bones`` and ``shots`` (how many),
+The job has ``triangles`` (m, 3), ``directions`` (2, 3) towards the two cameras, ``bones`` and ``shots`` (how many),
 bone i as ``bone_i_points`` and ``bone_i_triangles``, and shot i as ``shot_i_points`` (n, 3), ``shot_i_poses``
 (bones, 4, 4), and where it has them ``shot_i_distances`` (n,) [mm] to colour by and ``shot_i_outline`` (n, 3), the body
 whose outline is drawn over it. View k of shot i becomes ``i_k.webp`` in the folder.

@@ -9,7 +9,7 @@ from fem_reference.assessment.regression import WORST_FIRST, Check, Judgement, Q
 
 # A pull request is read by people: the worst judgements, and how many there are.
 MOST_ROWS = 15
-_COLUMNS = ("verdict", "question", "statistic", "frame", "was", "today", "allowed", "known to")
+_COLUMNS = ("verdict", "question", "statistic", "frame", "was", "now", "allowed", "error bar")
 
 
 def facts(check: Check) -> dict[str, Any]:
@@ -29,7 +29,7 @@ def facts(check: Check) -> dict[str, Any]:
                 "unit": one.unit,
                 "frame": one.frame,
                 "was": _null(one.was),
-                "today": _null(one.today),
+                "today": _null(one.current),
                 "allowed": _null(one.allowed),
                 "known_to": _null(one.known),
                 "why": one.why,
@@ -72,9 +72,9 @@ def junit(check: Check, seconds: float) -> str:
     """
     counts = {"tests": len(check.judgements), "failures": check.count("fail"), "errors": 0}
     counts |= {"skipped": check.count("inconclusive")}
-    told = {name: str(count) for name, count in counts.items()} | {"time": f"{seconds:.3f}"}
-    root = ElementTree.Element("testsuites", told)
-    suite = ElementTree.SubElement(root, "testsuite", {"name": f"{check.case}.{check.candidate}"} | told)
+    totals = {name: str(count) for name, count in counts.items()} | {"time": f"{seconds:.3f}"}
+    root = ElementTree.Element("testsuites", totals)
+    suite = ElementTree.SubElement(root, "testsuite", {"name": f"{check.case}.{check.candidate}"} | totals)
     for one in check.judgements:
         case = {"classname": f"{check.case}.{check.candidate}", "name": _named(one), "time": "0"}
         element = ElementTree.SubElement(suite, "testcase", case)
@@ -136,19 +136,19 @@ def _answers(check: Check) -> list[str]:
         ("within", "as near to the reference as allowed"),
     )
     lines = []
-    for question, told in asked:
+    for question, title in asked:
         words = [one.word for one in check.judgements if one.question == question]
         counts = ", ".join(f"{words.count(word)} {word}" for word in WORST_FIRST if word in words)
-        lines.append(f"{told} ({question}): {check.answer(question)}" + (f" ({counts})" if counts else ""))
+        lines.append(f"{title} ({question}): {check.answer(question)}" + (f" ({counts})" if counts else ""))
     return lines
 
 
 def _cells(one: Judgement) -> tuple[str, ...]:
-    numbers = (_told(value, one.unit) for value in (one.was, one.today, one.allowed, one.known))
+    numbers = (_text(value, one.unit) for value in (one.was, one.current, one.allowed, one.known))
     return (one.word, one.question, one.name, str(one.frame), *numbers)
 
 
-def _told(value: float, unit: str) -> str:
+def _text(value: float, unit: str) -> str:
     return f"{value:.4g} {unit}" if math.isfinite(value) else "none"
 
 

@@ -1,4 +1,4 @@
-"""A comparison as rows of numbers: what measures.json and measures.csv hold, and the time of a frame."""
+"""A comparison as rows of numbers: the contents of measures.json and measures.csv, and the time of a frame."""
 
 import csv
 import io
@@ -21,9 +21,9 @@ COLUMNS = ("candidate", "metric", "statistic", "frame", "value", "unit")
 def summary(comparison: Comparison) -> dict[str, Any]:
     """Everything that was measured, as valid JSON: a number that is not finite is None.
 
-    ``measures`` holds each candidate's deviation from the reference, and under ``"reference"`` its own change from rest
+    ``measures`` has each candidate's deviation from the reference, and under ``"reference"`` its own change from rest
     with the inversion numbers that its solver recorded; ``from_rest`` the change from rest of every run; ``error_bars`` how
-    well the reference is known and ``rankings`` whom that tells apart, empty without any.
+    well the reference is known and ``rankings`` whom that separates, empty without any.
     """
     reference = comparison.reference
     deviations = [row for run in comparison.candidates for row in _rows(run, comparison.deviations[run.name])]

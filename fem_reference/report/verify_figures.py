@@ -67,7 +67,7 @@ def _dot(axes: Axes, row: int, one: Result, limits: tuple[float, float]) -> None
     if math.isnan(value):
         axes.plot([high], [row], "x", **look)
     elif low < value <= high:
-        axes.plot([value], [row], "s" if one.spoiled else "o", **look)
+        axes.plot([value], [row], "s" if one.with_negative_control else "o", **look)
     else:
         axes.plot([min(max(value, low), high)], [row], "<" if value <= low else ">", markerfacecolor="white", **look)
 
@@ -86,7 +86,7 @@ def _style_overview(axes: Axes, limits: tuple[float, float]) -> None:
     marks = {
         "passes": ("o", PASS, PASS),
         "fails": ("o", FAIL, FAIL),
-        "fails, spoiled on purpose": ("s", FAIL, FAIL),
+        "fails, negative control": ("s", FAIL, FAIL),
         "smaller than shown, or exactly zero": ("<", PASS, "white"),
         "greater than shown": (">", FAIL, "white"),
         "not a number": ("x", FAIL, FAIL),

@@ -1,4 +1,4 @@
-"""The page of the verification catalogue. It holds everything itself, and reads without a network."""
+"""The page of the verification catalogue. It contains everything itself, and reads without a network."""
 
 import math
 from collections import Counter
@@ -36,9 +36,9 @@ class Verification:
     @property
     def summary(self) -> str:
         """The verdict in one line."""
-        passed, spoiled = len(self.results) - len(self.failed), sum(one.spoiled for one in self.results)
-        told = f", {spoiled} measured with their spoil" if spoiled else ""
-        return f"verdict: {self.word}, {passed} of {len(self.results)} pass{told}, {self.seconds:.0f} s"
+        passed, controls = len(self.results) - len(self.failed), sum(one.with_negative_control for one in self.results)
+        note = f", {controls} measured with their negative control" if controls else ""
+        return f"verdict: {self.word}, {passed} of {len(self.results)} pass{note}, {self.seconds:.0f} s"
 
     @property
     def families(self) -> dict[str, list[Result]]:
@@ -91,8 +91,8 @@ def rows(results: Iterable[Result]) -> list[dict[str, Any]]:
             "because": one.entry.because,
             "source": one.entry.source,
             "note": one.finding.note,
-            "spoil": one.entry.spoil,
-            "spoiled": one.spoiled,
+            "negative_control": one.entry.negative_control,
+            "with_negative_control": one.with_negative_control,
         }
         for one in results
     ]

@@ -79,17 +79,17 @@ async function muscle(run, faces) {
   return { ...run, whole, stride, mesh, plain: mesh.material, coloured: look("#ffffff", { vertexColors: true }), greatest: 0, label: label(run.name) };
 }
 
-async function bone(told) {
-  const whole = await wholeNumbers(told.positions, 1);
+async function bone(data) {
+  const whole = await wholeNumbers(data.positions, 1);
   const geometry = new three.BufferGeometry();
-  geometry.setIndex(new three.BufferAttribute(new Uint32Array(await unpacked(told.triangles)), 1));
-  geometry.setAttribute("position", new three.BufferAttribute(Float32Array.from(whole, (value, i) => told.low[i % 3] + told.step * value), 3));
+  geometry.setIndex(new three.BufferAttribute(new Uint32Array(await unpacked(data.triangles)), 1));
+  geometry.setAttribute("position", new three.BufferAttribute(Float32Array.from(whole, (value, i) => data.low[i % 3] + data.step * value), 3));
   geometry.computeVertexNormals();
   geometry.computeBoundingSphere();
   const mesh = new three.Mesh(geometry, look(BONE));
   mesh.matrixAutoUpdate = false;
   mesh.frustumCulled = false;
-  return { mesh, poses: told.poses };
+  return { mesh, poses: data.poses };
 }
 
 function label(name) {
@@ -171,12 +171,12 @@ function ramp(share, colours, at) {
 }
 
 function describe(run) {
-  const { frame, runs } = view, told = run.label.lastChild, off = run.off[frame];
+  const { frame, runs } = view, label = run.label.lastChild, off = run.off[frame];
   const known = run.reached[frame] && runs[0].reached[frame];
-  told.className = run.reached[frame] && !off ? "" : "bad";
-  told.textContent = run === runs[0] ? "" : `worst vertex ${off ? "more than " : ""}${number(run.greatest)} mm`;
-  if (off) told.textContent += `; ${off} vertices are farther off than is drawn`;
-  if (!known) told.textContent = run.reached[frame] ? "no frame of the reference" : "no frame";
+  label.className = run.reached[frame] && !off ? "" : "bad";
+  label.textContent = run === runs[0] ? "" : `worst vertex ${off ? "more than " : ""}${number(run.greatest)} mm`;
+  if (off) label.textContent += `; ${off} vertices are farther off than is drawn`;
+  if (!known) label.textContent = run.reached[frame] ? "no frame of the reference" : "no frame";
   const drawn = run.mesh.geometry.attributes.position.array;
   const mean = [0, 1, 2].map((k) => (3 * drawn.reduce((sum, value, i) => sum + (i % 3 === k ? value : 0), 0)) / drawn.length);
   run.label.dataset.mean = run.reached[frame] ? mean.join(" ") : "";

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.thinning import thin
-from fem_reference.problems.muscle import Body
+from fem_reference.problems.muscle import RigidBody
 from fem_reference.report import gallery, pictures
 from fem_reference.runs.store import Run
 
@@ -73,7 +73,7 @@ class _Box:
             steps = np.clip(np.round((points - self.low) / self.step), 0, _LEVELS)
         return np.nan_to_num(steps, nan=0.0).astype(np.uint16)
 
-    def told(self) -> dict[str, Any]:
+    def facts(self) -> dict[str, Any]:
         return {"low": self.low.tolist(), "step": self.step}
 
 
@@ -94,7 +94,7 @@ def view(comparison: Comparison, budget: int = BUDGET) -> Viewer:
         "triangles": _packed(reference.surface.triangles.astype("<u4").tobytes()),
         "bones": [_bone(bone, numbers) for bone in comparison.setup.bones],
         "camera": _camera(comparison, own),
-        **box.told(),
+        **box.facts(),
         **_runs(frames, reference.name, box),
     }
     names = tuple(run.name for run in shown[1:])
@@ -105,8 +105,8 @@ def _every(shown: list[Run], budget: int) -> int:
     """One frame in how many keeps the positions of all runs within ``budget`` bytes, as far as two frames are left."""
     count, vertices = len(shown[0].numbers), len(shown[0].surface.points)
     frame = len(shown) * vertices * 3 * 2
-    ways = range(1, max(count, 2))
-    return next((every for every in ways if -(-count // every) * frame <= budget), ways[-1])
+    strides = range(1, max(count, 2))
+    return next((every for every in strides if -(-count // every) * frame <= budget), strides[-1])
 
 
 def _frames(run: Run, numbers: tuple[int, ...]) -> Floats:
@@ -144,14 +144,14 @@ def _runs(frames: dict[str, Floats], reference: str, box: _Box) -> dict[str, Any
                 "worst": [float(known.max()), int(known.argmax())],
                 "reached": reached.tolist(),
                 "off": np.where(reached, (~inside).sum(axis=1), 0).tolist(),
-                "positions": _positions(_held_on(positions), box),
+                "positions": _positions(_last_finite(positions), box),
             }
         )
         top = max(top, float(known[inside.all(axis=1)].max(initial=0.0)))
     return {"runs": rows, "top": top}
 
 
-def _held_on(frames: Floats) -> Floats:
+def _last_finite(frames: Floats) -> Floats:
     """The frames with the last that was reached in the place of one that was not, which then costs no bytes."""
     reached = np.isfinite(frames).all(axis=(1, 2))
     last = np.maximum.accumulate(np.where(reached, np.arange(len(frames)), 0))
@@ -159,14 +159,14 @@ def _held_on(frames: Floats) -> Floats:
 
 
 def _positions(frames: Floats, box: _Box) -> str:
-    """Positions (f, n, 3) in the form that this module's text tells."""
+    """Positions (f, n, 3) in the form that this module's text describes."""
     whole = box.whole(frames)
     steps = np.diff(whole, axis=0, prepend=np.zeros_like(whole[:1])).view(np.int16)
     zigzag = ((steps << 1) ^ (steps >> 15)).view(np.uint16)
     return _packed((zigzag & 255).astype(np.uint8).tobytes() + (zigzag >> 8).astype(np.uint8).tobytes())
 
 
-def _bone(bone: Body, numbers: tuple[int, ...]) -> dict[str, Any]:
+def _bone(bone: RigidBody, numbers: tuple[int, ...]) -> dict[str, Any]:
     surface = thin(bone.surface, BONE_TRIANGLES)
     box = _Box.around(surface.points.min(axis=0), surface.points.max(axis=0))
     return {
@@ -174,7 +174,7 @@ def _bone(bone: Body, numbers: tuple[int, ...]) -> dict[str, Any]:
         "triangles": _packed(surface.triangles.astype("<u4").tobytes()),
         "positions": _positions(surface.points[None], box),
         "poses": [bone.pose(number).ravel().tolist() for number in numbers],
-        **box.told(),
+        **box.facts(),
     }
 
 

@@ -1,4 +1,4 @@
-"""What a run is known by: a hash over the scene, the settings, and the source code that its solver reaches."""
+"""The key of a run: a hash over the scene, the settings, and the source code that its solver reaches."""
 
 import ast
 import hashlib

@@ -222,7 +222,7 @@ def von_mises(stress: Floats) -> Floats:
 
 
 def lagrange(barycentric: Floats, gradients: Floats, count: int) -> tuple[Floats, Floats]:
-    """The Lagrange functions (n, count) of a tetrahedron with 4 or 10 nodes, in the order of ``continuum.reference_nodes``, and
+    """The Lagrange functions (n, count) of a tetrahedron with 4 or 10 nodes, in the order of ``body.reference_nodes``, and
     their gradients (n, count, 3) [1/mm], at barycentric coordinates (n, 4) whose gradients (n, 4, 3) [1/mm] are given.
 
     Of degree 2: ``L_i (2 L_i - 1)`` at corners, ``4 L_i L_j`` between two (Zienkiewicz and Taylor 2000, The Finite Element Method,

@@ -1,4 +1,4 @@
-"""What a solver makes of a scalar problem, and how it is stored: ``run.json`` and ``field.vtu``, which opens in ParaView."""
+"""Runs of scalar problems and how they are stored: ``run.json`` and ``field.vtu``, which opens in ParaView."""
 
 import json
 from dataclasses import dataclass, field

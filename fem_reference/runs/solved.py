@@ -10,7 +10,7 @@ from fem_reference.runs.store import Outcome
 @dataclass(frozen=True, eq=False)
 class Reached:
     """A state of a body at a frame: ``points`` (n, 3) [mm] where the nodes of the mesh are, and by name of what is prescribed the
-    ``forces`` (3,) [N] that hold it there, along the prescribed components, and their ``moments`` (3,) [N mm] about the origin (at
+    ``forces`` (3,) [N] of the constraint, along the prescribed components, and their ``moments`` (3,) [N mm] about the origin (at
     nodes of several regions that prescribe the same component, the force counts in each), and what obstructions exert; ``scalars``:
     min_det_F_quadrature, min_det_F_vertices, volume_ratio, energy [N mm] of what acts inside, newton_iterations, cut_backs; of
     the reference, of the means over cells, min_cell_volume_ratio and max_cell_volume_ratio, min_cell_fibre_stretch and

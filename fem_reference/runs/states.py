@@ -23,7 +23,7 @@ _ARRAYS = ("displacement", "pressure", "before", "rate")
 @dataclass(frozen=True, eq=False)
 class NodalState:
     """The unknowns of m cells: ``displacement`` (m, k, 3) [mm] at the k nodes of the element in the order of
-    ``continuum.reference_nodes``; ``pressure`` (m, l) [MPa] at the corners (l = 4 of a tetrahedron), constant in the cell (l = 1),
+    ``body.reference_nodes``; ``pressure`` (m, l) [MPa] at the corners (l = 4 of a tetrahedron), constant in the cell (l = 1),
     or none (l = 0).
 
     Where an effect feels how fast time passes, also the displacement ``before`` (m, k, 3) [mm] that the last load step started

@@ -33,7 +33,7 @@ log = logging.getLogger(__name__)
 
 Status = Literal["converged", "diverged", "inverted", "collapsed", "out of steps", "timed out", "crashed"]
 FORMAT = 1
-# Between the first and the last frame, progress is told no more often than this [s].
+# Between the first and the last frame, progress is reported no more often than this [s].
 QUIET = 1.0
 
 
@@ -123,7 +123,7 @@ class Writer:
         self.folder, self.surface, self.fibres, self.mesh, self.directions = folder, surface, fibres, mesh, directions
         self.state: dict[str, Any] = {"format": FORMAT, **identity, "status": "running", "message": "", "numbers": []}
         self.state |= {"scalars": {}, "cost": {}, "parts": []}
-        self.begin, self.told = time.perf_counter(), 0.0
+        self.begin, self.reported = time.perf_counter(), 0.0
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
         self._write_state()
@@ -190,9 +190,9 @@ class Writer:
         passed = time.perf_counter() - self.begin
         left = f", about {passed / (done - 1) * (wanted - done):.0f} s left" if 1 < done < wanted else ""
         note = f", {frame.note}" if frame.note else ""
-        if 1 < done < wanted and passed - self.told < QUIET:
+        if 1 < done < wanted and passed - self.reported < QUIET:
             return
-        self.told, name = passed, self.state["name"]
+        self.reported, name = passed, self.state["name"]
         log.info("%s: frame %d (%d of %d)%s, %.0f s%s", name, frame.number, done, wanted, note, passed, left)
 
 

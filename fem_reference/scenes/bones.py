@@ -31,8 +31,10 @@ class Motion(Record):
 
     @field_validator("axis", "direction")
     @classmethod
-    def _check_way(cls, way: tuple[float, float, float], info: ValidationInfo) -> tuple[float, float, float]:
-        return _checked_way(way, f"{'an' if info.field_name == 'axis' else 'a'} {info.field_name}")
+    def _check_direction(
+        cls, direction: tuple[float, float, float], info: ValidationInfo
+    ) -> tuple[float, float, float]:
+        return _checked_direction(direction, f"{'an' if info.field_name == 'axis' else 'a'} {info.field_name}")
 
     @field_validator("keyframes")
     @classmethod
@@ -73,7 +75,7 @@ class HalfSpace(Record):
     @field_validator("normal")
     @classmethod
     def _check_normal(cls, normal: tuple[float, float, float]) -> tuple[float, float, float]:
-        return _checked_way(normal, "a normal")
+        return _checked_direction(normal, "a normal")
 
 
 class Box(Record):
@@ -140,9 +142,9 @@ class Bone(Record):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        ways = ("surface", *CLOSED_FORMS)
-        if sum(getattr(self, way) is not None for way in ways) != 1:
-            raise ValueError(f"exactly one of {_quoted(ways)}")
+        forms = ("surface", *CLOSED_FORMS)
+        if sum(getattr(self, form) is not None for form in forms) != 1:
+            raise ValueError(f"exactly one of {_quoted(forms)}")
         if (self.surface is None) != (self.unit is None):
             raise ValueError('"unit" beside "surface" and only there')
         for key in ("distance_error", "distance_rounding"):
@@ -151,10 +153,10 @@ class Bone(Record):
         return self
 
 
-def _checked_way(way: tuple[float, float, float], name: str) -> tuple[float, float, float]:
-    if not 1e-9 < math.hypot(*way) < 1e9:
+def _checked_direction(direction: tuple[float, float, float], name: str) -> tuple[float, float, float]:
+    if not 1e-9 < math.hypot(*direction) < 1e9:
         raise ValueError(f"{name} that is not zero, with a length from 1e-9 to 1e9")
-    return way
+    return direction
 
 
 def _quoted(names: Sequence[str]) -> str:

@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.effects import Coursed, Effect, FieldEffect, Load
+from fem_reference.effects import Effect, FieldEffect, Load, Ramped
 from fem_reference.effects import find as find_effect
 from fem_reference.effects import names as effect_names
 from fem_reference.effects.contact import Contact, among
 from fem_reference.effects.damping import Damping
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record, join, parse
-from fem_reference.scenes.muscle import HOME, Scene, SceneFile, Spoil
+from fem_reference.scenes.muscle import HOME, NegativeControl, Scene, SceneFile
 from fem_reference.scenes.scalar import FieldScene, FieldSceneFile
 
-# What a load acts on, where it is no attachment: the surface that no bone holds.
+# What a load acts on, where it is no attachment: the surface that is not attached to bone.
 FREE = "free"
 
 
@@ -27,12 +27,15 @@ def cases() -> list[str]:
     return sorted(path.parent.name for path in (HOME / "cases").glob("*/case.toml"))
 
 
-def read(case: str | Path, *, spoiled: bool = False, changes: dict[str, Any] | None = None) -> Scene | FieldScene:
+def read(
+    case: str | Path, *, with_negative_control: bool = False, changes: dict[str, Any] | None = None
+) -> Scene | FieldScene:
     """The scene of a shipped case (by name), a folder with a ``case.toml``, or a scene file: with a ``domain`` that of a scalar
     field, else that of a muscle.
 
-    ``changes`` maps keys such as ``"frames.last"`` or ``"effect[1].bulk"`` to other values; ``spoiled`` applies the case's spoil.
-    That the spoil can be applied is checked too, except after changes of other keys: they may take away what it spoils.
+    ``changes`` maps keys such as ``"frames.last"`` or ``"effect[1].bulk"`` to other values; ``with_negative_control`` applies the
+    case's negative control. That the negative control can be applied is checked too, except after changes of other keys: they may
+    take away what it changes.
     """
     path = _scene_file(case)
     try:
@@ -41,11 +44,11 @@ def read(case: str | Path, *, spoiled: bool = False, changes: dict[str, Any] | N
         raise InputError(path, str(error), "a TOML file") from error
     for key, value in (changes or {}).items():
         _change(table, key, value, str(path))
-    if spoiled:
-        return _spoiled(table, path)
+    if with_negative_control:
+        return _with_negative_control(table, path)
     scene = _scene(table, path)
-    if not changes or any(key.startswith("spoil") for key in changes):
-        _check_spoil(scene, _spoiled(table, path))
+    if not changes or any(key.startswith("negative_control") for key in changes):
+        _check_negative_control(scene, _with_negative_control(table, path))
     return scene
 
 
@@ -58,10 +61,10 @@ def _scene_file(case: str | Path) -> Path:
 
 def _change(table: dict[str, Any], key: str, value: Any, place: str) -> None:
     parts = re.findall(r"[^.\[\]]+", key) or [""]
-    *way, last = [int(part) if part.isdecimal() else part for part in parts]
+    *parents, last = [int(part) if part.isdecimal() else part for part in parts]
     inside: Any = table
     try:
-        for part in way:
+        for part in parents:
             inside = inside[part]
         inside[last]  # a change replaces what is there
         inside[last] = value
@@ -94,31 +97,35 @@ def read_muscle(case: str | Path, changes: dict[str, Any] | None = None) -> Scen
     return scene
 
 
-def _spoiled(table: dict[str, Any], path: Path) -> Scene | FieldScene:
-    """The scene with its spoil applied; ``table`` stays as it is."""
+def _with_negative_control(table: dict[str, Any], path: Path) -> Scene | FieldScene:
+    """The scene with its negative control applied; ``table`` stays as it is."""
     place = str(path)
-    spoil = parse(Spoil, table.get("spoil"), join(place, "spoil"))
+    control = parse(NegativeControl, table.get("negative_control"), join(place, "negative_control"))
     table = deepcopy(table)
     try:
-        _change(table, spoil.key, spoil.value, place)
+        _change(table, control.key, control.value, place)
     except InputError as error:
-        raise InputError(join(place, "spoil.key"), f'"{spoil.key}"', "a key of this scene") from error
+        raise InputError(join(place, "negative_control.key"), f'"{control.key}"', "a key of this scene") from error
     try:
         return _scene(table, path)
     except InputError as error:
         why = str(error).removeprefix(f"{place}: ")
-        raise InputError(join(place, "spoil.value"), _told(spoil), f"a value that can be read ({why})") from error
-
-
-def _check_spoil(scene: Scene | FieldScene, spoiled: Scene | FieldScene) -> None:
-    if spoiled.model_copy(update={"spoil": scene.spoil}) == scene:
         raise InputError(
-            join(scene.place, "spoil.value"), _told(scene.spoil), f"a value that changes {scene.spoil.key}"
+            join(place, "negative_control.value"), _value_text(control), f"a value that can be read ({why})"
+        ) from error
+
+
+def _check_negative_control(scene: Scene | FieldScene, changed: Scene | FieldScene) -> None:
+    if changed.model_copy(update={"negative_control": scene.negative_control}) == scene:
+        raise InputError(
+            join(scene.place, "negative_control.value"),
+            _value_text(scene.negative_control),
+            f"a value that changes {scene.negative_control.key}",
         )
 
 
-def _told(spoil: Spoil) -> str:
-    return f'"{spoil.value}"' if isinstance(spoil.value, str) else repr(spoil.value)
+def _value_text(control: NegativeControl) -> str:
+    return f'"{control.value}"' if isinstance(control.value, str) else repr(control.value)
 
 
 def _scene(table: dict[str, Any], path: Path) -> Scene | FieldScene:
@@ -181,13 +188,13 @@ def _check_names(scene: Scene) -> None:
     ends = [(f"fibres.traced.{end}", getattr(traced, end)) for end in ("start", "end") if traced]
     _check_used(bones, [(f"attachment[{i}].bone", entry.bone) for i, entry in enumerate(scene.attachment)], scene.place)
     _check_used(attachments, ends, scene.place)
-    pushing = [
+    obstacles = [
         (f"effect[{i}].bones", name)
         for i, effect in enumerate(scene.effects)
         if isinstance(effect, Contact)
         for name in effect.bones or ()
     ]
-    _check_used(bones, pushing, scene.place)
+    _check_used(bones, obstacles, scene.place)
     _check_forces(scene)
     loads = [(f"effect[{i}].on", effect.on) for i, effect in enumerate(scene.effects) if isinstance(effect, Load)]
     _check_used([*attachments, FREE], loads, scene.place)
@@ -195,13 +202,13 @@ def _check_names(scene: Scene) -> None:
 
 
 def _check_forces(scene: Scene) -> None:
-    """Forces are told by the name of who exerts them, and something keeps the muscle from drifting."""
+    """Forces are reported by the name of the bone, and something keeps the muscle from drifting."""
     bones = [bone.name for bone in scene.bone]
-    pushed = among(scene.effects) is not None
+    contact = among(scene.effects) is not None
     for i, attachment in enumerate(scene.attachment):
-        if pushed and attachment.name in bones:
+        if contact and attachment.name in bones:
             place = join(scene.place, f"attachment[{i}].name")
-            raise InputError(place, f'"{attachment.name}", which a bone that pushes has too', "a name of its own")
+            raise InputError(place, f'"{attachment.name}", which a bone in contact has too', "a name of its own")
     if not scene.attachment and not any(isinstance(effect, Damping) for effect in scene.effects):
         want = 'an attachment, soft as it may be, or the effect "damping": without either the muscle drifts'
         raise InputError(join(scene.place, "attachment"), "none", want)
@@ -230,9 +237,9 @@ def _check_used(known: list[str], uses: list[tuple[str, str]], place: str) -> No
 def _check_rest(scene: Scene) -> None:
     """At the first frame every bone is where its surface is, and nothing acts that comes and goes: the muscle rests."""
     for i, effect in enumerate(scene.effects):
-        if isinstance(effect, Coursed) and effect.amount(scene.frames.first) != 0:
+        if isinstance(effect, Ramped) and effect.amount(scene.frames.first) != 0:
             got = f"an amount of {effect.amount(scene.frames.first):g} at frame {scene.frames.first}, the first"
-            raise InputError(join(scene.place, f"effect[{i}].course"), got, "0 there, where the muscle rests")
+            raise InputError(join(scene.place, f"effect[{i}].ramp"), got, "0 there, where the muscle rests")
     for i, bone in enumerate(scene.bone):
         pose = bone.motion.poses().pose(scene.frames.first) if bone.motion else np.eye(4)
         if not abs(pose - np.eye(4)).max() <= 1e-12:  # NaN is no rest

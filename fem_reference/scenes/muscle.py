@@ -32,7 +32,7 @@ HOME = home(Path(__file__).resolve().parent.parent)
 
 
 class Muscle(Record):
-    """The deformable body: a closed triangle surface, the size of the tetrahedra it is filled with, how often each of them is then
+    """The muscle: a closed triangle surface, the size of the tetrahedra it is filled with, how often each of them is then
     cut into eight (``refinements``), and how it is filled: with good tetrahedra (``"quality"``), or an axis-aligned box with a
     grid of boxes, each cut into six (``"block"``).
     """
@@ -61,8 +61,8 @@ class Outline(Record):
 
 
 class Attachment(Record):
-    """Which part of the muscle surface a bone holds: exactly one of ``vertices``, ``within`` (of the bone), ``outline``; and how:
-    by springs of a ``stiffness`` over its area, without it exactly.
+    """Which part of the muscle surface is attached to a bone: exactly one of ``vertices``, ``within`` (of the bone), ``outline``;
+    and how: by springs of a ``stiffness`` over its area, without it exactly.
     """
 
     name: str
@@ -74,7 +74,7 @@ class Attachment(Record):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if sum(way is not None for way in (self.vertices, self.within, self.outline)) != 1:
+        if sum(one is not None for one in (self.vertices, self.within, self.outline)) != 1:
             raise ValueError('exactly one of "vertices", "within", "outline"')
         return self
 
@@ -167,7 +167,7 @@ class Expectation(Record):
     because: str
 
 
-class Spoil(Record):
+class NegativeControl(Record):
     """One change of this scene that must turn its verdict to fail: the ``key`` to change and its ``value``."""
 
     key: str
@@ -176,7 +176,7 @@ class Spoil(Record):
 
 
 class SceneFile(Record):
-    """What a scene file holds."""
+    """The contents of a scene file."""
 
     title: str
     proves: str
@@ -189,11 +189,11 @@ class SceneFile(Record):
     reference: SolverChoice
     candidate: tuple[Candidate, ...]
     expect: tuple[Expectation, ...] = Field(min_length=1)
-    spoil: Spoil
+    negative_control: NegativeControl
 
 
 class Scene(SceneFile):
-    """A case, read and checked: what its file holds, and the name and place of its folder."""
+    """A case, read and checked: the contents of its file, and the name and place of its folder."""
 
     name: str
     folder: Path

@@ -1,4 +1,4 @@
-"""A scalar case as frozen records: where a field lives, which effects act on it, what holds it, and what is expected."""
+"""A scalar case as frozen records: where a field lives, which effects act on it, its boundary conditions, and what is expected."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -9,7 +9,7 @@ from pydantic import Field, field_validator, model_validator
 from fem_reference.effects import FieldEffect
 from fem_reference.foundations.formula import Formula
 from fem_reference.foundations.records import Record
-from fem_reference.scenes.muscle import Candidate, SolverChoice, Spoil, locate
+from fem_reference.scenes.muscle import Candidate, NegativeControl, SolverChoice, locate
 
 
 class Interval(Record):
@@ -62,18 +62,18 @@ class Domain(Record):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if sum(way is not None for way in (self.interval, self.nodes, self.mesh, self.surface)) != 1:
+        if sum(one is not None for one in (self.interval, self.nodes, self.mesh, self.surface)) != 1:
             raise ValueError('exactly one of "interval", "nodes", "mesh", "surface"')
         return self
 
 
 class Boundary(Record):
-    """A condition, in one of two ways.
+    """A condition, in one of two forms.
 
     ``on`` an end of an interval or the ``rim`` of triangles, there only ``where`` a formula is above zero at every vertex of a
     facet (an edge counts only with both its ends): the ``value`` of the field (Dirichlet) or its ``slope`` along the outward
     normal (Neumann). Or ``bounds``, a file as listing 4.5 loads it: a row of vertices, the first of all being 1, and a row of the
-    values that they are held at. What no condition names has slope 0.
+    values that they are fixed at. What no condition names has slope 0.
     """
 
     on: Literal["left", "right", "rim"] | None = None
@@ -114,7 +114,7 @@ class FieldExpectation(Record):
 
 
 class FieldSceneFile(Record):
-    """What the file of a scalar scene holds."""
+    """The contents of the file of a scalar scene."""
 
     title: str
     proves: str
@@ -126,11 +126,11 @@ class FieldSceneFile(Record):
     reference: SolverChoice
     candidate: tuple[Candidate, ...]
     expect: tuple[FieldExpectation, ...] = Field(min_length=1)
-    spoil: Spoil
+    negative_control: NegativeControl
 
 
 class FieldScene(FieldSceneFile):
-    """A scalar case, read and checked: what its file holds, and the name and place of its folder."""
+    """A scalar case, read and checked: the contents of its file, and the name and place of its folder."""
 
     name: str
     folder: Path

@@ -1,4 +1,4 @@
-"""Who computes: one file per solver, named as in scene files.
+"""Solvers: one file each, named as in scene files.
 
 Contract (tests/test_solvers.py): a solver of muscles has ``Settings``, a strict record of its own settings, and
 ``solve(problem, settings, sink) -> Outcome``, which sinks every requested frame as it is reached. A solver of scalar fields has
@@ -20,7 +20,7 @@ Task = Literal["solve", "solve_field", "solve_body"]
 _TASKS: dict[Task, tuple[str, str]] = {
     "solve": ("Settings", "muscles"),
     "solve_field": ("FieldSettings", "scalar fields"),
-    "solve_body": ("BodySettings", "bodies of continuum mechanics"),
+    "solve_body": ("BodySettings", "finite element bodies"),
 }
 
 

@@ -1,10 +1,10 @@
 """As rigid as possible: the surface keeps the shape of every vertex's edges. Report section 5.5.2; Sorkine and Alexa 2007.
 
-Frame number n is the state after the bones took their pose of frame n: the vertices that a bone holds go with it exactly, and
+Frame number n is the state after the bones took their pose of frame n: the vertices attached to a bone go with it exactly, and
 from the state before, the rotations of all cells (local step) and the positions of all other vertices (global step) take
-turns. Where the rows of held vertices are removed and weights are the same from both ends, both steps minimise eq. 5.10, each
+turns. Where the rows of attached vertices are removed and weights are the same from both ends, both steps minimise eq. 5.10, each
 over its own unknowns, so that the energy never rises; negative weights do not change that, as the matrix is still the
-positive one of linear elements. What a bone holds by springs it holds exactly here, and bones push nothing aside.
+positive one of linear elements. Attachments by springs are exact here, and there is no contact.
 """
 
 import time
@@ -41,10 +41,10 @@ class Settings(Record):
     ``weights`` of edges: "cotangent" (eq. 5.13), "clamped cotangent" (the same, the negative ones 0), "kirchhoff" (all 1),
     "tutte" (those, each row divided by its diagonal). A cotangent weight is negative where the angles opposite its edge are
     together more than pi. Kept, as libigl keeps them, such weights let a cell gain from a half turn, so that rest may not stay.
-    ``fixed``: the rows and columns of held vertices are left out ("remove"), or the columns alone, and all rows are met by
+    ``fixed``: the rows and columns of attached vertices are left out ("remove"), or the columns alone, and all rows are met by
     least squares ("ols", eq. 5.12). With removed rows tutte has the states of kirchhoff.
     ``rotations``: fitted before "each" global step, or once in a frame ("first only"): its later iterations then change nothing.
-    ``volume_step``: after each global step the vertices that no bone holds are scaled about the mean of all by eq. 5.9.
+    ``volume_step``: after each global step the free vertices are scaled about the mean of all by eq. 5.9.
     ``iterations``: in each frame; their number is the method. With a ``tolerance`` [mm] a frame is done as soon as no vertex moved
     by more in an iteration, and the run is out of steps where a frame is not done after so many.
     """
@@ -97,15 +97,15 @@ class Cells:
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """The global step for given ``held`` (k,) and ``free`` vertices, factorised once.
+    """The global step for given ``attached`` (k,) and ``free`` vertices, factorised once.
 
     ``rows`` of the Laplacian are kept, its columns split into ``coupling`` (rows, k) and those of ``factor``; ``fold``, of
     least squares, is the transpose that both sides are multiplied with. ``loose`` are free vertices that no weights tie to a
-    held one: where there are some, or nothing or everything is held, there is no ``factor`` and nothing else moves.
+    attached one: where there are some, or nothing or everything is attached, there is no ``factor`` and nothing else moves.
     """
 
     cells: Cells
-    held: Ints
+    attached: Ints
     free: Ints
     rows: Ints
     coupling: Any
@@ -114,23 +114,23 @@ class System:
     loose: Ints
 
     @classmethod
-    def of(cls, cells: Cells, held: Ints, fixed: Fixed) -> Self:
-        """The system with the rows of held vertices removed, or kept for least squares."""
+    def of(cls, cells: Cells, attached: Ints, fixed: Fixed) -> Self:
+        """The system with the rows of attached vertices removed, or kept for least squares."""
         everything, laplacian = np.arange(len(cells.rest)), cells.laplacian().tocsr()
-        free = np.setdiff1d(everything, held)
+        free = np.setdiff1d(everything, attached)
         rows = free if fixed == "remove" else everything
-        matrix, coupling = laplacian[rows][:, free], laplacian[rows][:, held]
+        matrix, coupling = laplacian[rows][:, free], laplacian[rows][:, attached]
         fold = None if fixed == "remove" else matrix.T.tocsr()
-        loose = _untied(laplacian, held)
+        loose = _untied(laplacian, attached)
         solvable = 0 < len(free) < len(everything) and len(loose) == 0
         factor = factorised(matrix if fold is None else fold @ matrix) if solvable else None
-        return cls(cells, held, free, rows, coupling, fold, factor, loose)
+        return cls(cells, attached, free, rows, coupling, fold, factor, loose)
 
     def place(self, points: Floats, rotations: Floats) -> Floats:
-        """The global step: positions (n, 3) [mm] that solve ``L p' = b`` with the held vertices where ``points`` has them."""
+        """The global step: positions (n, 3) [mm] that solve ``L p' = b`` with the attached vertices where ``points`` has them."""
         moved = points.copy()
         if self.factor is not None:
-            right = self.cells.right_side(rotations)[self.rows] - self.coupling @ points[self.held]
+            right = self.cells.right_side(rotations)[self.rows] - self.coupling @ points[self.attached]
             moved[self.free] = self.factor.solve(right if self.fold is None else self.fold @ right)
         return moved
 
@@ -151,7 +151,7 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
     """Iterate through every frame number from the first of ``setup.frames``, at rest, to the last."""
     cost = {"seconds_compile": compile_kernels()}
     begin = time.perf_counter()
-    system = System.of(Cells.of(setup.surface, settings.weights), setup.held_vertices, settings.fixed)
+    system = System.of(Cells.of(setup.surface, settings.weights), setup.attached_vertices, settings.fixed)
     cost["seconds_setup"] = time.perf_counter() - begin
     triangles, volume = setup.surface.triangles, enclosed_volume(setup.surface.points, setup.surface.triangles)
 
@@ -163,8 +163,8 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
             moved = system.place(points, rotations)
             if settings.volume_step:
                 moved = scaled(moved, triangles, system.free, volume)
-            way, points = farthest(moved - points), moved
-            if settings.tolerance is not None and way <= settings.tolerance:
+            displacement, points = farthest(moved - points), moved
+            if settings.tolerance is not None and displacement <= settings.tolerance:
                 return Relaxed(points, count, True)
         return Relaxed(points, settings.iterations, settings.tolerance is None)
 
@@ -174,12 +174,12 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
 def march(
     setup: Setup, system: System, relax: Callable[[Floats], Relaxed], sink: Sink, cost: dict[str, float]
 ) -> Outcome:
-    """Move the held vertices and ``relax`` the others, frame number by frame number; what it costs is added to ``cost``."""
+    """Move the attached vertices and ``relax`` the others, frame number by frame number; what it costs is added to ``cost``."""
     points, (first, *_, last) = np.array(setup.surface.points), setup.frames
     sink(Frame(first, points.copy(), scalars={"arap_energy_mm2": system.cells.energy(points)}))
     cost |= {"seconds_solve": 0.0, "iterations": 0, "local_global_steps": 0, "frames_off_tolerance": 0, "threads": 1}
     if len(system.loose):
-        why = f"vertex {system.loose[0]}: nothing but triangles without area or weight ties it to a held vertex"
+        why = f"vertex {system.loose[0]}: nothing but triangles without area or weight ties it to a attached vertex"
         return Outcome("diverged", f"{why}; kirchhoff weights feel no areas", cost)
     for iteration in range(first + 1, last + 1):
         begin = time.perf_counter()
@@ -191,7 +191,7 @@ def march(
         cost["local_global_steps"] += relaxed.iterations
         cost["frames_off_tolerance"] += not relaxed.met
         cost["seconds_per_iteration"] = cost["seconds_solve"] / cost["iterations"]
-        if found := trouble(points, setup.surface, system.held) or relaxed.trouble:
+        if found := trouble(points, setup.surface, system.attached) or relaxed.trouble:
             return Outcome(found.status, f"frame {iteration}: {found.sentence}; a slower motion may help", cost)
         if iteration in setup.frames:
             sink(Frame(iteration, points.copy(), scalars={"arap_energy_mm2": system.cells.energy(points)}))
@@ -205,7 +205,7 @@ def march(
 def scaled(points: Floats, triangles: Ints, free: Ints, volume: float) -> Floats:
     """``points`` (n, 3) with the ``free`` ones scaled about the mean of all by the cube root of V0 / V, eq. 5.9.
 
-    V0 is ``volume`` [mm3]. It is reached where all are free: as those that a bone holds stay, some of it is missing. What encloses
+    V0 is ``volume`` [mm3]. It is reached where all are free: as attached ones stay, some of it is missing. What encloses
     nothing stays as it is.
     """
     centre, inside = points.mean(axis=0), abs(enclosed_volume(points, triangles))
@@ -215,9 +215,9 @@ def scaled(points: Floats, triangles: Ints, free: Ints, volume: float) -> Floats
     return found
 
 
-def farthest(ways: Floats) -> float:
-    """The greatest length of ``ways`` (n, 3)."""
-    return float(np.sqrt(np.max(np.einsum("ij,ij->i", ways, ways))))
+def farthest(displacements: Floats) -> float:
+    """The greatest length of ``displacements`` (n, 3)."""
+    return float(np.sqrt(np.max(np.einsum("ij,ij->i", displacements, displacements))))
 
 
 def factorised(matrix: Any) -> Any:
@@ -264,7 +264,7 @@ def _edge_weights(surface: Surface, name: Weights) -> Any:
     return matrix
 
 
-def _untied(laplacian: Any, held: Ints) -> Ints:
-    """The vertices that no chain of edges of a weight other than 0 leads to a held one; none where nothing is held."""
+def _untied(laplacian: Any, attached: Ints) -> Ints:
+    """The vertices that no chain of edges of a weight other than 0 leads to a attached one; none where nothing is attached."""
     part = connected_components(laplacian != 0, directed=False)[1]
-    return np.flatnonzero(~np.isin(part, part[held])) if len(held) else np.zeros(0, np.int64)
+    return np.flatnonzero(~np.isin(part, part[attached])) if len(attached) else np.zeros(0, np.int64)

@@ -5,7 +5,7 @@
 positions of the iteration before. Where the iteration comes to rest, the slope of the energy is a multiple of the volume's:
 no small change that keeps the volume changes the energy. *ARAP as initial guess*: sweeps of PBD's projections (edge lengths,
 volume, dihedral angles) start from the ARAP state of the frame; nothing is kept of a velocity. Where both are asked for, the
-projections come last. As in ``arap``, bones push nothing aside.
+projections come last. As in ``arap``, there is no contact.
 """
 
 import time
@@ -42,7 +42,7 @@ class Projections(Record):
 
 
 class Settings(Record):
-    """ARAP with the rows of held vertices removed and rotations fitted in each iteration, and what keeps its volume.
+    """ARAP with the rows of attached vertices removed and rotations fitted in each iteration, and what keeps its volume.
 
     ``weights``, ``iterations`` and ``tolerance`` as in ``arap``; Tutte's are not offered, as with removed rows they have the
     states of kirchhoff. ``volume_constraint``: whether the energy is minimised at the volume of rest. ``projections``: off
@@ -66,8 +66,8 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
     """Iterate through every frame number from the first of ``setup.frames``, at rest, to the last."""
     cost = {"seconds_compile": compile_kernels() + _compile_projections()}
     begin = time.perf_counter()
-    system = System.of(Cells.of(setup.surface, settings.weights), setup.held_vertices, "remove")
-    rest = Constraints.at_rest(setup.surface.points, setup.surface.triangles, system.held)
+    system = System.of(Cells.of(setup.surface, settings.weights), setup.attached_vertices, "remove")
+    rest = Constraints.at_rest(setup.surface.points, setup.surface.triangles, system.attached)
     cost["seconds_setup"] = time.perf_counter() - begin
 
     def relax(points: Floats) -> Relaxed:
@@ -104,33 +104,33 @@ def at_volume(system: System, minimum: Floats, before: Floats, rest: Constraints
     lambda; of its roots the one nearest to the minimum counts, and Newton's method takes rounding from it. Without one the minimum
     stays as it is.
     """
-    way = np.zeros_like(minimum)
+    direction = np.zeros_like(minimum)
     if system.factor is None:
         return minimum
-    way[system.free] = system.factor.solve(volume(before, rest.triangles)[1][system.free])
-    factor = _least_root(minimum, way, rest)
+    direction[system.free] = system.factor.solve(volume(before, rest.triangles)[1][system.free])
+    factor = _least_root(minimum, direction, rest)
     if factor is None:
         return minimum
     for _ in range(_STEPS):
-        value, gradient = volume(minimum + factor * way, rest.triangles)
+        value, gradient = volume(minimum + factor * direction, rest.triangles)
         off = value - rest.six_volumes
         if abs(off) <= _REACHED * rest.six_volumes:
             break
-        factor -= off / np.sum(gradient * way)
-    return minimum + factor * way
+        factor -= off / np.sum(gradient * direction)
+    return minimum + factor * direction
 
 
-def _least_root(points: Floats, way: Floats, rest: Constraints) -> float | None:
-    """The lambda nearest to 0 at which ``points + lambda way`` (n, 3) have the volume of ``rest``, None where there is none.
+def _least_root(points: Floats, direction: Floats, rest: Constraints) -> float | None:
+    """The lambda nearest to 0 at which ``points + lambda direction`` (n, 3) have the volume of ``rest``, None where there is none.
 
-    Six times the volume is a cubic form: its coefficients are values and slopes at ``points`` and at ``way``. The greatest
-    ``1 / lambda`` is asked for, which a cubic term that is next to nothing does not spoil.
+    Six times the volume is a cubic form: its coefficients are values and slopes at ``points`` and at ``direction``. The greatest
+    ``1 / lambda`` is asked for, which a cubic term that is next to nothing does not harm.
     """
-    (value, slope), (cubic, slope_of_way) = volume(points, rest.triangles), volume(way, rest.triangles)
+    (value, slope), (cubic, slope_of_direction) = volume(points, rest.triangles), volume(direction, rest.triangles)
     off = value - rest.six_volumes
     if abs(off) <= _REACHED * rest.six_volumes:
         return 0.0
-    coefficients = np.array([off, np.sum(slope * way), np.sum(slope_of_way * points), cubic], np.float64)
+    coefficients = np.array([off, np.sum(slope * direction), np.sum(slope_of_direction * points), cubic], np.float64)
     if not np.isfinite(coefficients).all():
         return None
     roots = np.roots(coefficients)

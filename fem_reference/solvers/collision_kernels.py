@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.signed_distance import FAR, Grid
-from fem_reference.problems.muscle import Body
+from fem_reference.problems.muscle import RigidBody
 from fem_reference.solvers.compiled_kernels import compiled
 from fem_reference.solvers.pbd_kernels import Vector
 
@@ -127,7 +127,7 @@ class Obstacle:
     jumps at the first step. Vertices that are not ``free`` (n,) are never asked.
     """
 
-    def __init__(self, bone: Body, rest: Floats, free: NDArray[np.bool_], gap: float) -> None:
+    def __init__(self, bone: RigidBody, rest: Floats, free: NDArray[np.bool_], gap: float) -> None:
         self.bone, shape = bone, bone.shape
         self.grid = shape if isinstance(shape, Grid) else None
         self.coefficients = np.array(shape.coefficients) if isinstance(shape, Grid) else np.zeros((0, 0, 0))
@@ -166,14 +166,14 @@ class Obstacle:
         return distance if self.grid is None else np.minimum(distance, self.grid.margin)
 
 
-def push_out(points: Floats, obstacles: Sequence[Obstacle], stiffness: float) -> None:
+def move_out(points: Floats, obstacles: Sequence[Obstacle], stiffness: float) -> None:
     """Move ``points`` (n, 3) [mm] out of all bones in place, each by the sum of the ways out of every bone that it is in.
 
     ``stiffness`` is the share of each way that is gone. The masses cancel: a constraint has one vertex.
     """
-    ways = np.zeros_like(points)
+    moves = np.zeros_like(points)
     for one in obstacles:
         near = one.near(points)
         inside = near.value < 0
-        ways[near.vertices[inside]] -= stiffness * near.value[inside, None] * near.away[inside]
-    points += ways
+        moves[near.vertices[inside]] -= stiffness * near.value[inside, None] * near.away[inside]
+    points += moves

@@ -18,7 +18,7 @@ from fem_reference.foundations.mesh import Floats, Ints, Polylines
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record
 from fem_reference.geometry.wrapping import Cylinder, Obstacle, Paths, Sphere, straight
-from fem_reference.problems.muscle import Body, Problem
+from fem_reference.problems.muscle import Problem, RigidBody
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.scenes import bones
 
@@ -34,13 +34,13 @@ class Via(Record):
 
 
 class SphereOn(bones.Sphere):
-    """A sphere, told at rest, that moves with a ``bone``."""
+    """A sphere, given at rest, that moves with a ``bone``."""
 
     bone: str
 
 
 class CylinderOn(bones.Rod):
-    """A cylinder that moves with a ``bone``; ``start`` and ``end``, told at rest, say where its axis is: it does not end there."""
+    """A cylinder that moves with a ``bone``; ``start`` and ``end``, given at rest, say where its axis is: it does not end there."""
 
     bone: str
 
@@ -74,7 +74,7 @@ class Lines:
     the share ``share[j]`` of its length.
     """
 
-    bones: tuple[Body, ...]
+    bones: tuple[RigidBody, ...]
     fixed: Floats
     on: Ints
     part: Ints
@@ -90,10 +90,10 @@ class Lines:
 
 @dataclass(frozen=True)
 class Wrap:
-    """An ``obstacle``, told at rest, on a ``bone``; ``name`` is what messages call it."""
+    """An ``obstacle``, given at rest, on a ``bone``; ``name`` is what messages call it."""
 
     obstacle: Obstacle
-    bone: Body
+    bone: RigidBody
     name: str
 
 
@@ -182,8 +182,10 @@ def _lines(problem: Problem, settings: Settings) -> Lines:
 
 def _along(points: Floats, places: list[float]) -> Floats:
     """The points (k, 3) after ``places`` (k,) of the length of the polyline ``points`` (n, 3)."""
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    return np.column_stack([np.interp(np.array(places) * way[-1], way, points[:, axis]) for axis in range(3)])
+    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    return np.column_stack(
+        [np.interp(np.array(places) * travelled[-1], travelled, points[:, axis]) for axis in range(3)]
+    )
 
 
 def _spread(count: int, places: list[float]) -> tuple[Ints, Floats]:
@@ -198,19 +200,19 @@ def _spread(count: int, places: list[float]) -> tuple[Ints, Floats]:
 
 def _nearest(problem: Problem, points: Floats) -> Ints:
     """The index of the bone (n,) whose attachment has the vertex nearest to each of ``points`` (n, 3)."""
-    if not problem.held:
-        raise InputError("line_of_action", "a muscle that no bone holds", "attachments that lines are fixed to")
+    if not problem.attached:
+        raise InputError("line_of_action", "a muscle without attachments", "attachments that lines are fixed to")
     away = np.array(
         [
-            np.linalg.norm(points[:, None] - problem.surface.points[held.vertices], axis=2).min(axis=1)
-            for held in problem.held
+            np.linalg.norm(points[:, None] - problem.surface.points[attached.vertices], axis=2).min(axis=1)
+            for attached in problem.attached
         ]
     )
-    found = [_index(problem.bones, held.bone.name, "attachment") for held in problem.held]
+    found = [_index(problem.bones, attached.bone.name, "attachment") for attached in problem.attached]
     return np.array(found)[np.argmin(away, axis=0)]
 
 
-def _index(bodies: tuple[Body, ...], name: str, key: str) -> int:
+def _index(bodies: tuple[RigidBody, ...], name: str, key: str) -> int:
     names = [body.name for body in bodies]
     if name not in names:
         raise InputError(f"line_of_action: {key}", f'"{name}"', f"one of {', '.join(names)}")

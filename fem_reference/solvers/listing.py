@@ -20,7 +20,7 @@ class FieldSettings(Record):
 
 
 def solve_field(problem: FieldProblem, settings: FieldSettings) -> Solution:
-    """The listing for the problem's domain, from its mesh and what is held; its effects and slopes are the listing's own.
+    """The listing for the problem's domain, from its mesh and what is fixed; its effects and slopes are the listing's own.
 
     What listing 4.5 draws is minus the norm of its vector unknown; that is the field here, and the vector its components.
     """
@@ -34,8 +34,8 @@ def solve_field(problem: FieldProblem, settings: FieldSettings) -> Solution:
             raise InputError("listing: peclet", settings.peclet, "no peclet: listing 4.5 has none")
         if problem.fluxes:
             raise InputError("listing: boundary", "a slope", "values only: listing 4.5 has no slopes")
-        fixed = np.flatnonzero(~np.isnan(problem.held[: len(mesh.points)]))
-        bounds = np.array([fixed, problem.held[fixed]])
+        fixed = np.flatnonzero(~np.isnan(problem.fixed[: len(mesh.points)]))
+        bounds = np.array([fixed, problem.fixed[fixed]])
         norms, components = listing_kernels.fem2d(mesh.cells, mesh.points, bounds)
         values = 0.0 - norms
     if problem.order == 2:  # the listings are linear between vertices
@@ -49,9 +49,9 @@ def solve_field(problem: FieldProblem, settings: FieldSettings) -> Solution:
 
 def _check_ends(problem: FieldProblem) -> None:
     """InputError where the scene wants other conditions than listing 4.1 has: 0 at the first node, slope -1 at the last."""
-    points, held = problem.mesh.points, problem.held[: len(problem.mesh.points)]
+    points, fixed = problem.mesh.points, problem.fixed[: len(problem.mesh.points)]
     slopes = [(point, at(flux.slope, points[[point]])[0]) for flux in problem.fluxes for point in flux.facets[:, 0]]
-    if not (held[0] == 0 and np.isnan(held[1:]).all() and slopes == [(len(points) - 1, -1.0)]):
+    if not (fixed[0] == 0 and np.isnan(fixed[1:]).all() and slopes == [(len(points) - 1, -1.0)]):
         raise InputError(
             "listing: boundary", "other conditions", "value 0 on the left and slope -1 on the right, as listing 4.1 has"
         )

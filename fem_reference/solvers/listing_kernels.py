@@ -2,7 +2,7 @@
 
 Vertices are numbered from 0 here and from 1 there. ``bounds`` (2, m) is the listings' list of Dirichlet conditions: a row of
 vertices and a row of values. Lengths have any unit, or none: of the points of a mesh only the directions of its edges are felt.
-validation/octave holds the listings as Octave runs them, what they give, and how each misprint was read.
+validation/octave has the listings as Octave runs them, what they give, and how each misprint was read.
 """
 
 from typing import Any
@@ -68,18 +68,18 @@ def first_derivative(triangles: Ints, points: Floats) -> Any:
 
 
 def uniform(n: int) -> tuple[Floats, Floats]:
-    """Listing 4.3: a grid of ``n`` points (n, 2), a square number, on the unit square, y fastest, and its rim held at 0, (2, m)."""
+    """Listing 4.3: a grid of ``n`` points (n, 2), a square number, on the unit square, and its rim fixed at 0, (2, m)."""
     side = round(np.sqrt(n))
     if n < 4 or side * side != n:
         raise InputError("n", n, "a square number, at least 4")
     x, y = np.meshgrid(np.linspace(0, 1, side), np.linspace(0, 1, side))
     across, along = np.arange(1, side - 1), np.arange(0, n - side, side)
     rim = np.concatenate([across, along, along + side - 1, np.arange(n - side, n)])
-    return np.column_stack([x.T.ravel(), y.T.ravel()]), held(rim)
+    return np.column_stack([x.T.ravel(), y.T.ravel()]), fixed_at_zero(rim)
 
 
 def square() -> tuple[Floats, Floats]:
-    """Listing 4.5, lines 7 to 11: the grid of listing 4.3 on the square from (-1, -1) to (1, 1) and its rim held at 0."""
+    """Listing 4.5, lines 7 to 11: the grid of listing 4.3 on the square from (-1, -1) to (1, 1) and its rim fixed at 0."""
     coords, bounds = uniform(SIDE**2)
     return coords * 2 - 1, bounds
 
@@ -111,8 +111,8 @@ def rim(triangles: Ints) -> Ints:
     return np.unique(unique[sides == 1])
 
 
-def held(vertices: Ints) -> Floats:
-    """Bounds (2, m) that hold ``vertices`` (m,) at 0."""
+def fixed_at_zero(vertices: Ints) -> Floats:
+    """Bounds (2, m) that fix ``vertices`` (m,) at 0."""
     return np.array([vertices, np.zeros(len(vertices))], dtype=np.float64)
 
 

@@ -2,8 +2,8 @@
 
 A volumetric model, as Table 5.1 has it: the masses are the points of the tetrahedra, the springs their edges. (Janak's masses
 sample fibres and are joined to those near them; here the mesh says which are.) They carry the surface and the fibres along.
-Springs resist neither a change of volume nor a tetrahedron that turns inside out. Bones hold exactly, whatever the stiffness
-of an attachment. Where bones push, they push the masses of the surface: what is between those may be inside.
+Springs resist neither a change of volume nor a tetrahedron that turns inside out. Attachments are exact, whatever the stiffness
+of an attachment. Contact acts on the masses of the surface: what is between those may be inside.
 """
 
 import math
@@ -23,10 +23,10 @@ from fem_reference.geometry.embedding import Embedding, Locator
 from fem_reference.problems.muscle import Problem
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers import collision_kernels
-from fem_reference.solvers.collision_kernels import Obstacle, push_out
+from fem_reference.solvers.collision_kernels import Obstacle, move_out
 from fem_reference.solvers.common.state_checks import trouble
 from fem_reference.solvers.pbd import Collision
-from fem_reference.solvers.spring_kernels import Course, Network, advance, forces
+from fem_reference.solvers.spring_kernels import Network, PrescribedPath, advance, forces
 from fem_reference.solvers.xpbd import other_clock
 
 # Where no time step is asked for, it is this share of the greatest that is stable.
@@ -56,8 +56,8 @@ class Settings(Record):
     ``frame_time``: the solver's own time from a frame number to the next, and the longer it is the nearer the muscle is to
     equilibrium; the scene's interval is the clock of what the reference and recorded sequences do in time. ``damping``: the
     coefficient c, or ``"eq. 5.5"``, see ``report_damping``; without it none.
-    ``gravity``: an acceleration; without it none. ``collision``: bones push, at every step; without it not. ``time_step``: the
-    longest step wanted; without it one that is stable.
+    ``gravity``: an acceleration; without it none. ``collision``: contact with bones, at every step; without it none.
+    ``time_step``: the longest step wanted; without it one that is stable.
     """
 
     stiffness: Stiffness
@@ -102,7 +102,7 @@ def report_damping(mass: float, stiffness: float) -> float:
     return 2 * math.sqrt(2 * kilograms * (2 + 4 / newtons_per_metre)) / 1000
 
 
-def stable_time_step(network: Network, held: Ints) -> float:
+def stable_time_step(network: Network, fixed: Ints) -> float:
     """The time step [s] below which eqs 5.6 and 5.7 are stable, whatever the shape.
 
     A mode of the free masses is stable where ``4 m - 2 c dt - k dt^2 > 0`` (the Jury conditions), with k its stiffness. Of springs
@@ -113,19 +113,19 @@ def stable_time_step(network: Network, held: Ints) -> float:
     springs = network.stiffness * np.bincount(network.springs.ravel(), minlength=len(network.masses))
     c = network.damping
     limits = 4 * network.masses / (c + np.hypot(c, np.sqrt(8 * springs * network.masses)))
-    return float(np.delete(limits, held).min(initial=math.inf))
+    return float(np.delete(limits, fixed).min(initial=math.inf))
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A muscle as masses and springs: its ``network``, the masses that each attachment holds and all of them together, ``held``,
-    the bones as ``obstacles`` that push with ``stiffness``, and where the ``surface`` and the ``fibres`` are in the tetrahedra.
+    """A muscle as masses and springs: its ``network``, the masses of each attachment and all of them together, ``fixed``,
+    the bones as ``obstacles`` with ``stiffness``, and where the ``surface`` and the ``fibres`` are in the tetrahedra.
     """
 
     problem: Problem
     network: Network
     attached: tuple[Ints, ...]
-    held: Ints
+    fixed: Ints
     obstacles: list[Obstacle]
     stiffness: float
     surface: Embedding
@@ -134,15 +134,15 @@ class Model:
     @classmethod
     def of(cls, problem: Problem, settings: Settings) -> "Model":
         """The model of a problem."""
-        attached = tuple(np.unique(problem.mesh.facets[entry.attachment]) for entry in problem.held)
-        held = np.unique(np.concatenate([np.zeros(0, np.int64), *attached]))
+        attached = tuple(np.unique(problem.mesh.facets[entry.attachment]) for entry in problem.attached)
+        fixed = np.unique(np.concatenate([np.zeros(0, np.int64), *attached]))
         locator, collision = Locator(problem.mesh), settings.collision
         return cls(
             problem=problem,
             network=network_of(problem.mesh, settings),
             attached=attached,
-            held=held,
-            obstacles=[] if collision is None else _obstacles(problem, held, collision.gap),
+            fixed=fixed,
+            obstacles=[] if collision is None else _obstacles(problem, fixed, collision.gap),
             stiffness=0.0 if collision is None else collision.stiffness,
             surface=locator.embed(problem.surface.points),
             fibres=locator.embed(problem.fibres.points),
@@ -150,39 +150,39 @@ class Model:
 
     def move(self, points: Floats, previous: Floats, number: int, time_step: float, steps: int) -> None:
         """Take ``points`` and those a step before, (n, 3) [mm], in place from the frame number before to ``number``."""
-        before, after = (self._carried(frame)[self.held] for frame in (number - 1, number))
+        before, after = (self._carried(frame)[self.fixed] for frame in (number - 1, number))
         if not self.obstacles:
             for done in range(0, steps, _AT_ONCE):
                 upto = min(done + _AT_ONCE, steps)
                 start, end = ((1 - step / steps) * before + step / steps * after for step in (done, upto))
-                advance(points, previous, self.network, Course(self.held, start, end), time_step, upto - done)
+                advance(points, previous, self.network, PrescribedPath(self.fixed, start, end), time_step, upto - done)
             return
         for share in np.arange(1, steps + 1) / steps:
             there = (1 - share) * before + share * after
-            advance(points, previous, self.network, Course(self.held, there, there), time_step, 1)
+            advance(points, previous, self.network, PrescribedPath(self.fixed, there, there), time_step, 1)
             for one in self.obstacles:
                 one.move(number - 1 + share)
-            push_out(points, self.obstacles, self.stiffness)
+            move_out(points, self.obstacles, self.stiffness)
 
     def _carried(self, number: int) -> Floats:
-        """The masses (n, 3) [mm] at rest, but those that bones hold where they are at frame ``number``."""
+        """The masses (n, 3) [mm] at rest, but attached ones where they are at frame ``number``."""
         points = np.array(self.problem.mesh.points)
-        for entry, masses in zip(self.problem.held, self.attached, strict=True):
+        for entry, masses in zip(self.problem.attached, self.attached, strict=True):
             points[masses] = apply(entry.bone.pose(number), points[masses])
         return points
 
     def frame(self, points: Floats, number: int) -> Frame:
-        """What masses at ``points`` (n, 3) make of surface and fibres; vertices that bones hold are where the bones have them.
+        """What masses at ``points`` (n, 3) make of surface and fibres; attached vertices are where the bones have them.
 
-        Scalars: ``unbalanced_max`` [N], the greatest force on a mass that none holds, and ``inverted_tets``, how many are inside
+        Scalars: ``unbalanced_max`` [N], the greatest force on a free mass, and ``inverted_tets``, how many are inside
         out.
         """
         given, mesh = self.problem, self.problem.mesh
         moved = points - mesh.points
         surface = given.surface.points + self.surface.interpolate(mesh, moved)
-        for entry in given.held:
+        for entry in given.attached:
             surface[entry.vertices] = apply(entry.bone.pose(number), given.surface.points[entry.vertices])
-        free = np.delete(forces(points, self.network), self.held, axis=0)
+        free = np.delete(forces(points, self.network), self.fixed, axis=0)
         scalars = {
             "unbalanced_max": float(np.linalg.norm(free, axis=1).max(initial=0.0)),
             "inverted_tets": float((tet_volumes(points, mesh.tets) <= 0).sum()),
@@ -192,18 +192,18 @@ class Model:
         )
 
 
-def _obstacles(problem: Problem, held: Ints, gap: float) -> list[Obstacle]:
-    """All bones, as they push the masses of the surface that none of them holds."""
+def _obstacles(problem: Problem, fixed: Ints, gap: float) -> list[Obstacle]:
+    """All bones, as obstacles of the free masses of the surface."""
     loose = np.zeros(len(problem.mesh.points), bool)
     loose[boundary(problem.mesh.tets)[0]] = True
-    loose[held] = False
+    loose[fixed] = False
     return [Obstacle(bone, problem.mesh.points, loose, gap) for bone in problem.bones]
 
 
 def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
     """Step from rest at the first of ``problem.frames`` to the last of them; each frame wanted goes into ``sink``."""
     seconds_compile, model = _compile(settings), Model.of(problem, settings)
-    limit = stable_time_step(model.network, model.held)
+    limit = stable_time_step(model.network, model.fixed)
     wanted = settings.frame_time / (settings.time_step or SHARE_OF_STABLE * limit)
     points, first, last = np.array(problem.mesh.points), problem.frames[0], problem.frames[-1]
     rest, previous = Surface(problem.mesh.points, boundary(problem.mesh.tets)[0]), points.copy()
@@ -220,12 +220,12 @@ def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
         cost["iterations"] += 1
         cost["time_steps"] += steps
         cost["seconds_per_iteration"] = cost["seconds_solve"] / cost["iterations"]
-        if found := trouble(points, rest, model.held):
+        if found := trouble(points, rest, model.fixed):
             return Outcome(found.status, f"frame {number}: {found.sentence}; {_advice(time_step, limit)}", cost)
         if number in problem.frames:
             sink(model.frame(points, number))
-    told = _inverted(points, problem.mesh.tets) + other_clock(problem, settings.frame_time)
-    return Outcome("converged", f"{last - first} frame numbers of {steps} steps of {time_step:.3g} s{told}", cost)
+    notes = _inverted(points, problem.mesh.tets) + other_clock(problem, settings.frame_time)
+    return Outcome("converged", f"{last - first} frame numbers of {steps} steps of {time_step:.3g} s{notes}", cost)
 
 
 def _too_many(steps: float, settings: Settings, network: Network) -> str:
@@ -248,7 +248,7 @@ def _compile(settings: Settings) -> float:
     begin = time.perf_counter()
     points, nothing = np.array([[0.0, 0, 0], [1, 0, 0]]), np.zeros((0, 3))
     network = Network(np.ones(2), np.array([[0, 1]]), np.ones(1), 1.0, 0.0, np.zeros(3))
-    advance(points, points.copy(), network, Course(np.zeros(0, np.int64), nothing, nothing), 0.1, 1)
+    advance(points, points.copy(), network, PrescribedPath(np.zeros(0, np.int64), nothing, nothing), 0.1, 1)
     forces(points, network)
     if settings.collision is not None:
         collision_kernels.compile_all()

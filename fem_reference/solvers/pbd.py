@@ -22,7 +22,7 @@ from fem_reference.foundations.units import Length
 from fem_reference.problems.muscle import Problem, Setup
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers import collision_kernels
-from fem_reference.solvers.collision_kernels import Obstacle, push_out
+from fem_reference.solvers.collision_kernels import Obstacle, move_out
 from fem_reference.solvers.common.state_checks import trouble
 from fem_reference.solvers.pbd_kernels import (
     dihedrals,
@@ -42,7 +42,7 @@ _AS_NEAR = 1e-9
 
 
 class Collision(Record):
-    """How bones keep out what they do not hold: ``gap`` [mm], how near vertices may come, or as near as they are at rest;
+    """Contact of bones with free vertices: ``gap`` [mm], how near vertices may come, or as near as they are at rest;
     ``stiffness``, the share of the way out that one projection goes.
     """
 
@@ -59,7 +59,7 @@ class Settings(Record):
     share of its error that one projection of a constraint takes away, from 0 (constraint off) to 1.
 
     ``anisotropy`` a: edges have the stiffness ``stretch (1 - a |cos|)`` of their angle to the nearest fibre, both at rest;
-    1 in the report's program, when it has fibres. ``collision``: bones push (lines 12 to 14).
+    1 in the report's program, when it has fibres. ``collision``: contact with bones (lines 12 to 14).
     """
 
     sub_iterations: Annotated[int, Field(gt=0)]
@@ -78,7 +78,7 @@ class Constraints:
 
     ``lengths`` (e,) [mm] of ``edges`` (e, 2), of whose stiffness each has its ``share`` (e,); ``six_volumes`` [mm3], six
     times the volume inside ``triangles`` (m, 3); ``angles`` (e,) [rad] of ``hinges`` (e, 4), the two triangles at each
-    edge. ``inverse_masses`` (n,): 0 for a vertex that a bone holds, 1 for every other.
+    edge. ``inverse_masses`` (n,): 0 for an attached vertex, 1 for every other.
     """
 
     inverse_masses: Floats
@@ -91,11 +91,11 @@ class Constraints:
     angles: Floats
 
     @classmethod
-    def at_rest(cls, points: Floats, triangles: Ints, held: Ints) -> "Constraints":
-        """The constraints of a closed surface whose vertices ``held`` (k,) are held; all edges are as stiff."""
+    def at_rest(cls, points: Floats, triangles: Ints, attached: Ints) -> "Constraints":
+        """The constraints of a closed surface whose vertices ``attached`` (k,) are attached; all edges are as stiff."""
         points, triangles = np.array(points), np.array(triangles)  # the compiled functions know writable arrays only
         inverse_masses = np.ones(len(points))
-        inverse_masses[held] = 0
+        inverse_masses[attached] = 0
         hinges = hinges_of(triangles)
         edges = np.ascontiguousarray(hinges[:, :2])
         return cls(
@@ -142,13 +142,13 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
     obstacles = [] if settings.collision is None else obstacles_of(setup, settings.collision.gap)
     cost = {"seconds_compile": seconds_compile, "seconds_setup": time.perf_counter() - begin}
 
-    def iterate(points: Floats, way: Floats, frame: int) -> tuple[Floats, Floats]:
+    def iterate(points: Floats, displacement: Floats, frame: int) -> tuple[Floats, Floats]:
         carry(points, setup, frame)
         for one in obstacles:
             one.move(frame)
         for _ in range(settings.sub_iterations):
-            points, way = advance(points, way, constraints, settings, obstacles)
-        return points, way
+            points, displacement = advance(points, displacement, constraints, settings, obstacles)
+        return points, displacement
 
     return follow(setup, iterate, sink, cost)
 
@@ -156,7 +156,7 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
 def _constraints(setup: Setup, settings: Settings) -> Constraints:
     """Those of the surface at rest, with the stiffness that fibres leave to its edges."""
     surface = setup.surface
-    found = Constraints.at_rest(surface.points, surface.triangles, setup.held_vertices)
+    found = Constraints.at_rest(surface.points, surface.triangles, setup.attached_vertices)
     if settings.anisotropy is None:
         return found
     assert isinstance(setup, Problem)  # what a scene is solved from; it has fibres
@@ -164,36 +164,40 @@ def _constraints(setup: Setup, settings: Settings) -> Constraints:
 
 
 def obstacles_of(setup: Setup, gap: float) -> list[Obstacle]:
-    """All bones, as they push what none of them holds."""
+    """All bones, as obstacles of free vertices."""
     loose = np.ones(len(setup.surface.points), bool)
-    loose[setup.held_vertices] = False
+    loose[setup.attached_vertices] = False
     return [Obstacle(bone, setup.surface.points, loose, gap) for bone in setup.bones]
 
 
 def carry(points: Floats, setup: Setup, frame: float) -> None:
-    """Put the vertices that bones hold where those are at ``frame``."""
-    for entry in setup.held:
+    """Put the attached vertices where their bones are at ``frame``."""
+    for entry in setup.attached:
         points[entry.vertices] = apply(entry.bone.pose(frame), setup.surface.points[entry.vertices])
 
 
 def advance(
-    points: Floats, way: Floats, constraints: Constraints, settings: Settings, obstacles: Sequence[Obstacle] = ()
+    points: Floats,
+    displacement: Floats,
+    constraints: Constraints,
+    settings: Settings,
+    obstacles: Sequence[Obstacle] = (),
 ) -> tuple[Floats, Floats]:
-    """Positions (n, 3) [mm] and ``way`` = dt v (n, 3) [mm] after one step of Algorithm 1, lines 8 to 20."""
-    moved = points + (1 - settings.damping) * way
+    """Positions (n, 3) [mm] and ``displacement`` = dt v (n, 3) [mm] after one step of Algorithm 1, lines 8 to 20."""
+    moved = points + (1 - settings.damping) * displacement
     at = constraints
     for _ in range(settings.solver_iterations):
         project_distances(moved, at.inverse_masses, at.edges, at.lengths, settings.stretch * at.share)
         project_volume(moved, at.inverse_masses, at.triangles, at.six_volumes, settings.volume)
         project_dihedrals(moved, at.inverse_masses, at.hinges, at.angles, settings.bending)
         if settings.collision is not None:
-            push_out(moved, obstacles, settings.collision.stiffness)
+            move_out(moved, obstacles, settings.collision.stiffness)
     return moved, moved - points
 
 
 def follow(setup: Setup, iterate: Iterate, sink: Sink, cost: dict[str, float]) -> Outcome:
     """Iterate from rest at the first of ``setup.frames`` to the last, into ``sink``; what that costs is added to ``cost``."""
-    points, held, (first, *_, last) = np.array(setup.surface.points), setup.held_vertices, setup.frames
+    points, attached, (first, *_, last) = np.array(setup.surface.points), setup.attached_vertices, setup.frames
     kept = np.zeros(points.shape)
     sink(Frame(first, points.copy()))
     cost |= {"seconds_solve": 0.0, "iterations": 0, "threads": 1}
@@ -203,7 +207,7 @@ def follow(setup: Setup, iterate: Iterate, sink: Sink, cost: dict[str, float]) -
         cost["seconds_solve"] += time.perf_counter() - begin
         cost["iterations"] += 1
         cost["seconds_per_iteration"] = cost["seconds_solve"] / cost["iterations"]
-        if found := trouble(points, setup.surface, held):
+        if found := trouble(points, setup.surface, attached):
             advice = "a slower motion, more steps or a lower stiffness may help"
             return Outcome(found.status, f"frame {iteration}: {found.sentence}; {advice}", cost)
         if iteration in setup.frames:

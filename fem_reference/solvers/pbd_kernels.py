@@ -96,7 +96,7 @@ def volume(points: Floats, triangles: Ints) -> tuple[float, Floats]:
 def dihedral(p1: Vector, p2: Vector, p3: Vector, p4: Vector) -> tuple[float, Vector, Vector, Vector, Vector]:
     """Angle [rad] of triangles (p1, p2, p3) and (p1, p2, p4) about their edge p1-p2, and its gradients. Eq. 5.22-5.30.
 
-    It is pi if they are flat and cannot tell the two sides of a fold. Gradients are zero where arccos has none: flat,
+    It is pi if they are flat and cannot distinguish the two sides of a fold. Gradients are zero where arccos has none: flat,
     folded shut, no area. There arccos d loses half its digits too: it is taken as atan2(sine, d). Eq. 5.26 needs
     eq. 5.30 transposed, and ``n2 . (n2 x p2)`` in it is an outer product.
     """
@@ -155,9 +155,9 @@ def project_distances(points: Floats, inverse_masses: Floats, edges: Ints, rest:
 @compiled
 def to_segment(p: Vector, start: Vector, end: Vector) -> float:
     """Distance of a point [mm] from the segment between ``start`` and ``end``, which are apart."""
-    way, off = minus(end, start), minus(p, start)
-    share = min(1.0, max(0.0, dot(off, way) / max(dot(way, way), 1e-300)))
-    return distance(off, times(share, way))[0]
+    segment, off = minus(end, start), minus(p, start)
+    share = min(1.0, max(0.0, dot(off, segment) / max(dot(segment, segment), 1e-300)))
+    return distance(off, times(share, segment))[0]
 
 
 @compiled

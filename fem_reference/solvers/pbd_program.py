@@ -3,7 +3,7 @@
 The program (github.com/cervenkam/muscle-deformation-PBD) departs from the report's text, section 5.5.3 and Algorithm 1:
 
 - edges: each is projected twice in a sweep, as a half-edge of either triangle, vertex by vertex (text: one constraint)
-- held vertices weigh as much as all others and are put back after each step, so that what they take of a correction is
+- attached vertices weigh as much as all others and are put back after each step, so that what they take of a correction is
   lost (text: their w is 0, line 2)
 - volume: its change is divided by 6 and its gradient is not, which takes away a sixth of the error in a step (text:
   eq. 5.18 to 5.21 drop the 6 in both)
@@ -28,7 +28,7 @@ with the flags it comes with, -Ofast among them (gcc 12 on x86-64 does it again;
 leaves the recorded one by iteration 50). For the same reason a bone's pose is here the product of its motions, and the angle of
 flat pairs at rest is off by 2e-8 rad.
 
-Two things are not as there: held is what the scene says (there: all vertices in the voxels of a bone at rest), and fibres have
+Two things are not as there: attached is what the scene says (there: all vertices in the voxels of a bone at rest), and fibres have
 the direction they have (there: it is taken from points read beside their own).
 """
 
@@ -44,7 +44,7 @@ from pydantic import Field
 from fem_reference.foundations.mesh import TET_FACES, Floats, Ints, Surface
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record
-from fem_reference.problems.muscle import Body, Problem, Setup
+from fem_reference.problems.muscle import Problem, RigidBody, Setup
 from fem_reference.runs.store import Outcome, Sink
 from fem_reference.solvers.pbd import Constraints, along_fibres, carry, follow
 from fem_reference.solvers.pbd_kernels import distances, nearest_segments
@@ -115,7 +115,7 @@ class Bone:
     The pose is the product of all motions, as there, and not the one ``given``: they differ by rounding.
     """
 
-    def __init__(self, body: Body, count: int, frame: int) -> None:
+    def __init__(self, body: RigidBody, count: int, frame: int) -> None:
         self.body, self.voxels = body, Voxels.of(body.surface, count)
         self.given = self.pose = body.pose(frame)
         self.last = np.eye(4)
@@ -127,7 +127,7 @@ class Bone:
             self.last = np.round(given @ np.linalg.inv(self.given), DIGITS)
             self.given, self.pose = given, self.last @ self.pose
 
-    def push(self, reached: Floats, starts: Floats, goals: Floats) -> None:
+    def move_out(self, reached: Floats, starts: Floats, goals: Floats) -> None:
         """Correct where vertices that go from ``starts`` (n, 3) to ``goals`` (n, 3) [mm] come to be: ``reached`` (n, 3)."""
         back, voxels = np.linalg.inv(self.pose), self.voxels
         before, after = apply(back, starts), apply(back, goals)
@@ -135,8 +135,8 @@ class Bone:
         stuck = are_inside(voxels.inside, first)
         entered = are_inside(voxels.inside, last) & ~stuck
         reached[stuck] = apply(self.pose, apply(self.last, before[stuck]))
-        ways = (before - after)[entered] * (1 / voxels.size)
-        ends, too_far = march_out(voxels.inside, last[entered], ways)
+        displacements = (before - after)[entered] * (1 / voxels.size)
+        ends, too_far = march_out(voxels.inside, last[entered], displacements)
         reached[entered] = apply(self.pose, np.where(too_far[:, None], before[entered], voxels.points(ends)))
 
 
@@ -183,7 +183,7 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
     """Iterate from rest at the first of ``setup.frames`` to the last of them; each frame wanted goes into ``sink``."""
     seconds_compile = _compile(settings)
     begin = time.perf_counter()
-    constraints, held = constraints_of(setup, settings), setup.held_vertices
+    constraints, attached = constraints_of(setup, settings), setup.attached_vertices
     count, first = settings.voxels, setup.frames[0]
     bones = [] if count is None else [Bone(body, count, first) for body in setup.bones]
     cost = {"seconds_compile": seconds_compile, "seconds_setup": time.perf_counter() - begin}
@@ -196,7 +196,7 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
             goals = (1 - settings.damping) * velocity * STEP + points
             project(goals, constraints, settings.bending)
             reached = collided(points, goals, bones)
-            reached[held] = points[held]
+            reached[attached] = points[attached]
             points, velocity = reached, (reached - points) * (1 / STEP)
         return points, velocity
 
@@ -214,7 +214,7 @@ def collided(starts: Floats, goals: Floats, bones: Sequence[Bone]) -> Floats:
     """Where vertices come to be, (n, 3) [mm], that go from ``starts`` to ``goals`` (n, 3) among ``bones``."""
     reached = goals.copy()
     for bone in bones:
-        bone.push(reached, starts, goals)
+        bone.move_out(reached, starts, goals)
     return reached
 
 

@@ -237,15 +237,16 @@ def are_inside(inside: Bools, places: Floats) -> Bools:
 
 
 @compiled
-def march_out(inside: Bools, goals: Floats, ways: Floats) -> tuple[Floats, Bools]:
+def march_out(inside: Bools, goals: Floats, displacements: Floats) -> tuple[Floats, Bools]:
     """Where those come to be that are inside at ``goals`` (n, 3), and who has come back too far (n,); all in voxels.
 
-    They go straight back along their ``ways`` (n, 3), by steps of 1, until they are outside; too far is farther than a way.
+    They go straight back along their ``displacements`` (n, 3), by steps of 1, until they are outside; too far is farther than a
+    way.
     """
     reached, too_far = goals.copy(), np.empty(len(goals), np.bool_)
     for i in range(len(goals)):
-        length = math.sqrt(dot(at(ways, i), at(ways, i)))
-        step = times(1 / length, at(ways, i))
+        length = math.sqrt(dot(at(displacements, i), at(displacements, i)))
+        step = times(1 / length, at(displacements, i))
         taken = 0
         while taken < length + 1 and _is_inside(inside, at(reached, i)):
             move(reached, i, 1.0, step)

@@ -218,8 +218,8 @@ def _positions(surface: Surface, rest: Surface) -> Floats:
         raise InputError(surface.place, f"{len(surface.points)} vertices instead of {len(rest.points)}", want)
     if np.array_equal(surface.triangles, rest.triangles):
         return surface.points
-    ways = (_strangers(surface.triangles, triangles) for triangles in (rest.triangles, rest.triangles[:, ::-1]))
-    other = min(ways, key=np.count_nonzero)
+    orders = (_strangers(surface.triangles, triangles) for triangles in (rest.triangles, rest.triangles[:, ::-1]))
+    other = min(orders, key=np.count_nonzero)
     if other.any():
         got = f"{np.count_nonzero(other)} triangles of other vertices, the first triangle {other.argmax()}"
         raise InputError(surface.place, got, want)
@@ -243,8 +243,10 @@ def _turned(triangles: Ints) -> Ints:
 
 def _welded(soup: Surface, rest: Surface) -> Floats:
     """Points (n, 3) [mm] of the vertices of ``rest`` from triangles that share none, in the order of its own."""
-    ways = (_weld(soup.points, triangles, len(rest.points)) for triangles in (rest.triangles, rest.triangles[:, ::-1]))
-    points, gap, vertex = min(ways, key=lambda way: way[1])
+    orders = (
+        _weld(soup.points, triangles, len(rest.points)) for triangles in (rest.triangles, rest.triangles[:, ::-1])
+    )
+    points, gap, vertex = min(orders, key=lambda one: one[1])
     if gap > SAME_POINT:
         got = f"corners of vertex {vertex} that are {gap:.3g} mm apart"
         raise InputError(soup.place, got, f"the triangles of {rest.place} in their order")

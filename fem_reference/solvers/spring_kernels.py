@@ -25,10 +25,10 @@ class Network(NamedTuple):
     gravity: Floats
 
 
-class Course(NamedTuple):
-    """Masses ``held`` (h,), and where they are (h, 3) [mm] ``before`` and ``after``: they go from one to the other evenly."""
+class PrescribedPath(NamedTuple):
+    """Masses ``fixed`` (h,), and where they are (h, 3) [mm] ``before`` and ``after``: they go from one to the other evenly."""
 
-    held: Ints
+    fixed: Ints
     before: Floats
     after: Floats
 
@@ -60,7 +60,9 @@ def forces(points: Floats, network: Network) -> Floats:
 
 
 @compiled
-def advance(points: Floats, previous: Floats, network: Network, course: Course, time_step: float, steps: int) -> None:
+def advance(
+    points: Floats, previous: Floats, network: Network, path: PrescribedPath, time_step: float, steps: int
+) -> None:
     """Move ``points`` (n, 3) [mm] in place through ``steps`` of ``time_step`` [s]; ``previous`` (n, 3) are those a step before.
 
     Position Verlet with the velocity of the step before, eqs 5.6 and 5.7:
@@ -72,11 +74,11 @@ def advance(points: Floats, previous: Floats, network: Network, course: Course, 
             gain = time_step * time_step / network.masses[i]
             kept = 1 - time_step * network.damping / network.masses[i]
             for axis in range(3):
-                way = points[i, axis] - previous[i, axis]
+                displacement = points[i, axis] - previous[i, axis]
                 previous[i, axis] = points[i, axis]
-                points[i, axis] += kept * way + gain * acting[i, axis]
+                points[i, axis] += kept * displacement + gain * acting[i, axis]
         share = step / steps
-        for h in range(len(course.held)):
-            i = course.held[h]
+        for h in range(len(path.fixed)):
+            i = path.fixed[h]
             for axis in range(3):
-                points[i, axis] = (1 - share) * course.before[h, axis] + share * course.after[h, axis]
+                points[i, axis] = (1 - share) * path.before[h, axis] + share * path.after[h, axis]

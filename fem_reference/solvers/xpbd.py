@@ -42,7 +42,7 @@ from fem_reference.solvers.xpbd_kernels import pull_dihedrals, pull_distances, p
 
 
 class Collision(Record):
-    """How bones keep out what they do not hold: ``gap`` [mm], how near vertices may come, or as near as they are at rest;
+    """Contact of bones with free vertices: ``gap`` [mm], how near vertices may come, or as near as they are at rest;
     ``stiffness`` [MPa/mm]: pressed by p, the surface gets p / stiffness nearer.
     """
 
@@ -59,7 +59,7 @@ class Settings(Record):
 
     ``stretch`` [N/mm]: Young's modulus times thickness of the membrane. ``bending`` [N mm]: its stiffness as a plate. ``volume``
     [MPa]: bulk modulus of what it encloses. ``damping`` [1/s]: rate at which velocities decay that nothing keeps up.
-    ``collision``: bones push.
+    ``collision``: contact with bones.
     """
 
     frame_time: Time
@@ -77,9 +77,9 @@ class Settings(Record):
 class Constraints:
     """What a body keeps of its rest state, and how softly: any graph of edges, closed triangles and hinges, or none of a kind.
 
-    ``inverse_masses`` (n,) [1/t], 0 for what is held; ``edges`` (e, 2) of ``lengths`` (e,) [mm] and compliances ``edge_softness``
-    (e,) [mm/N]; ``triangles`` (m, 3) around ``six_volumes`` [mm3], ``volume_softness`` [mm5/N]; ``hinges`` (h, 4) of ``angles``
-    (h,) [rad] and ``hinge_softness`` (h,) [1/(N mm)].
+    ``inverse_masses`` (n,) [1/t], 0 for what is attached; ``edges`` (e, 2) of ``lengths`` (e,) [mm] and compliances
+    ``edge_softness`` (e,) [mm/N]; ``triangles`` (m, 3) around ``six_volumes`` [mm3], ``volume_softness`` [mm5/N]; ``hinges`` (h,
+    4) of ``angles`` (h,) [rad] and ``hinge_softness`` (h,) [1/(N mm)].
     """
 
     inverse_masses: Floats
@@ -94,8 +94,8 @@ class Constraints:
     hinge_softness: Floats
 
     @classmethod
-    def at_rest(cls, surface: Surface, held: Ints, settings: Settings) -> "Constraints":
-        """Those of a closed ``surface`` whose vertices ``held`` (k,) are held; none of a kind that has no stiffness.
+    def at_rest(cls, surface: Surface, attached: Ints, settings: Settings) -> "Constraints":
+        """Those of a closed ``surface`` whose vertices ``attached`` (k,) are attached; none of a kind that has no stiffness.
 
         In a net of equal triangles, edges of the stiffness ``stretch a / l^2`` of their length l and the area a of both their
         triangles make a membrane of Young's modulus ``stretch`` and Poisson's ratio 1/3, and hinges of ``bending l^2 / a`` bend
@@ -109,7 +109,7 @@ class Constraints:
             slice(None if stiffness else 0) for stiffness in (settings.stretch, settings.bending, settings.volume)
         )
         return cls(
-            inverse_masses=inverse_masses(surface, held, settings.density),
+            inverse_masses=inverse_masses(surface, attached, settings.density),
             edges=np.ascontiguousarray(hinges[stretched, :2]),
             lengths=distances(points, hinges[stretched]),
             edge_softness=slender[stretched] / (settings.stretch or math.inf),
@@ -138,12 +138,12 @@ def vertex_areas(surface: Surface) -> Floats:
     return np.bincount(surface.triangles.ravel(), weights=np.repeat(areas / 3, 3), minlength=len(surface.points))
 
 
-def inverse_masses(surface: Surface, held: Ints, density: float) -> Floats:
-    """Inverse masses (n,) [1/t] of vertices that share the mass of the enclosed body as they share its surface; 0 where held."""
+def inverse_masses(surface: Surface, attached: Ints, density: float) -> Floats:
+    """Inverse masses (n,) [1/t] of vertices that share the mass of the body as they share its surface; 0 where attached."""
     areas = vertex_areas(surface)
     mass = density * enclosed_volume(surface.points, surface.triangles) * areas / areas.sum()
     found = 1 / mass
-    found[held] = 0
+    found[attached] = 0
     return np.asarray(found)
 
 
@@ -153,26 +153,26 @@ def pair_areas(points: Floats, hinges: Ints) -> Floats:
 
 
 class Contact:
-    """An obstacle, how softly it pushes each vertex, (n,) [mm/N], and the multipliers (n,) of the present time step."""
+    """An obstacle, its contact softness at each vertex, (n,) [mm/N], and the multipliers (n,) of the present time step."""
 
     def __init__(self, obstacle: Obstacle, softness: Floats) -> None:
         self.obstacle, self.softness = obstacle, softness
         self.multipliers = np.zeros(len(softness))
 
     def begin(self) -> None:
-        """A time step begins: nothing pushes yet."""
+        """A time step begins: no contact yet."""
         self.multipliers[:] = 0
 
-    def push(self, points: Floats, inverse_masses: Floats, seconds: float) -> Floats:
-        """The ways (n, 3) [mm] of one projection: bones push and never pull, so that no multiplier is below 0."""
+    def project(self, points: Floats, inverse_masses: Floats, seconds: float) -> Floats:
+        """The ways (n, 3) [mm] of one projection: contact never pulls, so that no multiplier is below 0."""
         vertices, value, away = self.obstacle.near(points)
         soft, before, mass = self.softness[vertices] / seconds**2, self.multipliers[vertices], inverse_masses[vertices]
         after = np.maximum(before - (value + soft * before) / (mass + soft), 0)
         self.multipliers[vertices] = after
         self.obstacle.watch(vertices[after > 0])
-        ways = np.zeros_like(points)
-        ways[vertices] = ((after - before) * mass)[:, None] * away
-        return ways
+        moves = np.zeros_like(points)
+        moves[vertices] = ((after - before) * mass)[:, None] * away
+        return moves
 
 
 def advance(
@@ -191,7 +191,7 @@ def advance(
         pull_distances(moved, at.inverse_masses, at.edges, at.lengths, edges, of_edges)
         of_volume = pull_volume(moved, at.inverse_masses, at.triangles, at.six_volumes, enclosed, of_volume)
         pull_dihedrals(moved, at.inverse_masses, at.hinges, at.angles, hinges, of_hinges)
-        moved += sum((contact.push(moved, at.inverse_masses, dt) for contact in contacts), np.zeros_like(moved))
+        moved += sum((contact.project(moved, at.inverse_masses, dt) for contact in contacts), np.zeros_like(moved))
     return moved, (moved - points) / dt
 
 
@@ -199,7 +199,7 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
     """Iterate from rest at the first of ``setup.frames`` to the last of them; each frame wanted goes into ``sink``."""
     seconds_compile = _compile(settings)
     begin = time.perf_counter()
-    constraints = Constraints.at_rest(setup.surface, setup.held_vertices, settings)
+    constraints = Constraints.at_rest(setup.surface, setup.attached_vertices, settings)
     contacts = _contacts(setup, settings)
     step = Step(settings.frame_time / settings.sub_steps, settings.sweeps, settings.damping or 0.0)
     cost = {"seconds_compile": seconds_compile, "seconds_setup": time.perf_counter() - begin}
@@ -225,7 +225,7 @@ def other_clock(setup: Setup, frame_time: float) -> str:
 
 
 def _contacts(setup: Setup, settings: Settings) -> list[Contact]:
-    """One of each bone, where bones push."""
+    """One of each bone, where there is contact."""
     if settings.collision is None:
         return []
     softness = 1 / (settings.collision.stiffness * vertex_areas(setup.surface))

@@ -1,1 +1,1 @@
-"""What solves many times: error bars, rankings of solvers, convergence, benchmarks."""
+"""Studies of many solutions: error bars, rankings of solvers, convergence, benchmarks."""

@@ -18,7 +18,7 @@ from fem_reference.assessment.error_bars import ErrorBars, Orders, Pair
 from fem_reference.effects import Effect
 from fem_reference.effects.contact import Contact, among
 from fem_reference.foundations.errors import InputError
-from fem_reference.metrics import Yardstick
+from fem_reference.metrics import MeasurementContext
 from fem_reference.runs.store import Run
 from fem_reference.scenes.bones import Bone
 from fem_reference.scenes.muscle import Scene
@@ -100,7 +100,7 @@ def obtain(bench: Bench, reference: Run, *, model: bool = True) -> ErrorBars | N
         pair = _pair(bench, reference, model)
     log.info("error bar: measuring the runs against each other")
     bars = error_bars.error_bars(
-        pair, Yardstick.of(reference, reference.fibres, bench.setup().bones, bench.setup().free)
+        pair, MeasurementContext.of(reference, reference.fibres, bench.setup().bones, bench.setup().free)
     )
     if reference.folder is not None:
         error_bars.save(bars, reference.folder, _of(reference))
@@ -164,8 +164,8 @@ def _pair(bench: Bench, reference: Run, model: bool) -> Pair:
     scenes = {f"tetrahedra of {sizes[1]:.3g} mm": coarser}
     scenes |= {entry.name: coarser.model_copy(update=entry.changes) for entry in varied}
     if model and any(entry.stiffness is not None for entry in coarser.attachment):
-        held = tuple(entry.model_copy(update={"stiffness": None}) for entry in coarser.attachment)
-        scenes[_EXACT] = coarser.model_copy(update={"attachment": held})
+        attached = tuple(entry.model_copy(update={"stiffness": None}) for entry in coarser.attachment)
+        scenes[_EXACT] = coarser.model_copy(update={"attachment": attached})
     # Newton's method takes less than quadratic time of the unknowns: what larger tetrahedra save is at least their number.
     seconds = reference.outcome.cost.get("seconds", 0.0) * (sizes[0] / sizes[1]) ** 3
     runs = {}

@@ -5,9 +5,9 @@ from collections.abc import Iterable
 from fnmatch import fnmatch
 from pathlib import Path
 
-from fem_reference.assessment.solver_table import Family, Scenario, Standing, Table, families
+from fem_reference.assessment.solver_table import Family, Scenario, SolverResult, Table, families
 from fem_reference.foundations.errors import InputError
-from fem_reference.metrics import Measure, Yardstick, measure
+from fem_reference.metrics import Measure, MeasurementContext, measure
 from fem_reference.report.tables import seconds_per_frame
 from fem_reference.runs.key import versions
 from fem_reference.runs.store import Run
@@ -17,8 +17,8 @@ from fem_reference.studies.execution import Bench, complete
 
 log = logging.getLogger(__name__)
 
-# Our own, which need nothing, and the five of the report (6.1.3 to 6.1.6). Its iliacus as the report's program held it has no
-# solution beyond frame 77 (see the case): here it is held where the anatomy holds it.
+# Our own, which need nothing, and the five of the report (6.1.3 to 6.1.6). Its iliacus as the report's program attached it has no
+# solution beyond frame 77 (see the case): here it has its anatomical attachments.
 SCENARIOS = (
     "hip_flexion",
     "box_squeeze",
@@ -37,7 +37,7 @@ def stand(scenes: Iterable[Scene], store: Path, foreign: dict[str, list[Candidat
     """The table over ``scenes``, with runs in ``store``; ``foreign``: by case, what somebody else's solvers made of it, which is
     read before anything is solved.
     """
-    rows, scenarios, standings, missing = families(), list[Scenario](), list[Standing](), dict[str, str]()
+    rows, scenarios, results, missing = families(), list[Scenario](), list[SolverResult](), dict[str, str]()
     benches = [Bench(scene, store) for scene in scenes]
     read = {
         bench.scene.name: [bench.read(entry.name, entry, "--candidate") for entry in foreign.get(bench.scene.name, [])]
@@ -53,15 +53,15 @@ def stand(scenes: Iterable[Scene], store: Path, foreign: dict[str, list[Candidat
             continue
         scenario, found = _on(bench, rows, read[bench.scene.name])
         scenarios.append(scenario)
-        standings += found
+        results += found
     if foreign:
         rows = (*rows, Family(name=FOREIGN, form="", speed="", precision="", literature=""))
-    machines = tuple(dict.fromkeys(one.machine for one in standings if one.family != FOREIGN))
-    return Table(rows, tuple(scenarios), tuple(standings), missing, versions(), machines)
+    machines = tuple(dict.fromkeys(one.machine for one in results if one.family != FOREIGN))
+    return Table(rows, tuple(scenarios), tuple(results), missing, versions(), machines)
 
 
 def chosen(scene: Scene, row: Family) -> list[tuple[Candidate, str]]:
-    """Who stands for a family on a scene, and the place that says so."""
+    """The solvers measured for a family on a scene, and the place that says so."""
     own = [
         (candidate, f"candidate[{i}]")
         for i, candidate in enumerate(scene.candidate)
@@ -70,26 +70,26 @@ def chosen(scene: Scene, row: Family) -> list[tuple[Candidate, str]]:
     return own + [(candidate, f"{row.name} of Table 5.1") for candidate in row.candidate]
 
 
-def _on(bench: Bench, rows: Iterable[Family], foreign: list[Run]) -> tuple[Scenario, list[Standing]]:
+def _on(bench: Bench, rows: Iterable[Family], foreign: list[Run]) -> tuple[Scenario, list[SolverResult]]:
     """How everybody stands on the scene of a bench."""
     scene, numbers = bench.scene, bench.scene.frames.numbers
     reference = complete(bench.obtain("reference", scene.reference, "reference"), numbers)
     bars = refinement.stored(reference)
     assert reference.fibres is not None  # a reference has an interior
-    yardstick = Yardstick.of(reference, reference.fibres, bench.setup().bones, bench.setup().free)
-    found = [_standing(scene, REFERENCE, reference, bars.of_deviations if bars else ())]
+    context = MeasurementContext.of(reference, reference.fibres, bench.setup().bones, bench.setup().free)
+    found = [_result(scene, REFERENCE, reference, bars.of_deviations if bars else ())]
     meeting = [(row.name, *entry) for row in rows for entry in chosen(scene, row)]
     for i, (family, candidate, place) in enumerate(meeting):
         log.info("%s: %s, solver %d of %d", scene.name, candidate.name, i + 1, len(meeting))
         run = complete(bench.obtain(candidate.name, candidate, place), numbers)
-        found.append(_standing(scene, family, run, measure(run, reference, yardstick, METRICS)))
-    found += [_standing(scene, FOREIGN, run, measure(run, reference, yardstick, METRICS)) for run in foreign]
+        found.append(_result(scene, family, run, measure(run, reference, context, METRICS)))
+    found += [_result(scene, FOREIGN, run, measure(run, reference, context, METRICS)) for run in foreign]
     triangles = len(reference.surface.triangles)
-    return Scenario(scene.name, scene.title, triangles, yardstick.travel, reference.outcome), found
+    return Scenario(scene.name, scene.title, triangles, context.travel, reference.outcome), found
 
 
-def _standing(scene: Scene, family: str, run: Run, measures: tuple[Measure, ...]) -> Standing:
-    return Standing(
+def _result(scene: Scene, family: str, run: Run, measures: tuple[Measure, ...]) -> SolverResult:
+    return SolverResult(
         family,
         run.name,
         run.solver,

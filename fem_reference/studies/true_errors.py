@@ -1,4 +1,4 @@
-"""The finer solutions that error bars are held against: on smaller tetrahedra, with finer contact."""
+"""The finer solutions that error bars are compared with: on smaller tetrahedra, with finer contact."""
 
 import logging
 from collections.abc import Iterable
@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fem_reference.assessment.claims import CLAIMED, FINER, Claim, Claims, claimed
 from fem_reference.foundations.errors import InputError
-from fem_reference.metrics import Yardstick, at_rest, measure
+from fem_reference.metrics import MeasurementContext, at_rest, measure
 from fem_reference.scenes.muscle import Scene
 from fem_reference.studies import refinement
 from fem_reference.studies.execution import Bench, complete
@@ -53,11 +53,11 @@ def _of(scene: Scene, store: Path) -> list[Claim]:
     run = complete(finer.obtain("finer", scene.reference, "reference"), reference.numbers)
     if reference.fibres is None or run.outcome.status != "converged":
         return []
-    yardstick = Yardstick.of(reference, reference.fibres, bench.setup().bones, bench.setup().free)
+    context = MeasurementContext.of(reference, reference.fibres, bench.setup().bones, bench.setup().free)
     names = dict.fromkeys(metric for metric, _ in CLAIMED)
-    changes = [measure(one, at_rest(one), yardstick, names) for one in (reference, run)]
+    changes = [measure(one, at_rest(one), context, names) for one in (reference, run)]
     surfaces = [replace(one, fibres=None, fibre_positions=None) for one in (reference, run)]  # as candidates are
-    deviations = [measure(surfaces[0], one, yardstick, names) for one in surfaces]
+    deviations = [measure(surfaces[0], one, context, names) for one in surfaces]
     return [
         *claimed(scene.name, "change", bars, *changes),
         *claimed(scene.name, "deviation", bars, *deviations),

@@ -1,4 +1,4 @@
-"""The way from a case to a page, one call a step: what the package offers to Python."""
+"""The steps from a case to a page, one call each: what the package offers to Python."""
 
 import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -10,7 +10,7 @@ from fem_reference import export, report
 from fem_reference.assessment import comparison
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import ErrorBars
-from fem_reference.problems.body import Continuum
+from fem_reference.problems.body import Body
 from fem_reference.runs.solved import Solved
 from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
@@ -128,7 +128,7 @@ def write_report(comparison: Comparison, folder: str | Path) -> Path:
     return report.write(comparison, Path(folder))
 
 
-def solve_body(body: Continuum, *, progress: Progress | None = None, **settings: Any) -> Solved:
+def solve_body(body: Body, *, progress: Progress | None = None, **settings: Any) -> Solved:
     """Solve a body of any shape with the reference, FEniCSx.
 
     Parameters

@@ -13,8 +13,8 @@ import numpy as np
 from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.effects import make
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
-from fem_reference.problems.courses import Affine
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed
+from fem_reference.problems.paths import Affine
 from fem_reference.runs.solved import Solved
 from fem_reference.verification.parts import SYMMETRY, resistance
 from fem_reference.verification.truths import find
@@ -40,7 +40,7 @@ def squeezed(lab: Lab, element: str, poisson: float, stretches: tuple[float, ...
     plate = Prescribed("plate", "z1", (2,), Affine(_STILL, (0.0, 0.0, -1.0)))
     acting = make("neo_hooke", mu=f"{MU} MPa"), resistance(element, bulk_modulus(poisson))
     frames = tuple(1 - stretch for stretch in stretches)
-    body = Continuum(mesh, acting, (*SYMMETRY, plate), frames)
+    body = Body(mesh, acting, (*SYMMETRY, plate), frames)
     return lab.solve(body, element, first_step=0.1, smallest_step=1e-3, residual=1e-11)
 
 
@@ -87,8 +87,8 @@ ENTRIES = (
         kind="property",
         source="validation/loads.py: the only state in balance has a thousandth of the volume, which no flesh has",
         measure=partial(collapses, element="P2/P1", poisson=POISSON),
-        spoil="a Poisson ratio of 0.499, with which 0.993 of the volume are kept",
-        spoiled=partial(collapses, element="P2/P1", poisson=NEARLY_INCOMPRESSIBLE),
+        negative_control="a Poisson ratio of 0.499, with which 0.993 of the volume are kept",
+        with_negative_control=partial(collapses, element="P2/P1", poisson=NEARLY_INCOMPRESSIBLE),
     ),
     Entry(
         name="law_outside_its_range",
@@ -102,7 +102,7 @@ ENTRIES = (
         kind="closed form",
         source="validation/loads.py: one scalar equation for the volume, from the energy by hand (Holzapfel 2000, ch. 6.4)",
         measure=partial(outside, element="Q1/P0", poisson=POISSON),
-        spoil="a Poisson ratio of 0.32",
-        spoiled=partial(outside, element="Q1/P0", poisson=STIFFER),
+        negative_control="a Poisson ratio of 0.32",
+        with_negative_control=partial(outside, element="Q1/P0", poisson=STIFFER),
     ),
 )

@@ -1,4 +1,4 @@
-"""Bodies that are pushed by rigid ones: a plate on a block, and a ball on a large body, as Hertz has it."""
+"""Contact of bodies with rigid ones: a plate on a block, and a ball on a large body, as Hertz has it."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -12,9 +12,9 @@ from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere, Vector
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.contact import Contact, Obstruction
-from fem_reference.problems.courses import Rest
+from fem_reference.problems.paths import Rest
 from fem_reference.runs.solved import Reached
 from fem_reference.verification.parts import SYMMETRY, neo_hooke
 from fem_reference.verification.truths import find
@@ -27,11 +27,11 @@ BALL_STIFFNESS, FAR, CORE = 2.0, 300.0, 1.2  # [MPa/mm]; where the body ends, an
 
 @dataclass(frozen=True)
 class Slide:
-    """A rigid body, turned by the rotation vector ``turned`` [rad] and moved by ``start`` [mm], that goes by ``way`` [mm] from
+    """A rigid body, turned by the rotation vector ``turned`` [rad] and moved by ``start`` [mm], that goes by ``path`` [mm] from
     frame 0 to frame 1.
     """
 
-    way: Vector
+    path: Vector
     start: Vector = (0.0, 0.0, 0.0)
     turned: Vector = (0.0, 0.0, 0.0)
 
@@ -39,7 +39,7 @@ class Slide:
         """Its pose, 4 x 4."""
         pose = np.eye(4)
         pose[:3, :3] = Rotation.from_rotvec(self.turned).as_matrix()
-        pose[:3, 3] = np.array(self.start) + np.array(self.way) * frame
+        pose[:3, 3] = np.array(self.start) + np.array(self.path) * frame
         return pose
 
 
@@ -48,7 +48,7 @@ def plate(lab: Lab, element: str, stiffness: float) -> Finding:
     mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), ELEMENTS[element][0])
     law = Contact("z1", stiffness, 0.01)
     above = Obstruction("plate", HalfSpace((0.0, 0.0, 1.0), (0.0, 0.0, -1.0)), Slide((0.0, 0.0, -PLATE_WAY)))
-    body = Continuum(mesh, neo_hooke(MU, PLATE_BULK), SYMMETRY, (0.0, 1.0), contact=law, obstructions=(above,))
+    body = Body(mesh, neo_hooke(MU, PLATE_BULK), SYMMETRY, (0.0, 1.0), contact=law, obstructions=(above,))
     state = lab.solve(body, element, first_step=0.2, residual=1e-12).last
     return Finding(float(state.forces["plate"][2]), note=f"{state.scalars['contact_depth']:.4f} mm deep")
 
@@ -64,12 +64,12 @@ def _plate_truth() -> float:
 
 
 def pressed(lab: Lab, n: int, radius: float = RADIUS) -> Reached:
-    """A quarter of a large body, z >= 0, into which a ball of ``radius`` [mm] is pushed by APPROACH."""
+    """A quarter of a large body, z >= 0, into which a ball of ``radius`` [mm] is pressed by APPROACH."""
     mesh = shapes.ball_octant(CORE, FAR, n, 2 * n + 2, "hexahedron", 2)
     law = Contact("z0", BALL_STIFFNESS, 5e-4)
     ball = Obstruction("ball", Sphere((0.0, 0.0, -radius), radius), Slide((0.0, 0.0, APPROACH)))
-    held = (*SYMMETRY[:2], Prescribed("far", "outer", (0, 1, 2), Rest()))
-    body = Continuum(mesh, neo_hooke(MU, BULK), held, (0.0, 1.0), contact=law, obstructions=(ball,))
+    fixed = (*SYMMETRY[:2], Prescribed("far", "outer", (0, 1, 2), Rest()))
+    body = Body(mesh, neo_hooke(MU, BULK), fixed, (0.0, 1.0), contact=law, obstructions=(ball,))
     return lab.solve(body, "Q2/Q1", first_step=0.5, residual=1e-10, newton_iterations=25).last
 
 
@@ -117,8 +117,8 @@ def _hertz_entry(name: str, title: str, unit: str, attribute: str, value: Any) -
         kind="closed form",
         source="Hertz 1882; validation/hertz.py",
         measure=partial(_measured, n=4, value=value),
-        spoil="a ball of twice the radius",
-        spoiled=partial(_measured, n=4, value=value, radius=2 * RADIUS),
+        negative_control="a ball of twice the radius",
+        with_negative_control=partial(_measured, n=4, value=value, radius=2 * RADIUS),
     )
 
 
@@ -136,8 +136,8 @@ ENTRIES = (
             kind="closed form",
             source="validation/loads.py: the squeeze of a block, in series with the spring",
             measure=partial(plate, element=element, stiffness=PLATE_STIFFNESS),
-            spoil="a plate 1 % stiffer",
-            spoiled=partial(plate, element=element, stiffness=1.01 * PLATE_STIFFNESS),
+            negative_control="a plate 1 % stiffer",
+            with_negative_control=partial(plate, element=element, stiffness=1.01 * PLATE_STIFFNESS),
         )
         for element in ("P2/P1", "Q2/Q1", "Q1/P0")
     ),

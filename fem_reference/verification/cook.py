@@ -15,9 +15,9 @@ from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.effects import make
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
-from fem_reference.problems.courses import Rest
-from fem_reference.verification.parts import course, ladder, once, resistance
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed
+from fem_reference.problems.paths import Rest
+from fem_reference.verification.parts import ladder, once, ramp, resistance
 from fem_reference.verification.truths import find
 
 FAMILY = "Cook's membrane"
@@ -25,7 +25,7 @@ THICKNESS, HEIGHT = 2.0, 44.0  # of the panel, and of its clamped side [mm]
 SMALL = 1e-5  # the share of the load at which the answer is linear: terms of second order are some 1e-5 of it
 RESIDUAL = 1e-5  # at the whole load [N, mm3], where some 100 N act
 LOCKED = 0.5  # a tip that gets less than this share of its way is locked
-HELD = (
+FIXED = (
     Prescribed("clamp", "x0", (0, 1, 2), Rest()),
     Prescribed("z0", "z0", (2,), Rest()),
     Prescribed("z1", "z1", (2,), Rest()),
@@ -60,7 +60,7 @@ class Panel:
         """How far the corner (48, 60) goes along y [mm]."""
         return float(self.membrane.tip)
 
-    def body(self, n: int) -> Continuum:
+    def body(self, n: int) -> Body:
         """The panel in n by n cells."""
         faces = {face: face for face in ("x0", "x1", "z0", "z1")}
         mesh = shapes.mapped([shapes.Block(_place, (n, n, 1), faces)], ELEMENTS[self.element][0], 1)
@@ -68,9 +68,9 @@ class Panel:
         acting = (
             make("neo_hooke", mu=f"{self.membrane.shear * self.shear} MPa"),
             resistance(self.element, self.membrane.bulk * self.bulk),
-            make("traction", on="x1", force=pull, course=course()),
+            make("traction", on="x1", force=pull, ramp=ramp()),
         )
-        return Continuum(mesh, acting, HELD, (0.0, 1.0))
+        return Body(mesh, acting, FIXED, (0.0, 1.0))
 
     def tip(self, lab: Lab, n: int) -> float:
         """How far the corner goes in n by n cells [mm], over ``share``."""
@@ -88,8 +88,8 @@ class Panel:
         return Finding(self.tip(lab, n) / self.true_tip())
 
 
-def _tip_entry(name: str, title: str, panel: Panel, counts: tuple[int, ...], within: float, **told: Any) -> Entry:
-    """An entry whose value is the tip; ``told`` has ``because``, ``spoil`` and ``spoiled``."""
+def _tip_entry(name: str, title: str, panel: Panel, counts: tuple[int, ...], within: float, **fields: Any) -> Entry:
+    """An entry whose value is the tip; ``fields`` has ``because``, ``negative_control`` and ``with_negative_control``."""
     return Entry(
         name=name,
         family=FAMILY,
@@ -101,11 +101,11 @@ def _tip_entry(name: str, title: str, panel: Panel, counts: tuple[int, ...], wit
         kind="second solver",
         source=SOURCE,
         measure=partial(panel.ladder, counts=counts),
-        **told,
+        **fields,
     )
 
 
-def _spoiled(panel: Panel, n: int) -> Callable[[Lab], Finding]:
+def _with_negative_control(panel: Panel, n: int) -> Callable[[Lab], Finding]:
     return partial(once, value=panel.tip, count=n)
 
 
@@ -128,9 +128,11 @@ ENTRIES = (
         _COMPRESSIBLE,
         (4, 8, 16),
         0.005,
-        because="discretisation, held up by the singular clamped corners: 0.15 % too stiff",
-        spoil="Poisson's ratio is 0.4 instead of 1/3, at the same Young's modulus",
-        spoiled=_spoiled(Panel("COMPRESSIBLE", "P2", SMALL, shear=1.4**-1 * 4 / 3, bulk=5 / 3), 16),
+        because="discretisation, limited by the singular clamped corners: 0.15 % too stiff",
+        negative_control="Poisson's ratio is 0.4 instead of 1/3, at the same Young's modulus",
+        with_negative_control=_with_negative_control(
+            Panel("COMPRESSIBLE", "P2", SMALL, shear=1.4**-1 * 4 / 3, bulk=5 / 3), 16
+        ),
     ),
     _tip_entry(
         "cook_compressible_linear",
@@ -139,8 +141,8 @@ ENTRIES = (
         (16, 32, 64),
         0.04,
         because="discretisation by linear cells",
-        spoil="Poisson's ratio is 0.4999, at the same Young's modulus: it locks",
-        spoiled=_spoiled(_NEARLY_LINEAR, 64),
+        negative_control="Poisson's ratio is 0.4999, at the same Young's modulus: it locks",
+        with_negative_control=_with_negative_control(_NEARLY_LINEAR, 64),
     ),
     _tip_entry(
         "cook_nearly_incompressible",
@@ -148,9 +150,9 @@ ENTRIES = (
         _NEARLY,
         (4, 8, 16),
         0.005,
-        because="discretisation, held up by the singular clamped corners: 0.16 % too stiff",
-        spoil="linear tetrahedra without a pressure",
-        spoiled=_spoiled(_NEARLY_LINEAR, 16),
+        because="discretisation, limited by the singular clamped corners: 0.16 % too stiff",
+        negative_control="linear tetrahedra without a pressure",
+        with_negative_control=_with_negative_control(_NEARLY_LINEAR, 16),
     ),
     _tip_entry(
         "cook_hexahedra",
@@ -159,8 +161,8 @@ ENTRIES = (
         (4, 8, 16),
         0.001,
         because="discretisation: 0.02 % too stiff",
-        spoil=_STIFF,
-        spoiled=_spoiled(Panel("NEARLY_INCOMPRESSIBLE", "Q2/Q1", SMALL, shear=1.02), 16),
+        negative_control=_STIFF,
+        with_negative_control=_with_negative_control(Panel("NEARLY_INCOMPRESSIBLE", "Q2/Q1", SMALL, shear=1.02), 16),
     ),
     _tip_entry(
         "cook_constant_pressure",
@@ -169,8 +171,8 @@ ENTRIES = (
         (8, 16, 32),
         0.015,
         because="discretisation by linear cells: 0.5 % too stiff",
-        spoil="linear hexahedra without a pressure",
-        spoiled=_spoiled(Panel("NEARLY_INCOMPRESSIBLE", "Q1", SMALL), 32),
+        negative_control="linear hexahedra without a pressure",
+        with_negative_control=_with_negative_control(Panel("NEARLY_INCOMPRESSIBLE", "Q1", SMALL), 32),
     ),
     _tip_entry(
         "cook_quarter_load",
@@ -178,9 +180,9 @@ ENTRIES = (
         _QUARTER_TETRAHEDRA,
         (4, 8, 16),
         0.005,
-        because="discretisation, held up by the singular clamped corners: 0.17 % too stiff",
-        spoil="small strain, by linear extrapolation of a tiny load",
-        spoiled=_spoiled(Panel("FINITE_QUARTER", "P2/P1", SMALL), 16),
+        because="discretisation, limited by the singular clamped corners: 0.17 % too stiff",
+        negative_control="small strain, by linear extrapolation of a tiny load",
+        with_negative_control=_with_negative_control(Panel("FINITE_QUARTER", "P2/P1", SMALL), 16),
     ),
     _tip_entry(
         "cook_quarter_load_hexahedra",
@@ -189,8 +191,8 @@ ENTRIES = (
         (4, 8, 16),
         0.001,
         because="discretisation: 0.02 % too stiff",
-        spoil=_STIFF,
-        spoiled=_spoiled(Panel("FINITE_QUARTER", "Q2/Q1", shear=1.02), 16),
+        negative_control=_STIFF,
+        with_negative_control=_with_negative_control(Panel("FINITE_QUARTER", "Q2/Q1", shear=1.02), 16),
     ),
     _tip_entry(
         "cook_full_load",
@@ -199,8 +201,8 @@ ENTRIES = (
         (4, 8),
         0.002,
         because="discretisation (0.06 % too stiff) and 0.02 % that the truth leaves open: a clamped corner folds on fine meshes",
-        spoil="small strain, by linear extrapolation of a tiny load",
-        spoiled=_spoiled(Panel("FINITE", "Q2/Q1", SMALL), 8),
+        negative_control="small strain, by linear extrapolation of a tiny load",
+        with_negative_control=_with_negative_control(Panel("FINITE", "Q2/Q1", SMALL), 8),
     ),
     Entry(
         name="cook_p1_locks",
@@ -214,8 +216,8 @@ ENTRIES = (
         kind="property",
         source="where the tip should be: " + SOURCE,
         measure=partial(_NEARLY_LINEAR.ratio, n=8),
-        spoil="quadratic tetrahedra with a pressure",
-        spoiled=partial(_NEARLY.ratio, n=8),
+        negative_control="quadratic tetrahedra with a pressure",
+        with_negative_control=partial(_NEARLY.ratio, n=8),
     ),
     Entry(
         name="cook_taylor_hood",
@@ -229,7 +231,7 @@ ENTRIES = (
         kind="second solver",
         source=SOURCE,
         measure=partial(_NEARLY.ratio, n=8),
-        spoil="linear tetrahedra without a pressure",
-        spoiled=partial(_NEARLY_LINEAR.ratio, n=8),
+        negative_control="linear tetrahedra without a pressure",
+        with_negative_control=partial(_NEARLY_LINEAR.ratio, n=8),
     ),
 )

@@ -1,16 +1,16 @@
-"""Drag of the ground: a body that nothing holds, and a bar that creeps back."""
+"""Drag of the ground: a free body, and a bar that creeps back."""
 
 import numpy as np
 
 from fem_reference.assessment.catalogue import Entry, Finding, Lab, order
 from fem_reference.effects import Effect, make
 from fem_reference.problems import shapes
-from fem_reference.problems.body import Continuum, Prescribed
-from fem_reference.problems.courses import Rest
+from fem_reference.problems.body import Body, Prescribed
+from fem_reference.problems.paths import Rest
 from fem_reference.verification import truths
 from fem_reference.verification.homogeneous import MU, NEO
 from fem_reference.verification.loads import FREE_FALL, MUSCLE
-from fem_reference.verification.parts import course, resistance
+from fem_reference.verification.parts import ramp, resistance
 
 FAMILY = "damping"
 _SECONDS = 0.1  # from a frame number to the next
@@ -29,18 +29,18 @@ def _velocity(lab: Lab, seconds: float = _SECONDS) -> Finding:
     """Of a free block with its whole weight, over four frames [mm/s]; ``seconds`` are from a frame number to the next."""
     mesh = shapes.box((2, 2, 2), (1.0, 2.0, 3.0), "tetrahedron")
     pull = f"0, 0, {-FREE_FALL} mm/s^2"
-    weight = make("gravity", density=f"{MUSCLE} tonne/mm^3", acceleration=pull, course=course())
+    weight = make("gravity", density=f"{MUSCLE} tonne/mm^3", acceleration=pull, ramp=ramp())
     acting = (*NEO.effects, resistance("P2/P1", 100 * MU), weight, drag(_DRAG))
-    body = Continuum(mesh, acting, (), (0, 1, 5), interval=seconds)
+    body = Body(mesh, acting, (), (0, 1, 5), interval=seconds)
     solved = lab.solve(body, "P2/P1", first_step=0.5, residual=1e-13)
-    way = (solved.last.points - solved.states[1].points)[:, 2]
-    return Finding(float(way[np.argmax(np.abs(way))]) / (4 * _SECONDS))
+    displacement = (solved.last.points - solved.states[1].points)[:, 2]
+    return Finding(float(displacement[np.argmax(np.abs(displacement))]) / (4 * _SECONDS))
 
 
 _FALL = Entry(
     name="damped_fall",
     family=FAMILY,
-    title="Block that nothing holds, with a drag and its weight: the speed of its fastest node",
+    title="Free block, with a drag and its weight: the speed of its fastest node",
     unit="mm/s",
     truth=lambda: -float(truths.find("damping").terminal_velocity(MUSCLE * FREE_FALL, _DRAG)),
     within=1e-9,
@@ -50,8 +50,8 @@ _FALL = Entry(
     kind="closed form",
     source="validation/damping.py, terminal_velocity",
     measure=_velocity,
-    spoil="A time from frame to frame that is 1 % too long.",
-    spoiled=lambda lab: _velocity(lab, 1.01 * _SECONDS),
+    negative_control="A time from frame to frame that is 1 % too long.",
+    with_negative_control=lambda lab: _velocity(lab, 1.01 * _SECONDS),
 )
 
 # A bar in a smooth box that its weight stretched a little, and that creeps back when the weight is gone.
@@ -66,11 +66,11 @@ def _decay(lab: Lab, step: float, coefficient: float) -> float:
     """The rate [1/s] at which the end of the bar creeps back from frame ``_FROM`` to ``_TO``, in load steps of ``step`` frames."""
     mesh = shapes.box((1, 1, 4), (2.0, 2.0, _LENGTH), "hexahedron")
     pull = f"0, 0, {-_WEIGHT / MUSCLE} mm/s^2"
-    weight = make("gravity", density=f"{MUSCLE} tonne/mm^3", acceleration=pull, course=_GONE)
+    weight = make("gravity", density=f"{MUSCLE} tonne/mm^3", acceleration=pull, ramp=_GONE)
     walls = tuple(Prescribed(face, face, ("xyz".index(face[0]),), Rest()) for face in ("x0", "x1", "y0", "y1", "z0"))
     frames = tuple(np.linspace(0, _TO, round(_TO / step) + 1).tolist())
     acting = (*NEO.effects, resistance("Q2", _SOFT), weight, drag(coefficient))
-    body = Continuum(mesh, acting, walls, frames, interval=_SECONDS)
+    body = Body(mesh, acting, walls, frames, interval=_SECONDS)
     solved = lab.solve(body, "Q2", first_step=step, residual=1e-15)
     ends = [state.points[:, 2].max() - _LENGTH for state in (solved.states[round(_FROM / step)], solved.last)]
     return float(np.log(ends[0] / ends[1])) / ((_TO - _FROM) * _SECONDS)
@@ -100,8 +100,8 @@ _RELAXATION = Entry(
     kind="closed form",
     source="validation/damping.py, relaxation_rate",
     measure=_creep,
-    spoil="A drag 1 % too small.",
-    spoiled=lambda lab: _creep(lab, 0.99 * _CREEP),
+    negative_control="A drag 1 % too small.",
+    with_negative_control=lambda lab: _creep(lab, 0.99 * _CREEP),
 )
 
 ENTRIES = (_FALL, _RELAXATION)

@@ -18,7 +18,7 @@ from fem_reference.verification.homogeneous import (
     force_entry,
     stretch_entry,
 )
-from fem_reference.verification.parts import course
+from fem_reference.verification.parts import ramp
 
 FAMILY = "fibres"
 STRESS, OPTIMUM = 0.3, 1.05  # the peak active stress [MPa] and the fibre stretch at which it is reached
@@ -48,7 +48,7 @@ def passive_febio(c4: float = 6.0, c5: float = 0.3) -> Material:
 def active(activation: float = 1.0, stress: float = STRESS) -> Material:
     """Blemker's active fibres at an ``activation`` that grows to its full from frame 0 to 1; ``stress`` [MPa]."""
     numbers = {"stress": f"{stress} MPa", "optimal_stretch": OPTIMUM}
-    acting = make("fibre_active", course=course(activation), **numbers)
+    acting = make("fibre_active", ramp=ramp(activation), **numbers)
     return Material((acting,), _fibre_law("FibreActive", stress, OPTIMUM, activation))
 
 
@@ -61,18 +61,18 @@ def two_families(degrees: float) -> Material:
 
 def tension(activation: float = 1.0) -> Material:
     """A constant active tension of 0.06 MPa, times ``activation``."""
-    acting = make("active_tension", tension="0.06 MPa", course=course(activation))
+    acting = make("active_tension", tension="0.06 MPa", ramp=ramp(activation))
     return Material((acting,), _law("ActiveTension", 0.06 * activation))
 
 
 def taut(material: Material, stretch: float) -> Material:
     """``material`` whose fibres are stretched at rest by ``stretch``."""
-    acting = make("prestretch", stretch=stretch, course=course())
+    acting = make("prestretch", stretch=stretch, ramp=ramp())
     return Material((*material.effects, acting), lambda: truths.find("laws").Prestretched(material.law(), stretch))
 
 
-def _held(fibres: Material, stretch: float = 1.0) -> Specimen:
-    """Fibres along x in a neo-Hookean matrix, held at a stretch."""
+def _fixed(fibres: Material, stretch: float = 1.0) -> Specimen:
+    """Fibres along x in a neo-Hookean matrix, fixed at a stretch."""
     return Specimen(NEO + fibres, "P2/P1", "uniaxial", stretch)
 
 
@@ -86,10 +86,10 @@ _force, _stretch = partial(force_entry, FAMILY), partial(stretch_entry, FAMILY)
 
 def _slack() -> Entry:
     """Shortened along its fibres, which carry nothing: the truth is that of the matrix alone."""
-    muscle, matrix = _held(passive(), 0.8), Specimen(NEO, "P2/P1", "uniaxial", 0.8)
-    spoils = "Fibres across, where the block grows wider.", replace(muscle, fibre=Y)
+    muscle, matrix = _fixed(passive(), 0.8), Specimen(NEO, "P2/P1", "uniaxial", 0.8)
+    control = "Fibres across, where the block grows wider.", replace(muscle, fibre=Y)
     title = "Passive fibres (Blemker) that are shortened carry nothing: force of the matrix alone"
-    return replace(_force("passive_slack", title, muscle, spoils), truth=matrix.known_force)
+    return replace(_force("passive_slack", title, muscle, control), truth=matrix.known_force)
 
 
 def _passive() -> tuple[Entry, ...]:
@@ -102,27 +102,27 @@ def _passive() -> tuple[Entry, ...]:
     }
     places = {"toe": (1.25, "into their toe"), "line": (1.6, "beyond their toe")}
     found = []
-    for name, (law, right, spoil, wrong) in plans.items():
+    for name, (law, right, control, wrong) in plans.items():
         stretch, words = places[name.rsplit("_", 1)[1]]
         title = f"Passive fibres ({law}) stretched {words}: force"
-        found.append(_force(name, title, _held(right, stretch), (spoil, _held(wrong, stretch))))
+        found.append(_force(name, title, _fixed(right, stretch), (control, _fixed(wrong, stretch))))
     return (*found, _slack())
 
 
 def _active() -> tuple[Entry, ...]:
     """On both limbs of the force-length curve and between, free to shorten, and beside passive fibres."""
-    pushing = "Fibres push: activation of the wrong sign.", _held(active(-1.0))
+    pushing = "Fibres push: activation of the wrong sign.", _fixed(active(-1.0))
     stronger = "Peak stress 1 % too high.", active(stress=1.01 * STRESS)
     limbs = {"ascending": (0.6, "short"), "descending": (1.6, "long")}
     both, weaker = passive() + active(0.5), passive() + active(0.495)
     return (
-        _force("active_isometric", "Active fibres held at rest length: force", _held(active()), pushing),
+        _force("active_isometric", "Active fibres fixed at rest length: force", _fixed(active()), pushing),
         *(
             _force(
                 f"active_{limb}",
-                f"Active fibres held {length}, on the {limb} limb of the force-length curve: force",
-                _held(active(), stretch),
-                (stronger[0], _held(stronger[1], stretch)),
+                f"Active fibres fixed {length}, on the {limb} limb of the force-length curve: force",
+                _fixed(active(), stretch),
+                (stronger[0], _fixed(stronger[1], stretch)),
             )
             for limb, (stretch, length) in limbs.items()
         ),
@@ -135,15 +135,15 @@ def _active() -> tuple[Entry, ...]:
         ),
         _force(
             "passive_and_active",
-            "Passive and half activated fibres together, held long: force",
-            _held(both, 1.25),
-            ("Activation 1 % too low.", _held(weaker, 1.25)),
+            "Passive and half activated fibres together, fixed long: force",
+            _fixed(both, 1.25),
+            ("Activation 1 % too low.", _fixed(weaker, 1.25)),
         ),
         _force(
             "active_tension",
-            "Fibres of constant tension held at 0.9 of their rest length: force",
-            _held(tension(), 0.9),
-            ("Fibres push: tension of the wrong sign.", _held(tension(-1.0), 0.9)),
+            "Fibres of constant tension fixed at 0.9 of their rest length: force",
+            _fixed(tension(), 0.9),
+            ("Fibres push: tension of the wrong sign.", _fixed(tension(-1.0), 0.9)),
         ),
     )
 
@@ -164,9 +164,9 @@ def _families() -> tuple[Entry, ...]:
 
 
 def _prestretched() -> tuple[Entry, ...]:
-    """Fibres that are taut in the mesh: held they pull, released they shorten to where the matrix rests and they are slack."""
+    """Fibres that are taut in the mesh: fixed they pull, released they shorten to where the matrix rests and they are slack."""
     muscle, wrong = taut(NEO + passive(), 1.2), ("Prestretch 1 % too high.", taut(NEO + passive(), 1.212))
-    held = Specimen(muscle, "P2/P1", "uniaxial", 1.0)
+    fixed = Specimen(muscle, "P2/P1", "uniaxial", 1.0)
     free = Specimen(muscle, "P2/P1", "pulled", 0.0)
     released = _stretch(
         "prestretch_released",
@@ -175,9 +175,9 @@ def _prestretched() -> tuple[Entry, ...]:
         free,
         (wrong[0], replace(free, material=wrong[1])),
     )
-    title = "Muscle prestretched by 1.2 and held: force"
+    title = "Muscle prestretched by 1.2 and fixed: force"
     return (
-        _force("prestretch_held", title, held, (wrong[0], replace(held, material=wrong[1]))),
+        _force("prestretch_held", title, fixed, (wrong[0], replace(fixed, material=wrong[1]))),
         replace(released, truth=lambda: 1 / 1.2, source="The stretch that undoes the prestretch leaves no energy."),
     )
 

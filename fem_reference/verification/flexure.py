@@ -9,13 +9,13 @@ import numpy as np
 from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
-from fem_reference.problems.courses import Rest
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed
+from fem_reference.problems.paths import Rest
 from fem_reference.runs.solved import Reached
 from fem_reference.verification import truths
 from fem_reference.verification.parts import ladder, neo_hooke, once
 
-MU, BULK = 0.01, 1e4  # [MPa]; the truth is of incompressible matter
+MU, BULK = 0.01, 1e4  # [MPa]; the truth is of incompressible material
 THICKNESS, LENGTH, WIDTH = 10.0, 20.0, 2.5  # [mm]
 ANGLE = 1.0  # [rad], between the ends: the faces are at 15.7 and 25.4 mm
 
@@ -43,12 +43,12 @@ def bent(
     their planes, ``mu`` [MPa].
     """
     mesh = shapes.box((2 * n, 2 * n, 1), (THICKNESS, LENGTH / 2, WIDTH), ELEMENTS[element][0], 2)
-    held = (
+    fixed = (
         Prescribed("middle", "y0", (1,), Rest()),
         Prescribed("end", "y1", (0, 1, 2), Bend(THICKNESS, LENGTH, ANGLE)),
         *(Prescribed(face, face, (2,), Rest()) for face in faces),
     )
-    body = Continuum(mesh, neo_hooke(mu, BULK), held, (0.0, 1.0))
+    body = Body(mesh, neo_hooke(mu, BULK), fixed, (0.0, 1.0))
     return mesh.points, lab.solve(body, element, first_step=0.5, residual=1e-9).last
 
 
@@ -119,10 +119,10 @@ ENTRIES: tuple[Entry, ...] = (
         unit="N",
         truth=_true_moment,
         within=5e-5,
-        because="discretisation of order 4, 1e-5 with 8 cells through the thickness; the matter's K/mu of 1e6 adds 1e-6",
+        because="discretisation of order 4, 1e-5 with 8 cells through the thickness; the material's K/mu of 1e6 adds 1e-6",
         measure=partial(_UP, value=partial(_moment, element="P2/P1"), counts=(1, 2, 4), truth=_true_moment),
-        spoil="one lateral face is free, so that the block may change its width",
-        spoiled=partial(once, value=partial(_moment, element="P2/P1", faces=_FREE), count=4),
+        negative_control="one lateral face is free, so that the block may change its width",
+        with_negative_control=partial(once, value=partial(_moment, element="P2/P1", faces=_FREE), count=4),
     ),
     _BLOCK(
         name="flexure_moment_hexahedra",
@@ -132,8 +132,8 @@ ENTRIES: tuple[Entry, ...] = (
         within=1e-5,
         because="discretisation of order 4, 3e-6 with 6 cells through the thickness; K/mu of 1e6 adds 1e-6",
         measure=partial(_UP, value=partial(_moment, element="Q2/Q1"), counts=(1, 2, 3), truth=_true_moment),
-        spoil="the shear modulus is 1 % too large",
-        spoiled=partial(once, value=partial(_moment, element="Q2/Q1", mu=1.01 * MU), count=3),
+        negative_control="the shear modulus is 1 % too large",
+        with_negative_control=partial(once, value=partial(_moment, element="Q2/Q1", mu=1.01 * MU), count=3),
     ),
     _BLOCK(
         name="flexure_inner_radius",
@@ -143,8 +143,8 @@ ENTRIES: tuple[Entry, ...] = (
         within=1e-4,
         because="discretisation, 3e-5 with 6 cells through the thickness (Q2/Q1)",
         measure=_up_to_radius,
-        spoil="one lateral face is free, so that the block may change its width",
-        spoiled=partial(once, value=partial(_inner_radius, faces=_FREE), count=3),
+        negative_control="one lateral face is free, so that the block may change its width",
+        with_negative_control=partial(once, value=partial(_inner_radius, faces=_FREE), count=3),
     ),
     _BLOCK(
         name="flexure_thickness",
@@ -154,7 +154,7 @@ ENTRIES: tuple[Entry, ...] = (
         within=3e-5,
         because="discretisation of order 4 or more, 7e-6 with 6 cells through the thickness (Q2/Q1)",
         measure=partial(_UP, value=_thickness, counts=(1, 2, 3), truth=_true_thickness),
-        spoil="one lateral face is free, so that the block may change its width",
-        spoiled=partial(once, value=partial(_thickness, faces=_FREE), count=3),
+        negative_control="one lateral face is free, so that the block may change its width",
+        with_negative_control=partial(once, value=partial(_thickness, faces=_FREE), count=3),
     ),
 )

@@ -11,9 +11,9 @@ from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.effects import Effect, make
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Cells, Continuum, Prescribed
-from fem_reference.problems.courses import Along, Rest
-from fem_reference.verification.parts import Value, course, once, resistance
+from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
+from fem_reference.problems.paths import Along, Rest
+from fem_reference.verification.parts import Value, once, ramp, resistance
 from fem_reference.verification.truths import find
 
 FAMILY = "heart benchmark"
@@ -36,17 +36,17 @@ class Helix:
         return np.asarray(find("land").fibre(points))
 
 
-def matter(problem: Any, element: str, on: str, bulk: float) -> tuple[Effect, ...]:
+def effects_of(problem: Any, element: str, on: str, bulk: float) -> tuple[Effect, ...]:
     """What acts in a ``problem`` of ``validation.land``, its pressure ``on`` a part of the surface; ``bulk``: K [MPa]."""
     law = problem.law
     acting = (
         make("guccione", c=f"{law.c} MPa", bf=law.bf, bt=law.bt, bfs=law.bfs),
         resistance(element, bulk),
-        make("pressure", on=on, pressure=f"{problem.pressure} MPa", course=course()),
+        make("pressure", on=on, pressure=f"{problem.pressure} MPa", ramp=ramp()),
     )
     if problem.tension == 0:
         return acting
-    return (*acting, make("active_tension", tension=f"{problem.tension} MPa", course=course()))
+    return (*acting, make("active_tension", tension=f"{problem.tension} MPa", ramp=ramp()))
 
 
 @dataclass(frozen=True)
@@ -67,29 +67,29 @@ class Heart:
         law = replace(right.law, c=right.law.c * self.stiff)
         return replace(right, law=law, tension=right.tension * self.active)
 
-    def beam(self, n: int) -> Continuum:
+    def beam(self, n: int) -> Body:
         """Half of the beam of problem 1, y <= 0.5, in 10n by n by 2n cells."""
         mesh = shapes.box((10 * n, n, 2 * n), (10.0, 0.5, 1.0), ELEMENTS[self.element][0], self.degree)
-        held = (Prescribed("clamp", "x0", (0, 1, 2), Rest()), Prescribed("middle", "y1", (1,), Rest()))
-        return Continuum(mesh, matter(self.problem(1), self.element, "z0", self.bulk), held, (0.0, 1.0), Along(X))
+        fixed = (Prescribed("clamp", "x0", (0, 1, 2), Rest()), Prescribed("middle", "y1", (1,), Rest()))
+        return Body(mesh, effects_of(self.problem(1), self.element, "z0", self.bulk), fixed, (0.0, 1.0), Along(X))
 
-    def passive(self, counts: shapes.Counts) -> Continuum:
-        """A quarter of the ventricle of problem 2, whose matter is the same in all directions."""
+    def passive(self, counts: shapes.Counts) -> Body:
+        """A quarter of the ventricle of problem 2, whose material is the same in all directions."""
         mesh = shapes.ventricle_quarter(counts, ELEMENTS[self.element][0], self.degree)
-        held = (
+        fixed = (
             Prescribed("base", "base", (0, 1, 2), Rest()),
             Prescribed("x0", "x0", (0,), Rest()),
             Prescribed("y0", "y0", (1,), Rest()),
         )
-        return Continuum(mesh, matter(self.problem(2), self.element, "endo", self.bulk), held, (0.0, 1.0), Along(X))
+        return Body(mesh, effects_of(self.problem(2), self.element, "endo", self.bulk), fixed, (0.0, 1.0), Along(X))
 
-    def contracting(self, n: int) -> Continuum:
+    def contracting(self, n: int) -> Body:
         """The ventricle of problem 3, whose pressure and tension grow together, with n cells around an eighth of a turn."""
         mesh = _crowded(shapes.ventricle((n, 7 * n // 2, n), ELEMENTS[self.element][0], self.degree))
-        held = (Prescribed("base", "base", (0, 1, 2), Rest()),)
-        return Continuum(mesh, matter(self.problem(3), self.element, "endo", self.bulk), held, (0.0, 1.0), Helix())
+        fixed = (Prescribed("base", "base", (0, 1, 2), Rest()),)
+        return Body(mesh, effects_of(self.problem(3), self.element, "endo", self.bulk), fixed, (0.0, 1.0), Helix())
 
-    def height(self, lab: Lab, body: Continuum, point: Point) -> float:
+    def height(self, lab: Lab, body: Body, point: Point) -> float:
         """The z [mm] to which the node at ``point`` of one of the bodies goes."""
         state = lab.solve(body, self.element, first_step=0.2, residual=RESIDUAL).last
         return float(state.points[np.argmin(np.linalg.norm(body.mesh.points - point, axis=1)), 2])
@@ -127,8 +127,10 @@ def _ladder(lab: Lab, value: Value, counts: tuple[int, ...], size: float) -> Fin
     return Finding(steps[-1][1], ladder=steps)
 
 
-def _entry(name: str, title: str, truth: Callable[[], float], within: float, **told: Any) -> Entry:
-    """An entry whose value is a z [mm]; ``told`` has ``because``, ``measure``, ``spoil`` and ``spoiled``."""
+def _entry(name: str, title: str, truth: Callable[[], float], within: float, **fields: Any) -> Entry:
+    """An entry whose value is a z [mm]; ``fields`` has ``because``, ``measure``, ``negative_control`` and
+    ``with_negative_control``.
+    """
     return Entry(
         name=name,
         family=FAMILY,
@@ -139,7 +141,7 @@ def _entry(name: str, title: str, truth: Callable[[], float], within: float, **t
         relative=True,
         kind="published",
         source=SOURCE,
-        **told,
+        **fields,
     )
 
 
@@ -165,8 +167,10 @@ def _passive_entry(heart: Heart, place: int, because: str) -> Entry:
         0.005,
         because=f"0.5 %: {_BOUND}; {because}",
         measure=partial(_ladder, value=partial(heart.passive_apex, point=point), counts=(2, 3), size=AROUND),
-        spoil="20 % stiffer",
-        spoiled=partial(once, value=partial(replace(heart, stiff=1.2).passive_apex, point=point), count=3),
+        negative_control="20 % stiffer",
+        with_negative_control=partial(
+            once, value=partial(replace(heart, stiff=1.2).passive_apex, point=point), count=3
+        ),
     )
 
 
@@ -180,8 +184,10 @@ def _active_entry(place: int, because: str) -> Entry:
         0.005,
         because=f"0.5 %: {_BOUND}; {because}",
         measure=partial(_ladder, value=partial(_HEXAHEDRA.active_apex, point=point), counts=(2, 3), size=AROUND),
-        spoil="half the active tension",
-        spoiled=partial(once, value=partial(replace(_HEXAHEDRA, active=0.5).active_apex, point=point), count=3),
+        negative_control="half the active tension",
+        with_negative_control=partial(
+            once, value=partial(replace(_HEXAHEDRA, active=0.5).active_apex, point=point), count=3
+        ),
     )
 
 
@@ -193,8 +199,8 @@ ENTRIES = (
         0.003,
         because=f"0.3 %: {_BOUND}; the mesh leaves 0.2 %, as its clamped edges are singular",
         measure=partial(_ladder, value=_BEAM.beam_tip, counts=(2, 3), size=1.0),
-        spoil="5 % stiffer",
-        spoiled=partial(once, value=replace(_BEAM, stiff=1.05).beam_tip, count=3),
+        negative_control="5 % stiffer",
+        with_negative_control=partial(once, value=replace(_BEAM, stiff=1.05).beam_tip, count=3),
     ),
     *(_passive_entry(_TETRAHEDRA, place, "the mesh leaves 0.1 %") for place in (0, 1)),
     *(_passive_entry(_HEXAHEDRA, place, "the mesh leaves 0.1 %") for place in (0, 1)),

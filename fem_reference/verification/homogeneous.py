@@ -1,4 +1,4 @@
-"""Blocks in homogeneous states: finite elements that hold linear functions are exact there, so only rounding is left.
+"""Blocks in homogeneous states: finite elements that represent linear functions are exact there, so only rounding is left.
 
 ``Specimen`` serves the entries of fibres and loads too. The bulk modulus is finite in the body and in the truth alike.
 """
@@ -12,8 +12,8 @@ import numpy as np
 from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.effects import Effect, make
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
-from fem_reference.problems.courses import Affine, Along, Matrix, Radial
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed
+from fem_reference.problems.paths import Affine, Along, Matrix, Radial
 from fem_reference.runs.solved import Solved
 from fem_reference.verification import truths
 from fem_reference.verification.parts import SYMMETRY, resistance
@@ -94,11 +94,11 @@ class Specimen:
     bulk: float = BULK
     loads: tuple[Effect, ...] = ()
 
-    def body(self) -> Continuum:
+    def body(self) -> Body:
         """The block in two cells a side."""
         acting = (*self.material.effects, resistance(self.element, self.bulk), *self.loads)
         mesh = shapes.box((2, 2, 2), SIZE, ELEMENTS[self.element][0])
-        return Continuum(mesh, acting, MODES[self.mode][0](self.amount), (0, 1), Along(self.fibre))
+        return Body(mesh, acting, MODES[self.mode][0](self.amount), (0, 1), Along(self.fibre))
 
     def solved(self, lab: Lab) -> Solved:
         """Its states."""
@@ -127,24 +127,28 @@ class Specimen:
 
 
 SOURCE = "validation/homogeneous.py: balance by root finding (Ogden 1984, ch. 4.3)"
-EXACT = "The element holds the exact answer: what is left is rounding and the residual of 1e-13 N that ends Newton's method."
+EXACT = "The element represents the exact answer: what is left is rounding and the residual of 1e-13 N that ends Newton's method."
 
 
-def force_entry(family: str, name: str, title: str, specimen: Specimen, spoils: tuple[str, Specimen]) -> Entry:
-    """The force on a ``specimen`` against its truth; ``spoils``: what is wrong with the other specimen."""
-    spoil, wrong = spoils
+def force_entry(family: str, name: str, title: str, specimen: Specimen, control: tuple[str, Specimen]) -> Entry:
+    """The force on a ``specimen`` against its truth; ``control``: what is wrong with the other specimen."""
+    negative_control, wrong = control
     numbers = ("N", specimen.known_force, 1e-11, True)
-    return Entry(name, family, title, *numbers, EXACT, "closed form", SOURCE, specimen.force, spoil, wrong.force)
+    return Entry(
+        name, family, title, *numbers, EXACT, "closed form", SOURCE, specimen.force, negative_control, wrong.force
+    )
 
 
 def stretch_entry(
-    family: str, name: str, title: str, axis: int, specimen: Specimen, spoils: tuple[str, Specimen]
+    family: str, name: str, title: str, axis: int, specimen: Specimen, control: tuple[str, Specimen]
 ) -> Entry:
     """The stretch of a ``specimen`` along an axis against its truth."""
-    spoil, wrong = spoils
-    measure, spoiled = (lambda lab: specimen.stretch(axis, lab)), (lambda lab: wrong.stretch(axis, lab))
+    negative_control, wrong = control
+    measure, with_negative_control = (lambda lab: specimen.stretch(axis, lab)), (lambda lab: wrong.stretch(axis, lab))
     numbers = ("1", lambda: specimen.known_stretch(axis), 1e-11, True)
-    return Entry(name, family, title, *numbers, EXACT, "closed form", SOURCE, measure, spoil, spoiled)
+    return Entry(
+        name, family, title, *numbers, EXACT, "closed form", SOURCE, measure, negative_control, with_negative_control
+    )
 
 
 FAMILY = "homogeneous"
@@ -155,34 +159,34 @@ STIFFER_MOONEY = "Both moduli 1 % too high.", mooney_rivlin(1.01 * 0.003, 1.01 *
 AMOUNTS = {
     "uniaxial": (1.6, "stretched along one axis, free across"),
     "equibiaxial": (1.3, "stretched alike along two axes"),
-    "planar": (0.7, "shortened with its width held"),
+    "planar": (0.7, "shortened with its width fixed"),
     "simple_shear": (0.6, "in simple shear"),
 }
 
 
-def _isotropic(word: str, material: Material, mode: str, element: str, spoils: tuple[str, Material]) -> Entry:
-    """A block of a law, which has a ``word``, in a mode; ``spoils``: the material that is wrong."""
+def _isotropic(word: str, material: Material, mode: str, element: str, control: tuple[str, Material]) -> Entry:
+    """A block of a law, which has a ``word``, in a mode; ``control``: the material that is wrong."""
     amount, words = AMOUNTS[mode]
     specimen = Specimen(material, element, mode, amount)
     name = f"{word}_{mode}_{element}".lower().replace("-", "_").replace("/", "_")
     title = f"{word} block {words}, by {element}: force"
-    return force_entry(FAMILY, name, title, specimen, (spoils[0], replace(specimen, material=spoils[1])))
+    return force_entry(FAMILY, name, title, specimen, (control[0], replace(specimen, material=control[1])))
 
 
 def _heart(name: str, words: str, fibre: Vector, other: Vector) -> Entry:
     """Stretched along x, with its fibres along ``fibre``; wrong: along the ``other``."""
     specimen = Specimen(HEART, "P2/P1", "uniaxial", 1.15, fibre)
     title = f"Heart muscle (Guccione) stretched {words} its fibres: force"
-    spoils = "Fibres turned by a right angle.", replace(specimen, fibre=other)
-    return force_entry(FAMILY, name, title, specimen, spoils)
+    control = "Fibres turned by a right angle.", replace(specimen, fibre=other)
+    return force_entry(FAMILY, name, title, specimen, control)
 
 
 def _lateral() -> Entry:
     """How much a rather compressible block thins."""
     specimen = Specimen(NEO, "P2", "uniaxial", 1.6, bulk=10 * MU)
-    spoils = "Bulk modulus 1 % too high.", replace(specimen, bulk=10.1 * MU)
+    control = "Bulk modulus 1 % too high.", replace(specimen, bulk=10.1 * MU)
     title = "Compressible neo-Hookean block stretched along one axis, by P2: how much it thins"
-    return stretch_entry(FAMILY, "neo_hookean_thinning_p2", title, 1, specimen, spoils)
+    return stretch_entry(FAMILY, "neo_hookean_thinning_p2", title, 1, specimen, control)
 
 
 ENTRIES = (

@@ -15,17 +15,17 @@ from scipy.optimize import brentq, minimize_scalar
 from fem_reference.assessment.catalogue import Entry, Lab
 from fem_reference.effects import make
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Cells, Continuum, Prescribed
-from fem_reference.problems.courses import Radial, Rest
+from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
+from fem_reference.problems.paths import Radial, Rest
 from fem_reference.runs.solved import Solved
 from fem_reference.verification import truths
-from fem_reference.verification.parts import SYMMETRY, course, ladder, mooney_rivlin, neo_hooke, once
-from fem_reference.verification.torsion import Matter
+from fem_reference.verification.parts import SYMMETRY, ladder, mooney_rivlin, neo_hooke, once, ramp
+from fem_reference.verification.torsion import Material
 
 # [MPa]; C1 and C2 make a Mooney-Rivlin law of the shear modulus MU. Pressures are proportional to the moduli.
 MU, BULK = 1.0, 1e4
 C1, C2 = 0.3, 0.2
-NEARLY = 1e6  # [MPa], the bulk modulus where the truth is of incompressible matter
+NEARLY = 1e6  # [MPa], the bulk modulus where the truth is of incompressible material
 INNER, OUTER, LENGTH = 10.0, 20.0, 5.0  # radii of sphere and tube, length of the tube [mm]
 STRETCH, BEYOND = 1.5, 2.2  # a / A of the inner face; the pressure of the sphere is largest at 1.83
 PRESSED = 0.7  # [MPa], of 0.82 that the sphere can bear
@@ -52,34 +52,34 @@ def slope(solved: Solved) -> Chebyshev:
     return Chebyshev.fit(frames, energies, len(frames) - 1, domain=[frames[0], end]).deriv()
 
 
-def _blown(lab: Lab, n: int, element: str, matter: Matter, degree: int = 2, largest: float = 1.6) -> Pressures:
+def _blown(lab: Lab, n: int, element: str, material: Material, degree: int = 2, largest: float = 1.6) -> Pressures:
     """The pressures of the sphere whose inner face is moved out up to the largest stretch: it encloses ``pi a^3 / 6``."""
     grown = Prescribed("inner", "inner", (0, 1, 2), Radial(1.0, knots=((1.0, 0.0), (2.0, 1.0), (3.0, 2.0))))
     frames = stretches(largest, 8 if largest < 2 else 10)
-    body = Continuum(sphere(element, n, degree), matter(), (*SYMMETRY, grown), frames)
+    body = Body(sphere(element, n, degree), material(), (*SYMMETRY, grown), frames)
     curve = slope(lab.solve(body, element, first_step=0.2, residual=RESIDUAL))
     return lambda stretch: float(curve(stretch) / (np.pi / 2 * INNER**3 * stretch**2))
 
 
-def _pressure(lab: Lab, n: int, element: str, matter: Matter, degree: int = 2) -> float:
+def _pressure(lab: Lab, n: int, element: str, material: Material, degree: int = 2) -> float:
     """In the sphere at STRETCH [MPa]."""
-    return _blown(lab, n, element, matter, degree)(STRETCH)
+    return _blown(lab, n, element, material, degree)(STRETCH)
 
 
-def _limit_stretch(lab: Lab, n: int, matter: Matter) -> float:
+def _limit_stretch(lab: Lab, n: int, material: Material) -> float:
     """Where the pressure in the sphere is largest."""
-    return _top(_blown(lab, n, "Q2/Q1", matter, largest=BEYOND))
+    return _top(_blown(lab, n, "Q2/Q1", material, largest=BEYOND))
 
 
-def _limit_pressure(lab: Lab, n: int, matter: Matter, degree: int = 2) -> float:
+def _limit_pressure(lab: Lab, n: int, material: Material, degree: int = 2) -> float:
     """The largest pressure in the sphere [MPa]."""
-    pressures = _blown(lab, n, "Q2/Q1", matter, degree, BEYOND)
+    pressures = _blown(lab, n, "Q2/Q1", material, degree, BEYOND)
     return pressures(_top(pressures))
 
 
-def _fall(lab: Lab, n: int, matter: Matter) -> float:
+def _fall(lab: Lab, n: int, material: Material) -> float:
     """From the largest pressure in the sphere to that at BEYOND [MPa]."""
-    pressures = _blown(lab, n, "Q2/Q1", matter, largest=BEYOND)
+    pressures = _blown(lab, n, "Q2/Q1", material, largest=BEYOND)
     return pressures(_top(pressures)) - pressures(BEYOND)
 
 
@@ -91,8 +91,8 @@ def _top(pressures: Pressures) -> float:
 def _pressed(lab: Lab, n: int, mu: float) -> float:
     """The mean stretch of the sphere's inner face, over its nodes, where a fluid of the pressure PRESSED is in it."""
     mesh = sphere("P2/P1", n, 2)
-    fluid = make("pressure", on="inner", pressure=f"{PRESSED} MPa", course=course())
-    body = Continuum(mesh, (*neo_hooke(mu, BULK), fluid), SYMMETRY, (0.0, 1.0))
+    fluid = make("pressure", on="inner", pressure=f"{PRESSED} MPa", ramp=ramp())
+    body = Body(mesh, (*neo_hooke(mu, BULK), fluid), SYMMETRY, (0.0, 1.0))
     state = lab.solve(body, "P2/P1", first_step=0.25, residual=RESIDUAL).last
     inside = np.linalg.norm(mesh.points, axis=1) < INNER * (1 + 1e-9)
     return float(np.linalg.norm(state.points[inside], axis=1).mean() / INNER)
@@ -101,9 +101,9 @@ def _pressed(lab: Lab, n: int, mu: float) -> float:
 def _tube(lab: Lab, n: int, element: str, ends: tuple[str, ...] = ("bottom", "top"), degree: int = 2) -> Solved:
     """A quarter of the tube, whose inner face is moved out to STRETCH, and whose ``ends`` stay in their planes."""
     mesh = shapes.tube_quarter(INNER, OUTER, LENGTH, (2 * n, 2 * n, 1), ELEMENTS[element][0], degree)
-    held = [Prescribed(end, end, (2,), Rest()) for end in ends]
+    fixed = [Prescribed(end, end, (2,), Rest()) for end in ends]
     grown = Prescribed("inner", "inner", (0, 1), Radial(1.0, (1.0, 1.0, 0.0), ((1.0, 0.0), (2.0, 1.0))))
-    body = Continuum(mesh, neo_hooke(MU, BULK), (*SYMMETRY[:2], *held, grown), stretches(STRETCH, 8))
+    body = Body(mesh, neo_hooke(MU, BULK), (*SYMMETRY[:2], *fixed, grown), stretches(STRETCH, 8))
     return lab.solve(body, element, first_step=0.2, residual=RESIDUAL)
 
 
@@ -120,8 +120,8 @@ def _tube_force(lab: Lab, n: int, element: str, degree: int = 2) -> float:
 
 def _true_pressure(law: Callable[[Any], Any]) -> float:
     """In the sphere at STRETCH [MPa], of a law of ``validation/laws.py``."""
-    matter = law(truths.find("laws"))
-    return float(truths.find("radial").sphere_pressure(matter, BULK, (INNER, OUTER), STRETCH))
+    material = law(truths.find("laws"))
+    return float(truths.find("radial").sphere_pressure(material, BULK, (INNER, OUTER), STRETCH))
 
 
 def _true_pressed() -> float:
@@ -185,10 +185,12 @@ ENTRIES: tuple[Entry, ...] = (
         within=2e-4,
         because="discretisation of order 4, 5e-5 with 6 cells through the wall; the polynomial of the energy adds 1e-6",
         measure=partial(
-            _UP, value=partial(_pressure, element="P2/P1", matter=_NEO_HOOKE), counts=(1, 2, 3), truth=_TRUE_PRESSURE
+            _UP, value=partial(_pressure, element="P2/P1", material=_NEO_HOOKE), counts=(1, 2, 3), truth=_TRUE_PRESSURE
         ),
-        spoil="straight cells, whose surfaces have flat facets",
-        spoiled=partial(once, value=partial(_pressure, element="P2/P1", matter=_NEO_HOOKE, degree=1), count=3),
+        negative_control="straight cells, whose surfaces have flat facets",
+        with_negative_control=partial(
+            once, value=partial(_pressure, element="P2/P1", material=_NEO_HOOKE, degree=1), count=3
+        ),
     ),
     _FINITE(
         name="inflation_sphere_pressure_hexahedra",
@@ -198,10 +200,12 @@ ENTRIES: tuple[Entry, ...] = (
         within=4e-4,
         because="discretisation of order 4, 1.1e-4 with 4 cells through the wall; the polynomial of the energy adds 1e-6",
         measure=partial(
-            _UP, value=partial(_pressure, element="Q2/Q1", matter=_NEO_HOOKE), counts=(1, 2), truth=_TRUE_PRESSURE
+            _UP, value=partial(_pressure, element="Q2/Q1", material=_NEO_HOOKE), counts=(1, 2), truth=_TRUE_PRESSURE
         ),
-        spoil="straight cells, whose surfaces have flat facets",
-        spoiled=partial(once, value=partial(_pressure, element="Q2/Q1", matter=_NEO_HOOKE, degree=1), count=2),
+        negative_control="straight cells, whose surfaces have flat facets",
+        with_negative_control=partial(
+            once, value=partial(_pressure, element="Q2/Q1", material=_NEO_HOOKE, degree=1), count=2
+        ),
     ),
     _FINITE(
         name="inflation_sphere_pressure_mooney_rivlin",
@@ -210,9 +214,9 @@ ENTRIES: tuple[Entry, ...] = (
         truth=partial(_true_pressure, lambda laws: laws.MooneyRivlin(C1, C2)),
         within=4e-4,
         because="discretisation of order 4, 1e-4 with 4 cells through the wall (Q2/Q1)",
-        measure=partial(once, value=partial(_pressure, element="Q2/Q1", matter=_MOONEY_RIVLIN), count=2),
-        spoil="neo-Hookean matter of the same shear modulus",
-        spoiled=partial(once, value=partial(_pressure, element="Q2/Q1", matter=_NEO_HOOKE), count=2),
+        measure=partial(once, value=partial(_pressure, element="Q2/Q1", material=_MOONEY_RIVLIN), count=2),
+        negative_control="neo-Hookean material of the same shear modulus",
+        with_negative_control=partial(once, value=partial(_pressure, element="Q2/Q1", material=_NEO_HOOKE), count=2),
     ),
     _FINITE(
         name="inflation_sphere_stretch",
@@ -222,8 +226,8 @@ ENTRIES: tuple[Entry, ...] = (
         within=4e-4,
         because="discretisation of order 4, 8e-5 with 4 cells through the wall (P2/P1)",
         measure=partial(_UP, value=partial(_pressed, mu=MU), counts=(1, 2), truth=_true_pressed),
-        spoil="the shear modulus is 1 % too large",
-        spoiled=partial(once, value=partial(_pressed, mu=1.01 * MU), count=2),
+        negative_control="the shear modulus is 1 % too large",
+        with_negative_control=partial(once, value=partial(_pressed, mu=1.01 * MU), count=2),
     ),
     _LIMIT(
         name="inflation_limit_pressure",
@@ -232,9 +236,11 @@ ENTRIES: tuple[Entry, ...] = (
         truth=_true_limit_pressure,
         within=4e-4,
         because="discretisation of order 4, 1e-4 with 4 cells through the wall (Q2/Q1); the polynomial adds 1e-6",
-        measure=partial(once, value=partial(_limit_pressure, matter=_NEARLY_INCOMPRESSIBLE), count=2),
-        spoil="straight cells, whose surfaces have flat facets",
-        spoiled=partial(once, value=partial(_limit_pressure, matter=_NEARLY_INCOMPRESSIBLE, degree=1), count=2),
+        measure=partial(once, value=partial(_limit_pressure, material=_NEARLY_INCOMPRESSIBLE), count=2),
+        negative_control="straight cells, whose surfaces have flat facets",
+        with_negative_control=partial(
+            once, value=partial(_limit_pressure, material=_NEARLY_INCOMPRESSIBLE, degree=1), count=2
+        ),
     ),
     _LIMIT(
         name="inflation_limit_stretch",
@@ -243,9 +249,9 @@ ENTRIES: tuple[Entry, ...] = (
         truth=_true_limit_stretch,
         within=1e-4,
         because="discretisation of order 4, 2e-5 with 4 cells through the wall (Q2/Q1)",
-        measure=partial(once, value=partial(_limit_stretch, matter=_NEARLY_INCOMPRESSIBLE), count=2),
-        spoil="Mooney-Rivlin matter of the same shear modulus, whose pressure goes on rising",
-        spoiled=partial(once, value=partial(_limit_stretch, matter=_MOONEY_RIVLIN), count=2),
+        measure=partial(once, value=partial(_limit_stretch, material=_NEARLY_INCOMPRESSIBLE), count=2),
+        negative_control="Mooney-Rivlin material of the same shear modulus, whose pressure goes on rising",
+        with_negative_control=partial(once, value=partial(_limit_stretch, material=_MOONEY_RIVLIN), count=2),
     ),
     _LIMIT(
         name="inflation_fall_beyond_limit",
@@ -254,9 +260,9 @@ ENTRIES: tuple[Entry, ...] = (
         truth=_true_fall,
         within=2e-3,
         because="4 % of a pressure that is found to 1e-4: of its error 2e-4 is left (Q2/Q1, 4 cells through the wall)",
-        measure=partial(once, value=partial(_fall, matter=_NEARLY_INCOMPRESSIBLE), count=2),
-        spoil="Mooney-Rivlin matter of the same shear modulus, whose pressure goes on rising",
-        spoiled=partial(once, value=partial(_fall, matter=_MOONEY_RIVLIN), count=2),
+        measure=partial(once, value=partial(_fall, material=_NEARLY_INCOMPRESSIBLE), count=2),
+        negative_control="Mooney-Rivlin material of the same shear modulus, whose pressure goes on rising",
+        with_negative_control=partial(once, value=partial(_fall, material=_MOONEY_RIVLIN), count=2),
     ),
     _FINITE(
         name="inflation_tube_pressure",
@@ -268,8 +274,8 @@ ENTRIES: tuple[Entry, ...] = (
         measure=partial(
             _UP, value=partial(_tube_pressure, element="Q2/Q1"), counts=(1, 2, 3), truth=_TRUE_TUBE_PRESSURE
         ),
-        spoil="one end of the tube is free to move along it",
-        spoiled=partial(once, value=partial(_tube_pressure, element="Q2/Q1", ends=("bottom",)), count=3),
+        negative_control="one end of the tube is free to move along it",
+        with_negative_control=partial(once, value=partial(_tube_pressure, element="Q2/Q1", ends=("bottom",)), count=3),
     ),
     _FINITE(
         name="inflation_tube_axial_force",
@@ -279,7 +285,7 @@ ENTRIES: tuple[Entry, ...] = (
         within=5e-5,
         because="discretisation of order 4, 1e-5 with 6 cells through the wall (P2/P1)",
         measure=partial(_UP, value=partial(_tube_force, element="P2/P1"), counts=(1, 2, 3), truth=_TRUE_TUBE_FORCE),
-        spoil="straight cells, whose surfaces have flat facets",
-        spoiled=partial(once, value=partial(_tube_force, element="P2/P1", degree=1), count=3),
+        negative_control="straight cells, whose surfaces have flat facets",
+        with_negative_control=partial(once, value=partial(_tube_force, element="P2/P1", degree=1), count=3),
     ),
 )

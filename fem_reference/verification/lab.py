@@ -1,10 +1,10 @@
-"""Where entries are measured: one process of FEniCSx, and scikit-fem."""
+"""The solvers that measure entries: one process of FEniCSx, and scikit-fem."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from fem_reference.problems.body import Continuum
+from fem_reference.problems.body import Body
 from fem_reference.runs.solved import Solved
 from fem_reference.solvers import fenicsx, scikit_fem
 from fem_reference.solvers.fenicsx.session import Session
@@ -18,12 +18,12 @@ class FemLab:
     def __init__(self, session: Session) -> None:
         self.session = session
 
-    def solve(self, body: Continuum, element: str, **settings: Any) -> Solved:
+    def solve(self, body: Body, element: str, **settings: Any) -> Solved:
         """The states of ``body`` by the reference, FEniCSx; none may take for ever."""
         limited = {"time_limit": _TIME_LIMIT} | settings
         return self.session.solve(body, fenicsx.BodySettings(element=element, **limited))
 
-    def second(self, body: Continuum, element: str, **settings: Any) -> Solved:
+    def second(self, body: Body, element: str, **settings: Any) -> Solved:
         """The states of ``body`` by the second opinion, scikit-fem."""
         return scikit_fem.solve_body(body, scikit_fem.BodySettings(element=element, **settings))
 

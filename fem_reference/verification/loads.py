@@ -7,8 +7,8 @@ import numpy as np
 from fem_reference.assessment.catalogue import Entry, Finding, Lab, order
 from fem_reference.effects import Effect, make
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Cells, Continuum, Prescribed
-from fem_reference.problems.courses import Rest, Turn
+from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
+from fem_reference.problems.paths import Rest, Turn
 from fem_reference.verification import truths
 from fem_reference.verification.homogeneous import (
     BULK,
@@ -19,18 +19,18 @@ from fem_reference.verification.homogeneous import (
     Specimen,
     stretch_entry,
 )
-from fem_reference.verification.parts import SYMMETRY, course, resistance, zero
+from fem_reference.verification.parts import SYMMETRY, ramp, resistance, zero
 
 FAMILY = "loads"
 MUSCLE, FAT = 1.06e-9, 0.92e-9  # densities [tonne/mm3]
 FREE_FALL = 9810.0  # mm/s2
-HELD = (Prescribed("z0", "z0", (0, 1, 2), Rest()),)
+FIXED = (Prescribed("z0", "z0", (0, 1, 2), Rest()),)
 
 
 def weight(density: float, times: float = 1.0) -> Effect:
     """Gravity along -z, ``times`` that of the earth, on ``density`` [tonne/mm3]."""
     pull = f"0, 0, {-FREE_FALL * times} mm/s^2"
-    return make("gravity", density=f"{density} tonne/mm^3", acceleration=pull, course=course())
+    return make("gravity", density=f"{density} tonne/mm^3", acceleration=pull, ramp=ramp())
 
 
 def wet(mesh: Cells, faces: tuple[str, ...]) -> Cells:
@@ -40,12 +40,12 @@ def wet(mesh: Cells, faces: tuple[str, ...]) -> Cells:
 
 def pressed(pressure: float) -> Effect:
     """A fluid of ``pressure`` [MPa] on what is wet."""
-    return make("pressure", on="wet", pressure=f"{pressure} MPa", course=course())
+    return make("pressure", on="wet", pressure=f"{pressure} MPa", ramp=ramp())
 
 
 def dead(nominal: float) -> Effect:
     """A force per area at rest along x on the face x1 [MPa]."""
-    return make("traction", on="x1", force=f"{nominal}, 0, 0 MPa", course=course())
+    return make("traction", on="x1", force=f"{nominal}, 0, 0 MPa", ramp=ramp())
 
 
 # The weight of a standing block.
@@ -56,7 +56,7 @@ def _reaction(density: float, lab: Lab) -> Finding:
     """Of a block of muscle of 300 ml that stands, stuck to its base [N]."""
     mesh = shapes.box((3, 2, 2), _LARGE, "tetrahedron")
     acting = (*NEO.effects, resistance("P2/P1", BULK), weight(density))
-    last = lab.solve(Continuum(mesh, acting, HELD, (0, 1)), "P2/P1", first_step=0.25, residual=1e-10).last
+    last = lab.solve(Body(mesh, acting, FIXED, (0, 1)), "P2/P1", first_step=0.25, residual=1e-10).last
     return Finding(float(last.forces["z0"][2]))
 
 
@@ -73,8 +73,8 @@ _STANDING = Entry(
     kind="closed form",
     source="Density times acceleration times volume.",
     measure=lambda lab: _reaction(MUSCLE, lab),
-    spoil="The density of fat instead of muscle.",
-    spoiled=lambda lab: _reaction(FAT, lab),
+    negative_control="The density of fat instead of muscle.",
+    with_negative_control=lambda lab: _reaction(FAT, lab),
 )
 
 # A soft column in a box that sinks under its own weight by a tenth of its height.
@@ -87,8 +87,7 @@ def _top(element: str, cells: int, lab: Lab) -> float:
     walls = (Prescribed(face, face, ("xyz".index(face[0]),), Rest()) for face in ("x0", "x1", "y0", "y1", "z0"))
     acting = (*NEO.effects, resistance(element, _SOFT), weight(MUSCLE, _WEIGHT / (MUSCLE * FREE_FALL)))
     return (
-        float(lab.solve(Continuum(mesh, acting, tuple(walls), (0, 1)), element, **STEPS).last.points[:, 2].max())
-        - _HEIGHT
+        float(lab.solve(Body(mesh, acting, tuple(walls), (0, 1)), element, **STEPS).last.points[:, 2].max()) - _HEIGHT
     )
 
 
@@ -114,8 +113,8 @@ _COLUMN = Entry(
     kind="closed form",
     source="validation/loads.py, column_top: balance integrated by hand",
     measure=lambda lab: _column("Q2", lab),
-    spoil="Linear instead of quadratic elements (Q1).",
-    spoiled=lambda lab: _column("Q1", lab),
+    negative_control="Linear instead of quadratic elements (Q1).",
+    with_negative_control=lambda lab: _column("Q1", lab),
 )
 
 # A block in a fluid, free to shrink on its planes of symmetry.
@@ -126,7 +125,7 @@ def _shrunk(load: Effect, lab: Lab) -> Finding:
     """V/V0 of a block under a ``load`` on what is wet."""
     mesh = wet(shapes.box((2, 2, 2), SIZE, "tetrahedron"), ("x1", "y1", "z1"))
     acting = (*NEO.effects, resistance("P2/P1", _COMPRESSIBLE), load)
-    return Finding(lab.solve(Continuum(mesh, acting, SYMMETRY, (0, 1)), "P2/P1", **STEPS).last.scalars["volume_ratio"])
+    return Finding(lab.solve(Body(mesh, acting, SYMMETRY, (0, 1)), "P2/P1", **STEPS).last.scalars["volume_ratio"])
 
 
 _HYDROSTATIC = Entry(
@@ -137,13 +136,13 @@ _HYDROSTATIC = Entry(
     truth=lambda: float(truths.find("loads").pressed_volume(_COMPRESSIBLE, _FLUID)),
     within=1e-12,
     relative=True,
-    because="The element holds the exact answer, but for the residual: 1e-13 N may add up over the 100 nodes to 10 times as much, "
+    because="The element has the exact answer, but for the residual: 1e-13 N may add up over the 100 nodes to 10 times as much, "
     "and a pressure of this over a face of 3 mm2 changes the volume by 3e-13.",
     kind="closed form",
     source="validation/loads.py, pressed_volume",
     measure=lambda lab: _shrunk(pressed(_FLUID), lab),
-    spoil="The fluid's pressure 1 % too high.",
-    spoiled=lambda lab: _shrunk(pressed(1.01 * _FLUID), lab),
+    negative_control="The fluid's pressure 1 % too high.",
+    with_negative_control=lambda lab: _shrunk(pressed(1.01 * _FLUID), lab),
 )
 
 _ALL = ("x0", "x1", "y0", "y1", "z0", "z1")
@@ -154,7 +153,7 @@ def _left_over(faces: tuple[str, ...], lab: Lab) -> Finding:
     """The sum of the forces [N] on both ends of a block, its top tilted by 0.3 rad, in a fluid that wets ``faces``."""
     mesh = wet(shapes.box((2, 2, 2), SIZE, "tetrahedron"), faces)
     acting = (*NEO.effects, resistance("P2/P1", BULK), pressed(2 * MU))
-    forces = lab.solve(Continuum(mesh, acting, (*HELD, _TILT), (0, 1)), "P2/P1", **STEPS).last.forces
+    forces = lab.solve(Body(mesh, acting, (*FIXED, _TILT), (0, 1)), "P2/P1", **STEPS).last.forces
     return Finding(float(np.linalg.norm(forces["z0"] + forces["z1"])))
 
 
@@ -171,8 +170,8 @@ _CLOSED = Entry(
     kind="property",
     source="The divergence of the cofactor of F vanishes (Piola; Holzapfel 2000, ch. 2.4).",
     measure=lambda lab: _left_over(_ALL, lab),
-    spoil="The top is dry.",
-    spoiled=lambda lab: _left_over(_ALL[:-1], lab),
+    negative_control="The top is dry.",
+    with_negative_control=lambda lab: _left_over(_ALL[:-1], lab),
 )
 
 _QUARTER = Turn((0.0, 1.0, 0.0), np.pi / 2, knots=((1.0, 0.0), (2.0, 1.0)))
@@ -183,7 +182,7 @@ def _turned(load: Effect, lab: Lab) -> Finding:
     mesh = wet(shapes.box((2, 2, 2), SIZE, "tetrahedron"), ("x1",))
     base = (Prescribed("z0", "z0", (0, 1, 2), _QUARTER),)
     acting = (*NEO.effects, resistance("P2/P1", BULK), load)
-    solved = lab.solve(Continuum(mesh, acting, base, (0, 1, 2)), "P2/P1", **STEPS)
+    solved = lab.solve(Body(mesh, acting, base, (0, 1, 2)), "P2/P1", **STEPS)
     after, before = solved.last.points, solved.states[1].points
     return Finding(float(np.linalg.norm(after - before - _QUARTER(before, 2), axis=1).max()))
 
@@ -201,16 +200,16 @@ _FOLLOWER = Entry(
     kind="property",
     source="Objectivity: Nanson's formula turns with F.",
     measure=lambda lab: _turned(pressed(0.2 * MU), lab),
-    spoil="A dead load of the same size.",
-    spoiled=lambda lab: _turned(dead(-0.2 * MU), lab),
+    negative_control="A dead load of the same size.",
+    with_negative_control=lambda lab: _turned(dead(-0.2 * MU), lab),
 )
 
 
 def _dead_pull() -> Entry:
     pulled = Specimen(NEO, "P2/P1", "pulled", MU, loads=(dead(MU),))
-    follower = make("pressure", on="x1", pressure=f"{-MU} MPa", course=course())
-    spoils = "The force spread over the area as it is now.", replace(pulled, loads=(follower,))
-    return stretch_entry(FAMILY, "dead_pull", "Block pulled by a dead force: how far it stretches", 0, pulled, spoils)
+    follower = make("pressure", on="x1", pressure=f"{-MU} MPa", ramp=ramp())
+    control = "The force spread over the area as it is now.", replace(pulled, loads=(follower,))
+    return stretch_entry(FAMILY, "dead_pull", "Block pulled by a dead force: how far it stretches", 0, pulled, control)
 
 
 ENTRIES = (_STANDING, _COLUMN, _HYDROSTATIC, _CLOSED, _FOLLOWER, _dead_pull())

@@ -1,4 +1,4 @@
-"""What entries are made of: effects as scene files write them, planes of symmetry, values on ladders of meshes."""
+"""Parts of entries: effects as scene files write them, planes of symmetry, values on ladders of meshes."""
 
 from collections.abc import Callable
 
@@ -6,7 +6,7 @@ from fem_reference.assessment import catalogue
 from fem_reference.assessment.catalogue import Finding, Lab
 from fem_reference.effects import Effect, make
 from fem_reference.problems.body import ELEMENTS, Prescribed
-from fem_reference.problems.courses import Rest
+from fem_reference.problems.paths import Rest
 
 Value = Callable[[Lab, int], float]  # of so many cells
 
@@ -14,7 +14,7 @@ Value = Callable[[Lab, int], float]  # of so many cells
 SYMMETRY = tuple(Prescribed(face, face, (axis,), Rest()) for axis, face in enumerate(("x0", "y0", "z0")))
 
 
-def course(full: float = 1.0) -> list[dict[str, float]]:
+def ramp(full: float = 1.0) -> list[dict[str, float]]:
     """From nothing at frame 0 to ``full`` at frame 1, as scene files write it."""
     return [{"frame": 0.0, "amount": 0.0}, {"frame": 1.0, "amount": full}]
 
@@ -26,12 +26,12 @@ def resistance(element: str, bulk: float) -> Effect:
 
 
 def neo_hooke(mu: float, bulk: float) -> tuple[Effect, ...]:
-    """Matter of the moduli ``mu`` and ``bulk`` [MPa], the latter in mixed form."""
+    """Material of the moduli ``mu`` and ``bulk`` [MPa], the latter in mixed form."""
     return make("neo_hooke", mu=f"{mu} MPa"), make("incompressible", bulk=f"{bulk} MPa")
 
 
 def mooney_rivlin(c1: float, c2: float, bulk: float) -> tuple[Effect, ...]:
-    """Matter of ``c1``, ``c2`` and the modulus ``bulk`` [MPa], the latter in mixed form."""
+    """Material of ``c1``, ``c2`` and the modulus ``bulk`` [MPa], the latter in mixed form."""
     return make("mooney_rivlin", c1=f"{c1} MPa", c2=f"{c2} MPa"), make("incompressible", bulk=f"{bulk} MPa")
 
 

@@ -1,4 +1,6 @@
-"""What every element must hold exactly, whatever the shape of its cells: linear functions, and turns of any size."""
+"""Patch tests: what every element must represent exactly, whatever the shape of its cells: linear functions, and turns of any
+size.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -6,8 +8,8 @@ import numpy as np
 
 from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
-from fem_reference.problems.courses import Along, Matrix, Turn
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed
+from fem_reference.problems.paths import Along, Matrix, Turn
 from fem_reference.runs.solved import Reached
 from fem_reference.verification.fibres import active
 from fem_reference.verification.homogeneous import BULK, NEO, SIZE, STEPS, Material, X, everywhere
@@ -33,11 +35,11 @@ class Patch:
     degree: int = 1
     share: float = 1.0
 
-    def body(self) -> Continuum:
+    def body(self) -> Body:
         """The box and what moves it."""
         mesh = shapes.warped_box(COUNTS, SIZE, ELEMENTS[self.element][0], self.degree, BUMP)
         acting = (*NEO.effects, resistance(self.element, BULK))
-        return Continuum(mesh, acting, everywhere(_times(self.share)), (0, 1))
+        return Body(mesh, acting, everywhere(_times(self.share)), (0, 1))
 
     def error(self, lab: Lab) -> Finding:
         """How far a node is at most from where the whole gradient takes it [mm]."""
@@ -72,7 +74,7 @@ class Turned:
         )
         acting = (*self.material.effects, resistance(self.element, BULK))
         steps = AT_ONCE if self.faces == SURFACE else STEPS
-        solved = lab.solve(Continuum(mesh, acting, prescribed, (0, 1, 2), Along(X)), self.element, **steps)
+        solved = lab.solve(Body(mesh, acting, prescribed, (0, 1, 2), Along(X)), self.element, **steps)
         return solved.states[1], solved.last
 
     def error(self, lab: Lab) -> Finding:
@@ -97,7 +99,7 @@ def _patch(element: str, degree: int = 1) -> Entry:
     return Entry(
         name=f"patch_{element.lower().replace('/', '_')}{'_curved' if degree == 2 else ''}",
         family="patch tests",
-        title=f"{element} on {shape} cells holds a stretch, a shear and a turn at once: largest error of a node",
+        title=f"{element} on {shape} cells represents a stretch, a shear and a turn at once: largest error of a node",
         unit="mm",
         truth=zero,
         within=WITHIN,
@@ -106,8 +108,8 @@ def _patch(element: str, degree: int = 1) -> Entry:
         kind="property",
         source="The patch test: Irons and Razzaque 1972; Bathe 2014, Finite Element Procedures, ch. 4.2.4",
         measure=patch.error,
-        spoil="The surface is moved 1 % too far.",
-        spoiled=replace(patch, share=1.01).error,
+        negative_control="The surface is moved 1 % too far.",
+        with_negative_control=replace(patch, share=1.01).error,
     )
 
 
@@ -124,8 +126,8 @@ _BLOCK = Entry(
     kind="property",
     source="Objectivity: a law sees C = F^T F only.",
     measure=Turned(NEO, "Q2/Q1", SURFACE).error,
-    spoil="One face is turned 1 % further.",
-    spoiled=Turned(NEO, "Q2/Q1", SURFACE, 1.01).error,
+    negative_control="One face is turned 1 % further.",
+    with_negative_control=Turned(NEO, "Q2/Q1", SURFACE, 1.01).error,
 )
 _ENERGY = replace(
     _BLOCK,
@@ -136,8 +138,8 @@ _ENERGY = replace(
     because="A turn stores nothing. Of mu/2 (I1 - 3) rounding is left: mu/2 I1 of the whole block is 0.14 N mm, its last digit "
     "3e-17, and I1 and the sum over the block take some hundred operations.",
     measure=Turned(NEO, "P2/P1", ENDS).energy,
-    spoil="One end is turned 1 % further.",
-    spoiled=Turned(NEO, "P2/P1", ENDS, 1.01).energy,
+    negative_control="One end is turned 1 % further.",
+    with_negative_control=Turned(NEO, "P2/P1", ENDS, 1.01).energy,
 )
 _MUSCLE = replace(
     _BLOCK,
@@ -145,8 +147,8 @@ _MUSCLE = replace(
     title="Contracting block whose ends are turned by 1 rad: largest difference to itself turned",
     because=f"Fibres turn with the body: {LEFT}.",
     measure=Turned(NEO + active(0.03), "P2/P1", ENDS).error,
-    spoil="One end is turned 1 % further.",
-    spoiled=Turned(NEO + active(0.03), "P2/P1", ENDS, 1.01).error,
+    negative_control="One end is turned 1 % further.",
+    with_negative_control=Turned(NEO + active(0.03), "P2/P1", ENDS, 1.01).error,
 )
 
 ENTRIES = (*(_patch(element) for element in _STRAIGHT), _patch("Q2/Q1", 2), _BLOCK, _ENERGY, _MUSCLE)

@@ -13,9 +13,9 @@ from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.effects import make
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Cells, Continuum, Prescribed
-from fem_reference.problems.courses import Rest
-from fem_reference.verification.parts import course, neo_hooke
+from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
+from fem_reference.problems.paths import Rest
+from fem_reference.verification.parts import neo_hooke, ramp
 from fem_reference.verification.truths import find
 
 FAMILY = "rims of attachments"
@@ -51,7 +51,7 @@ def _halves(counts: shapes.Counts, depth: float, grading: float) -> Cells:
     return shapes.mapped(blocks, ELEMENTS[ELEMENT][0], 1)
 
 
-def _plane(level: int, grading: float) -> Continuum:
+def _plane(level: int, grading: float) -> Body:
     """A slice in plane strain, of 4 cells to a side and more by factors of two."""
     n = 4 * 2**level
     mesh = _halves((n, 1, n), 0.5, grading)
@@ -59,16 +59,16 @@ def _plane(level: int, grading: float) -> Continuum:
     return _pulled(mesh, slides)
 
 
-def _block(level: int, grading: float) -> Continuum:
+def _block(level: int, grading: float) -> Body:
     """A block with free ends, of 3 cells to a side and more by factors of two."""
     n = 3 * 2**level
     return _pulled(_halves((n, 2**level, n), 0.5, grading), ())
 
 
-def _pulled(mesh: Cells, slides: tuple[Prescribed, ...]) -> Continuum:
-    acting = (*neo_hooke(MU, BULK), make("traction", on="pulled", force=f"{LOAD}, 0, 0 MPa", course=course()))
-    held = Prescribed("clamped", "clamped", (0, 1, 2), Rest()), Prescribed("x0", "x0", (0,), Rest())
-    return Continuum(mesh, acting, (*held, *slides), (0.0, 1.0))
+def _pulled(mesh: Cells, slides: tuple[Prescribed, ...]) -> Body:
+    acting = (*neo_hooke(MU, BULK), make("traction", on="pulled", force=f"{LOAD}, 0, 0 MPa", ramp=ramp()))
+    fixed = Prescribed("clamped", "clamped", (0, 1, 2), Rest()), Prescribed("x0", "x0", (0,), Rest())
+    return Body(mesh, acting, (*fixed, *slides), (0.0, 1.0))
 
 
 @dataclass(frozen=True)
@@ -110,8 +110,8 @@ def _entry(name: str, title: str, rim: Rim, within: float, because: str) -> Entr
         kind="closed form",
         source="validation/rims.py: Williams 1952",
         measure=rim.order,
-        spoil="uniform meshes" if graded else "graded towards the rim",
-        spoiled=other.order,
+        negative_control="uniform meshes" if graded else "graded towards the rim",
+        with_negative_control=other.order,
     )
 
 

@@ -62,26 +62,27 @@ def _known(catalogue: dict[str, Entry], text: str) -> str:
     """What could have been meant by ``text``: the names closest to it, and every family."""
     families = dict.fromkeys(entry.family for entry in catalogue.values())
     near = get_close_matches(text, catalogue, n=5)
-    told = f" (such as {', '.join(near)})" if near else ""
-    return f"an entry{told}, a family ({', '.join(families)}) or a pattern of them"
+    such = f" (such as {', '.join(near)})" if near else ""
+    return f"an entry{such}, a family ({', '.join(families)}) or a pattern of them"
 
 
 def run(
     wanted: Sequence[Entry],
     make_lab: Callable[[], AbstractContextManager[Lab]],
-    spoiled: frozenset[str] = frozenset(),
+    with_negative_control: frozenset[str] = frozenset(),
 ) -> tuple[Result, ...]:
-    """What came of the entries, in their order; those whose names are in ``spoiled`` are measured with their spoil.
+    """What came of the entries, in their order; those whose names are in ``with_negative_control`` are measured with their
+    negative control.
 
     Two at a time where there are two cores, each thread with a lab of its own. However this ends, its labs are closed.
     """
     waiting, found = deque(enumerate(wanted)), dict[int, Result]()
-    telling, begin = threading.Lock(), time.perf_counter()
+    reporting, begin = threading.Lock(), time.perf_counter()
 
     def work(lab: Lab) -> None:
         for place, entry in _taken(waiting):
-            last = _measured(entry, lab, spoiled=entry.name in spoiled)
-            with telling:
+            last = _measured(entry, lab, with_negative_control=entry.name in with_negative_control)
+            with reporting:
                 found[place] = last
                 _log_progress(last, len(found), len(wanted), time.perf_counter() - begin)
 
@@ -105,20 +106,25 @@ def _taken(waiting: deque[tuple[int, Entry]]) -> Iterator[tuple[int, Entry]]:
         yield taken
 
 
-def _measured(entry: Entry, lab: Lab, *, spoiled: bool) -> Result:
+def _measured(entry: Entry, lab: Lab, *, with_negative_control: bool) -> Result:
     """What came of an entry; where it raised, a finding or a truth that is not a number, and a note that says why."""
     begin = time.perf_counter()
     try:
-        finding = (entry.spoiled if spoiled else entry.measure)(lab)
+        finding = (entry.with_negative_control if with_negative_control else entry.measure)(lab)
     except FAILURES as error:
         finding = Finding(math.nan, note=f"{type(error).__name__}: {error}")
     seconds = time.perf_counter() - begin
     try:
-        return result(entry, finding, seconds, spoiled=spoiled)
+        return result(entry, finding, seconds, with_negative_control=with_negative_control)
     except FAILURES as error:
         notes = [finding.note, f"no truth, {type(error).__name__}: {error}"]
         return Result(
-            entry, replace(finding, note="; ".join(filter(None, notes))), math.nan, math.nan, seconds, spoiled
+            entry,
+            replace(finding, note="; ".join(filter(None, notes))),
+            math.nan,
+            math.nan,
+            seconds,
+            with_negative_control,
         )
 
 

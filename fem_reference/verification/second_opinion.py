@@ -15,21 +15,21 @@ from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.effects import make
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Cells, Continuum, Prescribed
-from fem_reference.problems.courses import Affine, Along, Rest, Turn
+from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
+from fem_reference.problems.paths import Affine, Along, Rest, Turn
 from fem_reference.runs.solved import Reached
 from fem_reference.verification import fibres
 from fem_reference.verification.cook import Panel
 from fem_reference.verification.homogeneous import HEART, MOONEY, MU, NEO, Specimen
 from fem_reference.verification.loads import dead
-from fem_reference.verification.parts import course, zero
+from fem_reference.verification.parts import ramp, zero
 from fem_reference.verification.patch import Patch
 
 RESIDUAL = 1e-14  # [N, mm3]
 FIBRE = Along((2 / 7, 3 / 7, 6 / 7))
 # Bends and twists at once: an axis between that of the bar, z, and one across it.
 TURN = Turn((1.0, 0.0, 2.0), 0.5, (0.5, 0.5, 2.0))
-RAMP = course()
+RAMP = ramp()
 MIXED = ("incompressible", {"bulk": "1 MPa"})
 PENALTY = ("incompressible_penalty", {"bulk": "1 MPa"})
 NEO_HOOKE = ("neo_hooke", {"mu": "10 kPa"})
@@ -40,12 +40,12 @@ PASSIVE = (
     "fibre_passive",
     {"stress": "300 kPa", "p1": 0.05, "p2": 6.6, "optimal_stretch": 1.0, "linear_from": 1.4},
 )
-ACTIVE = ("fibre_active", {"stress": "20 kPa", "optimal_stretch": 1.0, "course": RAMP})
+ACTIVE = ("fibre_active", {"stress": "20 kPa", "optimal_stretch": 1.0, "ramp": RAMP})
 FEBIO = ("fibre_passive_febio", {"c3": "5 kPa", "c4": 5.0, "c5": "300 kPa", "linear_from": 1.3})
-TENSION = ("active_tension", {"tension": "5 kPa", "course": RAMP})
-PRESTRETCH = ("prestretch", {"stretch": 1.1, "course": RAMP})
-WEIGHT = ("gravity", {"density": "1060 kg/m3", "acceleration": "9.81, 0, -500 m/s^2", "course": RAMP})
-FLUID = ("pressure", {"on": "x1", "pressure": "1 kPa", "course": RAMP})
+TENSION = ("active_tension", {"tension": "5 kPa", "ramp": RAMP})
+PRESTRETCH = ("prestretch", {"stretch": 1.1, "ramp": RAMP})
+WEIGHT = ("gravity", {"density": "1060 kg/m3", "acceleration": "9.81, 0, -500 m/s^2", "ramp": RAMP})
+FLUID = ("pressure", {"on": "x1", "pressure": "1 kPa", "ramp": RAMP})
 
 Named = tuple[str, dict[str, Any]]  # an effect and its parameters as scene files write them
 
@@ -63,10 +63,10 @@ class Sample:
     quadrature: int
     residual = RESIDUAL
 
-    def body(self) -> Continuum:
+    def body(self) -> Body:
         """The body."""
         acting = tuple(make(name, **parameters) for name, parameters in self.acting)
-        return Continuum(self.mesh(kind=ELEMENTS[self.element][0]), acting, self.prescribed, (0.0, 1.0), FIBRE)
+        return Body(self.mesh(kind=ELEMENTS[self.element][0]), acting, self.prescribed, (0.0, 1.0), FIBRE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +75,7 @@ class Borrowed:
     that of each solver.
     """
 
-    body: Callable[[], Continuum]
+    body: Callable[[], Body]
     element: str
     quadrature: int | None = None
     residual: float = 1e-13
@@ -94,7 +94,7 @@ PULLED = (
 )
 
 
-def stiffer(body: Continuum, error: float) -> Continuum:
+def stiffer(body: Body, error: float) -> Body:
     """``body`` with an ``error`` of the first parameter of its first effect, a modulus, relative."""
     first, *others = body.effects
     name, value, _ = first.parameters[0]
@@ -147,8 +147,8 @@ def _entry(name: str, title: str, sample: Sample | Borrowed, within: float, beca
         kind="second solver",
         source="scikit-fem's elements; derivatives by jets, own assembly and Newton's method, scipy's sparse LU",
         measure=partial(agreement, sample=sample),
-        spoil="in scikit-fem the first modulus is 1 % too large",
-        spoiled=partial(agreement, sample=sample, error=0.01),
+        negative_control="in scikit-fem the first modulus is 1 % too large",
+        with_negative_control=partial(agreement, sample=sample, error=0.01),
     )
 
 
@@ -181,7 +181,7 @@ _SPECIMENS = {
         "with two families of fibres, stretched alike along two axes",
         Specimen(NEO + fibres.two_families(30.0), "P2/P1", "equibiaxial", 1.25),
     ),
-    "planar": ("of Mooney-Rivlin matter, shortened with its width held", Specimen(MOONEY, "Q1/P0", "planar", 0.7)),
+    "planar": ("of Mooney-Rivlin material, shortened with its width fixed", Specimen(MOONEY, "Q1/P0", "planar", 0.7)),
     "simple_shear": ("of Guccione's heart muscle in simple shear", Specimen(HEART, "P2/P1", "simple_shear", 0.3)),
     "pulled": (
         "with active fibres, pulled by a dead force",
@@ -192,14 +192,14 @@ _SPECIMENS = {
         Specimen(NEO + fibres.passive_febio(), "P2/P1", "uniaxial", 1.6),
     ),
     "tension": (
-        "with fibres of constant tension, held short",
+        "with fibres of constant tension, fixed short",
         Specimen(NEO + fibres.tension(), "P2/P1", "uniaxial", 0.9),
     ),
     "taut": (
-        "of prestretched muscle, held",
+        "of prestretched muscle, fixed",
         Specimen(fibres.taut(NEO + fibres.passive(), 1.2), "P2/P1", "uniaxial", 1.0),
     ),
-    "neo_hooke": ("of neo-Hookean matter, stretched along one axis", Specimen(NEO, "P1", "uniaxial", 1.6)),
+    "neo_hooke": ("of neo-Hookean material, stretched along one axis", Specimen(NEO, "P1", "uniaxial", 1.6)),
 }
 
 ENTRIES = (
@@ -220,7 +220,7 @@ ENTRIES = (
     ),
     _entry(
         "homogeneous",
-        "A block of Mooney-Rivlin matter pulled to 1.3 times its length,",
+        "A block of Mooney-Rivlin material pulled to 1.3 times its length,",
         Sample((MOONEY_RIVLIN, MIXED), SHORT_BAR, PULLED, "P2/P1", 4),
         1e-11,
         _CONSTANT,

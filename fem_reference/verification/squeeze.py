@@ -1,7 +1,7 @@
 """A block squeezed between plates: smooth ones, to a tenth of its height and back, and glued ones, until its corners fold over.
 
 Smooth plates leave every state homogeneous, also below half the height, where it is unstable: Newton's method follows it, as
-nothing on a structured mesh disturbs it. On the way back a load step that is too large finds another state at rest: the block
+nothing on a structured mesh disturbs it. On the return path a load step that is too large finds another state at rest: the block
 turned by half a turn, through its planes of symmetry.
 """
 
@@ -11,8 +11,8 @@ import numpy as np
 
 from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
-from fem_reference.problems.courses import Affine, Rest
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed
+from fem_reference.problems.paths import Affine, Rest
 from fem_reference.runs.solved import Reached, Solved
 from fem_reference.verification.parts import neo_hooke, zero
 from fem_reference.verification.truths import find
@@ -20,14 +20,14 @@ from fem_reference.verification.truths import find
 MU = 0.01  # [MPa]
 HEIGHT = 0.1  # of the squeezed block over that at rest
 THERE_AND_BACK = ((0.0, 0.0), (1.0, 1.0), (2.0, 0.0))
-STEPS = 5  # each way
+STEPS = 5  # in each direction
 RESIDUAL = 1e-11  # [N, mm3]
 GLUED_TO, GLUED_STEPS = 0.4, 12
 _NOT_MOVING = ((0.0, 0.0, 0.0),) * 3
 
 
 def _smooth(lab: Lab, element: str, bulk: float, *, growing: bool = False) -> tuple[Reached, ...]:
-    """All states of an eighth of a cube there and back: at even steps, or where they are ``growing`` at the ends of both ways."""
+    """All states of an eighth of a cube there and back: at even steps, or where they are ``growing`` at the ends of both paths."""
     mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), ELEMENTS[element][0])
     prescribed = (
         Prescribed("x0", "x0", (0,), Rest()),
@@ -36,8 +36,8 @@ def _smooth(lab: Lab, element: str, bulk: float, *, growing: bool = False) -> tu
         Prescribed("plate", "z1", (2,), Affine(_NOT_MOVING, (0.0, 0.0, HEIGHT - 1), THERE_AND_BACK)),
     )
     frames = (0.0, 1.0, 2.0) if growing else tuple(np.linspace(0, 2, 2 * STEPS + 1).tolist())
-    body = Continuum(mesh, neo_hooke(MU, bulk), prescribed, frames)
-    # Every state by Newton's method, those of the way back too.
+    body = Body(mesh, neo_hooke(MU, bulk), prescribed, frames)
+    # Every state by Newton's method, those of the return path too.
     solved = lab.solve(body, element, first_step=0.05, smallest_step=1e-3, residual=RESIDUAL, reuse=False)
     return (*solved.states[:-1], solved.last)
 
@@ -76,11 +76,11 @@ def _glued(lab: Lab, element: str, count: int, height: float, **settings: float)
         Prescribed("top", "z1", (0, 1, 2), Affine(_NOT_MOVING, (0.0, 0.0, height - 1))),
     )
     frames = tuple(np.linspace(0, 1, GLUED_STEPS + 1).tolist())
-    body = Continuum(mesh, neo_hooke(MU, 10.0), prescribed, frames)
+    body = Body(mesh, neo_hooke(MU, 10.0), prescribed, frames)
     return lab.solve(body, element, first_step=1.0, smallest_step=0.005, residual=RESIDUAL, **settings)
 
 
-def _told(solved: Solved, height: float) -> str:
+def _end_note(solved: Solved, height: float) -> str:
     last = solved.states[-1]
     return (
         f"{solved.outcome.status}: {solved.outcome.message}. Last state kept at {1 - (1 - height) * last.frame:.3f} of the height: "
@@ -94,7 +94,7 @@ def inverts(lab: Lab, element: str, count: int, height: float) -> Finding:
     solved = _glued(lab, element, count, height)
     outcome = solved.outcome
     found = outcome.status == "inverted" and "Newton's method converged" in outcome.message
-    return Finding(float(found), note=_told(solved, height))
+    return Finding(float(found), note=_end_note(solved, height))
 
 
 def stays_upright(lab: Lab, element: str, count: int, height: float, **settings: float) -> Finding:
@@ -102,7 +102,7 @@ def stays_upright(lab: Lab, element: str, count: int, height: float, **settings:
     solved = _glued(lab, element, count, height, **settings)
     scalars = solved.states[-1].scalars
     smallest = min(scalars["min_det_F_quadrature"], scalars["min_det_F_vertices"])
-    return Finding(float(solved.outcome.status == "converged" and smallest > 0), note=_told(solved, height))
+    return Finding(float(solved.outcome.status == "converged" and smallest > 0), note=_end_note(solved, height))
 
 
 def _force_truth(bulk: float) -> float:
@@ -134,8 +134,8 @@ def _force_entry(name: str, element: str, bulk: float) -> Entry:
         kind="closed form",
         source=_SOURCE,
         measure=partial(force, element=element, bulk=bulk),
-        spoil="bulk modulus 1 % too small",
-        spoiled=partial(force, element=element, bulk=bulk, error=-0.01),
+        negative_control="bulk modulus 1 % too small",
+        with_negative_control=partial(force, element=element, bulk=bulk, error=-0.01),
     )
 
 
@@ -152,8 +152,8 @@ def _volume_entry(name: str, element: str, bulk: float) -> Entry:
         kind="closed form",
         source=_SOURCE,
         measure=partial(volume, element=element, bulk=bulk),
-        spoil="bulk modulus 1 % too small",
-        spoiled=partial(volume, element=element, bulk=bulk, error=-0.01),
+        negative_control="bulk modulus 1 % too small",
+        with_negative_control=partial(volume, element=element, bulk=bulk, error=-0.01),
     )
 
 
@@ -170,8 +170,8 @@ def _return_entry(name: str, element: str, bulk: float) -> Entry:
         kind="property",
         source="a hyperelastic body that nothing loads or moves is at rest",
         measure=partial(way_back, element=element, bulk=bulk),
-        spoil="load steps that may grow: they lead to the block turned by half a turn, with no energy and det F = 1",
-        spoiled=partial(way_back, element=element, bulk=bulk, growing=True),
+        negative_control="load steps that may grow: they lead to the block turned by half a turn, with no energy and det F = 1",
+        with_negative_control=partial(way_back, element=element, bulk=bulk, growing=True),
     )
 
 
@@ -184,17 +184,17 @@ ENTRIES = (
     Entry(
         name="bonded_squeeze_is_inverted",
         family="squeeze",
-        title="Squeezed to 0.4 of its height between plates that it sticks to, Q1/P0 folds over at its corners, and that is told",
+        title="Squeezed to 0.4 of its height between plates that it sticks to, Q1/P0 folds over at its corners, as reported",
         unit="1",
         truth=_one,
         within=0.1,
         relative=False,
         because="it is yes (1) or no (0), and nothing between",
         kind="property",
-        source="det F above zero everywhere, or matter would go through itself; Newton's method does not see it at a vertex",
+        source="det F above zero everywhere, or material would go through itself; Newton's method does not see it at a vertex",
         measure=partial(inverts, element="Q1/P0", count=4, height=GLUED_TO),
-        spoil="squeezed to 0.7 of its height only",
-        spoiled=partial(inverts, element="Q1/P0", count=4, height=0.7),
+        negative_control="squeezed to 0.7 of its height only",
+        with_negative_control=partial(inverts, element="Q1/P0", count=4, height=0.7),
     ),
     Entry(
         name="bonded_squeeze_stays_upright",
@@ -206,10 +206,10 @@ ENTRIES = (
         relative=False,
         because="it is yes (1) or no (0), and nothing between",
         kind="property",
-        source="det F above zero everywhere, or matter would go through itself",
+        source="det F above zero everywhere, or material would go through itself",
         measure=partial(stays_upright, element="Q2/Q1", count=2, height=0.7),
-        spoil="squeezed to 0.4 of its height",
-        spoiled=partial(stays_upright, element="Q2/Q1", count=2, height=GLUED_TO),
+        negative_control="squeezed to 0.4 of its height",
+        with_negative_control=partial(stays_upright, element="Q2/Q1", count=2, height=GLUED_TO),
     ),
     Entry(
         name="bonded_squeeze_with_vertices",
@@ -221,9 +221,9 @@ ENTRIES = (
         relative=False,
         because="it is yes (1) or no (0), and nothing between",
         kind="property",
-        source="det F above zero everywhere, or matter would go through itself",
+        source="det F above zero everywhere, or material would go through itself",
         measure=partial(stays_upright, element="P2/P1", count=2, height=GLUED_TO),
-        spoil="a rule of quadrature of degree 4, which has no points at the vertices",
-        spoiled=partial(stays_upright, element="P2/P1", count=2, height=GLUED_TO, quadrature_degree=4),
+        negative_control="a rule of quadrature of degree 4, which has no points at the vertices",
+        with_negative_control=partial(stays_upright, element="P2/P1", count=2, height=GLUED_TO, quadrature_degree=4),
     ),
 )

@@ -5,15 +5,15 @@ import numpy as np
 from fem_reference.assessment.catalogue import Entry, Finding, Lab, order
 from fem_reference.effects import Effect, make
 from fem_reference.problems import shapes
-from fem_reference.problems.body import Continuum, Prescribed
-from fem_reference.problems.courses import Affine
+from fem_reference.problems.body import Body, Prescribed
+from fem_reference.problems.paths import Affine
 from fem_reference.verification import truths
 from fem_reference.verification.homogeneous import MU, NEO
 from fem_reference.verification.parts import SYMMETRY, resistance
 
 FAMILY = "viscosity"
 _ETA, _SECONDS = 0.02, 1.5  # MPa s; s from a frame number to the next
-_BULK = 1e6 * MU  # so high that the truth of incompressible matter holds to 1e-6
+_BULK = 1e6 * MU  # so high that the truth of incompressible material holds to 1e-6
 _STEPS = (1 / 32, 1 / 64, 1 / 128)
 _SOURCE = "validation/viscosity.py"
 
@@ -30,7 +30,7 @@ def _squeezed(lab: Lab, step: float, eta: float) -> float:
     mesh = shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
     frames = tuple(np.linspace(0, 1, round(1 / step) + 1).tolist())
     acting = (*NEO.effects, resistance("P2/P1", _BULK), viscosity(eta))
-    solved = lab.solve(Continuum(mesh, acting, (*SYMMETRY, plate), frames, interval=_SECONDS), "P2/P1", first_step=step)
+    solved = lab.solve(Body(mesh, acting, (*SYMMETRY, plate), frames, interval=_SECONDS), "P2/P1", first_step=step)
     return float(solved.last.forces["plate"][2])
 
 
@@ -60,8 +60,8 @@ _SQUEEZE = Entry(
     kind="closed form",
     source=f"{_SOURCE}, squeeze_force",
     measure=_force,
-    spoil="A viscosity 1 % too small.",
-    spoiled=lambda lab: _force(lab, 0.99 * _ETA),
+    negative_control="A viscosity 1 % too small.",
+    with_negative_control=lambda lab: _force(lab, 0.99 * _ETA),
 )
 
 # A block under a small weight on its top until frame 1, which then creeps back.
@@ -72,10 +72,10 @@ _GONE = [{"frame": 0.0, "amount": 0.0}, {"frame": 1.0, "amount": 1.0}, {"frame":
 def _decay(lab: Lab, step: float, eta: float) -> float:
     """The rate [1/s] at which the block creeps back from frame ``_FROM`` to ``_TO``, in load steps of ``step`` frames."""
     mesh = shapes.box((1, 1, 1), (1.0, 2.0, 3.0), "tetrahedron")
-    weight = make("traction", on="z1", force=f"0, 0, {-_STRESS} MPa", course=_GONE)
+    weight = make("traction", on="z1", force=f"0, 0, {-_STRESS} MPa", ramp=_GONE)
     frames = tuple(np.linspace(0, _TO, round(_TO / step) + 1).tolist())
     acting = (*NEO.effects, resistance("P2/P1", _BULK), weight, viscosity(eta))
-    body = Continuum(mesh, acting, SYMMETRY, frames, interval=_SECONDS)
+    body = Body(mesh, acting, SYMMETRY, frames, interval=_SECONDS)
     solved = lab.solve(body, "P2/P1", first_step=step, residual=1e-14)
     ends = [state.points[:, 2].max() - 3.0 for state in (solved.states[round(_FROM / step)], solved.last)]
     return float(np.log(ends[0] / ends[1])) / ((_TO - _FROM) * _SECONDS)
@@ -105,8 +105,8 @@ _CREEP = Entry(
     kind="closed form",
     source=f"{_SOURCE}, creep_rate",
     measure=_creep,
-    spoil="A viscosity 1 % too small.",
-    spoiled=lambda lab: _creep(lab, 0.99 * _ETA),
+    negative_control="A viscosity 1 % too small.",
+    with_negative_control=lambda lab: _creep(lab, 0.99 * _ETA),
 )
 
 ENTRIES = (_SQUEEZE, _CREEP)

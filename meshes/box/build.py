@@ -1,4 +1,4 @@
-"""A box to squeeze between plates, straight fibres in it, and where to hold it loosely.
+"""A box to squeeze between plates, straight fibres in it, and where to attach it loosely.
 
     python meshes/box/build.py
 
@@ -22,7 +22,7 @@ STEP = 10  # between the points of a fibre
 ALONG_Y = [(x, z) for x in (-35, 0, 35) for z in (-30, 30)]
 ALONG_X = [(y, z) for y in (20, 50, 80) for z in (-10, 10)]
 
-# Half the extent in y and z, about the middle, of what is held of the faces across x.
+# Half the extent in y and z, about the middle, of what is attached of the faces across x.
 HALF = np.array([20, 30])
 
 Floats = NDArray[np.float64]
@@ -104,17 +104,17 @@ def main() -> None:
     """Write the box, its fibres and their card."""
     points, triangles = build()["box"]
     lines = fibres()
-    held = sides(points)
+    attached = sides(points)
     volume = float(np.prod(HIGH - LOW))
     surface, threads = ply(points, triangles), vtk(lines)
-    listed = "\n".join(["vertex", *map(str, held), ""]).encode()
+    listed = "\n".join(["vertex", *map(str, attached), ""]).encode()
     size = f"triangles = {len(triangles)}\nvolume_mm3 = {volume:.3f}"
     text = "# A box to squeeze. Written by build.py: change that, not this.\n"
     text += entry("box.ply", "box of 100 x 80 x 100, y from 10 to 90, in squares of 5", size, surface)
     text += entry(
         "fibres.vtk", "straight lines in the box, six along y and six along x", f"lines = {len(lines)}", threads
     )
-    text += entry("sides.csv", "vertices in the middle of the faces across x", f"vertices = {len(held)}", listed)
+    text += entry("sides.csv", "vertices in the middle of the faces across x", f"vertices = {len(attached)}", listed)
     (FOLDER / "sides.csv").write_bytes(listed)
     (FOLDER / "box.ply").write_bytes(surface)
     (FOLDER / "fibres.vtk").write_bytes(threads)

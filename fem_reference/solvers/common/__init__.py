@@ -1,1 +1,1 @@
-"""What solvers share: load steps, checks of states."""
+"""Shared by solvers: load steps, checks of states."""

@@ -7,7 +7,7 @@ import numpy as np
 from fem_reference.foundations.mesh import Floats, Ints, Surface, enclosed_volume
 from fem_reference.runs.store import Status
 
-# A body spread this many times as wide as at rest, or as what the bones hold of it, is lost.
+# A body spread this many times as wide as at rest, or as its attached part, is lost.
 _WIDE = 10.0
 # So is one of this many times its volume. Flesh keeps its volume within a few percent, and a surface that keeps its dihedral
 # angles alone was seen at twice its volume; one blown up by a wrong root or by scaling has no such bound. What the bones draw
@@ -23,12 +23,12 @@ class Trouble:
     sentence: str
 
 
-def trouble(points: Floats, rest: Surface, held: Ints) -> Trouble | None:
-    """What is wrong with ``points`` (n, 3) [mm] of a closed surface, of which bones hold ``held`` (k,); None if nothing is."""
+def trouble(points: Floats, rest: Surface, attached: Ints) -> Trouble | None:
+    """What is wrong with ``points`` (n, 3) [mm] of a closed surface, with ``attached`` vertices (k,); None if nothing is."""
     lost = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if len(lost):
         return Trouble("diverged", f"the position of {len(lost)} points is not a number (point {lost[0]} for one)")
-    wide, at_rest, between = _spread(points), _spread(rest.points), _spread(points[held])
+    wide, at_rest, between = _spread(points), _spread(rest.points), _spread(points[attached])
     if wide > _WIDE * max(at_rest, between):
         return Trouble("diverged", f"the muscle is spread over {wide:.3g} mm, at rest {at_rest:.3g} mm")
     ratio = enclosed_volume(points, rest.triangles) / enclosed_volume(rest.points, rest.triangles)

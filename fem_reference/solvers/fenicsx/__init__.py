@@ -21,9 +21,9 @@ from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import join
 from fem_reference.foundations.subprocesses import command
 from fem_reference.geometry.embedding import Locator
-from fem_reference.problems.body import Continuum, check_element
+from fem_reference.problems.body import Body, check_element
 from fem_reference.problems.muscle import Problem
-from fem_reference.problems.muscle_body import as_continuum
+from fem_reference.problems.muscle_body import as_body
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers.fenicsx import resources
 from fem_reference.solvers.fenicsx.field import FieldSettings, solve_field
@@ -61,7 +61,7 @@ def check_effects(settings: Settings, effects: tuple[Effect, ...], place: str) -
 def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
     """Solve every requested frame in worker processes; frames carry surface, fibres and tets."""
     require(settings)
-    body = as_continuum(problem)
+    body = as_body(problem)
     settings = _planned(settings, body)
     with tempfile.TemporaryDirectory(prefix="fem_reference-") as folder:
         job = Path(folder) / "job.pickle"
@@ -94,26 +94,27 @@ def _pass_on(problem: Problem, frame: Frame, sink: Sink, passed: list[int]) -> N
     """A frame that is wanted, its number noted in ``passed``; what relaxes before the first is not."""
     if frame.number in problem.frames:
         if not passed and (overlap := frame.scalars.get("overlap_at_rest", 0.0)) > 0:
-            frame = replace(frame, note=f"{frame.note}, {overlap:.2g} mm of overlap with bones at rest pushed out")
+            frame = replace(frame, note=f"{frame.note}, {overlap:.2g} mm of overlap with bones at rest removed")
         passed.append(int(frame.number))
-        sink(_with_held(problem, replace(frame, number=int(frame.number))))
+        sink(_with_attachment_errors(problem, replace(frame, number=int(frame.number))))
 
 
-def _with_held(problem: Problem, frame: Frame) -> Frame:
-    """The frame with how far the surface vertices that bones hold are from where the bones have them, ``held_off_rms`` and
+def _with_attachment_errors(problem: Problem, frame: Frame) -> Frame:
+    """The frame with how far the surface vertices attached to bones are from where the bones have them, ``held_off_rms`` and
     ``held_off_max`` [mm]: exact attachments are facets of tets, which cover them only roughly, and springs give way. As it is
-    where no bone holds anything.
+    where nothing is attached.
     """
     surface = frame.surface
-    if not problem.held or surface is None:
+    if not problem.attached or surface is None:
         return frame
     off = np.concatenate(
         [
             np.linalg.norm(
-                surface[held.vertices] - apply(held.bone.pose(frame.number), problem.surface.points[held.vertices]),
+                surface[attached.vertices]
+                - apply(attached.bone.pose(frame.number), problem.surface.points[attached.vertices]),
                 axis=1,
             )
-            for held in problem.held
+            for attached in problem.attached
         ]
     )
     scalars = {"held_off_rms": float(np.sqrt(np.mean(off**2))), "held_off_max": float(off.max())}
@@ -139,7 +140,7 @@ def _command(settings: Settings, job: Path) -> list[str]:
     return [mpiexec, "-n", str(ranks), *worker]
 
 
-def _planned(settings: Settings, body: Continuum) -> Settings:
+def _planned(settings: Settings, body: Body) -> Settings:
     """The settings with what the size of ``body`` and the machine ask for where they leave it open."""
     chosen = resources.planned(settings, body.mesh, resources.available())
     if chosen.linear_solver == "multigrid" and (chosen.ranks or 1) > 1:

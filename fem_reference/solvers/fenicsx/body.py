@@ -14,13 +14,13 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from fem_reference.foundations.mesh import Floats, Ints
-from fem_reference.problems.body import ELEMENTS, Continuum, Prescribed
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.solvers.common.load_steps import Attempt
-from fem_reference.solvers.fenicsx import choice, compiling, forms, meshes, pushed_points
+from fem_reference.solvers.fenicsx import choice, compiling, contact_points, forms, meshes
+from fem_reference.solvers.fenicsx.boundary_conditions import PointSprings, PrescribedRegion
 from fem_reference.solvers.fenicsx.clock import Clock
-from fem_reference.solvers.fenicsx.contact import Pushes
+from fem_reference.solvers.fenicsx.contact import ContactForces
 from fem_reference.solvers.fenicsx.determinants import Determinants
-from fem_reference.solvers.fenicsx.holds import Hold, PointHold
 from fem_reference.solvers.fenicsx.known import Known, State
 from fem_reference.solvers.fenicsx.linear import Factorised
 from fem_reference.solvers.fenicsx.newton import Newton
@@ -32,10 +32,10 @@ from fem_reference.solvers.fenicsx.system import System
 from fem_reference.solvers.fenicsx.validity import Validity
 
 
-class Body:
+class AssembledBody:
     """The unknowns of a body, made of an element of ``ELEMENTS``, and their equations."""
 
-    def __init__(self, body: Continuum, settings: BodySettings) -> None:
+    def __init__(self, body: Body, settings: BodySettings) -> None:
         self.comm, self.reuse = MPI.COMM_WORLD, settings.reuse
         self.effects = body.effects
         self.mesh = meshes.distribute(self.comm, body.mesh)
@@ -51,11 +51,11 @@ class Body:
         self.clock = Clock(body, form.before, form.rate)
         self.volume_form, self.energy_form = compiling.form(form.volume), compiling.form(form.energy)
         self.rest_volume = self.integral(self.volume_form)
-        self.held = [self._hold(entry, form) for entry in body.prescribed]
+        self.conditions = [self._condition(entry, form) for entry in body.prescribed]
         self.determinants = Determinants(self.mesh, self.cells, form.determinant, form.rule[0], body.mesh.kind)
         self.validity = Validity(self.mesh, self.cells, form, body)
         self.spent = Spent()
-        self.system = System(form, self.unknowns, settings.element, self.held, self.spent)
+        self.system = System(form, self.unknowns, settings.element, self.conditions, self.spent)
         symmetric = has_energy(body)
         self.system.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)  # type: ignore[arg-type]  # as its stubs have it
         self.linear = choice.make(self.system, symmetric, settings, self.spent)
@@ -69,24 +69,24 @@ class Body:
         self.nodes = meshes.Nodes(body.mesh, self.cells, ufl.split(self.unknowns)[0])
         self.nodal = Nodal(self.cells, settings.element, self.unknowns, self.clock) if settings.store_state else None
 
-    def _hold(self, entry: Prescribed, form: forms.Form) -> Hold | PointHold:
+    def _condition(self, entry: Prescribed, form: forms.Form) -> PrescribedRegion | PointSprings:
         """What prescribes ``entry``."""
         if isinstance(entry.on, str):
-            return Hold(self.unknowns, entry, form.regions[entry.on])
+            return PrescribedRegion(self.unknowns, entry, form.regions[entry.on])
         parents = np.ravel(self.displacement_dofs)
-        points = pushed_points.on_skin(self.displacement_space, parents, entry.on, self.local)
-        return PointHold(self.unknowns, entry, points)
+        points = contact_points.on_skin(self.displacement_space, parents, entry.on, self.local)
+        return PointSprings(self.unknowns, entry, points)
 
-    def _contact(self, body: Continuum, form: forms.Form) -> Pushes:
+    def _contact(self, body: Body, form: forms.Form) -> ContactForces:
         """What obstructions do."""
         law, space, parents = body.contact, self.displacement_space, np.ravel(self.displacement_dofs)
         assert law is not None  # asked for only where it is there
         if isinstance(law.on, str):
             facets = form.regions[law.on]
-            points = pushed_points.on_facets(space, parents, body.mesh, facets, form.degree)
+            points = contact_points.on_facets(space, parents, body.mesh, facets, form.degree)
         else:
-            points = pushed_points.on_skin(space, parents, law.on, self.local)
-        return Pushes(law, body.obstructions, points, self.unknowns, body.frames[0])
+            points = contact_points.on_skin(space, parents, law.on, self.local)
+        return ContactForces(law, body.obstructions, points, self.unknowns, body.frames[0])
 
     @property
     def size(self) -> int:
@@ -146,15 +146,15 @@ class Body:
         amounts = [effect.amount(frame) for effect in self.effects]
         poses = [entry.pose(frame).ravel() for entry in self.contact.obstructions] if self.contact else []
         allowed = [self.contact.law.allowance(frame)] if self.contact else []
-        held = [hold.prescribed for hold in self.held]
-        return np.concatenate([amounts, allowed, *poses, *held])
+        values = [one.prescribed for one in self.conditions]
+        return np.concatenate([amounts, allowed, *poses, *values])
 
     def _set(self, frame: float) -> None:
         """What acts and is prescribed at ``frame``."""
         for effect, amount in zip(self.effects, self.amounts, strict=True):
             amount.value = effect.amount(frame)
-        for hold in self.held:
-            hold.move_to(frame)
+        for one in self.conditions:
+            one.move_to(frame)
 
     def scalars(self) -> dict[str, float]:
         """The smallest det F at quadrature points and vertices, V/V0, and the energy [N mm]."""
@@ -171,7 +171,7 @@ class Body:
         for when what acts is the same again. None where the tangent is not symmetric.
 
         With drag or viscosity these are the directions in which the energy does so by more than a factor e over all frames, were
-        the body held still from now on: the viscous stress of this step is left out.
+        the body attached still from now on: the viscous stress of this step is left out.
         """
         if self.recalled is not None:
             return self.recalled.negative_modes
@@ -188,23 +188,23 @@ class Body:
         return float(self.comm.allreduce(fem.assemble_scalar(form), MPI.SUM))
 
     def forces(self, *, divided: bool) -> tuple[dict[str, Floats], dict[str, Floats]]:
-        """By name of what is prescribed, the force (3,) [N] that holds it there and its moment (3,) [N mm] about the origin. What
+        """By name of what is prescribed, the force (3,) [N] that keeps it there and its moment (3,) [N mm] about the origin. What
         an unknown of several regions takes is ``divided`` between them, so that all forces are in balance, or counts in each.
         """
         balance, now = self.system.reactions(), np.array(self.unknowns.x.array)
         shared = self._shared if divided else np.ones(len(now), np.int64)
-        held = {hold.entry.name: hold.force(balance, now, shared) for hold in self.held}
-        held |= self.contact.forces() if self.contact else {}
-        forces = {name: self.comm.allreduce(force, MPI.SUM) for name, (force, _) in held.items()}
-        moments = {name: self.comm.allreduce(moment, MPI.SUM) for name, (_, moment) in held.items()}
+        found = {one.entry.name: one.force(balance, now, shared) for one in self.conditions}
+        found |= self.contact.forces() if self.contact else {}
+        forces = {name: self.comm.allreduce(force, MPI.SUM) for name, (force, _) in found.items()}
+        moments = {name: self.comm.allreduce(moment, MPI.SUM) for name, (_, moment) in found.items()}
         return forces, moments
 
     @cached_property
     def _shared(self) -> Ints:
         """By how many regions each unknown (n,) is prescribed."""
         count = np.zeros(len(self.unknowns.x.array), np.int64)
-        for hold in self.held:
-            for component in hold.components if isinstance(hold, Hold) else ():
+        for one in self.conditions:
+            for component in one.components if isinstance(one, PrescribedRegion) else ():
                 count[component.dofs[0]] += 1
         return count
 

@@ -170,7 +170,7 @@ def _unknowns(space: fem.FunctionSpace) -> Places:
 
 
 def _tables(element: str, msh: Any, rule: tuple[Floats, Floats]) -> dict[str, Floats]:
-    """What ``cells.c`` is told of an element at the points of a ``rule``."""
+    """What ``cells.c`` needs of an element at the points of a ``rule``."""
     kind, degree, pressure = ELEMENTS[element]
     points, weights = rule
     cell, warped = basix.CellType[kind], basix.LagrangeVariant.gll_warped

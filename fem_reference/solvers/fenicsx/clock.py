@@ -7,13 +7,13 @@ import numpy as np
 from dolfinx import fem
 
 from fem_reference.foundations.mesh import Floats
-from fem_reference.problems.body import Continuum
+from fem_reference.problems.body import Body
 
 
 class Clock:
     """Sets ``rate`` [1/s] and the unknowns ``before`` of a load step; both stay as they are where nothing needs the time."""
 
-    def __init__(self, body: Continuum, before: fem.Function | None, rate: fem.Constant) -> None:
+    def __init__(self, body: Body, before: fem.Function | None, rate: fem.Constant) -> None:
         self.before, self.rate, self.interval, self.at = before, rate, body.interval, body.frames[0]
         self.whole = body.frames[-1] - body.frames[0]
 

@@ -1,4 +1,4 @@
-"""How what is solved is compiled: patiently where another process compiles the same, past what one left half-done, and for this
+"""Compilation of forms: patiently where another process compiles the same, past what one left half-done, and for this
 machine.
 """
 
@@ -33,7 +33,7 @@ def machine() -> str:
 
 
 # All instructions of this machine, and sums in any order. Never -ffast-math itself: it takes for granted that nothing is NaN, by
-# which a state without a value is told, and makes the whole process round denormal numbers to zero.
+# which a state without a value is detected, and makes the whole process round denormal numbers to zero.
 FLAGS = [
     "-O3",
     "-march=native",
@@ -97,4 +97,4 @@ def prepare() -> None:
 
 def _stop(_number: int, _frame: FrameType | None) -> None:
     # FFCx cleans up after an Exception, which SystemExit is not.
-    raise RuntimeError("told to stop")
+    raise RuntimeError("asked to stop")

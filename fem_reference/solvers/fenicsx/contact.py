@@ -1,4 +1,4 @@
-"""Rigid bodies that push on material points of a body: pressure of the gap, with its tangent, added to what cells contribute.
+"""Contact of rigid bodies with material points of a body: pressure of the gap, with its tangent, added to what cells contribute.
 
 Only points that may be near a body are asked for their distance to it: how far the others were when they were asked last, and how
 far they moved since, says that they cannot be.
@@ -13,12 +13,12 @@ from mpi4py import MPI
 
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.motion import apply
-from fem_reference.problems.contact import Contact, Nearby, Obstruction, nearest_on_way
-from fem_reference.solvers.fenicsx.pushed_points import PushedPoints
+from fem_reference.problems.contact import Contact, Nearby, Obstruction, nearest_on_path
+from fem_reference.solvers.fenicsx.contact_points import ContactPoints
 
 
 @dataclass(frozen=True, eq=False)
-class Push:
+class Pressed:
     """What one obstruction does at the m of n points that are ``near``: ``gap`` (m,) [mm], negative inside, ``pressure`` (m,) [MPa
     per rest area], ``traction`` (m, 3) and its ``slope`` (m, 3, 3) [MPa/mm]; and in the obstruction's rest frame all points,
     ``local`` (n, 3) [mm]. No other point is within the smoothing.
@@ -32,14 +32,14 @@ class Push:
     local: Floats
 
 
-class Pushes:
-    """What obstructions do to this rank's pushed points."""
+class ContactForces:
+    """What obstructions do to this rank's contact points."""
 
     def __init__(
         self,
         law: Contact,
         obstructions: tuple[Obstruction, ...],
-        points: PushedPoints,
+        points: ContactPoints,
         unknowns: fem.Function,
         frame: float,
     ) -> None:
@@ -58,9 +58,9 @@ class Pushes:
         """What obstructions do with the unknowns as they are and the obstructions where they are at ``frame``."""
         self.frame = frame
         points = self.points.positions(self.unknowns.x.array)
-        self.now = [self._push(i, points, frame) for i in range(len(self.obstructions))]
+        self.now = [self._pressed(i, points, frame) for i in range(len(self.obstructions))]
 
-    def _push(self, i: int, points: Floats, frame: float) -> Push:
+    def _pressed(self, i: int, points: Floats, frame: float) -> Pressed:
         """What an obstruction, where it is at ``frame``, does to ``points`` (n, 3) [mm]; they feel what overlaps at rest less."""
         pose, shape = self.obstructions[i].pose(frame), self.obstructions[i].shape
         turn = pose[:3, :3]
@@ -72,7 +72,7 @@ class Pushes:
         pressure, change = self.law.pressure(sampled.distance + allowed)
         normal, curvature = sampled.gradient @ turn.T, turn @ sampled.curvature @ turn.T
         slope = change[:, None, None] * normal[:, :, None] * normal[:, None, :] + pressure[:, None, None] * curvature
-        return Push(near, sampled.distance, pressure, pressure[:, None] * normal, slope, local)
+        return Pressed(near, sampled.distance, pressure, pressure[:, None] * normal, slope, local)
 
     def tractions(self) -> Floats:
         """What all of them do together (n, 3) [MPa]."""
@@ -84,11 +84,11 @@ class Pushes:
     def predicted(self, frame: float, moves: Floats) -> Floats:
         """As ``tractions``, if the unknowns made ``moves`` and the obstructions went on to ``frame``, linearly in both."""
         points = self.points.positions(self.unknowns.x.array)
-        way = self.points.positions(moves) - self.points.rest
+        displacement = self.points.positions(moves) - self.points.rest
         found = self.tractions()
         for entry, one in zip(self.obstructions, self.now, strict=True):
             step = entry.pose(frame) @ np.linalg.inv(entry.pose(self.frame))
-            ahead = way[one.near] - (apply(step, points[one.near]) - points[one.near])
+            ahead = displacement[one.near] - (apply(step, points[one.near]) - points[one.near])
             found[one.near] += np.einsum("nij,nj->ni", one.slope, ahead)
         return found
 
@@ -98,7 +98,7 @@ class Pushes:
         self.points.add_forces(residual, -self.points.areas[:, None] * tractions)
 
     def tangent(self) -> Iterator[tuple[Ints, Floats, Floats]]:
-        """The slope of the residual, obstruction by obstruction: cells (p,) of the points that are pushed, the basis (p, k) that
+        """The slope of the residual, obstruction by obstruction: cells (p,) of the points in contact, the basis (p, k) that
         carries them, and the slope (p, 3, 3) of what is out of balance there.
         """
         for one in self.now:
@@ -118,8 +118,8 @@ class Pushes:
         return found
 
     def scalars(self, comm: MPI.Comm) -> dict[str, float]:
-        """The greatest ``contact_depth`` [mm] and largest ``contact_pressure`` [MPa] at a point, the rest area that is pushed,
-        ``contact_area`` [mm2], and how deep the deepest point that is pushed was at rest, ``overlap_at_rest`` [mm].
+        """The greatest ``contact_depth`` [mm] and largest ``contact_pressure`` [MPa] at a point, the rest area in contact,
+        ``contact_area`` [mm2], and how deep the deepest point in contact was at rest, ``overlap_at_rest`` [mm].
         """
         pushed = np.zeros(len(self.points.areas), bool)
         depth = pressure = overlap = 0.0
@@ -172,15 +172,15 @@ class Pushes:
         met = np.flatnonzero(self.nearby[i].touched)
         starts, ends = self.settled[i].local[met], self.now[i].local[met]
         before, now = (self.obstructions[i].shape.sample(places) for places in (starts, ends))
-        ways = ends - starts
+        displacements = ends - starts
         # A gap is not known far away: what points outward there is the way back, and the way on.
         outward = [
-            np.where(one.gradient.any(axis=1)[:, None], one.gradient, sign * ways)
+            np.where(one.gradient.any(axis=1)[:, None], one.gradient, sign * displacements)
             for one, sign in ((before, -1), (now, 1))
         ]
         turned = np.flatnonzero(np.einsum("ni,ni->n", *outward) < 0)
-        on_way = nearest_on_way(self.obstructions[i], starts[turned], ways[turned], self.law.smoothing)
-        excess = np.minimum(np.minimum(before.distance, now.distance)[turned], 0) - on_way
+        on_path = nearest_on_path(self.obstructions[i], starts[turned], displacements[turned], self.law.smoothing)
+        excess = np.minimum(np.minimum(before.distance, now.distance)[turned], 0) - on_path
         if not excess.max(initial=0.0) > self.law.smoothing:
             return None
         worst = int(np.argmax(excess))

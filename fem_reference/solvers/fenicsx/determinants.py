@@ -1,4 +1,4 @@
-"""Where det F is smallest: the check that a converged state is one that matter can be in."""
+"""Where det F is smallest: the check that a converged state is physically possible."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -27,7 +27,7 @@ def solve_field(problem: FieldProblem, settings: FieldSettings) -> Solution:
     with tempfile.TemporaryDirectory(prefix="fem_reference-") as folder:
         job = Path(folder) / "job.pickle"
         job.write_bytes(pickle.dumps(problem))
-        return _run(command("-m", f"{__package__}.field_worker", str(job)), settings, len(problem.held))
+        return _run(command("-m", f"{__package__}.field_worker", str(job)), settings, len(problem.fixed))
 
 
 def _run(command_line: list[str], settings: FieldSettings, count: int) -> Solution:

@@ -77,14 +77,14 @@ def solve(problem: FieldProblem) -> tuple[Floats, dict[str, Any]]:
     begin = time.perf_counter()
     left, right, space, node = equations(problem)
     set_up = time.perf_counter()
-    A, b = _assembled(left, right, space, problem.held[node])
+    A, b = _assembled(left, right, space, problem.fixed[node])
     assembled = time.perf_counter()
     found, failure = _solved(A, b)
     cost = {
         "seconds_set_up": set_up - begin,
         "seconds_assembly": assembled - set_up,
         "seconds_solve": time.perf_counter() - assembled,
-        "unknowns": float(np.isnan(problem.held).sum()),
+        "unknowns": float(np.isnan(problem.fixed).sum()),
         "peak_memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
     }
     values = np.full(len(node), np.nan)
@@ -124,11 +124,11 @@ def _flux_measures(msh: mesh.Mesh, problem: FieldProblem) -> list[Any]:
     return [ds(i) for i, _ in parts]
 
 
-def _assembled(left: Any, right: Any, space: Any, held: Floats) -> tuple[Any, Any]:
-    """Matrix and right side, with the equation of each unknown that is ``held`` (N,), NaN where free, replaced by its value."""
+def _assembled(left: Any, right: Any, space: Any, fixed: Floats) -> tuple[Any, Any]:
+    """Matrix and right side, with the equation of each unknown that is ``fixed`` (N,), NaN where free, replaced by its value."""
     values = fem.Function(space)
-    values.x.array[:] = np.nan_to_num(held)
-    conditions = [fem.dirichletbc(values, np.flatnonzero(~np.isnan(held)).astype(np.int32))]
+    values.x.array[:] = np.nan_to_num(fixed)
+    conditions = [fem.dirichletbc(values, np.flatnonzero(~np.isnan(fixed)).astype(np.int32))]
     A = assemble_matrix(left, bcs=conditions)
     A.assemble()
     b = assemble_vector(right)
@@ -141,7 +141,7 @@ def _solved(A: Any, b: Any) -> tuple[Floats, str | None]:
     """The solution of ``A x = b`` by MUMPS's sparse LU factorisation, and a sentence where there is none."""
     x = A.createVecRight()
     if not np.isfinite(A.norm() + b.norm()):
-        return x.array, "the equations hold a number that is not finite: a formula without a value somewhere?"
+        return x.array, "the equations have a number that is not finite: a formula without a value somewhere?"
     solver = PETSc.KSP().create(A.comm)
     solver.setOperators(A)
     solver.setType("preonly")

@@ -12,7 +12,7 @@ from ufl.constantvalue import Zero
 
 from fem_reference.effects import Effect, Energy, Load, State, elastic_state, total_energy
 from fem_reference.foundations.mesh import Floats, Ints
-from fem_reference.problems.body import Continuum
+from fem_reference.problems.body import Body
 from fem_reference.solvers.fenicsx import compiling, meshes, quadrature
 from fem_reference.solvers.fenicsx.settings import BodySettings
 
@@ -45,9 +45,7 @@ class Form:
     (q,) of the quadrature, of ``degree``; ``regions``: by name, this rank's facets.
     """
 
-    def __init__(
-        self, msh: mesh.Mesh, body: Continuum, unknowns: fem.Function, settings: BodySettings, cells: Ints
-    ) -> None:
+    def __init__(self, msh: mesh.Mesh, body: Body, unknowns: fem.Function, settings: BodySettings, cells: Ints) -> None:
         """``cells``: which cell of the body each of this rank's is."""
         self.mesh, self.regions = msh, meshes.local_facets(msh, body.mesh.facets)
         self.rule = quadrature.rule(settings.element, settings.quadrature_degree)
@@ -81,7 +79,7 @@ class Form:
         """The measure of the facets of ``region``."""
         return self.ds(list(self.regions).index(region))
 
-    def _fibre(self, body: Continuum, cells: Ints) -> list[Any] | None:
+    def _fibre(self, body: Body, cells: Ints) -> list[Any] | None:
         """The fibre direction at the quadrature points, where an effect asks for it."""
         if body.fibre is None or not any("fibre" in effect.needs for effect in body.effects):
             return None

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fem_reference.foundations.mesh import Floats, Ints
-from fem_reference.problems.body import Continuum
+from fem_reference.problems.body import Body
 from fem_reference.runs.states import NodalState
 from fem_reference.solvers.fenicsx.settings import BodySettings
 
@@ -16,7 +16,7 @@ class Job:
     positions are wanted. Of a muscle there are some; then forces at edges that its attachments share are divided between them.
     """
 
-    body: Continuum
+    body: Body
     settings: BodySettings
     samples: dict[str, tuple[Ints, Floats]]
 

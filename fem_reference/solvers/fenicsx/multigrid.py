@@ -123,9 +123,9 @@ class Multigrid:
         values = np.tile(np.tile(shares[node, vertex], cells.count), 3)
         _, once = np.unique(rows * (3 * corner.max() + 3) + columns, return_index=True)
         rows, columns, values = rows[once], columns[once], values[once]
-        held = system.fixed[displaced]
-        fixed = np.unique(columns[(values > 1 - 1e-12) & held[rows]])
-        gone = held[rows] | np.isin(columns, fixed)
+        prescribed = system.fixed[displaced]
+        fixed = np.unique(columns[(values > 1 - 1e-12) & prescribed[rows]])
+        gone = prescribed[rows] | np.isin(columns, fixed)
         shape = (len(displaced), int(3 * corner.max() + 3))
         found = csr_array(coo_array((np.where(gone, 0.0, values), (rows, columns)), shape=shape))
         csr = (found.indptr.astype(np.int32), found.indices.astype(np.int32), found.data)

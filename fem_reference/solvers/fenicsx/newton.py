@@ -72,7 +72,7 @@ class Newton:
         if self.system.contact is None:
             return self._linearise(moves)
         norm = self._linearise(moves, self.system.contact.predicted(frame, moves))
-        if norm <= self.residual:  # nothing moves by itself, and only the new gaps can tell
+        if norm <= self.residual:  # nothing moves by itself, and only the new gaps show it
             self._meet(frame)
             norm = self._linearise(moves)
         return norm

@@ -15,7 +15,7 @@ from fem_reference.foundations.errors import MissingSoftware
 from fem_reference.foundations.subprocesses import environment
 from fem_reference.runs.store import Outcome
 
-# One thread a rank. Open MPI, where it is used, refuses root and more ranks than cores unless told otherwise.
+# One thread a rank. Open MPI, where it is used, refuses root and more ranks than cores unless set otherwise.
 _SETTINGS = {
     "OMP_NUM_THREADS": "1",
     "PYTHONUNBUFFERED": "1",
@@ -70,12 +70,12 @@ class Process:
         return Outcome("crashed", f"the FEniCSx process ended with exit status {code} ({self._reason()}); {kept}")
 
     def _reason(self) -> str:
-        """The line of its error output that tells most: the last that names an error, else the last."""
+        """The line of its error output that says most: the last that names an error, else the last."""
         named = [line for line in self.errors if re.match(r"\w*(\.\w+)*(Error|Exception)\b", line)]
         return (named or self.errors or ["without a word"])[-1].strip()
 
     def feed(self, line: str) -> None:
-        """Write a line to its standard input; one that died does not read it, which its ending tells."""
+        """Write a line to its standard input; one that died does not read it, which its exit shows."""
         assert self.process.stdin is not None
         with suppress(BrokenPipeError):
             self.process.stdin.write(f"{line}\n")

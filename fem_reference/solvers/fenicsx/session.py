@@ -11,7 +11,7 @@ import cloudpickle
 import numpy as np
 
 from fem_reference.foundations.subprocesses import command
-from fem_reference.problems.body import Continuum, check
+from fem_reference.problems.body import Body, check
 from fem_reference.runs.solved import Reached, Solved
 from fem_reference.runs.store import Outcome
 from fem_reference.solvers.fenicsx.jobs import Job, stored_state
@@ -28,7 +28,7 @@ class Session:
         self.process: Process | None = None
         self.closed = False
 
-    def solve(self, body: Continuum, settings: BodySettings) -> Solved:
+    def solve(self, body: Body, settings: BodySettings) -> Solved:
         """The states of ``body``; a process that dies is the status *crashed*, and one that takes longer than the time limit is
         ended and *timed out*, not an exception. RuntimeError once it is closed.
         """
@@ -91,7 +91,7 @@ def session() -> Iterator[Session]:
             own.closed = True
 
 
-def solve_body(body: Continuum, settings: BodySettings) -> Solved:
+def solve_body(body: Body, settings: BodySettings) -> Solved:
     """The states of ``body`` by a session of its own."""
     with session() as own:
         return own.solve(body, settings)

@@ -1,4 +1,4 @@
-"""How the reference is solved."""
+"""Settings of the reference solver."""
 
 from typing import Literal
 
@@ -11,7 +11,7 @@ from fem_reference.foundations.units import Time
 class BodySettings(Record):
     """Numerics of a body; steps are in frame numbers.
 
-    ``element``: one of ``continuum.ELEMENTS``. ``first_step`` and ``smallest_step`` bound the load step: it grows by half after an
+    ``element``: one of ``body.ELEMENTS``. ``first_step`` and ``smallest_step`` bound the load step: it grows by half after an
     easy step (at most 5 Newton iterations), up to ``largest_step`` where there is one, and is halved when Newton needs more than
     ``newton_iterations`` or a cell inverts.
     ``residual`` [N, mm3] ends Newton's iteration: the norm of out-of-balance nodal forces and of the volume equation.

@@ -1,4 +1,4 @@
-"""Where the time goes: seconds by phase, and counts."""
+"""Time spent: seconds by phase, and counts."""
 
 import time
 from collections import Counter, defaultdict

@@ -4,12 +4,12 @@ import numpy as np
 from dolfinx import fem
 
 from fem_reference.effects import Load
-from fem_reference.problems.body import Continuum
+from fem_reference.problems.body import Body
 from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolveError
 from fem_reference.solvers.fenicsx.system import System
 
 
-def has_energy(body: Continuum) -> bool:
+def has_energy(body: Body) -> bool:
     """Whether all that acts on ``body`` has an energy, so that its tangent is symmetric; loads may have none."""
     return not any(isinstance(effect, Load) for effect in body.effects)
 

@@ -16,10 +16,10 @@ from scipy.sparse import csr_array
 
 from fem_reference.foundations.mesh import Floats
 from fem_reference.solvers.fenicsx import compiling
+from fem_reference.solvers.fenicsx.boundary_conditions import PointSprings, PrescribedRegion
 from fem_reference.solvers.fenicsx.cells import CellSums, Structure, Tangent
-from fem_reference.solvers.fenicsx.contact import Pushes
+from fem_reference.solvers.fenicsx.contact import ContactForces
 from fem_reference.solvers.fenicsx.forms import Form
-from fem_reference.solvers.fenicsx.holds import Hold, PointHold
 from fem_reference.solvers.fenicsx.spent import Spent
 
 _ROUNDING = 1e-11  # [mm] of positions
@@ -31,27 +31,32 @@ class System:
     """
 
     def __init__(
-        self, form: Form, unknowns: fem.Function, element: str, holds: list[Hold | PointHold], spent: Spent
+        self,
+        form: Form,
+        unknowns: fem.Function,
+        element: str,
+        conditions: list[PrescribedRegion | PointSprings],
+        spent: Spent,
     ) -> None:
         space = unknowns.function_space
-        self.unknowns, self.holds, self.spent = unknowns, holds, spent
+        self.unknowns, self.conditions, self.spent = unknowns, conditions, spent
         self.index_map, self.block = space.dofmap.index_map, space.dofmap.index_map_bs
         self.owned, self.size = self.index_map.size_local * self.block, len(unknowns.x.array)
         self.fixed: NDArray[np.bool_] = np.zeros(self.size, bool)
-        for hold in holds:
-            self.fixed[hold.exact] = True
+        for one in conditions:
+            self.fixed[one.exact] = True
         self.cells = CellSums(form, unknowns, element)
         structure = self.structure = self.cells.structure()
         self.tangent = Tangent(np.zeros(len(structure.columns) + 1), self.cells.places(structure, self.fixed))
         self.scale = np.ones(self.size)  # of the unknowns of linear systems
         self.b, self.work = create_vector(space), la.vector(self.index_map, self.block)
         self._make_matrix(structure)
-        self.ties = [hold for hold in holds if isinstance(hold, PointHold)]
-        springs = sum((hold.springs(form) for hold in holds if isinstance(hold, Hold)), 0)
+        self.ties = [one for one in conditions if isinstance(one, PointSprings)]
+        springs = sum((one.springs(form) for one in conditions if isinstance(one, PrescribedRegion)), 0)
         self.springs, self.loads = (
             SurfaceSums(terms, unknowns, structure, self.fixed) if terms else None for terms in (springs, form.loads)
         )
-        self.contact: Pushes | None = None
+        self.contact: ContactForces | None = None
 
     def _make_matrix(self, structure: Structure) -> None:
         """A matrix that takes the entries of the tangent; those of ghost rows go to the ranks that own them."""
@@ -134,8 +139,8 @@ class System:
     def missing(self) -> Floats:
         """By how much (n,) the unknowns are more than what is prescribed; 0 where nothing is."""
         found = np.zeros(self.size)
-        for hold in self.holds:
-            found[hold.exact] = self.unknowns.x.array[hold.exact] - hold.targets
+        for one in self.conditions:
+            found[one.exact] = self.unknowns.x.array[one.exact] - one.targets
         return found
 
     def lacking(self) -> bool:

@@ -1,8 +1,8 @@
 """Whether the laws of a body are used where they are meant, and whether the body has collapsed: judged by means over cells.
 
-By means, since the strain at the rim of what is held has no bound in the exact solution: det F at a vertex there may be far off in
-a cell that has kept its volume. A mean may be off there too, in single cells (0.37 and 1.9 in ``gluteus_maximus``, with a bulk
-modulus of a thousand shear moduli): there laws are named, and a body has collapsed only where more of it than that is lost.
+By means, since the strain at the rim of what is attached has no bound in the exact solution: det F at a vertex there may be far
+off in a cell that has kept its volume. A mean may be off there too, in single cells (0.37 and 1.9 in ``gluteus_maximus``, with a
+bulk modulus of a thousand shear moduli): there laws are named, and a body has collapsed only where more of it than that is lost.
 """
 
 from collections.abc import Iterable
@@ -15,7 +15,7 @@ from mpi4py import MPI
 
 from fem_reference.foundations.limits import Limit
 from fem_reference.foundations.mesh import Floats, Ints
-from fem_reference.problems.body import Continuum
+from fem_reference.problems.body import Body
 from fem_reference.solvers.fenicsx import compiling
 from fem_reference.solvers.fenicsx.forms import Form, Rule
 
@@ -78,7 +78,7 @@ class Ranges:
 class Validity:
     """The means over the cells of a body of what its laws have limits on. Its methods are collective."""
 
-    def __init__(self, msh: mesh.Mesh, cells: Ints, form: Form, body: Continuum) -> None:
+    def __init__(self, msh: mesh.Mesh, cells: Ints, form: Form, body: Body) -> None:
         """``cells``: which cell of the body each of this rank's is."""
         self.mesh, self.cells, self.effects = msh, cells, body.effects
         wanted = {"V/V0": form.determinant}

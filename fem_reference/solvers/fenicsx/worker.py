@@ -17,7 +17,7 @@ from fem_reference.solvers.fenicsx.jobs import Job
 from fem_reference.solvers.fenicsx.processes import MARK
 
 from fem_reference.solvers.fenicsx import compiling  # isort: skip - after the door
-from fem_reference.solvers.fenicsx.body import Body  # isort: skip
+from fem_reference.solvers.fenicsx.body import AssembledBody  # isort: skip
 from fem_reference.solvers.fenicsx.validity import Ranges  # isort: skip
 from fem_reference.solvers.common.load_steps import Attempt, Step, Steps, march  # isort: skip
 
@@ -30,7 +30,7 @@ class Worker:
         begin = time.perf_counter()
         _forget_peak()
         self.job, self.folder, self.settings = job, folder, job.settings
-        self.body = Body(job.body, job.settings)
+        self.body = AssembledBody(job.body, job.settings)
         self.set_up = time.perf_counter() - begin
         self.solving = self.checking = 0.0
         self.counts = {"newton_iterations": 0, "load_steps": 0, "cut_backs": 0}
@@ -78,7 +78,7 @@ class Worker:
         return {} if modes is None else {"negative_modes": modes}
 
     def instability(self) -> str:
-        """What is to be told of unstable states, nothing where there are none."""
+        """The note on unstable states, nothing where there are none."""
         if not self.unstable:
             return ""
         most, first = max(self.unstable.values()), min(self.unstable)
@@ -104,7 +104,7 @@ class Worker:
         return f", and contact is deepest, {contact.deepest(self.body.comm)}" if contact else ""
 
     def report_frame(self, reached: Step) -> None:
-        """Write the frame's positions and forces beside the job and tell of it."""
+        """Write the frame's positions and forces beside the job and report it."""
         forces, moments = self.body.forces(divided=bool(self.job.samples))
         arrays = {name: self.body.positions(*sample) for name, sample in self.job.samples.items()}
         arrays |= {"nodes": self.body.node_positions()}

@@ -12,7 +12,7 @@ from scipy.sparse.linalg import splu
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.records import Record
-from fem_reference.problems.body import Continuum, Prescribed, check
+from fem_reference.problems.body import Body, Prescribed, check
 from fem_reference.runs.solved import Reached, Solved
 from fem_reference.runs.store import Outcome
 from fem_reference.solvers.common.load_steps import Attempt, Step, Steps, march
@@ -28,7 +28,7 @@ _GROWTH = 10.0  # of the out-of-balance forces, above which a Newton step is hal
 class BodySettings(Record):
     """Numerics of a body; steps are in frame numbers.
 
-    ``element``: one of ``continuum.ELEMENTS``. ``first_step`` and ``smallest_step`` bound the load step, by default one to each
+    ``element``: one of ``body.ELEMENTS``. ``first_step`` and ``smallest_step`` bound the load step, by default one to each
     frame: it grows by half after an easy step (at most 5 Newton iterations) and is halved when Newton needs more than
     ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3] ends Newton's iteration: the norm of out-of-balance nodal forces
     and of the volume equation. ``quadrature_degree``: of the polynomials that are integrated exactly on a straight cell, by
@@ -43,7 +43,7 @@ class BodySettings(Record):
     quadrature_degree: int | None = Field(default=None, gt=0)
 
 
-def solve_body(body: Continuum, settings: BodySettings) -> Solved:
+def solve_body(body: Body, settings: BodySettings) -> Solved:
     """The states of ``body`` at its frames, as far as they can be reached."""
     check(body, settings.element)
     if body.contact is not None:
@@ -82,19 +82,19 @@ class _Tangent:
     residual: Floats
     matrix: Any
 
-    def step(self, free: Ints, held: Ints, gap: Floats) -> Floats:
-        """The Newton step, where the ``held`` unknowns change by ``gap``; RuntimeError where there is no unique one."""
+    def step(self, free: Ints, fixed: Ints, gap: Floats) -> Floats:
+        """The Newton step, where the ``fixed`` unknowns change by ``gap``; RuntimeError where there is no unique one."""
         step = np.zeros_like(self.unknowns)
-        step[held] = gap
+        step[fixed] = gap
         rows = self.matrix[free]
-        step[free] = splu(rows[:, free].tocsc()).solve(-self.residual[free] - rows[:, held] @ gap)
+        step[free] = splu(rows[:, free].tocsc()).solve(-self.residual[free] - rows[:, fixed] @ gap)
         return step
 
 
 class _March:
     """The unknowns of a body on their way through its frames."""
 
-    def __init__(self, body: Continuum, settings: BodySettings) -> None:
+    def __init__(self, body: Body, settings: BodySettings) -> None:
         self.body, self.settings = body, settings
         self.equations = Equations(body, settings.element, settings.quadrature_degree)
         self.unknowns = np.zeros(self.equations.space.size)
@@ -116,21 +116,21 @@ class _March:
         return attempt
 
     def _newton(self, frame: float) -> tuple[Attempt, Floats]:
-        held, wanted = self._held(frame)
-        free = np.setdiff1d(np.arange(len(self.unknowns)), held)
+        fixed, wanted = self._fixed(frame)
+        free = np.setdiff1d(np.arange(len(self.unknowns)), fixed)
         now, allowed = self._tangent(self.unknowns.copy(), frame), self.settings.newton_iterations
         rounding = _ROUNDING * np.ptp(self.equations.space.rest, axis=0).max()
         for iteration in range(allowed + 1):
-            gap = wanted - now.unknowns[held]
+            gap = wanted - now.unknowns[fixed]
             gap[np.abs(gap) < rounding] = 0
             size = float(np.linalg.norm(now.residual[free]))
             if size < self.settings.residual and not gap.any():
-                now.unknowns[held] = wanted
+                now.unknowns[fixed] = wanted
                 return Attempt(None, iteration), now.unknowns
             if iteration == allowed:
                 break
             try:
-                step = now.step(free, held, gap)
+                step = now.step(free, fixed, gap)
             except RuntimeError:  # what SuperLU raises where a pivot is zero
                 return Attempt("diverged", iteration, "the equations have no unique solution"), now.unknowns
             then = self._along(now, step, free, np.inf if gap.any() else _GROWTH * size, frame)
@@ -151,29 +151,29 @@ class _March:
     def _tangent(self, unknowns: Floats, frame: float) -> "_Tangent":
         return _Tangent(unknowns, *self.equations.assembled(unknowns, frame))
 
-    def _held(self, frame: float) -> tuple[Ints, Floats]:
+    def _fixed(self, frame: float) -> tuple[Ints, Floats]:
         """The unknowns that are prescribed exactly, each once, and their values at ``frame``."""
         values: dict[int, float] = {}
         for entry in self.body.prescribed:
             if entry.stiffness is None:
                 nodes = self.nodes[entry.name]
-                moved = entry.course(self.equations.space.rest[nodes], frame)
+                moved = entry.path(self.equations.space.rest[nodes], frame)
                 for i in entry.components:
                     values |= dict(zip((3 * nodes + i).tolist(), moved[:, i].tolist(), strict=True))
         return np.array(list(values), np.int64), np.array(list(values.values()))
 
     def state(self, step: Step) -> Reached:
-        """What is to be told of the present unknowns."""
+        """The note on the present unknowns."""
         equations, unknowns = self.equations, self.unknowns
         places = equations.space.rest + unknowns[: equations.space.rest.size].reshape(-1, 3)
         residual, _ = equations.assembled(unknowns, step.frame, springs=False)
-        held = {entry.name: self._force(entry, places, residual) for entry in self.body.prescribed}
+        fixed = {entry.name: self._force(entry, places, residual) for entry in self.body.prescribed}
         inside, vertices = equations.smallest_determinants(unknowns)
         return Reached(
             step.frame,
             places[equations.space.nodes],
-            {name: force for name, (force, _) in held.items()},
-            {name: moment for name, (_, moment) in held.items()},
+            {name: force for name, (force, _) in fixed.items()},
+            {name: moment for name, (_, moment) in fixed.items()},
             {
                 "min_det_F_quadrature": inside,
                 "min_det_F_vertices": vertices,

@@ -11,7 +11,7 @@ from scipy.sparse import coo_array
 from fem_reference.effects import Effect, Load, State, total_energy
 from fem_reference.foundations.jets import Jet, JetFunctions, constant, variables
 from fem_reference.foundations.mesh import Floats
-from fem_reference.problems.body import Continuum, Prescribed
+from fem_reference.problems.body import Body, Prescribed
 from fem_reference.solvers.scikit_fem.spaces import DISPLACEMENT, PRESSURE, VARIABLES, Points, Space
 
 # By element: exact for what its displacement gives on a straight cell with a law of second degree in the strain.
@@ -35,7 +35,7 @@ class _Part:
 class Equations:
     """The equations of ``body`` in the unknowns of ``space``."""
 
-    def __init__(self, body: Continuum, element: str, quadrature_degree: int | None) -> None:
+    def __init__(self, body: Body, element: str, quadrature_degree: int | None) -> None:
         self.body, self.space = body, Space(body.mesh, element, quadrature_degree or QUADRATURE_DEGREE[element])
         inside = self.space.inside
         if body.fibre is not None and any("fibre" in effect.needs for effect in body.effects):
@@ -128,7 +128,7 @@ def _load_law(load: Load, points: Points, jets: list[Any], frame: float) -> tupl
 
 def _spring_law(entry: Prescribed, points: Points, jets: list[Any], frame: float) -> tuple[Floats, Floats]:
     """The virtual work of springs that pull towards what is prescribed."""
-    wanted = entry.course(points.places.reshape(-1, 3), frame)
+    wanted = entry.path(points.places.reshape(-1, 3), frame)
     pull = [
         entry.stiffness * (jets[9 + i] - wanted[:, i]) if i in entry.components else constant(0.0, jets[0])
         for i in range(3)

@@ -70,7 +70,7 @@ def space(problem: FieldProblem) -> tuple[Any, Flat]:
 
 
 def assemble(problem: FieldProblem) -> tuple[Any, Floats]:
-    """Matrix (N, N) and right side (N,) of the weak form, without what is held; nodes in the order of the problem."""
+    """Matrix (N, N) and right side (N,) of the weak form, without what is fixed; nodes in the order of the problem."""
     basis, laid = space(problem)
     place, slope_of = _place(problem, basis, laid), _slope_weights(basis)
 
@@ -107,8 +107,8 @@ def _solved(problem: FieldProblem) -> Solution:
     begin = time.perf_counter()
     A, b = assemble(problem)
     assembled = time.perf_counter()
-    free = np.isnan(problem.held)
-    values = np.where(free, 0.0, problem.held)
+    free = np.isnan(problem.fixed)
+    values = np.where(free, 0.0, problem.fixed)
     if not (np.isfinite(A.data).all() and np.isfinite(b).all()):
         return _failed(len(b), "a coefficient or source has no finite value somewhere")
     if free.any():
@@ -173,7 +173,7 @@ def _order(problem: FieldProblem, basis: Any) -> Any:
 
 def _fluxes(problem: FieldProblem) -> Floats:
     """What flows in over the boundary, (N,): the integral of k slope times each hat function, by Gauss's rule of 3 points."""
-    b = np.zeros(len(problem.held))
+    b = np.zeros(len(problem.fixed))
     for flux in problem.fluxes:
         ends = problem.mesh.points[flux.facets]
         if flux.facets.shape[1] == 1:

@@ -1,6 +1,6 @@
 """How fast solvers are, in processor time, beside the speed of the machine and that of the report's own program.
 
-Processor time, of all threads together, is what a machine shared by many can tell; and a ratio within one run is what compares
+Processor time, of all threads together, is what a machine shared by many can report; and a ratio within one run is what compares
 with another.
 """
 
@@ -115,7 +115,7 @@ def _solve(bench: Bench, solver: str, settings: Record, iterations: int) -> str:
 
 
 def _per_iteration(task: Callable[[int], str], bench: Bench) -> float:
-    """CPU time [s] for an iteration; not a number where the solver failed, or took too little to be told."""
+    """CPU time [s] for an iteration; not a number where the solver failed, or took too little to be speed."""
     frames = bench.scene.frames
     count = min(ITERATIONS, frames.last - frames.first)
     if task(WARM_UP) != "converged":  # compiled functions are loaded, which is not counted
@@ -168,6 +168,6 @@ def text(timings: list[Timing], machine: Machine) -> str:
     ]
     for one in timings:
         beside = "" if one.ratio is None else f", {one.ratio:.2f} times the report's program ({one.limit:g} a second)"
-        told = "failed" if one.per_second is None else f"{1 / max(one.seconds):.4g} to {one.per_second:.4g}"
-        lines.append(f"  {one.case}, {one.triangles} triangles: {one.name} {told}{beside}")
+        speed = "failed" if one.per_second is None else f"{1 / max(one.seconds):.4g} to {one.per_second:.4g}"
+        lines.append(f"  {one.case}, {one.triangles} triangles: {one.name} {speed}{beside}")
     return "\n".join(lines)

@@ -13,7 +13,7 @@ from fem_reference.foundations.errors import InputError
 
 ROOT = Path(__file__).resolve().parent.parent.parent.parent
 # What timing imports: commits without it have their modules in other places.
-_NEEDED = "fem_reference/problems/courses.py"
+_NEEDED = "fem_reference/problems/paths.py"
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What timing the reference came to: as JSON has it, and as a table for people."""
+"""Timings of the reference: as JSON, and as a table for people."""
 
 import os
 from typing import Any

@@ -21,8 +21,8 @@ from fem_reference import solvers
 from fem_reference.effects import make
 from fem_reference.foundations.mesh import Floats, fingerprint
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, ByCell, Cells, Continuum, Prescribed
-from fem_reference.problems.courses import Rest, Turn
+from fem_reference.problems.body import ELEMENTS, Body, ByCell, Cells, Prescribed
+from fem_reference.problems.paths import Rest, Turn
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
 from fem_reference.solvers import fenicsx
@@ -43,21 +43,21 @@ EFFECTS: dict[str, dict[str, Any]] = {
 Solve = Callable[[bool], tuple[Outcome, Floats]]
 
 
-def fusiform(element: str, rings: int, slices: int) -> Continuum:
+def fusiform(element: str, rings: int, slices: int) -> Body:
     """A muscle like a spindle along z, of ``slices`` layers of straight cells, ``rings`` of them around its core; its fibres run
-    from end to end, its bottom is held and its top is turned.
+    from end to end, its bottom is fixed and its top is turned.
     """
     straight = shapes.cylinder(RADIUS, LENGTH, rings, slices, ELEMENTS[element][0], 1)
     along = 2 * straight.points[:, 2:] / LENGTH - 1
     points = straight.points * np.hstack([np.repeat(1 - THINNER * along**2, 2, axis=1), np.ones_like(along)])
     mesh = replace(straight, points=points)
     knots = ((0.0, 0.0), (float(FRAMES), 1.0))
-    held = (
+    fixed = (
         Prescribed("bottom", "bottom", (0, 1, 2), Rest()),
         Prescribed("top", "top", (0, 1, 2), Turn((0.0, 1.0, 0.0), ANGLE, HINGE, knots=knots)),
     )
     acting = tuple(make(name, **parameters) for name, parameters in EFFECTS.items())
-    return Continuum(mesh, acting, held, tuple(map(float, range(FRAMES + 1))), ByCell(_fibres(mesh)))
+    return Body(mesh, acting, fixed, tuple(map(float, range(FRAMES + 1))), ByCell(_fibres(mesh)))
 
 
 def _fibres(mesh: Cells) -> Floats:

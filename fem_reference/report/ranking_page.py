@@ -1,4 +1,4 @@
-"""The page ``table-5-1``: what the report rates with pluses and minuses, in numbers."""
+"""The page ``table-5-1``: speed and precision of solvers, which the report rates with pluses and minuses, in numbers."""
 
 import io
 import math
@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from fem_reference.assessment import ranking
-from fem_reference.assessment.solver_table import Standing, Table, report_speeds
+from fem_reference.assessment.solver_table import SolverResult, Table, report_speeds
 from fem_reference.report.curves import LOOK, PALETTE, REFERENCE, Curve, inline
 from fem_reference.report.tables import finite
 from fem_reference.report.templates import template
@@ -37,7 +37,7 @@ _MORE = ("#882255", "#999933", "#332288", "#777777")
 
 def render(table: Table) -> str:
     """The whole page as text."""
-    return template("standings_page.html").render(
+    return template("ranking_page.html").render(
         table=table,
         columns=COLUMNS,
         over_all=OVER_ALL,
@@ -67,14 +67,14 @@ def facts(table: Table) -> dict[str, Any]:
         ],
         "missing": table.missing,
         "report": [one.model_dump(mode="json", exclude={"candidate", "of_case"}) for one in table.families],
-        "standings": [_row(one) for one in table.standings],
+        "standings": [_row(one) for one in table.results],
         "rankings": {one.case: ranking.facts(table.rankings(one.case)) for one in table.scenarios},
         "versions": table.versions,
         "machines": list(table.machines),
     }
 
 
-def _row(one: Standing) -> dict[str, Any]:
+def _row(one: SolverResult) -> dict[str, Any]:
     worst = {}
     for metric, statistic, _, unit in COLUMNS:
         found = one.worst(metric, statistic)
@@ -95,7 +95,7 @@ def _drawing(table: Table) -> Curve:
         figure = Figure(figsize=(9.6, 4.6), layout="constrained")
         FigureCanvasSVG(figure)
         axes = figure.add_subplot()
-        shown = [one for one in table.standings if _place(one) is not None]
+        shown = [one for one in table.results if _place(one) is not None]
         colours = _colours(table)
         for one in shown:
             x, y = _place(one)  # type: ignore[misc]
@@ -105,22 +105,22 @@ def _drawing(table: Table) -> Curve:
         _label(figure, axes, table, [name for name in colours if any(_label_of(one) == name for one in shown)])
         text = io.StringIO()
         figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
-    return Curve(title, inline(text.getvalue(), "standings", title))
+    return Curve(title, inline(text.getvalue(), "ranking", title))
 
 
 def _colours(table: Table) -> dict[str, str]:
     """A colour for everybody who is drawn."""
-    names = dict.fromkeys(_label_of(one) for one in table.standings if not one.of_reference and _place(one) is not None)
+    names = dict.fromkeys(_label_of(one) for one in table.results if not one.of_reference and _place(one) is not None)
     return {"reference": REFERENCE} | dict(zip(names, cycle([*PALETTE, *_MORE]), strict=False))
 
 
-def _label_of(one: Standing) -> str:
-    """What tells a solver from all others: somebody else's may have the name of one of ours."""
+def _label_of(one: SolverResult) -> str:
+    """What distinguishes a solver from all others: somebody else's may have the name of one of ours."""
     ours = one.of_reference or one.solver != "recorded"
     return one.name if ours else f"{one.name} ({one.family.lower()})"
 
 
-def _place(one: Standing) -> tuple[float, float] | None:
+def _place(one: SolverResult) -> tuple[float, float] | None:
     worst = one.worst("surface_deviation", "rms_percent")
     if worst is None or one.seconds_per_frame is None or not (math.isfinite(worst[0]) and worst[0] > 0):
         return None

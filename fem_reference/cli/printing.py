@@ -1,4 +1,4 @@
-"""What a command says, and where: on standard output, as JSON, as exit status."""
+"""Output of commands: on standard output, as JSON, as exit status."""
 
 import argparse
 import json
@@ -13,15 +13,15 @@ INTERRUPTED, TERMINATED = 130, 143  # what shells report for them
 
 def lines(facts: dict[str, Any], indent: str = "") -> list[str]:
     """Nested facts as indented lines."""
-    told = []
+    printed = []
     for key, value in facts.items():
         if isinstance(value, dict):
-            told += [f"{indent}{key}:", *lines(value, indent + "  ")]
+            printed += [f"{indent}{key}:", *lines(value, indent + "  ")]
         elif isinstance(value, list):
-            told += [f"{indent}{key}:", *(f"{indent}  {entry}" for entry in value)]
+            printed += [f"{indent}{key}:", *(f"{indent}  {entry}" for entry in value)]
         else:
-            told.append(f"{indent}{key}: {value:.6g}" if isinstance(value, float) else f"{indent}{key}: {value}")
-    return told
+            printed.append(f"{indent}{key}: {value:.6g}" if isinstance(value, float) else f"{indent}{key}: {value}")
+    return printed
 
 
 def out(options: argparse.Namespace) -> Path:
@@ -29,7 +29,7 @@ def out(options: argparse.Namespace) -> Path:
     return options.out if options.out is not None else Path("reports")
 
 
-def tell(facts: dict[str, Any], text: str, options: argparse.Namespace) -> None:
+def write_output(facts: dict[str, Any], text: str, options: argparse.Namespace) -> None:
     """Print ``text``, and write ``facts`` as JSON where that is wanted."""
     print(text)
     if options.json is not None:

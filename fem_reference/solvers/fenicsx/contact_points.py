@@ -1,4 +1,4 @@
-"""Material points that rigid bodies push on or springs pull at: where they are in the cells, how displacement reaches them."""
+"""Contact points, and points that springs pull at: where they are in the cells, how displacement reaches them."""
 
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -15,7 +15,7 @@ from fem_reference.problems.body import Cells
 
 
 @dataclass(frozen=True, eq=False)
-class PushedPoints:
+class ContactPoints:
     """n points of this rank's cells: where they ``rest`` (n, 3) [mm], the rest ``areas`` (n,) [mm2] they stand for, the ``cells``
     (n,) they move with, and how: the values ``basis`` (n, k) there of the nodal functions whose unknowns are ``dofs`` (n, k, 3).
     """
@@ -45,7 +45,7 @@ class PushedPoints:
         return self.dofs.reshape(-1, 3)[first], csr_array(entries, shape=(len(self.basis), len(first)))
 
 
-def on_facets(space: fem.FunctionSpace, parents: Ints, mesh: Cells, facets: Ints, degree: int) -> PushedPoints:
+def on_facets(space: fem.FunctionSpace, parents: Ints, mesh: Cells, facets: Ints, degree: int) -> ContactPoints:
     """The quadrature points of a rule of ``degree`` on those of the ``facets`` whose cell is this rank's own; ``space`` is that of
     the displacement, ``parents`` the unknown of each of its degrees of freedom.
     """
@@ -65,11 +65,11 @@ def on_facets(space: fem.FunctionSpace, parents: Ints, mesh: Cells, facets: Ints
         areas = np.linalg.norm(across, axis=2) * weights
         repeated = np.repeat(cells, len(points))
         parts.append(_points(space, parents, repeated, np.tile(within, (len(cells), 1)), places, areas))
-    columns = ([getattr(part, entry.name) for part in parts] for entry in fields(PushedPoints))
-    return PushedPoints(*(np.concatenate(column) for column in columns))
+    columns = ([getattr(part, entry.name) for part in parts] for entry in fields(ContactPoints))
+    return ContactPoints(*(np.concatenate(column) for column in columns))
 
 
-def on_skin(space: fem.FunctionSpace, parents: Ints, skin: Skin, local: dict[int, int]) -> PushedPoints:
+def on_skin(space: fem.FunctionSpace, parents: Ints, skin: Skin, local: dict[int, int]) -> ContactPoints:
     """The points of a ``skin`` whose cell is this rank's own; ``local``: its number here by that in the body's mesh."""
     mine = np.array([i for i, cell in enumerate(skin.cells) if int(cell) in local], np.int64)
     cells = np.array([local[int(skin.cells[i])] for i in mine], np.int64)
@@ -83,18 +83,18 @@ def on_skin(space: fem.FunctionSpace, parents: Ints, skin: Skin, local: dict[int
 
 def _points(
     space: fem.FunctionSpace, parents: Ints, cells: Ints, within: Floats, rest: Floats, areas: Floats
-) -> PushedPoints:
+) -> ContactPoints:
     """Points at ``within`` (n, 3) of the reference cell of ``cells`` (n,)."""
     basis = _element(space).tabulate(0, within)[0, :, :, 0]
     nodes = space.dofmap.list[cells].astype(np.int64)
     dofs = np.asarray(parents, np.int64)[3 * nodes[:, :, None] + np.arange(3)]
-    return PushedPoints(rest.reshape(-1, 3), areas.ravel(), np.asarray(cells), basis, dofs)
+    return ContactPoints(rest.reshape(-1, 3), areas.ravel(), np.asarray(cells), basis, dofs)
 
 
-def _empty(space: fem.FunctionSpace) -> PushedPoints:
+def _empty(space: fem.FunctionSpace) -> ContactPoints:
     count = space.dofmap.list.shape[1]
     no = np.zeros(0, np.int64)
-    return PushedPoints(np.zeros((0, 3)), np.zeros(0), no, np.zeros((0, count)), np.zeros((0, count, 3), np.int64))
+    return ContactPoints(np.zeros((0, 3)), np.zeros(0), no, np.zeros((0, count)), np.zeros((0, count, 3), np.int64))
 
 
 def _element(space: fem.FunctionSpace) -> Any:

@@ -1,4 +1,4 @@
-"""What entries prescribe: displacements of rest points over the frames, as callables that go to another process."""
+"""Prescribed paths: displacements of rest points over the frames, as callables that can be pickled."""
 
 from dataclasses import dataclass
 
@@ -53,11 +53,11 @@ class Turn:
 
     def __call__(self, points: Floats, frame: float) -> Floats:
         """The displacement (n, 3) [mm] of rest points (n, 3)."""
-        way = np.array(self.axis) / np.linalg.norm(self.axis)
+        unit = np.array(self.axis) / np.linalg.norm(self.axis)
         arms = points - np.array(self.centre)
-        along = arms @ way if self.per_length else np.ones(len(points))
+        along = arms @ unit if self.per_length else np.ones(len(points))
         angles = amount(self.knots, frame) * self.angle * along
-        turned = Rotation.from_rotvec(angles[:, None] * way).apply(arms)
+        turned = Rotation.from_rotvec(angles[:, None] * unit).apply(arms)
         return np.asarray(turned - arms)
 
 

@@ -1,5 +1,5 @@
-"""What is prescribed on a region: exactly, by conditions on its unknowns, or by springs over its facets or at points of a skin; and
-the force that it takes.
+"""Boundary conditions on a region: exactly, by conditions on its unknowns, or by springs over its facets or at points of a skin;
+and the force that it takes.
 """
 
 from typing import Any
@@ -10,8 +10,8 @@ from dolfinx import fem
 
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import Prescribed
+from fem_reference.solvers.fenicsx.contact_points import ContactPoints
 from fem_reference.solvers.fenicsx.forms import Form
-from fem_reference.solvers.fenicsx.pushed_points import PushedPoints
 
 
 class _Component:
@@ -28,7 +28,7 @@ class _Component:
         self.own = self.dofs[0] < owned
 
 
-class Hold:
+class PrescribedRegion:
     """A ``Prescribed`` on this rank's ``facets``."""
 
     def __init__(self, unknowns: fem.Function, entry: Prescribed, facets: Ints) -> None:
@@ -70,9 +70,9 @@ class Hold:
         return np.concatenate([entry.values.x.array for entry in self.components])
 
     def move_to(self, frame: float) -> None:
-        """Prescribe what the course gives at ``frame``."""
+        """Prescribe the displacement of the path at ``frame``."""
         for entry in self.components:
-            entry.values.x.array[entry.dofs[1]] = self.entry.course(entry.rest, frame)[:, entry.component]
+            entry.values.x.array[entry.dofs[1]] = self.entry.path(entry.rest, frame)[:, entry.component]
 
     def force(self, residual: Floats, now: Floats, shared: Ints) -> tuple[Floats, Floats]:
         """The force (3,) [N] and its moment (3,) [N mm] about the origin that this rank's part of the region takes, from the
@@ -87,14 +87,14 @@ class Hold:
         return forces.sum(axis=0), np.cross(places, forces).sum(axis=0)
 
 
-class PointHold:
+class PointSprings:
     """A ``Prescribed`` by springs at the ``points`` of this rank's cells: they are not unknowns, so that none is exact."""
 
     exact: Ints = np.zeros(0, np.int64)
     targets: Floats = np.zeros(0)
 
-    def __init__(self, unknowns: fem.Function, entry: Prescribed, points: PushedPoints) -> None:
-        assert entry.stiffness is not None  # continuum.check
+    def __init__(self, unknowns: fem.Function, entry: Prescribed, points: ContactPoints) -> None:
+        assert entry.stiffness is not None  # body.check
         self.entry, self.unknowns, self.points = entry, unknowns, points
         along = np.isin(np.arange(3), entry.components)
         self.stiffness = entry.stiffness * points.areas[:, None] * along  # [N/mm]
@@ -106,8 +106,8 @@ class PointHold:
         return self.wanted.ravel()
 
     def move_to(self, frame: float) -> None:
-        """Prescribe what the course gives at ``frame``."""
-        self.wanted = self.points.rest + self.entry.course(self.points.rest, frame)
+        """Prescribe the displacement of the path at ``frame``."""
+        self.wanted = self.points.rest + self.entry.path(self.points.rest, frame)
 
     def add_residual(self, residual: Floats, moves: Floats | None) -> None:
         """Add what pulls to ``residual`` over this rank's unknowns; as if the unknowns had made ``moves`` (n,), where given."""
@@ -115,11 +115,11 @@ class PointHold:
         self.points.add_forces(residual, self._pulls(now if moves is None else now + moves))
 
     def tangent(self) -> tuple[Ints, Floats, Floats]:
-        """The slope of the residual, as ``Pushes.tangent`` has it."""
+        """The slope of the residual, as ``ContactForces.tangent`` has it."""
         return self.points.cells, self.points.basis, self.stiffness[:, :, None] * np.eye(3)
 
     def force(self, _residual: Floats, now: Floats, _shared: Ints) -> tuple[Floats, Floats]:
-        """As ``Hold.force``: of springs, it is what they pull with."""
+        """As ``PrescribedRegion.force``: of springs, it is what they pull with."""
         pulls = -self._pulls(now)
         return pulls.sum(axis=0), np.cross(self.points.positions(now), pulls).sum(axis=0)
 
