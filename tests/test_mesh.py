@@ -161,7 +161,10 @@ UNUSABLE = {
         np.concatenate([CORNER, CORNER[:1] + 2]),
         np.array([*FAN, [1, 4, 3], [3, 4, 1]]),
     ),
-    "3 edges that both their triangles run the same way": (CORNER, np.array([TET_FACES[0][::-1], *TET_FACES[1:]])),
+    "3 edges that both their triangles run in the same direction": (
+        CORNER,
+        np.array([TET_FACES[0][::-1], *TET_FACES[1:]]),
+    ),
     "1 points that no triangle uses": (np.concatenate([CORNER, CORNER[:1]]), TET_FACES),
     r"2 separate parts, the smallest \(96 mm2\) around \(22.0, 32.0, 42.0\) mm, want one": _two(BAR, APART),
     rf"1 vertices where parts touch, the first vertex {TOP} at \(10.0, 10.0, 60.0\) mm, want a manifold": _two(

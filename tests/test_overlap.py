@@ -73,7 +73,7 @@ def test_only_what_is_nearest_to_triangles_that_count_is_counted() -> None:
 def test_bodies_apart_and_the_same_draw_twice() -> None:
     assert shared(BALL, floor(-0.01)) == 0
     assert shared(BALL, Sphere((0, 0, 70.1), 20.0)) == 0
-    assert shared(BALL, Sphere((0, 0, 25.0), 20.0)) == 0  # swallowed whole, which no vertex tells either
+    assert shared(BALL, Sphere((0, 0, 25.0), 20.0)) == 0  # swallowed whole, which no vertex shows either
     assert shared(BALL, floor(7)) == shared(BALL, floor(7))
 
 

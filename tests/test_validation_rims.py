@@ -5,7 +5,7 @@ import pytest
 
 from validation.rims import exponent, far_order
 
-# Williams 1952, figure 1 (clamped-free), and closed forms: where nothing gives way on a flat face, 1/2.
+# Williams 1952, figure 1 (clamped-free), and closed forms: where nothing yields on a flat face, 1/2.
 KNOWN = [
     (180, 0.5, 0.5),
     (90, 0.5, 0.5946),

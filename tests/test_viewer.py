@@ -198,7 +198,7 @@ def show(browser: Browser, comparison, folder: Path, fragment: str = "") -> None
 
 
 def labels(browser: Browser) -> dict[str, tuple[str, list[float]]]:
-    """What each pane shown tells, and the mean [mm] of the vertices that are drawn in it, by its name."""
+    """What each pane shown states, and the mean [mm] of the vertices that are drawn in it, by its name."""
     found = browser.ask(
         "[...document.querySelectorAll('.viewer-label:not([hidden])')]"
         ".map((it) => [it.firstChild.textContent, it.lastChild.textContent, it.dataset.mean])"

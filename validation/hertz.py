@@ -68,7 +68,7 @@ class Hertz:
         return self.peak_pressure * np.sqrt(np.maximum(1 - (distance / self.contact_radius) ** 2, 0))
 
     def sunk(self, side: Side, distance: Floats) -> Floats:
-        """How far the surface of ``side`` gives way [mm] at a ``distance`` r [mm]: with ``q = (1 - nu^2)/E p0 / (2 a)``,
+        """How far the surface of ``side`` yields [mm] at a ``distance`` r [mm]: with ``q = (1 - nu^2)/E p0 / (2 a)``,
         ``q pi/2 (2 a^2 - r^2)`` in the contact, ``q ((2 a^2 - r^2) asin(a/r) + a sqrt(r^2 - a^2))`` outside.
         """
         a = self.contact_radius
@@ -85,7 +85,7 @@ def rigid_sphere(radius: float, young: float, poisson: float, force: float) -> H
 
 
 def force_at(radius: float, young: float, poisson: float, approach: float) -> float:
-    """The force [N] that pushes a rigid sphere of ``radius`` R [mm] by ``approach`` d [mm] into a half-space:
+    """The force [N] that presses a rigid sphere of ``radius`` R [mm] by ``approach`` d [mm] into a half-space:
     ``4/3 E* sqrt(R) d^(3/2)``, ``E* = young / (1 - poisson^2)``.
     """
     return 4 / 3 * young / (1 - poisson**2) * math.sqrt(radius * approach) * approach

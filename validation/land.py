@@ -2,7 +2,7 @@
 
 Source: Land et al., Verification of cardiac mechanics software, Proc. R. Soc. A 471 (2015) 20150641, doi
 10.1098/rspa.2015.0641. Units: mm, N, MPa (the paper has kPa). In all three the material is incompressible and the load is a
-pressure of the fluid outside: it pushes along the inward normal of the deformed surface, the force per deformed area (a
+pressure of the fluid outside: it acts along the inward normal of the deformed surface, the force per deformed area (a
 follower load).
 
 The passive law is Guccione's, ``W = C/2 (e^Q - 1)``, ``Q = b_f E_ff^2 + b_t (E_ss^2 + E_nn^2 + 2 E_sn^2) + 2 b_fs (E_fs^2 +
@@ -108,7 +108,7 @@ def fibre(points: Floats) -> Floats:
     from +z; on the axis itself, where there is no x_v, counter-clockwise is y.
 
     Public codes differ in the hand of this helix (cardiac-geometries has u in [0, pi], so that x_u points down): the mirror image
-    of the body, whose apices are at the same z and which twists the other way.
+    of the body, whose apices are at the same z and which twists in the other direction.
     """
     points = np.asarray(points, dtype=float)
     t = depth(points)

@@ -28,7 +28,7 @@ def exponent(angle: float, poisson: float) -> float:
     crossing = np.flatnonzero(values[:-1] * values[1:] < 0)
     if len(crossing):
         return float(brentq(miss, powers[crossing[0]], powers[crossing[0] + 1], xtol=1e-14))
-    near = int(np.argmax(values))  # a double root, as on a flat face where nothing gives way
+    near = int(np.argmax(values))  # a double root, as on a flat face where nothing yields
     bounds = powers[near - 1], powers[near + 1]
     return float(
         minimize_scalar(lambda power: -miss(power), bounds=bounds, method="bounded", options={"xatol": 1e-12}).x

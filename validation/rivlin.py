@@ -31,7 +31,7 @@ class Torsion:
         return np.pi * (self.c1 + self.c2) * self.twist * self.radius**4
 
     def axial_force(self) -> float:
-        """``-pi/2 (c1 + 2 c2) twist^2 A^4`` [N]: negative, the ends must be pushed together (Poynting effect)."""
+        """``-pi/2 (c1 + 2 c2) twist^2 A^4`` [N]: negative, the ends must be pressed together (Poynting effect)."""
         return -np.pi / 2 * (self.c1 + 2 * self.c2) * self.twist**2 * self.radius**4
 
     def end_stress(self, radius: float) -> float:

@@ -10,12 +10,12 @@ from fem_reference.foundations import units
 class Pressure(Ramped, Load):
     """``-amount p J F^-T N``, with N the outward normal at rest: a pressure on the surface as it is now, by Nanson's formula.
 
-    ``on``: the part of the surface; ``pressure``: p [MPa], which pushes inwards where it is positive.
+    ``on``: the part of the surface; ``pressure``: p [MPa], inwards where it is positive.
     """
 
     pressure: units.Pressure
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:
         """Force per rest area [MPa], (3,)."""
-        pushed = -state.amount * self.pressure
-        return [pushed * sum(c * n for c, n in zip(row, normal, strict=True)) for row in state.cofactors]
+        load = -state.amount * self.pressure
+        return [load * sum(c * n for c, n in zip(row, normal, strict=True)) for row in state.cofactors]

@@ -134,7 +134,9 @@ def check_closed(surface: Surface) -> Surface:
             raise InputError(surface.place, f"{len(wrong)} {what}, the first at ({x:.1f}, {y:.1f}, {z:.1f}) mm", want)
     twice = len(directed) - len(np.unique(directed, axis=0))
     if twice:
-        raise InputError(surface.place, f"{twice} edges that both their triangles run the same way", "one orientation")
+        raise InputError(
+            surface.place, f"{twice} edges that both their triangles run in the same direction", "one orientation"
+        )
     lost = len(points) - len(np.unique(triangles))
     if lost:
         raise InputError(surface.place, f"{lost} points that no triangle uses", "every point on the surface")

@@ -1,4 +1,4 @@
-"""Rigid motion of a bone: frame number -> 4 x 4 pose, by an angle about a fixed axis or a way along it, between keyframes."""
+"""Rigid motion of a bone: frame number -> 4 x 4 pose, by an angle about a fixed axis or a distance along it, between keyframes."""
 
 from dataclasses import dataclass
 

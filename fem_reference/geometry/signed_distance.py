@@ -119,7 +119,7 @@ def build(surface: Surface, spacing: float, margin: float, rounding: float = 0.0
 
     ``rounding`` [mm]: the standard deviation s of the Gaussian mean that is taken of it, as flat triangles are no smooth body
     to slide along; where the surface has a mean curvature of 1/r, that moves it inward by s^2/r. It counts as error.
-    Which way single triangles run does not matter. InputError where the surface bounds no body, as ``check_closed`` says.
+    The orientation of single triangles does not matter. InputError where the surface bounds no body, as ``check_closed`` says.
     """
     surface = _one_way(surface)
     low, shape = _extent(surface, spacing, margin)
@@ -192,7 +192,7 @@ def _write(path: Path, grid: Grid) -> None:
 
 
 def _one_way(surface: Surface) -> Surface:
-    """A closed surface whose triangles all run the same way, outward."""
+    """A closed surface whose triangles are all oriented outward."""
     check_finite(surface)
     triangles, _ = igl.bfs_orient(surface.triangles)
     return check_closed(Surface(surface.points, triangles, surface.place))

@@ -45,7 +45,8 @@ def attached_skin(surface: Surface, shares: Floats, mesh: TetMesh, apart: float)
 
 def _skin(corners: Floats, shares: Floats, mesh: TetMesh, apart: float) -> Skin:
     """Three points inside each triangle of ``corners`` (t, 3, 3), a rule that is exact for squares and has none on sharp edges,
-    where two faces would be pushed at once; they are cut in four until their edges are no longer than ``apart`` [mm] on average.
+    where two faces would be in contact at once; they are cut in four until their edges are no longer than ``apart`` [mm] on
+    average.
     """
     while len(corners) and _edge_length(corners) > apart:
         corners, shares = _quartered(corners), _quartered(shares[:, :, None])[:, :, 0]

@@ -47,7 +47,7 @@ class Paths:
         return np.where(beyond[:, None], last, np.where(wraps[:, None], self._on_obstacle(which, on), straight))
 
     def _on_obstacle(self, which: Ints, share: Floats) -> Floats:
-        """The points (m, 3) after ``share`` (m,) of the way along the obstacle."""
+        """The points (m, 3) after ``share`` (m,) of the path along the obstacle."""
         first, last, axes = self.touches[0][which], self.touches[1][which], self.axes[which]
         arm, angle = first - self.middles[which], (share * self.turns[which])[:, None]
         height = np.sum(arm * axes, axis=1)[:, None] * axes
@@ -99,7 +99,7 @@ class Cylinder:
         return np.asarray(self.radius - np.linalg.norm(_across(points - self.point, self._unit()), axis=1))
 
     def around(self, starts: Floats, ends: Floats) -> Paths:
-        """Along a helix, the shorter way round."""
+        """Along a helix, the shorter path round."""
         axis = self._unit()
         one, other = (_across(points - self.point, axis) for points in (starts, ends))
         senses = np.where(np.cross(one, other) @ axis < 0, -1.0, 1.0)

@@ -37,8 +37,8 @@ def check(body: "Body", element: str) -> None:
     check_element(element, body.mesh.kind, body.mesh.degree, body.effects, "element")
     _check_prescribed(body.prescribed)
     fixed = [entry.on for entry in body.prescribed if isinstance(entry.on, str)]
-    pushed = [body.contact.on] if body.contact and isinstance(body.contact.on, str) else []
-    used = dict.fromkeys([*fixed, *pushed, *(effect.on for effect in body.effects if isinstance(effect, Load))])
+    contact = [body.contact.on] if body.contact and isinstance(body.contact.on, str) else []
+    used = dict.fromkeys([*fixed, *contact, *(effect.on for effect in body.effects if isinstance(effect, Load))])
     for on in used:
         if on not in body.mesh.facets:
             raise InputError("on", f'"{on}"', f"a region of the body: {', '.join(body.mesh.facets)}")
@@ -50,7 +50,7 @@ def check(body: "Body", element: str) -> None:
 
 
 def _check_prescribed(prescribed: tuple["Prescribed", ...]) -> None:
-    """InputError where two share a name, by which their forces are reported, or springs would push away."""
+    """InputError where two share a name, by which their forces are reported, or springs would repel."""
     names = [entry.name for entry in prescribed]
     for entry in prescribed:
         if names.count(entry.name) > 1:

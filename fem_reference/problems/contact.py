@@ -13,7 +13,7 @@ from fem_reference.geometry.skins import Skin
 
 @dataclass(frozen=True, eq=False)
 class Obstruction:
-    """A rigid body in the way: its ``shape`` in its own rest frame, and the 4 x 4 matrix ``pose`` of a frame number that takes it
+    """An obstacle: its ``shape`` in its own rest frame, and the 4 x 4 matrix ``pose`` of a frame number that takes it
     to where it is; both picklable.
     """
 

@@ -130,7 +130,7 @@ class Setup:
 class Problem(Setup):
     """A setup filled with tetrahedra (``mesh.facets`` by attachment), with its effects and fibres; ``fibre``, the direction of the
     fibres at any point, where an effect needs it; ``skin``, the contact surface, where there is contact; ``attached_skins``, by
-    attachment that holds by springs, what these pull at; ``mesh_facts`` are what the mesh is like, ``seconds`` how long it took
+    attachment by springs, what these pull at; ``mesh_facts`` are what the mesh is like, ``seconds`` how long it took
     to make.
     """
 
@@ -205,7 +205,7 @@ def build(scene: Scene, rest: Setup) -> Problem:
 
 
 def _check_outside(scene: Scene, rest: Setup, contact: ContactEffect) -> None:
-    """InputError where a bone in contact is wholly inside the muscle: there is no way out of it."""
+    """InputError where a bone in contact is wholly inside the muscle: nothing moves it out."""
     for i, bone in enumerate(rest.bones):
         if contact.is_by(bone.name) and signed_distances(bone.surface.points, rest.surface).max() < 0:
             raise InputError(join(scene.place, f"bone[{i}]"), "a bone wholly inside the muscle", "one that is not")

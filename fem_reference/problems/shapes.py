@@ -38,7 +38,7 @@ class Block:
     """A part of a body: ``place`` takes points (n, 3) of the unit cube smoothly to points (n, 3) [mm], ``counts`` are the cells
     along its axes, ``faces`` names the region of the surface that a face of the cube, x0 to z1, is in.
 
-    Where two blocks meet, the axes along their common face point the same ways: so the tetrahedra fit.
+    Where two blocks meet, the axes along their common face have the same directions: so the tetrahedra fit.
     """
 
     place: Map

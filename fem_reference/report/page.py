@@ -135,7 +135,7 @@ def _model_change(bar: ErrorBar) -> float | None:
 
 
 def ticks(top: float) -> list[tuple[float, float]]:
-    """Round values from 0 to ``top`` with their share of the way, and ``top`` itself.
+    """Round values from 0 to ``top`` with their share of it, and ``top`` itself.
 
     >>> ticks(4.6)
     [(0.0, 0.0), (0.217, 1.0), (0.435, 2.0), (0.652, 3.0), (1.0, 4.6)]

@@ -2,7 +2,7 @@
 
 A bone's distance is asked only for the vertices that it may have come near to: a distance grows and falls no faster than the
 way gone, so that a vertex which has gone less far, seen from the bone, than it was away is still outside. Vertices alone are
-asked, at the places they reach and not on their way there: a sharp edge gets between them, and what goes through a thin bone
+asked, at the places they reach and not on their path there: a sharp edge gets between them, and what goes through a thin bone
 in one step comes out on its other side. The distance to a bone of triangles is kept on a grid along the axes at rest: with the
 whole scene turned, ``pbd`` puts the vertices of the case hip_flexion elsewhere by up to 1.2 mm, 0.1 mm on average.
 """
@@ -167,9 +167,9 @@ class Obstacle:
 
 
 def move_out(points: Floats, obstacles: Sequence[Obstacle], stiffness: float) -> None:
-    """Move ``points`` (n, 3) [mm] out of all bones in place, each by the sum of the ways out of every bone that it is in.
+    """Move ``points`` (n, 3) [mm] out of all bones in place, each by the sum of the displacements out of every bone that it is in.
 
-    ``stiffness`` is the share of each way that is gone. The masses cancel: a constraint has one vertex.
+    ``stiffness`` is the share of each displacement that is applied. The masses cancel: a constraint has one vertex.
     """
     moves = np.zeros_like(points)
     for one in obstacles:

@@ -40,7 +40,7 @@ def can_keep(folder: Path) -> bool:
 def kept_code() -> Path:
     """The folder where machine code of this version of the loops is kept; it may be deleted.
 
-    A compiled function holds those that it calls. numba looks only at a function's own file to see whether it changed,
+    A compiled function contains those that it calls. numba looks only at a function's own file to see whether it changed,
     hence one folder for what all of them are together.
     """
     digest = hashlib.sha256()

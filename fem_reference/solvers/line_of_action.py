@@ -2,7 +2,7 @@
 
 Report 5.2 and 5.3. A line's ends are the fibre's, each fixed to the bone whose attachment is nearest at rest; between two fixed
 points it is as short as it can be. It has a length and no surface, and is judged on that length alone. A shortest path takes the
-shorter way round: where ends turn past what is opposite, it changes sides.
+shorter path round: where ends turn past what is opposite, it changes sides.
 """
 
 import time
@@ -49,7 +49,7 @@ class Settings(Record):
     """What lines go through and around; without any key they are straight.
 
     ``via``: points in the order in which a fibre passes them. ``sphere`` or ``cylinder``: an obstacle that every part of a
-    line goes around, from one fixed point to the next, where the straight way would cross it.
+    line goes around, from one fixed point to the next, where the straight path would cross it.
     """
 
     via: tuple[Via, ...] = ()

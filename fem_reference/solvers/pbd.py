@@ -2,7 +2,7 @@
 
 Frame number n is the state after iteration n. In an iteration the bones take their pose and stay; then every
 sub-iteration is a whole step of the algorithm. No force acts from outside, so the time step cancels: what is kept of a
-velocity is the way a vertex goes in one sub-iteration, ``dt v``, and no time step is asked for. The result depends on
+velocity is the displacement of a vertex in one sub-iteration, ``dt v``, and no time step is asked for. The result depends on
 the order of the vertices, as it does in the report: constraints are projected one after the other. Collisions are found anew
 in every sweep, where line 13 finds them once.
 """
@@ -43,7 +43,7 @@ _AS_NEAR = 1e-9
 
 class Collision(Record):
     """Contact of bones with free vertices: ``gap`` [mm], how near vertices may come, or as near as they are at rest;
-    ``stiffness``, the share of the way out that one projection goes.
+    ``stiffness``, the share of the displacement out of a bone that one projection makes.
     """
 
     gap: Annotated[Length, Field(ge=0)]

@@ -17,7 +17,7 @@ from fem_reference.solvers.pbd_kernels import Vector, at, cross, dot, minus, mov
 
 Bools = NDArray[np.bool_]
 
-# Pairs of triangles whose normals have a greater cosine, either way, are left alone.
+# Pairs of triangles whose normals have a greater cosine, of either sign, are left alone.
 FLAT_COSINE = 1 - 1e-10
 # A fold is corrected only by so many of its gradients.
 SMALLEST_RATIO, GREATEST_RATIO = 0.1, 10.0
@@ -240,8 +240,8 @@ def are_inside(inside: Bools, places: Floats) -> Bools:
 def march_out(inside: Bools, goals: Floats, displacements: Floats) -> tuple[Floats, Bools]:
     """Where those come to be that are inside at ``goals`` (n, 3), and who has come back too far (n,); all in voxels.
 
-    They go straight back along their ``displacements`` (n, 3), by steps of 1, until they are outside; too far is farther than a
-    way.
+    They go straight back along their ``displacements`` (n, 3), by steps of 1, until they are outside; too far is farther than
+    their length.
     """
     reached, too_far = goals.copy(), np.empty(len(goals), np.bool_)
     for i in range(len(goals)):

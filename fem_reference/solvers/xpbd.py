@@ -164,7 +164,7 @@ class Contact:
         self.multipliers[:] = 0
 
     def project(self, points: Floats, inverse_masses: Floats, seconds: float) -> Floats:
-        """The ways (n, 3) [mm] of one projection: contact never pulls, so that no multiplier is below 0."""
+        """The displacements (n, 3) [mm] of one projection: contact never pulls, so that no multiplier is below 0."""
         vertices, value, away = self.obstacle.near(points)
         soft, before, mass = self.softness[vertices] / seconds**2, self.multipliers[vertices], inverse_masses[vertices]
         after = np.maximum(before - (value + soft * before) / (mass + soft), 0)

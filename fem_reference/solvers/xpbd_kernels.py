@@ -3,7 +3,7 @@
 A constraint C stands for the energy ``C^2 / (2 alpha)`` with a compliance alpha. A projection moves ``points`` (n, 3) [mm] in
 place by ``dp_i = w_i grad_i C dl``, ``dl = -(C + a l) / (sum_j w_j |grad_j C|^2 + a)`` with the inverse masses w (n,) [1/t] and
 ``a = alpha / dt^2`` (their eq. 18), and adds dl to the multiplier l, which begins a time step as 0: ``l / dt^2`` is the
-constraint's force. The constraints of an array follow each other (Gauss-Seidel), so that the way to the solution depends on
+constraint's force. The constraints of an array follow each other (Gauss-Seidel), so that the path to the solution depends on
 their order and the solution does not.
 """
 

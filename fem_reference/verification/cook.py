@@ -24,7 +24,7 @@ FAMILY = "Cook's membrane"
 THICKNESS, HEIGHT = 2.0, 44.0  # of the panel, and of its clamped side [mm]
 SMALL = 1e-5  # the share of the load at which the answer is linear: terms of second order are some 1e-5 of it
 RESIDUAL = 1e-5  # at the whole load [N, mm3], where some 100 N act
-LOCKED = 0.5  # a tip that gets less than this share of its way is locked
+LOCKED = 0.5  # a tip that gets less than this share of its displacement is locked
 FIXED = (
     Prescribed("clamp", "x0", (0, 1, 2), Rest()),
     Prescribed("z0", "z0", (2,), Rest()),
@@ -212,7 +212,7 @@ ENTRIES = (
         truth=lambda: LOCKED / 2,
         within=LOCKED / 2,
         relative=False,
-        because="the band is all from 0 to 0.5: what gets less than half of its way is called locked; how much less is no truth",
+        because="the band is all from 0 to 0.5: less than half of the displacement is called locked; how much less is no truth",
         kind="property",
         source="where the tip should be: " + SOURCE,
         measure=partial(_NEARLY_LINEAR.ratio, n=8),

@@ -83,7 +83,7 @@ def _thickness(lab: Lab, n: int, faces: tuple[str, ...] = ("z0", "z1")) -> float
 
 def _up_to_radius(lab: Lab) -> Finding:
     found = ladder(lab, _inner_radius, (1, 2, 3), THICKNESS / 2, _true_inner_radius)
-    return replace(found, order=None, note="the error changes its sign on the way: no order")
+    return replace(found, order=None, note="the error changes its sign between meshes: no order")
 
 
 def _truth() -> Any:

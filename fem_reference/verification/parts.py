@@ -46,6 +46,6 @@ def once(lab: Lab, value: Value, count: int) -> Finding:
 
 
 def ladder(lab: Lab, value: Value, counts: tuple[int, ...], size: float, truth: Callable[[], float]) -> Finding:
-    """The ``value`` with the last of ``counts`` cells, of size ``size / count`` [mm], and its way there."""
+    """The ``value`` with the last of ``counts`` cells, of size ``size / count`` [mm], and its convergence."""
     steps = tuple((size / count, value(lab, count)) for count in counts)
     return Finding(steps[-1][1], catalogue.order(steps, truth()), steps)

@@ -2,7 +2,7 @@
 
     python meshes/box/build.py
 
-writes box.ply, fibres.vtk, sides.csv and card.toml beside this file. Lengths in mm; y is the way plates squeeze it.
+writes box.ply, fibres.vtk, sides.csv and card.toml beside this file. Lengths in mm; y is the direction in which plates squeeze it.
 
 The faces of the box are cut into squares of 5 mm, and each of those into two triangles along the diagonal from its lowest to its
 highest corner: as grids of boxes of 5, 10 or 20 mm are that are cut into Kuhn's tetrahedra, so that those nest in it.

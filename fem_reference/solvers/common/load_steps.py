@@ -21,7 +21,7 @@ class Attempt:
 
 @dataclass(frozen=True)
 class Step:
-    """The way to a requested frame: load steps, Newton iterations and cut-backs since the last one. Where it could not be
+    """The steps to a requested frame: load steps, Newton iterations and cut-backs since the last one. Where it could not be
     reached, ``status`` and ``sentence`` are those of the last attempt, and the last good state is ``at`` a frame.
     """
 

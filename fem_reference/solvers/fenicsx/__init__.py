@@ -101,7 +101,7 @@ def _pass_on(problem: Problem, frame: Frame, sink: Sink, passed: list[int]) -> N
 
 def _with_attachment_errors(problem: Problem, frame: Frame) -> Frame:
     """The frame with how far the surface vertices attached to bones are from where the bones have them, ``held_off_rms`` and
-    ``held_off_max`` [mm]: exact attachments are facets of tets, which cover them only roughly, and springs give way. As it is
+    ``held_off_max`` [mm]: exact attachments are facets of tets, which cover them only roughly, and springs yield. As it is
     where nothing is attached.
     """
     surface = frame.surface

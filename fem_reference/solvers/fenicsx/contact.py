@@ -103,9 +103,9 @@ class ContactForces:
         """
         for one in self.now:
             some = np.flatnonzero(one.slope.any(axis=(1, 2)))
-            pushed = one.near[some]
-            areas = self.points.areas[pushed, None, None]
-            yield self.points.cells[pushed], self.points.basis[pushed], -areas * one.slope[some]
+            touched = one.near[some]
+            areas = self.points.areas[touched, None, None]
+            yield self.points.cells[touched], self.points.basis[touched], -areas * one.slope[some]
 
     def forces(self) -> dict[str, tuple[Floats, Floats]]:
         """By name of an obstruction, the force (3,) [N] that it exerts on this rank's points and its moment (3,) [N mm] about the
@@ -113,25 +113,25 @@ class ContactForces:
         """
         points, found = self.points.positions(self.unknowns.x.array), {}
         for entry, one in zip(self.obstructions, self.now, strict=True):
-            pushed = self.points.areas[one.near, None] * one.traction
-            found[entry.name] = pushed.sum(axis=0), np.cross(points[one.near], pushed).sum(axis=0)
+            forces = self.points.areas[one.near, None] * one.traction
+            found[entry.name] = forces.sum(axis=0), np.cross(points[one.near], forces).sum(axis=0)
         return found
 
     def scalars(self, comm: MPI.Comm) -> dict[str, float]:
         """The greatest ``contact_depth`` [mm] and largest ``contact_pressure`` [MPa] at a point, the rest area in contact,
         ``contact_area`` [mm2], and how deep the deepest point in contact was at rest, ``overlap_at_rest`` [mm].
         """
-        pushed = np.zeros(len(self.points.areas), bool)
+        touched = np.zeros(len(self.points.areas), bool)
         depth = pressure = overlap = 0.0
         for one, before in zip(self.now, self.overlaps, strict=True):
-            pushed[one.near[one.pressure > 0]] = True
+            touched[one.near[one.pressure > 0]] = True
             depth = max(depth, float(-one.gap.min(initial=0.0)))
             pressure = max(pressure, float(one.pressure.max(initial=0.0)))
             overlap = max(overlap, float(before.max(initial=0.0)) - self.law.smoothing)
         found = {
             "contact_depth": comm.allreduce(depth, MPI.MAX),
             "contact_pressure": comm.allreduce(pressure, MPI.MAX),
-            "contact_area": comm.allreduce(float(self.points.areas[pushed].sum()), MPI.SUM),
+            "contact_area": comm.allreduce(float(self.points.areas[touched].sum()), MPI.SUM),
         }
         return found | ({"overlap_at_rest": comm.allreduce(max(overlap, 0.0), MPI.MAX)} if self.law.relaxed else {})
 
@@ -160,7 +160,7 @@ class ContactForces:
         self.now, self.frame = self.settled, self.settled_at
 
     def tunnelled(self, comm: MPI.Comm) -> str | None:
-        """Where a point went through an obstruction since the last settled state: on its straight way through the obstruction's
+        """Where a point went through an obstruction since the last settled state: on its straight path through the obstruction's
         frame it was inside, deeper than at both ends, and it left on the other side. None where none did.
         """
         mine = [one for i in range(len(self.obstructions)) if (one := self._through(i))]
@@ -173,7 +173,7 @@ class ContactForces:
         starts, ends = self.settled[i].local[met], self.now[i].local[met]
         before, now = (self.obstructions[i].shape.sample(places) for places in (starts, ends))
         displacements = ends - starts
-        # A gap is not known far away: what points outward there is the way back, and the way on.
+        # A gap is not known far away: what points outward there is the direction back, and the direction on.
         outward = [
             np.where(one.gradient.any(axis=1)[:, None], one.gradient, sign * displacements)
             for one, sign in ((before, -1), (now, 1))

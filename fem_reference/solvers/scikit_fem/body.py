@@ -92,7 +92,7 @@ class _Tangent:
 
 
 class _March:
-    """The unknowns of a body on their way through its frames."""
+    """The unknowns of a body along the path of its frames."""
 
     def __init__(self, body: Body, settings: BodySettings) -> None:
         self.body, self.settings = body, settings

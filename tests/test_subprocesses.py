@@ -1,4 +1,4 @@
-"""Child processes import this copy of the package and nothing from the folder that they are started in."""
+"""Subprocesses import this copy of the package and nothing from the folder that they are started in."""
 
 import subprocess
 import sys
