@@ -31,3 +31,10 @@ def test_the_verbs() -> None:
 
 def test_nothing_is_left_to_fill_in() -> None:
     assert "@@" not in README
+
+
+def test_every_file_that_is_linked_is_there() -> None:
+    home = Path(__file__).parent.parent
+    for page in (home / "README.md", *(home / "docs").glob("*.md")):
+        links = re.findall(r"\]\((?!https?:|#)([^)#]+)", page.read_text(encoding="utf-8"))
+        assert not [link for link in links if not (page.parent / link).exists()], page
