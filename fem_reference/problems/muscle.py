@@ -1,13 +1,13 @@
 """Scene -> everything a solver needs, as arrays: bodies, what is attached, effects, fibres, frames. It knows no solver."""
 
 import logging
-import os
 import time
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
+import platformdirs
 from numpy.typing import NDArray
 
 from fem_reference.effects import Effect
@@ -54,8 +54,7 @@ DISTANCE_MARGIN = 12.0
 
 def kept_distances() -> Path:
     """The folder where grids of distances are kept; it may be deleted."""
-    cache = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111 - Path.home() may raise
-    return Path(cache) / "fem_reference" / "distances"
+    return platformdirs.user_cache_path("fem_reference") / "distances"
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,6 @@
 """Compilation of loops, and the cache of their machine code."""
 
 import hashlib
-import os
 import tempfile
 from collections.abc import Callable
 from functools import cache
@@ -9,6 +8,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import numba
+import platformdirs
 
 
 def compiled[F: Callable[..., Any]](function: F) -> F:
@@ -46,5 +46,4 @@ def kept_code() -> Path:
     digest = hashlib.sha256()
     for path in sorted(Path(__file__).parent.glob("*_kernels.py")):
         digest.update(path.read_bytes())
-    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111 - Path.home() may raise
-    return Path(home) / "fem_reference" / "compiled" / digest.hexdigest()[:16]
+    return platformdirs.user_cache_path("fem_reference") / "compiled" / digest.hexdigest()[:16]

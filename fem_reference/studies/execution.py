@@ -1,6 +1,5 @@
 """A scene and a choice of solver -> a run: from the store where it was solved before, else solved now and stored."""
 
-import fcntl
 import logging
 import os
 import platform
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from filelock import FileLock, Timeout
 
 from fem_reference import __version__, solvers
 from fem_reference.foundations.records import Record
@@ -112,13 +112,16 @@ class Bench:
 def _alone(folder: Path) -> Iterator[None]:
     """Nobody else makes the run in ``folder`` meanwhile: whoever comes second waits, and then finds it made."""
     folder.parent.mkdir(parents=True, exist_ok=True)
-    with (folder.parent / f".{folder.name}.lock").open("w") as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            log.info("%s: another process is making this run; waiting for it", folder)
-            fcntl.flock(lock, fcntl.LOCK_EX)
+    lock = FileLock(folder.parent / f".{folder.name}.lock")
+    try:
+        lock.acquire(timeout=0)
+    except Timeout:
+        log.info("%s: another process is making this run; waiting for it", folder)
+        lock.acquire()
+    try:
         yield
+    finally:
+        lock.release()
 
 
 def _build(scene: Scene, setup: Setup) -> Problem:
