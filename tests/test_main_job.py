@@ -328,7 +328,7 @@ def test_list_and_show(job, capsys) -> None:
     assert any("fenicsx-" in path for path in facts["runs"])
     status, facts = job.call("show", str(job.case))
     assert status == cli.DONE
-    assert facts["attachments"]["origin"].endswith("attached by floor exactly")
+    assert facts["attachments"]["origin"].endswith("attached to floor exactly")
     status, facts = job.call("show", str(job.case), "--set", "reference.first_step=4.0")
     assert facts["reference"] == "fenicsx first_step=4.0"
     assert (job.out / "bar" / "tets.vtu").exists()
