@@ -367,7 +367,9 @@ def test_how_well_the_reference_is_known_is_reported(comparison):
     assert "With <code>--error-bar</code> the reference is solved" in page.render(comparison)
     text = page.render(with_bars(comparison))
     assert "(4 mm instead of 2 mm)" in text
-    assert "order 1.50)" in text
+    assert "order 1.50 in general" in text
+    names = ", ".join(attachment.name for attachment in comparison.scene.attachment)
+    assert f"Along the rims of {names}, where" in text
     assert "By how much exact ones would change a statistic" in text
     assert "cause of error halved at a time (load steps)" in text
     assert "--error-bar" not in text
