@@ -24,7 +24,7 @@ from fem_reference.io import files
 from fem_reference.problems import muscle
 from fem_reference.problems.body import ByCell
 from fem_reference.problems.muscle import Problem
-from fem_reference.report.tables import seconds_per_frame
+from fem_reference.runs.cost import seconds_per_frame
 from fem_reference.runs.store import Outcome, Run
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import Scene

@@ -22,8 +22,9 @@ from fem_reference.metrics import Measure, MeasurementContext
 from fem_reference.problems.muscle import RigidBody, Setup
 from fem_reference.report import gallery, page
 from fem_reference.report.curves import curves
-from fem_reference.report.tables import COLUMNS, seconds_per_frame
+from fem_reference.report.tables import COLUMNS
 from fem_reference.report.words import duration, number
+from fem_reference.runs.cost import seconds_per_frame
 from fem_reference.runs.store import Outcome, Run
 from fem_reference.scenes import casefile
 

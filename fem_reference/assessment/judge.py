@@ -18,6 +18,7 @@ _KINDS = {
     "%": ("a fraction", 100.0),
     "mm3": ("a volume", 1.0),
     "deg": ("an angle", 180 / math.pi),
+    "s": ("a time", 1.0),
 }
 
 
@@ -75,7 +76,7 @@ def check(scene: Scene) -> None:
         for key in ("truth", "within"):
             text = getattr(expectation, key)
             try:
-                value = _number(text, known[name])
+                value = in_unit(text, known[name])
             except ValueError as error:
                 raise InputError(f"{place}.{key}", f'"{text}"', str(error)) from error
             if key == "within" and value < 0:
@@ -93,7 +94,7 @@ def verdict(
     """
     name = (expectation.metric, expectation.statistic)
     found = next(measure for measure in measures if (measure.metric, measure.statistic) == name)
-    truth, within = (_number(text, found.unit) for text in (expectation.truth, expectation.within))
+    truth, within = (in_unit(text, found.unit) for text in (expectation.truth, expectation.within))
     frames = range(len(numbers)) if expectation.frame == "any" else [numbers.index(expectation.frame)]
     values = [float(found.values[frame]) for frame in frames]
     known = [0.0 if bars is None else float(bars[frame]) for frame in frames]
@@ -111,6 +112,7 @@ def verdict(
     return Verdict(word, expectation, values[decides], truth, within, found.unit, frame, bar)
 
 
-def _number(text: str, unit: str) -> float:
+def in_unit(text: str, unit: str) -> float:
+    """A quantity as text in the unit of a metric; ValueError where it is none of that kind."""
     kind, factor = _KINDS[unit]
     return quantity(text, kind) * factor

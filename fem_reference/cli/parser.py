@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from fem_reference import __version__
-from fem_reference.cli import benchmark, check, export, scalar, verbs
+from fem_reference.cli import benchmark, check, export, recommend, scalar, study, verbs
 
 
 def parser() -> argparse.ArgumentParser:
@@ -56,6 +56,10 @@ def parser() -> argparse.ArgumentParser:
     _add_page_options(page, unit)
     speed = "time the solvers of Table 5.1 in processor time, beside the machine's own speed, or the reference by phase"
     benchmark.add_options(add("benchmark", benchmark.benchmark, speed, case=False))
+    costs = "what accuracy costs in time: reference and candidates over ladders of settings, and the page"
+    study.add_options(add("study", study.study, costs, case=False))
+    advice = "which solver and setting to take for an error or a time, out of what studies measured"
+    recommend.add_options(add("recommend", recommend.advise, advice))
     catalogue = add("verify", verbs.verify, "measure problems whose answers are known and write the page", case=False)
     known = "an entry, a family or a shell pattern of them (default: all)"
     catalogue.add_argument("names", metavar="NAME", nargs="*", help=known)

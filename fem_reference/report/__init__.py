@@ -3,16 +3,18 @@
 import json
 from pathlib import Path
 
+from fem_reference.assessment import cost_study
 from fem_reference.assessment.claims import Claims
 from fem_reference.assessment.comparison import Comparison
+from fem_reference.assessment.cost_study import Study
 from fem_reference.assessment.scalar_example import Example
 from fem_reference.assessment.solver_table import Table
 from fem_reference.io import files
-from fem_reference.report import claims_page, field_page, page, ranking_page, verify_page
+from fem_reference.report import claims_page, field_page, page, ranking_page, study_page, verify_page
 from fem_reference.report.tables import as_csv, summary
 from fem_reference.report.verify_page import Verification
 
-__all__ = ["summary", "write", "write_claims", "write_examples", "write_ranking", "write_verification"]
+__all__ = ["summary", "write", "write_claims", "write_examples", "write_ranking", "write_study", "write_verification"]
 
 
 def write(comparison: Comparison, folder: Path) -> Path:
@@ -62,6 +64,17 @@ def write_claims(claims: Claims, folder: Path, name: str) -> Path:
     texts = {
         f"{name}.json": json.dumps(claims_page.facts(claims), indent=1, allow_nan=False),
         f"{name}.html": claims_page.render(claims),
+    }
+    _write(texts, folder)
+    return folder / f"{name}.html"
+
+
+def write_study(study: Study, folder: Path, name: str) -> Path:
+    """Write the page ``name`` of what accuracy costs and its numbers as JSON into ``folder``; the path of the page."""
+    cases = [cost_study.facts(case, study.origin) for case in study.cases]
+    texts = {
+        f"{name}.json": json.dumps(cases[0] if len(cases) == 1 else cases, indent=1, allow_nan=False),
+        f"{name}.html": study_page.render(study),
     }
     _write(texts, folder)
     return folder / f"{name}.html"

@@ -1,6 +1,7 @@
 """The page ``error-bars``: what is claimed to be known against what a finer solution says."""
 
 import io
+from collections.abc import Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -30,7 +31,7 @@ def render(claims: Claims) -> str:
             for metric, statistic in CLAIMED
         },
         widest=lambda case, metric, statistic: widest(claims, case, metric, statistic),
-        drawings=[_drawing(claims, metric) for metric in UNITS],
+        drawings=[drawing(claims.claims, metric, "claims") for metric in UNITS],
     )
 
 
@@ -53,17 +54,17 @@ def facts(claims: Claims) -> dict[str, Any]:
     }
 
 
-def _drawing(claims: Claims, metric: str) -> Curve:
-    """Bars against errors, a colour for each case."""
+def drawing(claims: Sequence[Claim], metric: str, name: str) -> Curve:
+    """Bars against errors, a colour for each case; ``name`` makes its ids those of this drawing alone."""
     title = f"{words(metric).capitalize()}: claimed against true"
     with mpl.rc_context(LOOK):
         figure = Figure(figsize=(4.6, 4.0), layout="constrained")
         FigureCanvasSVG(figure)
         axes = figure.add_subplot()
-        shown = [one for one in claims.claims if one.metric == metric and one.error > LEAST and one.bar > 0]
+        shown = [one for one in claims if one.metric == metric and one.error > LEAST and one.bar > 0]
         values = [value for one in shown for value in (one.bar, one.error)]
         ends = [0.5 * min(values, default=0.1), 2 * max(values, default=1.0)]
-        for i, case in enumerate(claims.sizes):
+        for i, case in enumerate(dict.fromkeys(one.case for one in claims)):
             some = [one for one in shown if one.case == case]
             colour = PALETTE[i % len(PALETTE)]
             axes.plot([one.error for one in some], [one.bar for one in some], ".", color=colour, label=case, alpha=0.7)
@@ -75,4 +76,4 @@ def _drawing(claims: Claims, metric: str) -> Curve:
         axes.legend(fontsize="small")
         text = io.StringIO()
         figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
-    return Curve(title, inline(text.getvalue(), f"claims-{metric}", title))
+    return Curve(title, inline(text.getvalue(), f"{name}-{metric}", title))

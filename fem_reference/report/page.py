@@ -19,10 +19,11 @@ from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.metrics import Measure, find
 from fem_reference.report import gallery, pictures
 from fem_reference.report.curves import curves, label_of
-from fem_reference.report.tables import inversion, known, runs, seconds_per_frame
+from fem_reference.report.tables import inversion, known, runs
 from fem_reference.report.templates import template
 from fem_reference.report.viewer import view
 from fem_reference.report.words import listed, ratio, words
+from fem_reference.runs.cost import seconds_per_frame
 from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import Scene

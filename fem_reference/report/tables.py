@@ -1,12 +1,10 @@
-"""A comparison as rows of numbers: the contents of measures.json and measures.csv, and the time of a frame."""
+"""A comparison as rows of numbers: the contents of measures.json and measures.csv."""
 
 import csv
 import io
 import math
 from collections.abc import Iterable
 from typing import Any
-
-import numpy as np
 
 from fem_reference.assessment import ranking
 from fem_reference.assessment.comparison import Comparison
@@ -75,29 +73,6 @@ def inversion(run: Run) -> tuple[Measure, ...]:
     """The smallest det F per frame [1] that a solver recorded (scalars ``min_det_F...``), as measures."""
     names = [name for name in run.scalars if name.startswith("min_det_F")]
     return tuple(Measure("inversion", name, "1", run.scalars[name]) for name in names)
-
-
-def seconds_per_frame(run: Run) -> float | None:
-    """Time to solve one of the frames after the first that were reached [s]; None where the run was computed elsewhere by somebody
-    who does not say.
-
-    ``seconds_solve`` is a solver's own time without compiling and writing; without it the whole wall time counts.
-    """
-    cost = run.outcome.cost
-    seconds = cost.get("seconds_solve", cost.get("seconds"))
-    solved = reached(run) - 1
-    if run.solver == "recorded":
-        each = cost.get("seconds_per_frame")  # for a frame number
-        return None if each is None else each * (run.numbers[-1] - run.numbers[0]) / max(len(run.numbers) - 1, 1)
-    if seconds is None or solved < 1:
-        return None
-    return seconds / solved
-
-
-def reached(run: Run) -> int:
-    """How many frames have positions, of the fibres where there is no surface."""
-    positions = run.positions if run.has_surface or run.fibre_positions is None else run.fibre_positions
-    return int(np.isfinite(positions).all(axis=(1, 2)).sum())
 
 
 def _rows(run: Run, measures: Iterable[Measure]) -> list[dict[str, Any]]:

@@ -3,6 +3,7 @@
 import logging
 import os
 import platform
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -15,6 +16,7 @@ from filelock import FileLock, Timeout
 
 from fem_reference import __version__, solvers
 from fem_reference.foundations.records import Record
+from fem_reference.foundations.usage import forget_peak_memory, peak_memory
 from fem_reference.problems import muscle
 from fem_reference.problems.muscle import Problem, Setup
 from fem_reference.runs import store
@@ -55,8 +57,7 @@ class Bench:
         """The run of a solver of our own, by the name that pages give it; ``place`` is where the scene chooses it."""
         if choice.solver == "recorded":  # files may change behind a name; they are read anew each time
             return self.read(name, choice, place)
-        settings = self.settings(choice, place)
-        folder = self.store / f"{choice.solver}-{self.key(choice.solver, settings)}"
+        settings, folder = self.settings(choice, place), self.folder(choice, place)
         if (stored := _stored(folder, name)) is not None:
             return stored
         solvers.require(choice.solver, settings, place)
@@ -64,12 +65,20 @@ class Bench:
         with _alone(folder):
             return _stored(folder, name) or self._solve(name, choice.solver, settings, folder)
 
+    def folder(self, choice: SolverChoice, place: str) -> Path:
+        """Where the run of a solver of our own is stored, once there is one."""
+        return self.store / f"{choice.solver}-{self.key(choice.solver, self.settings(choice, place))}"
+
     def _solve(self, name: str, solver: str, settings: Record, folder: Path) -> Run:
         built = self.problem()
         origin = self.origin(solver, settings) | {"mesh": built.mesh_facts}
         identity = {"name": name, "solver": solver, "origin": origin, "frames": built.frames}
         writer = store.Writer(folder, identity, built.surface, built.fibres, built.mesh, built.directions)
+        forget_peak_memory()
+        began = time.process_time()
         outcome = solvers.find(solver, self.scene.place).solve(built, settings, writer.add)
+        used = {"seconds_processor": time.process_time() - began, "peak_memory_mb": peak_memory()}
+        outcome = replace(outcome, cost=used | outcome.cost)  # a solver with processes of its own says what those used
         if not writer.frames:  # it failed before its first frame, which is rest
             writer.add(Frame(built.frames[0], built.surface.points, built.fibres.points))
         writer.close(outcome)

@@ -8,7 +8,7 @@ from pathlib import Path
 from fem_reference.assessment.solver_table import Family, Scenario, SolverResult, Table, families
 from fem_reference.foundations.errors import InputError
 from fem_reference.metrics import Measure, MeasurementContext, measure
-from fem_reference.report.tables import seconds_per_frame
+from fem_reference.runs.cost import seconds_per_frame
 from fem_reference.runs.key import versions
 from fem_reference.runs.store import Run
 from fem_reference.scenes.muscle import Candidate, Scene

@@ -88,9 +88,11 @@ class Factorised:
             self.there = False
             raise LinearSolveError(f"MUMPS reports {self.factors.getMumpsInfog(_ERROR)}")
         self.fresh = self.there = True
+        operations = self.factors.getMumpsRinfog(_FLOPS)
+        self.spent.counts["factorisation_flops"] += operations
         counted = self.factors.getMumpsInfog(_ENTRIES)
         entries = counted if counted > 0 else -1e6 * counted  # MUMPS counts many in millions
-        self.limit = int(min(max(self.factors.getMumpsRinfog(_FLOPS) / entries / _OPERATIONS, _LEAST), _MOST))
+        self.limit = int(min(max(operations / entries / _OPERATIONS, _LEAST), _MOST))
 
     def solve(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> None:
         """Solve for ``x``, up to ``tolerance`` times the norm of ``b``, or exactly; ``LinearSolveError`` if that cannot be done."""

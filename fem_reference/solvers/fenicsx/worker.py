@@ -3,15 +3,14 @@
 import gc
 import json
 import pickle
-import resource
 import sys
 import time
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from fem_reference.foundations.usage import forget_peak_memory, peak_memory
 from fem_reference.solvers.fenicsx import dolfinx_door  # noqa: F401 - first
 from fem_reference.solvers.fenicsx.jobs import Job
 from fem_reference.solvers.fenicsx.processes import MARK
@@ -22,13 +21,17 @@ from fem_reference.solvers.fenicsx.validity import Ranges  # isort: skip
 from fem_reference.solvers.common.load_steps import Attempt, Step, Steps, march  # isort: skip
 
 
+_COUNTED = ("factorisations", "factorisation_flops", "krylov_iterations", "halved_steps")
+
+
 class Worker:
     """One job on all ranks; the first rank reports."""
 
     def __init__(self, job: Job, folder: Path) -> None:
         """``folder``: where the frames are written."""
         begin = time.perf_counter()
-        _forget_peak()
+        forget_peak_memory()
+        self.began = time.process_time()
         self.job, self.folder, self.settings = job, folder, job.settings
         self.body = AssembledBody(job.body, job.settings)
         self.set_up = time.perf_counter() - begin
@@ -130,35 +133,23 @@ class Worker:
             sys.stdout.flush()
 
     def cost(self) -> dict[str, float]:
-        """Seconds by phase as the first rank sees them, counts, and memory over all ranks."""
+        """Seconds by phase as the first rank sees them, counts, and processor time and memory over all ranks."""
         spent = self.body.spent
-        memory = self.body.comm.allreduce(_peak_memory())
+        memory = self.body.comm.allreduce(peak_memory())
+        processor = self.body.comm.allreduce(time.process_time() - self.began)
         return {
             "seconds_set_up": self.set_up,
             "seconds_solve": self.solving,
             **{f"seconds_{name}": spent.seconds[name] for name in ("assembly", "contact", "factorisation", "krylov")},
             "seconds_stability": self.checking,
-            **{name: float(spent.counts[name]) for name in ("factorisations", "krylov_iterations", "halved_steps")},
+            "seconds_processor": processor,
+            **{name: float(spent.counts[name]) for name in _COUNTED},
             **{name: float(count) for name, count in self.counts.items()},
             "unknowns": float(self.body.size),
             "peak_memory_mb": memory,
             "ranks": float(self.body.comm.size),
             "threads": 1.0,
         }
-
-
-def _forget_peak() -> None:
-    """Begin anew to watch the memory of this process, which may have solved larger bodies before; Linux can."""
-    with suppress(OSError):
-        Path("/proc/self/clear_refs").write_text("5", encoding="utf-8")
-
-
-def _peak_memory() -> float:
-    """The most memory [MB] since then, or since this process began."""
-    with suppress(OSError, StopIteration):
-        lines = Path("/proc/self/status").read_text(encoding="utf-8").splitlines()
-        return next(float(line.split()[1]) / 1024 for line in lines if line.startswith("VmHWM"))
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def main(argument: str) -> None:

@@ -1,0 +1,65 @@
+"""What accuracy costs on cases: points of error and cost, as pages show them and files keep them."""
+
+import json
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from fem_reference.assessment.claims import Claim
+from fem_reference.assessment.fronts import Point
+from fem_reference.foundations.errors import InputError
+
+FORMAT = 1
+
+
+@dataclass(frozen=True, eq=False)
+class CaseStudy:
+    """The points of a case; ``units`` of errors by ``metric.statistic``, and ``bars``, how well the truth is known, by the same;
+    ``truth``: in words what that is; ``claims``: error bars of coarser members beside their errors; ``triangles``,
+    ``travel`` [mm], the greatest displacement of the truth; ``features``, what the case is like as far as its scene says
+    (:mod:`studies.features`).
+    """
+
+    case: str
+    title: str
+    truth: str
+    points: tuple[Point, ...]
+    units: dict[str, str]
+    bars: dict[str, float]
+    claims: tuple[Claim, ...]
+    triangles: int
+    travel: float
+    features: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """Studies of cases; ``missing``: by case, why it was left out; ``origin``: with what and on what it was measured."""
+
+    cases: tuple[CaseStudy, ...]
+    missing: dict[str, str] = field(default_factory=dict)
+    origin: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def points(self) -> tuple[Point, ...]:
+        """All points of all cases."""
+        return tuple(point for case in self.cases for point in case.points)
+
+
+def facts(case: CaseStudy, origin: dict[str, str]) -> dict[str, Any]:
+    """The study of a case as valid JSON."""
+    return {"format": FORMAT, **asdict(case), "origin": origin}
+
+
+def load(path: Path) -> CaseStudy:
+    """The study of a case from the file that :func:`facts` went into; InputError where it is none."""
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        if found.pop("format") != FORMAT:
+            raise InputError(f"{path}: format", "another one", str(FORMAT))
+        del found["origin"]
+        found["points"] = tuple(Point(**point) for point in found["points"])
+        found["claims"] = tuple(Claim(**claim) for claim in found["claims"])
+        return CaseStudy(**found)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise InputError(path, repr(error), "a study as the verb study writes it") from error

@@ -1,0 +1,149 @@
+"""What accuracy costs: measured settings as points of error and cost, those that no other beats, and what halving an error costs.
+
+Settings are compared at the same error or the same cost and never at the same settings (work-precision diagrams: Hairer, Norsett,
+Wanner 1993, Solving Ordinary Differential Equations I, II.10).
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+# What a point may cost: by name a title and its unit. The first is what is meant by cost where nothing else is said.
+COSTS: dict[str, tuple[str, str]] = {
+    "seconds_per_frame": ("time of a frame", "s"),
+    "seconds": ("whole time, with set-up", "s"),
+    "seconds_processor": ("processor time", "s"),
+    "unknowns": ("unknowns", ""),
+    "newton_iterations": ("Newton iterations", ""),
+    "factorisations": ("factorisations", ""),
+    "factorisation_flops": ("operations of the factorisations", ""),
+    "krylov_iterations": ("Krylov iterations", ""),
+    "projections": ("projections of a constraint", ""),
+    "peak_memory_mb": ("most memory", "MB"),
+}
+# A slope needs so many points, whose errors span so much.
+_LEAST_POINTS, _LEAST_SPAN = 3, 1.3
+
+
+@dataclass(frozen=True)
+class Point:
+    """A ``solver`` with settings, run on a ``case``: what was varied (``knob``, "" for the settings that the case or the standard
+    has) to what (``value``, as text); ``choice``, all that is needed to do it again; how it ended.
+
+    ``errors``: by ``metric.statistic``, the greatest magnitude over the frames of the deviation from the truth; ``costs``: by name,
+    those of ``COSTS`` that it has, and seconds by phase.
+    """
+
+    case: str
+    solver: str
+    name: str
+    knob: str
+    value: str
+    choice: dict[str, Any]
+    status: str
+    message: str
+    errors: dict[str, float] = field(default_factory=dict)
+    costs: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def is_default(self) -> bool:
+        """Whether nothing was varied."""
+        return not self.knob
+
+    @property
+    def label(self) -> str:
+        """What tells it from the other points of its solver."""
+        name = "" if self.name in (self.solver, "reference") else f"{self.name}, "
+        return f"{name}{self.knob} = {self.value}" if self.knob else f"{self.name}, as it is"
+
+    def at(self, error: str, cost: str) -> tuple[float, float] | None:
+        """Its error and its cost, None where one is not known or not above zero."""
+        pair = self.errors.get(error, math.nan), self.costs.get(cost, math.nan)
+        return pair if self.status == "converged" and min(pair) > 0 and all(map(math.isfinite, pair)) else None
+
+
+def pareto(points: Iterable[Point], error: str, cost: str) -> tuple[Point, ...]:
+    """The points that no other one beats in both error and cost, the cheapest first."""
+    known = [(pair[1], pair[0], i, point) for i, point in enumerate(points) if (pair := point.at(error, cost))]
+    found, best = list[Point](), math.inf
+    for _, value, _, point in sorted(known):
+        if value < best:
+            found.append(point)
+            best = value
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class Price:
+    """What a ``solver`` asks for accuracy: ``factor``, how many times the cost for half the error along its front, NaN where more
+    cost does not make it better; the ``best`` and ``worst`` errors of the front, from ``count`` points.
+    """
+
+    solver: str
+    factor: float
+    best: float
+    worst: float
+    count: int
+
+
+def price(points: Iterable[Point], solver: str, error: str, cost: str) -> Price | None:
+    """The price of a ``solver``: a line through its front in logarithms, by least squares; None where nothing is known of it."""
+    front = pareto((point for point in points if point.solver == solver), error, cost)
+    pairs = [pair for point in front if (pair := point.at(error, cost))]
+    if not pairs:
+        return None
+    errors, costs = np.array(pairs).T
+    factor = math.nan
+    if len(pairs) >= _LEAST_POINTS and errors.max() > _LEAST_SPAN * errors.min():
+        slope = np.polyfit(np.log(errors), np.log(costs), 1)[0]
+        factor = float(2.0**-slope)
+    return Price(solver, factor, float(errors.min()), float(errors.max()), len(pairs))
+
+
+def solvers(points: Iterable[Point]) -> tuple[str, ...]:
+    """The solvers that points are of, in their order."""
+    return tuple(dict.fromkeys(point.solver for point in points))
+
+
+@dataclass(frozen=True)
+class Match:
+    """The points, one of each solver at most, that are best at the ``same`` cost or error, ``at`` most so much."""
+
+    same: str
+    at: float
+    best: dict[str, Point]
+
+
+def at_same_cost(points: Sequence[Point], error: str, cost: str, at: float) -> Match:
+    """Of each solver the point of the least ``error`` among those that cost at most ``at``."""
+    best = dict[str, Point]()
+    for point in points:
+        pair = point.at(error, cost)
+        if pair and pair[1] <= at and (point.solver not in best or pair[0] < best[point.solver].errors[error]):
+            best[point.solver] = point
+    return Match(cost, at, best)
+
+
+def at_same_error(points: Sequence[Point], error: str, cost: str, at: float) -> Match:
+    """Of each solver the point that costs the least among those whose ``error`` is at most ``at``."""
+    best = dict[str, Point]()
+    for point in points:
+        pair = point.at(error, cost)
+        if pair and pair[0] <= at and (point.solver not in best or pair[1] < best[point.solver].costs[cost]):
+            best[point.solver] = point
+    return Match(error, at, best)
+
+
+def levels(points: Iterable[Point], error: str, cost: str, *, of_error: bool, count: int = 5) -> tuple[float, ...]:
+    """Errors or costs over the range of the points at which they can be compared: 1, 2 or 5 times a power of ten."""
+    values = [pair[0 if of_error else 1] for point in points if (pair := point.at(error, cost))]
+    if not values:
+        return ()
+    powers = range(math.floor(math.log10(min(values))), math.ceil(math.log10(max(values))) + 1)
+    round_ones = [digit * 10.0**power for power in powers for digit in (1, 2, 5)]
+    within = [value for value in round_ones if min(values) <= value <= 1.001 * max(values)] or [max(values)]
+    step = max(1, math.ceil(len(within) / count))
+    return tuple(within[::-1][::step][::-1])

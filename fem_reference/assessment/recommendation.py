@@ -1,0 +1,156 @@
+"""Which setting to take for an error or a time: the cheapest or nearest measured one, on the case itself or on those most
+like it.
+"""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fem_reference.assessment.cost_study import CaseStudy
+from fem_reference.assessment.fronts import Point
+
+TIME = "seconds_per_frame"
+# Of other cases so many are asked, those most alike.
+_ALIKE = 3
+# Of what is expected from other cases, this share holds on each case that was left out when the margin was found.
+_HOLDING = 0.95
+# How many times as many triangles take so many times as long is the same for all: linear, as sweeps over constraints are.
+_COMPARED = ("motion_to_size", "contact", "bulk_to_shear", "fibres_to_shear")
+
+
+@dataclass(frozen=True)
+class Expected:
+    """A setting with the ``error`` and the ``time`` of a frame [s] that are expected of it; ``of``: the cases it was
+    measured on.
+    """
+
+    point: Point
+    error: float
+    time: float
+    of: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Margins:
+    """How many times as great errors and times are assumed as the cases most alike have them; 1 where measured on the case."""
+
+    error: float = 1.0
+    time: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Recommendation:
+    """What is recommended (None: no setting meets what is asked), out of ``count`` settings, with the ``margins`` that are
+    in it.
+    """
+
+    best: Expected | None
+    count: int
+    margins: Margins
+    of: tuple[str, ...]
+
+
+def recommend(
+    features: Mapping[str, float], case: str, studies: Sequence[CaseStudy], metric: str, limits: Mapping[str, float]
+) -> Recommendation:
+    """The setting for a ``case``: the cheapest whose ``metric`` is at most ``limits["error"]``, or the nearest whose time
+    for a frame [s] is at most ``limits["time"]``; both where both are given (the cheapest then).
+    """
+    own = [study for study in studies if study.case == case]
+    margins = Margins() if own else _margins(studies, metric)
+    known = _measured(own[0], metric) if own else list(_expected(features, studies, metric, margins))
+    of = (case,) if own else tuple(study.case for study in alike(features, studies))
+    fitting = [
+        one for one in known if one.error <= limits.get("error", math.inf) and one.time <= limits.get("time", math.inf)
+    ]
+    rank = (lambda one: (one.time, one.error)) if "error" in limits else (lambda one: (one.error, one.time))
+    return Recommendation(min(fitting, key=rank, default=None), len(known), margins, of)
+
+
+def alike(features: Mapping[str, float], studies: Iterable[CaseStudy]) -> list[CaseStudy]:
+    """The studies of the cases most like one with these features, the most alike first."""
+    return sorted(studies, key=lambda study: _distance(features, study.features))[:_ALIKE]
+
+
+def _distance(one: Mapping[str, float], other: Mapping[str, float]) -> float:
+    """How unlike two cases are: over ratios, in powers of two; a case with contact and one without are far apart."""
+    pairs = [(_compared(one, name), _compared(other, name)) for name in _COMPARED]
+    return sum(abs(math.log2((1e-3 + a) / (1e-3 + b))) for a, b in pairs)
+
+
+def _compared(features: Mapping[str, float], name: str) -> float:
+    if name == "motion_to_size":
+        return features["motion"] / features["size"]
+    return min(features[name], 1.0) if name == "contact" else features[name]
+
+
+def _measured(study: CaseStudy, metric: str) -> list[Expected]:
+    """The settings measured on a case; what is not known of the truth counts as error."""
+    bar = study.bars.get(metric, 0.0)
+    pairs = [(point, pair) for point in study.points if (pair := point.at(metric, TIME))]
+    return [Expected(point, pair[0] + bar, pair[1], (study.case,)) for point, pair in pairs]
+
+
+def _expected(
+    features: Mapping[str, float], studies: Sequence[CaseStudy], metric: str, margins: Margins
+) -> Iterable[Expected]:
+    """The settings that were measured on every one of the cases most alike; errors count by the motion, times by the triangles, and
+    the worst of the cases counts.
+    """
+    chosen = alike(features, studies)
+    by_key = [{_key(one.point, study): one for one in _measured(study, metric)} for study in chosen]
+    for key in set.intersection(*map(set, by_key)) if by_key else ():
+        found = [(study, known[key]) for study, known in zip(chosen, by_key, strict=True)]
+        error = max(one.error * scale(features, study.features, metric) for study, one in found)
+        time = max(one.time * features["triangles"] / study.features["triangles"] for study, one in found)
+        yield Expected(
+            found[0][1].point, margins.error * error, margins.time * time, tuple(study.case for study in chosen)
+        )
+
+
+def scale(features: Mapping[str, float], other: Mapping[str, float], metric: str) -> float:
+    """By how much an error on the ``other`` case counts here: lengths by the motion, shares as they are."""
+    return 1.0 if metric.startswith("volume.") or metric.endswith("_percent") else features["motion"] / other["motion"]
+
+
+def _key(point: Point, study: CaseStudy) -> str:
+    """What makes a setting the same on two cases; tetrahedra count by their size in that of the case's own reference."""
+    scene = {name: value for name, value in point.choice.get("scene", {}).items() if not name.startswith("muscle.")}
+    if scene:
+        return f"{study.case}: {point.label}"  # of that scene's own values, on no other case
+    if "scene" in point.choice:
+        factor, fewer = tetrahedra(point, study)
+        return f"{point.solver}: tetrahedra {factor:.3g}, {fewer:g} refinements fewer, {_settings(point)}"
+    return f"{point.solver}: {_settings(point)}"
+
+
+def tetrahedra(point: Point, study: CaseStudy) -> tuple[float, float]:
+    """Of a point on other tetrahedra, their size in that of the case's own before refinement, and how much less they are
+    refined.
+    """
+    scene = point.choice["scene"]
+    size = float(str(scene["muscle.tet_size"]).removesuffix(" mm"))
+    return size / study.features["tet_size"], study.features["refinements"] - scene["muscle.refinements"]
+
+
+def _settings(point: Point) -> str:
+    own = {name: value for name, value in point.choice.items() if name not in ("scene", "solver", "name")}
+    return ", ".join(f"{name} = {value}" for name, value in sorted(own.items(), key=str))
+
+
+def _margins(studies: Sequence[CaseStudy], metric: str) -> Margins:
+    """Found by leaving out each study in turn: how many times as great what was measured there is as expected from the others."""
+    errors, times = list[float](), list[float]()
+    for study in studies:
+        others = [other for other in studies if other is not study]
+        measured = {_key(one.point, study): one for one in _measured(study, metric)}
+        for one in _expected(study.features, others, metric, Margins()):
+            key = next((_key(one.point, other) for other in others if one.point.case == other.case), "")
+            if (here := measured.get(key)) is not None:
+                errors.append(here.error / one.error)
+                times.append(here.time / one.time)
+    if not errors:
+        return Margins(2.0, 2.0)  # of one study alone nothing can be learned about others
+    return Margins(*(max(1.0, float(np.quantile(ratios, _HOLDING))) for ratios in (errors, times)))

@@ -1,0 +1,63 @@
+"""Whether settings that are good on some cases are good on another: each case left out in turn."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from statistics import fmean
+
+from fem_reference.assessment.fronts import Point
+
+
+@dataclass(frozen=True)
+class Transfer:
+    """Settings of a ``solver`` chosen on all cases but one (``left_out``) and tried on that: their ``error`` there, the ``best``
+    error that any of the same settings has there, and the ``default``'s (NaN where there is none).
+    """
+
+    solver: str
+    left_out: str
+    chosen: str
+    error: float
+    best: float
+    default: float
+
+    @property
+    def loss(self) -> float:
+        """How much more the error is than it could be: 0 where the settings chosen are the best there too."""
+        return self.error / self.best - 1
+
+
+def transfers(points: Iterable[Point], error: str) -> tuple[Transfer, ...]:
+    """For every solver and case, settings chosen by the least mean logarithm of the error over the other cases among those that
+    were measured on every case.
+    """
+    by_solver: dict[str, dict[str, dict[str, float]]] = {}
+    defaults: dict[tuple[str, str], float] = {}
+    for point in points:
+        value = point.errors.get(error, math.nan)
+        if point.status != "converged" or not value > 0:
+            continue
+        by_solver.setdefault(point.solver, {}).setdefault(f"{point.name}: {point.label}", {})[point.case] = value
+        if point.is_default:
+            defaults.setdefault((point.solver, point.case), value)
+    found = list[Transfer]()
+    for solver, settings in by_solver.items():
+        cases = sorted({case for values in settings.values() for case in values})
+        everywhere = {label: values for label, values in settings.items() if len(values) == len(cases)}
+        if len(cases) > 1 and everywhere:
+            found += [_left_out(solver, everywhere, cases, case, defaults) for case in cases]
+    return tuple(found)
+
+
+def _left_out(
+    solver: str,
+    settings: dict[str, dict[str, float]],
+    cases: Sequence[str],
+    left_out: str,
+    defaults: dict[tuple[str, str], float],
+) -> Transfer:
+    others = [case for case in cases if case != left_out]
+    chosen = min(settings, key=lambda label: fmean(math.log(settings[label][case]) for case in others))
+    best = min(values[left_out] for values in settings.values())
+    default = defaults.get((solver, left_out), math.nan)
+    return Transfer(solver, left_out, chosen, settings[chosen][left_out], best, default)

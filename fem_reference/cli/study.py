@@ -1,0 +1,46 @@
+"""The verb ``study``: what accuracy costs in time on cases."""
+
+import argparse
+
+from fem_reference import report
+from fem_reference.assessment.cost_study import facts
+from fem_reference.cli.printing import DONE, SOLVER_FAILED, out, write_output
+from fem_reference.foundations.errors import InputError
+from fem_reference.report import study_page
+from fem_reference.scenes import casefile
+from fem_reference.studies import cost
+from fem_reference.studies.campaign import Workers
+
+PAGE = "study"
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options that this verb has."""
+    parser.add_argument(
+        "cases", metavar="CASE", nargs="+", help="a shipped case (see list), a case folder or a case.toml"
+    )
+    parser.add_argument(
+        "--workers", type=int, default=1, metavar="N", help="how many runs are made at once (default: 1)"
+    )
+    cluster = (
+        "address of a Dask scheduler (such as dask-jobqueue starts) whose workers make the runs; they see --out too"
+    )
+    parser.add_argument("--scheduler", metavar="ADDRESS", help=cluster)
+    only = "the ladders of the reference only, or those of the candidates (default: both)"
+    parser.add_argument("--only", choices=cost.PARTS, help=only)
+
+
+def study(options: argparse.Namespace) -> int:
+    """Measure what accuracy costs on cases, and write the page; one on each case, and one on all where there are several."""
+    if options.workers < 1:
+        raise InputError("--workers", options.workers, "1 or more")
+    scenes = [casefile.read_muscle(case) for case in options.cases]
+    workers, parts = Workers(options.workers, options.scheduler), [options.only] if options.only else cost.PARTS
+    found = cost.study(scenes, out(options) / "runs", workers, parts)
+    for case in found.cases:
+        path = report.write_study(cost.alone(found, case), out(options) / case.case, PAGE)
+    if len(found.cases) != 1:
+        path = report.write_study(found, out(options), PAGE)
+    printed = {"cases": [facts(case, found.origin) for case in found.cases], "missing": found.missing}
+    write_output(printed, f"{study_page.text(found)}\npage: {path}", options)
+    return SOLVER_FAILED if found.missing else DONE

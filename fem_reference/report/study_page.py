@@ -1,0 +1,201 @@
+"""The page of a study: error against cost, who is best at the same cost or error, what half the error costs."""
+
+import io
+import json
+from collections.abc import Sequence
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+from fem_reference.assessment.claims import Cover
+from fem_reference.assessment.cost_study import CaseStudy, Study
+from fem_reference.assessment.fronts import (
+    COSTS,
+    Match,
+    Point,
+    Price,
+    at_same_cost,
+    at_same_error,
+    levels,
+    pareto,
+    price,
+    solvers,
+)
+from fem_reference.assessment.transfer import transfers
+from fem_reference.report.claims_page import UNITS as CLAIMED_UNITS
+from fem_reference.report.claims_page import drawing as claims_drawing
+from fem_reference.report.curves import BAND, LOOK, PALETTE, Curve, inline
+from fem_reference.report.templates import template
+from fem_reference.report.words import listed, number, words
+
+REFERENCE = "fenicsx"
+TIME = "seconds_per_frame"
+# What the fronts, the sentences and the tables are about, and what tables are matched by.
+SHOWN = ("surface_deviation.rms", "fibre_length.rms_percent", "volume.deviation")
+MAIN = SHOWN[0]
+MATCHED = (TIME, "peak_memory_mb", "unknowns")
+_COLOURS = ("#222222", *PALETTE, "#7f7f7f", "#8c564b", "#17becf")
+
+
+def render(study: Study) -> str:
+    """The whole page as text."""
+    return template("study_page.html").render(
+        study=study,
+        title="What accuracy costs" + (f": {study.cases[0].title}" if len(study.cases) == 1 else ""),
+        shown=SHOWN,
+        main=MAIN,
+        time=TIME,
+        costs=COSTS,
+        fronts=fronts,
+        sentences=sentences,
+        matched=matched,
+        left_out=left_out,
+        title_of=title_of,
+        data=json.dumps(_data(study)).replace("</", "<\\/"),
+        cover=lambda case: Cover.of(case.claims),
+        claims=lambda case: [claims_drawing(case.claims, metric, case.case) for metric in CLAIMED_UNITS],
+        transfers=transfers(study.points, MAIN) if len(study.cases) > 1 else (),
+    )
+
+
+def title_of(name: str) -> str:
+    """A statistic or a cost in words.
+
+    >>> title_of("surface_deviation.rms"), title_of("seconds_per_frame")
+    ('surface deviation, rms', 'time of a frame')
+    """
+    return COSTS[name][0] if name in COSTS else ", ".join(map(words, name.split(".")))
+
+
+def sentences(case: CaseStudy, error: str = MAIN) -> list[str]:
+    """What a case says about the price of accuracy."""
+    unit = case.units[error]
+    prices = {solver: found for solver in solvers(case.points) if (found := price(case.points, solver, error, TIME))}
+    said = [_sentence(one, unit) for one in prices.values()]
+    others = {solver: one.best for solver, one in prices.items() if solver != REFERENCE}
+    if REFERENCE in prices and others:
+        nearest = min(others, key=lambda solver: others[solver])
+        if prices[REFERENCE].best < others[nearest]:
+            said.append(f"Below {number(others[nearest])} {unit}, the best of {nearest}, only the reference gets.")
+    return said
+
+
+def _sentence(one: Price, unit: str) -> str:
+    reach = f"{number(one.worst)} to {number(one.best)} {unit}"
+    if one.factor > 1:
+        return f"To halve the error of {one.solver} costs {number(one.factor)} times the time (from {reach})."
+    if one.count > 1:
+        return f"More time hardly makes {one.solver} better: from {reach} along its front."
+    return f"Of {one.solver} one setting is both the fastest and the nearest, with {number(one.best)} {unit}."
+
+
+def matched(case: CaseStudy, error: str = MAIN) -> list[tuple[str, str, list[Match]]]:
+    """Tables at the same time, memory, unknowns and error: what is the same, what is compared, and the rows."""
+    tables = [
+        (
+            cost,
+            error,
+            [at_same_cost(case.points, error, cost, at) for at in levels(case.points, error, cost, of_error=False)],
+        )
+        for cost in MATCHED
+    ]
+    rows = [at_same_error(case.points, error, TIME, at) for at in levels(case.points, error, TIME, of_error=True)]
+    return [*tables, (error, TIME, rows)]
+
+
+def left_out(case: CaseStudy) -> list[Point]:
+    """The points that are on no front since they did not reach all frames, or were refused."""
+    return [point for point in case.points if point.status != "converged"]
+
+
+def fronts(case: CaseStudy) -> list[Curve]:
+    """Error against time, a drawing for each of the statistics shown."""
+    return [_front(case, error) for error in SHOWN]
+
+
+def _front(case: CaseStudy, error: str) -> Curve:
+    title = title_of(error).capitalize()
+    with mpl.rc_context(LOOK):
+        figure = Figure(figsize=(4.9, 4.2), layout="constrained")
+        FigureCanvasSVG(figure)
+        axes = figure.add_subplot()
+        for i, solver in enumerate(solvers(case.points)):
+            _draw(
+                axes,
+                [point for point in case.points if point.solver == solver],
+                error,
+                solver,
+                _COLOURS[i % len(_COLOURS)],
+            )
+        if (bar := case.bars.get(error, 0.0)) > 0:
+            axes.axhspan(axes.get_ylim()[0], bar, color=BAND, linewidth=0, label="error bar of the truth")
+        axes.set(xscale="log", yscale="log")
+        axes.set_xlabel("time of a frame, s")
+        axes.set_ylabel(f"{title_of(error)}, {case.units[error]}")
+        figure.legend(loc="outside lower center", ncols=3, fontsize="small")
+        text = io.StringIO()
+        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
+    return Curve(title, inline(text.getvalue(), f"front-{case.case}-{error.replace('.', '-')}", title))
+
+
+def _draw(axes: Any, points: Sequence[Point], error: str, solver: str, colour: str) -> None:
+    """The points of a solver, its front as a line, its default settings as rings."""
+    pairs = [(point, pair) for point in points if (pair := point.at(error, TIME))]
+    if not pairs:
+        return
+    axes.plot(
+        [pair[1] for _, pair in pairs], [pair[0] for _, pair in pairs], ".", color=colour, markersize=5, label=solver
+    )
+    front = [pair for point in pareto(points, error, TIME) if (pair := point.at(error, TIME))]
+    axes.plot([pair[1] for pair in front], [pair[0] for pair in front], "-", color=colour, linewidth=1.2)
+    rings = [pair for point, pair in pairs if point.is_default]
+    axes.plot(
+        [pair[1] for pair in rings], [pair[0] for pair in rings], "o", color=colour, markersize=9, fillstyle="none"
+    )
+
+
+def _data(study: Study) -> dict[str, Any]:
+    """What the drawing with free axes draws."""
+    return {
+        "costs": COSTS,
+        "reference": REFERENCE,
+        "colours": _COLOURS,
+        "cases": [
+            {
+                "case": case.case,
+                "units": case.units,
+                "bars": case.bars,
+                "points": [
+                    {
+                        "solver": one.solver,
+                        "label": one.label,
+                        "default": one.is_default,
+                        "errors": one.errors,
+                        "costs": one.costs,
+                    }
+                    for one in case.points
+                    if one.status == "converged"
+                ],
+            }
+            for case in study.cases
+        ],
+    }
+
+
+def text(study: Study) -> str:
+    """A study as lines of text."""
+    lines = list[str]()
+    for case in study.cases:
+        there = sum(point.status == "converged" for point in case.points)
+        lines.append(f"{case.case}: {there} points of {listed(list(solvers(case.points)))}; the truth is {case.truth}")
+        for error in SHOWN:
+            known = f", known to {number(case.bars[error])} {case.units[error]}" if error in case.bars else ""
+            lines.append(f"  {title_of(error)}{known}:")
+            lines += [f"    {sentence}" for sentence in sentences(case, error)]
+        lines += [
+            f"  left out: {point.solver}, {point.label}: {point.status}: {point.message}" for point in left_out(case)
+        ]
+    lines += [f"left out: {case}: {why}" for case, why in study.missing.items()]
+    return "\n".join(lines)

@@ -1,0 +1,164 @@
+"""What accuracy costs on a case: its reference and candidates over ladders of settings, each run measured against the truth."""
+
+import logging
+import math
+import os
+import platform
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal, get_args
+
+import numpy as np
+
+from fem_reference import __version__, metrics
+from fem_reference.assessment.claims import Claim, claimed
+from fem_reference.assessment.cost_study import CaseStudy, Study
+from fem_reference.assessment.error_bars import ErrorBars
+from fem_reference.assessment.fronts import COSTS, Point
+from fem_reference.foundations.errors import InputError
+from fem_reference.metrics import MeasurementContext, at_rest, measure
+from fem_reference.runs.cost import seconds_per_frame
+from fem_reference.runs.key import versions
+from fem_reference.runs.store import Run
+from fem_reference.scenes.muscle import Scene
+from fem_reference.studies import refinement
+from fem_reference.studies.campaign import Made, Workers, carry_out
+from fem_reference.studies.execution import Bench, complete
+from fem_reference.studies.features import features
+from fem_reference.studies.ladders import Trial, candidate_trials, reference_trials
+
+log = logging.getLogger(__name__)
+
+# What is measured on every point.
+METRICS = ("volume", "fibre_length", "surface_deviation", "penetration")
+Part = Literal["reference", "candidates"]
+PARTS: tuple[Part, ...] = get_args(Part)
+_LADDERS = {"reference": reference_trials, "candidates": candidate_trials}
+# Error bars of so many of the reference's coarser members are set beside their errors: the finest of those that are cheap.
+_CLAIMING = 4
+
+
+def study(scenes: Iterable[Scene], store: Path, workers: Workers, parts: Sequence[Part] = PARTS) -> Study:
+    """Study each of ``scenes``, or ``parts`` of it, with runs in ``store``: solved where that was not done before."""
+    cases, missing = list[CaseStudy](), dict[str, str]()
+    for scene in scenes:
+        try:
+            cases.append(_of(scene, store, workers, parts))
+        except InputError as error:
+            log.info("%s is left out: %s", scene.name, error)
+            missing[scene.name] = str(error)
+    together = "one after the other" if workers == Workers() else f"{workers.count} at once"
+    machine = f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores, runs {together}"
+    return Study(tuple(cases), missing, {"fem_reference": __version__, "machine": machine, **versions()})
+
+
+def alone(found: Study, case: CaseStudy) -> Study:
+    """The part of a study that is about one of its cases."""
+    return Study((case,), {}, found.origin)
+
+
+def _of(scene: Scene, store: Path, workers: Workers, parts: Sequence[Part]) -> CaseStudy:
+    bench = Bench(scene, store)
+    log.info("%s: the truth", scene.name)
+    truth = bench.obtain("reference", scene.reference, "reference")
+    if truth.outcome.status != "converged" or truth.fibres is None:
+        raise InputError(scene.place, f"a reference that {truth.outcome.status}", "one that reaches all frames")
+    bars = refinement.stored(truth) or refinement.obtain(bench, truth, model=False)
+    context = MeasurementContext.of(truth, truth.fibres, bench.setup().bones, bench.setup().free)
+    trials = [trial for part in parts for trial in _LADDERS[part](scene)]
+    made = carry_out(trials, store, workers)
+    points = tuple(_point(scene, one, truth, context) for one in made)
+    size = scene.muscle.tet_size / 2**scene.muscle.refinements
+    return CaseStudy(
+        case=scene.name,
+        title=scene.title,
+        truth=f"its reference on tetrahedra of {size:.3g} mm",
+        points=points,
+        units=metrics.units(),
+        bars=_known(bars),
+        claims=_claims(made, truth, context, store),
+        triangles=len(truth.surface.triangles),
+        travel=context.travel,
+        features=features(scene, bench.setup()),
+    )
+
+
+def _known(bars: ErrorBars | None) -> dict[str, float]:
+    """How well each statistic of a deviation is known, at worst over the frames."""
+    if bars is None:
+        return {}
+    worst = {f"{bar.metric}.{bar.statistic}": float(bar.values[bar.worst]) for bar in bars.of_deviations}
+    return {name: value for name, value in worst.items() if math.isfinite(value)}
+
+
+def _point(scene: Scene, one: Made, truth: Run, context: MeasurementContext) -> Point:
+    trial, run = one.trial, one.run
+    choice = {"solver": trial.choice.solver, **trial.choice.settings}
+    if trial.changed:
+        choice["scene"] = trial.changed
+    point = Point(
+        case=scene.name,
+        solver=trial.choice.solver,
+        name=trial.name,
+        knob=trial.knob,
+        value=trial.value,
+        choice=choice,
+        status="refused",
+        message=one.failure,
+    )
+    if run is None:
+        return point
+    status, message = run.outcome.status, run.outcome.message
+    return replace(point, status=status, message=message, errors=errors(run, truth, context), costs=costs(run))
+
+
+def errors(run: Run, truth: Run, context: MeasurementContext) -> dict[str, float]:
+    """By ``metric.statistic``, the greatest magnitude over the frames of the deviation of a ``run`` from the ``truth``; nothing of
+    a run that did not reach every frame, and nothing of the truth itself.
+    """
+    if run.outcome.status != "converged" or run.folder == truth.folder:
+        return {}
+    whole = complete(run, truth.numbers)
+    found = {
+        f"{one.metric}.{one.statistic}": float(np.abs(one.values).max()) for one in _measures(whole, truth, context)
+    }
+    return {name: value for name, value in found.items() if math.isfinite(value)}
+
+
+def _measures(run: Run, truth: Run, context: MeasurementContext) -> tuple[metrics.Measure, ...]:
+    return measure(run, truth, context, METRICS)
+
+
+def costs(run: Run) -> dict[str, float]:
+    """What a run cost: those of ``COSTS`` that are known, and seconds by phase."""
+    cost = run.outcome.cost
+    each = seconds_per_frame(run)
+    found = {} if each is None else {"seconds_per_frame": each}
+    found |= {name: cost[name] for name in COSTS if name in cost}
+    return found | {name: value for name, value in cost.items() if name.startswith("seconds_")}
+
+
+def _claims(made: Sequence[Made], truth: Run, context: MeasurementContext, store: Path) -> tuple[Claim, ...]:
+    """The error bars of the reference on coarser tetrahedra, beside its difference from the truth."""
+    found = list[Claim]()
+    members = [
+        one for one in made if one.trial.knob == "tetrahedra" and one.run and one.run.outcome.status == "converged"
+    ]
+    for one in members[-_CLAIMING:]:
+        assert one.run is not None
+        log.info("error bars of %s", one.trial.label)
+        bars = refinement.stored(one.run) or refinement.obtain(Bench(one.trial.scene, store), one.run, model=False)
+        if bars is not None:
+            found += _claimed(one.trial, bars, one.run, truth, context)
+    return tuple(found)
+
+
+def _claimed(trial: Trial, bars: ErrorBars, run: Run, truth: Run, context: MeasurementContext) -> list[Claim]:
+    """The claims of the ``bars`` of a ``run`` about its change from rest and about deviations from it."""
+    names = ("surface_deviation", "fibre_length", "volume")
+    changes = [measure(one, at_rest(one), context, names) for one in (run, truth)]
+    surfaces = [replace(one, fibres=None, fibre_positions=None) for one in (run, truth)]  # as candidates are
+    deviations = [measure(surfaces[0], one, context, names) for one in surfaces]
+    case = f"{trial.scene.name}, {trial.value}"
+    return [*claimed(case, "change", bars, *changes), *claimed(case, "deviation", bars, *deviations)]

@@ -1,0 +1,40 @@
+"""What a case is like, as numbers known before it is solved: by them cases are compared."""
+
+import numpy as np
+
+from fem_reference.effects.contact import among
+from fem_reference.effects.fibre_passive import FibrePassive
+from fem_reference.effects.incompressible import Incompressible
+from fem_reference.effects.neo_hooke import NeoHooke
+from fem_reference.foundations.motion import apply
+from fem_reference.problems.muscle import Setup
+from fem_reference.scenes.muscle import Scene
+
+
+def features(scene: Scene, setup: Setup) -> dict[str, float]:
+    """``size`` [mm], the diagonal of the muscle's box; ``triangles``; ``motion`` [mm], the greatest displacement of an
+    attached vertex over the frames; ``contact``, how many bones may press; ``bulk_to_shear`` and ``fibres_to_shear`` of the
+    material, 0 where it has none; ``tet_size`` [mm] and ``refinements`` of the reference.
+    """
+    points = setup.surface.points
+    moved = [
+        np.linalg.norm(apply(entry.bone.pose(number), points[entry.vertices]) - points[entry.vertices], axis=1).max()
+        for entry in setup.attached
+        for number in setup.frames
+        if len(entry.vertices)
+    ]
+    contact = among(scene.effects)
+    shear = sum(effect.mu for effect in scene.effects if isinstance(effect, NeoHooke))
+    bulk = sum(effect.bulk for effect in scene.effects if isinstance(effect, Incompressible))
+    fibres = sum(effect.stress for effect in scene.effects if isinstance(effect, FibrePassive))
+    pressing = 0 if contact is None else len(scene.bone if contact.bones is None else contact.bones)
+    return {
+        "size": float(np.linalg.norm(np.ptp(points, axis=0))),
+        "triangles": float(len(setup.surface.triangles)),
+        "motion": float(max(moved, default=0.0)),
+        "contact": float(pressing),
+        "bulk_to_shear": bulk / shear if shear else 0.0,
+        "fibres_to_shear": fibres / shear if shear else 0.0,
+        "tet_size": float(scene.muscle.tet_size),
+        "refinements": float(scene.muscle.refinements),
+    }

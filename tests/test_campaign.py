@@ -1,0 +1,97 @@
+"""Campaigns: a point is the same alone, among workers and after a kill; a worker that dies loses nothing but time."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import small
+
+from fem_reference.foundations.subprocesses import command
+from fem_reference.scenes import casefile
+from fem_reference.scenes.muscle import SolverChoice
+from fem_reference.studies import cost
+from fem_reference.studies.campaign import Workers, carry_out
+from fem_reference.studies.ladders import Trial
+
+pytestmark = pytest.mark.slow
+PBD = {"sub_iterations": 3, "solver_iterations": 2, "damping": 0.05, "stretch": 1.0, "volume": 1.0, "bending": 0.5}
+
+
+def scene_in(folder: Path):
+    return casefile.read_muscle(small.write(folder / "bar"))
+
+
+def die_once(flag: Path, trial: Trial) -> Trial:
+    """The trial, but the first process that gets it dies of it."""
+    if not flag.exists():
+        flag.touch()
+        os._exit(9)
+    return trial
+
+
+@dataclass(frozen=True)
+class Deadly(Trial):
+    """A trial that kills the first worker that it is sent to."""
+
+    flag: Path = Path()
+
+    def __reduce__(self):
+        return die_once, (self.flag, Trial(self.scene, self.choice, self.name, self.knob, self.value))
+
+
+def test_a_worker_that_dies_loses_nothing(tmp_path) -> None:
+    scene = scene_in(tmp_path)
+    choices = [SolverChoice(solver="pbd", **(PBD | {"sub_iterations": count})) for count in (1, 2, 3)]
+    trials = [Trial(scene, choice, "pbd", "sub_iterations", str(i)) for i, choice in enumerate(choices)]
+    deadly = Deadly(scene, choices[1], "pbd", "sub_iterations", "1", flag=tmp_path / "died")
+    made = carry_out([trials[0], deadly, trials[2]], tmp_path / "runs", Workers(2))
+    assert (tmp_path / "died").exists()
+    assert [one.run.outcome.status for one in made] == ["converged"] * 3
+    alone = carry_out(trials, tmp_path / "alone", Workers())
+    for one, other in zip(made, alone, strict=True):
+        assert abs(one.run.positions - other.run.positions).max() == 0
+
+
+def test_bad_settings_are_one_trial_that_failed(tmp_path) -> None:
+    scene = scene_in(tmp_path)
+    bad = Trial(scene, SolverChoice(solver="pbd", **(PBD | {"stretch": 7.0})), "pbd", "stretch", "7")
+    good = Trial(scene, SolverChoice(solver="pbd", **PBD), "pbd")
+    for workers in (Workers(), Workers(2)):
+        refused, solved = carry_out([bad, good], tmp_path / "runs", workers)
+        assert refused.run is None
+        assert "stretch" in refused.failure
+        assert solved.run is not None
+
+
+def errors_of(study: cost.Study) -> dict[str, dict[str, float]]:
+    return {f"{point.name} {point.label}": point.errors for point in study.points}
+
+
+def test_a_point_is_the_same_alone_with_workers_and_after_a_kill(tmp_path) -> None:
+    folder = small.write(tmp_path / "bar")
+    alone = cost.study([scene_in(tmp_path)], tmp_path / "alone" / "runs", Workers(), ("candidates",))
+    assert len(errors_of(alone)) > 5
+    together = cost.study([scene_in(tmp_path)], tmp_path / "two" / "runs", Workers(2), ("candidates",))
+    assert errors_of(together) == errors_of(alone)
+    line = command(
+        "-m", "fem_reference", "study", str(folder), "--only", "candidates", "--out", str(tmp_path / "cut"), "--quiet"
+    )
+    with subprocess.Popen(line, start_new_session=True) as cut_off:
+        while not list((tmp_path / "cut" / "runs").glob("pbd-*/run.json")):
+            assert cut_off.poll() is None
+            time.sleep(0.05)
+        os.killpg(cut_off.pid, signal.SIGKILL)
+    assert not (tmp_path / "cut" / "bar" / "study.json").exists()
+    subprocess.run(line, check=True, stdout=sys.stderr)
+    points = json.loads((tmp_path / "cut" / "bar" / "study.json").read_text())["points"]
+    resumed = {
+        f"{point['name']} {point['label']}" if "label" in point else point["name"]: point["errors"] for point in points
+    }
+    assert list(resumed.values())[-1] == list(errors_of(alone).values())[-1]
+    assert [point["errors"] for point in points] == [point.errors for point in alone.points]

@@ -1,0 +1,116 @@
+"""Recommendations: measured where the case was studied, else from the cases most like it, with margins found by leaving each
+out.
+"""
+
+import json
+
+import pytest
+
+from fem_reference.assessment.cost_study import CaseStudy, facts, load
+from fem_reference.assessment.fronts import Point
+from fem_reference.assessment.recommendation import recommend
+from fem_reference.foundations.errors import InputError
+
+RMS, TIME = "surface_deviation.rms", "seconds_per_frame"
+SETTINGS = (
+    (1, 0.2, 0.001),
+    (3, 0.1, 0.003),
+    (10, 0.02, 0.01),
+)  # sweeps, error over motion, time of a frame of 1000 triangles
+
+
+def features(motion: float, triangles: float = 1000) -> dict[str, float]:
+    return {
+        "size": 200.0,
+        "triangles": triangles,
+        "motion": motion,
+        "contact": 1.0,
+        "bulk_to_shear": 1000.0,
+        "fibres_to_shear": 30.0,
+        "tet_size": 10.0,
+        "refinements": 1.0,
+    }
+
+
+def study(case: str, motion: float, triangles: float = 1000, bar: float = 0.0) -> CaseStudy:
+    """A case on which errors are those shares of its motion and times in proportion to its triangles."""
+    points = tuple(
+        Point(
+            case,
+            "pbd",
+            "pbd",
+            "sweeps",
+            str(sweeps),
+            {"solver": "pbd", "sweeps": sweeps},
+            "converged",
+            "",
+            {RMS: share * motion},
+            {TIME: time * triangles / 1000},
+        )
+        for sweeps, share, time in SETTINGS
+    )
+    known = {RMS: bar}
+    return CaseStudy(
+        case, case, "made up", points, {RMS: "mm"}, known, (), int(triangles), motion, features(motion, triangles)
+    )
+
+
+STUDIES = [study("a", 50), study("b", 80, 3000), study("c", 120, 2000)]
+
+
+def test_the_cheapest_that_meets_the_error_is_taken_on_a_studied_case() -> None:
+    found = recommend(features(50), "a", STUDIES, RMS, {"error": 6.0})
+    assert found.best is not None
+    assert found.best.point.choice["sweeps"] == 3
+    assert found.best.error == pytest.approx(5.0)
+    assert found.of == ("a",)
+
+
+def test_what_is_not_known_of_the_truth_counts_as_error() -> None:
+    found = recommend(features(50), "a", [study("a", 50, bar=2.0)], RMS, {"error": 6.0})
+    assert found.best is not None
+    assert found.best.point.choice["sweeps"] == 10
+
+
+def test_the_nearest_within_the_time_is_taken() -> None:
+    found = recommend(features(50), "a", STUDIES, RMS, {"time": 0.004})
+    assert found.best is not None
+    assert found.best.point.choice["sweeps"] == 3
+
+
+def test_another_case_is_expected_to_scale_with_motion_and_triangles() -> None:
+    # Errors follow the motion and times the triangles exactly, so that no margin is needed: 0.1 * 60 mm in 0.003 * 4 s.
+    found = recommend(features(60, 4000), "new", STUDIES, RMS, {"error": 6.5})
+    assert found.best is not None
+    assert found.margins.error == pytest.approx(1.0)
+    assert (found.best.error, found.best.time) == pytest.approx((6.0, 0.012))
+
+
+def test_a_case_that_errs_more_than_the_others_widens_the_margin() -> None:
+    worse = study("d", 50)
+    doubled = tuple(Point(**(vars(one) | {"errors": {RMS: 2 * one.errors[RMS]}})) for one in worse.points)
+    found = recommend(
+        features(60), "new", [*STUDIES, CaseStudy(**(vars(worse) | {"points": doubled}))], RMS, {"error": 1e9}
+    )
+    assert found.margins.error == pytest.approx(2.0, rel=0.1)
+
+
+def test_none_is_recommended_where_none_meets_what_is_asked() -> None:
+    assert recommend(features(50), "a", STUDIES, RMS, {"error": 0.01}).best is None
+    assert recommend(features(50), "new", STUDIES, RMS, {"time": 1e-9}).best is None
+
+
+def test_a_study_is_the_same_when_read_back(tmp_path) -> None:
+    path = tmp_path / "study.json"
+    path.write_text(json.dumps(facts(STUDIES[0], {"machine": "here"})))
+    assert load(path) == STUDIES[0] or vars(load(path)) == vars(STUDIES[0])
+
+
+@pytest.mark.parametrize(
+    "text", ["", "{}", "[]", '{"format": 2}', '{"format": 1, "points": 3, "origin": 0, "claims": []}']
+)
+def test_a_file_that_is_no_study_is_refused_by_name(tmp_path, text) -> None:
+    path = tmp_path / "study.json"
+    path.write_text(text)
+    with pytest.raises(InputError, match=r"study\.json"):
+        load(path)

@@ -1,0 +1,97 @@
+"""The page of a study: its sentences, its tables at the same cost or error, and a drawing whose axes the reader chooses."""
+
+import json
+import math
+import re
+
+import pytest
+
+from fem_reference.assessment.cost_study import CaseStudy, Study
+from fem_reference.assessment.fronts import Point
+from fem_reference.report import study_page, write_study
+
+UNITS = {"surface_deviation.rms": "mm", "fibre_length.rms_percent": "%", "volume.deviation": "%"}
+
+
+def points(solver: str, order: float, best: float, case: str = "hip") -> list[Point]:
+    """Points of a solver whose error falls with the time to the power ``order``, down to ``best``."""
+    found = []
+    for i, seconds in enumerate((1, 2, 4, 8)):
+        errors = dict.fromkeys(UNITS, best * (8 / seconds) ** order)
+        costs = {"seconds_per_frame": 0.01 * seconds, "peak_memory_mb": 100.0 * seconds, "unknowns": 500.0}
+        about = (case, solver, solver, "sweeps" if i else "", str(seconds) if i else "", {"solver": solver})
+        found.append(Point(*about, "converged", "", errors, costs))
+    return found
+
+
+def study(case: str = "hip", *more: Point) -> CaseStudy:
+    made = (*points("fenicsx", 1.0, 0.1, case), *points("pbd", 0.5, 4.0, case), *more)
+    bars = {"surface_deviation.rms": 0.2}
+    return CaseStudy(case, f"The {case}", "its reference", made, UNITS, bars, (), 1000, 100.0)
+
+
+def test_the_price_of_half_the_error_is_said_in_a_sentence() -> None:
+    said = study_page.sentences(study())
+    # Errors that fall as the square root of the time take four times the time to halve, those of first order twice.
+    assert said[0].startswith("To halve the error of fenicsx costs 2.00 times the time")
+    assert said[1].startswith("To halve the error of pbd costs 4.00 times the time")
+    assert said[2] == "Below 4 mm, the best of pbd, only the reference gets."
+
+
+def test_a_solver_that_time_does_not_help_is_said_to_be_so() -> None:
+    flat = [
+        Point(
+            "hip",
+            "arap",
+            "arap",
+            "n",
+            str(i),
+            {},
+            "converged",
+            "",
+            {"surface_deviation.rms": 5 - 0.1 * i},
+            {"seconds_per_frame": i},
+        )
+        for i in (1, 2, 3)
+    ]
+    assert any(
+        sentence.startswith("More time hardly makes arap better")
+        for sentence in study_page.sentences(study("hip", *flat))
+    )
+
+
+def test_the_page_shows_what_was_left_out_and_why(tmp_path) -> None:
+    failed = Point("hip", "xpbd", "xpbd", "sweeps", "<b>1</b>", {}, "diverged", "frame 3: & lost")
+    path = write_study(
+        Study((study("hip", failed),), {"far": "data is missing"}, {"machine": "here"}), tmp_path, "study"
+    )
+    text = path.read_text(encoding="utf-8")
+    assert "diverged: frame 3: &amp; lost" in text
+    assert "<b>1</b>" not in text
+    assert "data is missing" in text
+    assert not re.search(r'(?:src|href)="https?:', text)
+
+
+def test_tables_compare_at_the_same_cost_and_never_at_the_same_settings() -> None:
+    tables = {same: rows for same, _, rows in study_page.matched(study())}
+    assert set(tables) == {"seconds_per_frame", "peak_memory_mb", "unknowns", "surface_deviation.rms"}
+    for row in tables["seconds_per_frame"]:
+        assert all(point.costs["seconds_per_frame"] <= row.at for point in row.best.values())
+
+
+def test_numbers_of_the_page_are_valid_json_with_every_point(tmp_path) -> None:
+    write_study(Study((study(),), {}, {"machine": "here"}), tmp_path, "study")
+    found = json.loads(
+        (tmp_path / "study.json").read_text(encoding="utf-8"), parse_constant=lambda name: pytest.fail(name)
+    )
+    assert len(found["points"]) == 8
+    text = (tmp_path / "study.html").read_text(encoding="utf-8")
+    data = json.loads(re.search(r'id="study">(.*?)</script>', text, re.DOTALL)[1])
+    assert len(data["cases"][0]["points"]) == 8
+
+
+def test_settings_are_tried_on_cases_that_they_were_not_chosen_on(tmp_path) -> None:
+    whole = Study(tuple(study(case) for case in ("hip", "knee", "jaw")), {}, {"machine": "here"})
+    text = write_study(whole, tmp_path, "study").read_text(encoding="utf-8")
+    assert "Are settings that are good on some cases good on another?" in text
+    assert math.isclose(max(one.loss for one in study_page.transfers(whole.points, "surface_deviation.rms")), 0.0)
