@@ -19,7 +19,7 @@ from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import PositiveLength
 from fem_reference.problems.muscle import Setup
 from fem_reference.runs.store import Outcome, Sink
-from fem_reference.solvers.arap import Cells, Relaxed, Symmetric, System, compile_kernels, farthest, march
+from fem_reference.solvers.arap import Cells, Relaxed, Symmetric, System, alternate, compile_kernels, farthest
 from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.pbd import Constraints, Stiffness
 from fem_reference.solvers.pbd_kernels import project_dihedrals, project_distances, project_volume, volume
@@ -76,7 +76,7 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
             return found
         return Relaxed(projected(found.points, rest, settings.projections), found.iterations, found.met, found.trouble)
 
-    return march(setup, system, relax, sink, cost)
+    return alternate(setup, system, relax, sink, cost)
 
 
 def minimise(system: System, points: Floats, settings: Settings, rest: Constraints) -> Relaxed:

@@ -46,7 +46,8 @@ from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record
 from fem_reference.problems.muscle import Problem, RigidBody, Setup
 from fem_reference.runs.store import Outcome, Sink
-from fem_reference.solvers.pbd import Constraints, along_fibres, carry, follow
+from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow
+from fem_reference.solvers.pbd import Constraints, along_fibres
 from fem_reference.solvers.pbd_kernels import distances, nearest_segments
 from fem_reference.solvers.program_kernels import (
     angles_of,
@@ -200,7 +201,7 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
             points, velocity = reached, (reached - points) * (1 / STEP)
         return points, velocity
 
-    return follow(setup, iterate, sink, cost)
+    return follow(MovingSurface(setup, iterate, cost), setup.frames, sink)
 
 
 def project(points: Floats, at: Constraints, bending: float) -> None:

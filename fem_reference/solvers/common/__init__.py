@@ -1,1 +1,1 @@
-"""Shared by solvers: load steps, checks of states."""
+"""Shared by solvers: the loop over frames, load steps, checks of states."""
