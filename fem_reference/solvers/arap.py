@@ -25,6 +25,7 @@ from fem_reference.problems.muscle import Setup
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers import arap_kernels
 from fem_reference.solvers.common.frame_loop import carry, follow, refused
+from fem_reference.solvers.common.protocol import MuscleSolver, Trade
 from fem_reference.solvers.common.state_checks import Trouble, trouble
 
 Symmetric = Literal["cotangent", "clamped cotangent", "kirchhoff"]
@@ -53,7 +54,7 @@ class Settings(Record):
     fixed: Fixed
     rotations: Literal["each", "first only"]
     volume_step: bool
-    iterations: Annotated[int, Field(gt=0)]
+    iterations: Annotated[int, Field(gt=0), Trade((1, 3, 10, 30, 100))]
     tolerance: PositiveLength | None = None
 
 
@@ -288,3 +289,13 @@ def _untied(laplacian: Any, attached: Ints) -> Ints:
     """The vertices that no chain of edges of a weight other than 0 leads to a attached one; none where nothing is attached."""
     part = connected_components(laplacian != 0, directed=False)[1]
     return np.flatnonzero(~np.isin(part, part[attached])) if len(attached) else np.zeros(0, np.int64)
+
+
+_EXAMPLE = {
+    "weights": "clamped cotangent",
+    "fixed": "remove",
+    "rotations": "each",
+    "volume_step": False,
+    "iterations": 3,
+}
+SOLVES = (MuscleSolver(settings=Settings, solve=solve, example=_EXAMPLE),)

@@ -21,6 +21,7 @@ from fem_reference.problems.muscle import Problem, RigidBody
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.scenes import bones
 from fem_reference.solvers.common.frame_loop import each
+from fem_reference.solvers.common.protocol import MuscleSolver
 from fem_reference.solvers.common.state_checks import Trouble
 
 # An end this deep [mm] in an obstacle is on its surface, but for rounding.
@@ -239,3 +240,6 @@ def _index(bodies: tuple[RigidBody, ...], name: str, key: str) -> int:
     if name not in names:
         raise InputError(f"line_of_action: {key}", f'"{name}"', f"one of {', '.join(names)}")
     return names.index(name)
+
+
+SOLVES = (MuscleSolver(settings=Settings, solve=solve, example={}),)

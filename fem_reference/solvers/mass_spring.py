@@ -25,6 +25,7 @@ from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers import collision_kernels
 from fem_reference.solvers.collision_kernels import Obstacle, move_out
 from fem_reference.solvers.common.frame_loop import follow, other_clock, refused
+from fem_reference.solvers.common.protocol import MuscleSolver, Trade
 from fem_reference.solvers.common.state_checks import Trouble, trouble
 from fem_reference.solvers.pbd import Collision
 from fem_reference.solvers.spring_kernels import Network, PrescribedPath, advance, forces
@@ -62,7 +63,7 @@ class Settings(Record):
 
     stiffness: Stiffness
     density: Density
-    frame_time: Time
+    frame_time: Annotated[Time, Trade(("5 ms", "20 ms", "80 ms"))]
     damping: Annotated[float | Literal["eq. 5.5"] | None, BeforeValidator(_damping)] = None
     gravity: AccelerationVector | None = None
     collision: Collision | None = None
@@ -279,3 +280,7 @@ def _compile(settings: Settings) -> float:
     if settings.collision is not None:
         collision_kernels.compile_all()
     return time.perf_counter() - begin
+
+
+_EXAMPLE = {"stiffness": "1 N/mm", "density": "1060 kg/m3", "frame_time": "20 ms", "damping": "eq. 5.5"}
+SOLVES = (MuscleSolver(settings=Settings, solve=solve, example=_EXAMPLE),)

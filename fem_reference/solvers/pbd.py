@@ -23,6 +23,7 @@ from fem_reference.runs.store import Outcome, Sink
 from fem_reference.solvers import collision_kernels
 from fem_reference.solvers.collision_kernels import Obstacle, move_out
 from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow
+from fem_reference.solvers.common.protocol import MuscleSolver, Trade
 from fem_reference.solvers.pbd_kernels import (
     dihedrals,
     distances,
@@ -59,8 +60,8 @@ class Settings(Record):
     1 in the report's program, when it has fibres. ``collision``: contact with bones (lines 12 to 14).
     """
 
-    sub_iterations: Annotated[int, Field(gt=0)]
-    solver_iterations: Annotated[int, Field(gt=0)]
+    sub_iterations: Annotated[int, Field(gt=0), Trade((1, 3, 10))]
+    solver_iterations: Annotated[int, Field(gt=0), Trade((1, 3, 10, 30))]
     damping: Annotated[float, Field(ge=0, lt=1)]
     stretch: Stiffness
     volume: Stiffness
@@ -197,3 +198,7 @@ def _compile(settings: Settings) -> float:
     if settings.collision is not None:
         collision_kernels.compile_all()
     return time.perf_counter() - begin
+
+
+_EXAMPLE = {"sub_iterations": 3, "solver_iterations": 2, "damping": 0.1, "stretch": 1.0, "volume": 1.0, "bending": 0.5}
+SOLVES = (MuscleSolver(settings=Settings, solve=solve, example=_EXAMPLE),)
