@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 
 import pytest
 import small
+import stand_ins
 
 from fem_reference import cli
 from fem_reference.io import files
@@ -63,16 +64,14 @@ class Work:
 @pytest.fixture
 def solved(monkeypatch) -> None:
     """The reference is made by ``swell``."""
-    monkeypatch.setattr(fenicsx, "require", lambda _: None)
-    monkeypatch.setattr(fenicsx, "solve", swell)
+    stand_ins.solve_by(monkeypatch, fenicsx, swell)
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory) -> Path:
     """The folder of a case with a baseline, its reference solved and its error bars known."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fenicsx, "require", lambda _: None)
-        patch.setattr(fenicsx, "solve", swell)
+        stand_ins.solve_by(patch, fenicsx, swell)
         root = tmp_path_factory.mktemp("made")
         small.write(root / "bar")
         (root / "mine").mkdir()
@@ -125,7 +124,7 @@ def test_an_update_takes_current_values(work) -> None:
 
 @pytest.mark.usefixtures("solved")
 def test_a_candidate_of_the_case_is_checked_by_its_name(work, monkeypatch) -> None:
-    monkeypatch.setattr(pbd, "solve", swell)
+    stand_ins.solve_by(monkeypatch, pbd, swell)
     work.baseline = work.root / "pbd.json"
     assert work.check("--update", candidate="pbd") == cli.DONE
     assert work.check(candidate="pbd") == cli.DONE
@@ -135,7 +134,7 @@ def test_a_candidate_of_the_case_is_checked_by_its_name(work, monkeypatch) -> No
 @pytest.mark.usefixtures("solved")
 @pytest.mark.parametrize("solver", [fenicsx, pbd])
 def test_a_solver_that_fails_is_status_three_and_writes_no_baseline(work, monkeypatch, capsys, solver) -> None:
-    monkeypatch.setattr(solver, "solve", fail)
+    stand_ins.solve_by(monkeypatch, solver, fail)
     for stored in (work.root / "reports" / "runs").glob(f"{solver.__name__.split('.')[-1]}-*"):
         shutil.rmtree(stored)
     work.baseline = work.root / "pbd.json"

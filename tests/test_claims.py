@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 import small
+import stand_ins
 
 from fem_reference import cli
 from fem_reference.assessment.claims import CLAIMED, Claim, Claims, Cover, claimed
@@ -79,8 +80,7 @@ def test_it_is_asked_for_by_the_command_line(tmp_path, monkeypatch) -> None:
             sink(Frame(number, problem.surface.points * factor, problem.fibres.points * factor))
         return Outcome("converged", "done", {"seconds": 1.0})
 
-    monkeypatch.setattr(fenicsx, "require", lambda _: None)
-    monkeypatch.setattr(fenicsx, "solve", swell)
+    stand_ins.solve_by(monkeypatch, fenicsx, swell)
     case, out = small.write(tmp_path / "bar"), tmp_path / "out"
     assert cli.main(["page", "error-bars", "--case", str(case), "--out", str(out), "--quiet"]) == cli.DONE
     numbers = json.loads((out / "error-bars.json").read_text())

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import small
+import stand_ins
 
 from fem_reference import cli, report
 from fem_reference.assessment import solver_table
@@ -50,8 +51,7 @@ def shift(problem, _, sink) -> Outcome:
 @pytest.fixture
 def case(tmp_path, monkeypatch):
     """The small scene, its reference shifted, and a table of two families."""
-    monkeypatch.setattr(fenicsx, "require", lambda _: None)
-    monkeypatch.setattr(fenicsx, "solve", shift)
+    stand_ins.solve_by(monkeypatch, fenicsx, shift)
     monkeypatch.setattr(table_5_1, "families", lambda: ROWS)
     monkeypatch.setattr(candidates, "families", lambda: ROWS)
     return small.write(tmp_path / "bar")
@@ -220,7 +220,7 @@ def test_a_ratio_is_reported_where_the_report_has_a_speed() -> None:
 
 
 def test_a_solver_that_fails_has_no_time(case, monkeypatch) -> None:
-    monkeypatch.setattr(pbd, "solve", lambda *_: Outcome("diverged", "lost"))
+    stand_ins.solve_by(monkeypatch, pbd, lambda *_: Outcome("diverged", "lost"))
     timings, machine = candidates.measure([Bench(casefile.read_muscle(case), case.parent)])
     assert [one.per_second for one in timings] == [None, None]
     assert "pbd failed" in candidates.text(timings, machine)

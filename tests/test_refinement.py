@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import small
+import stand_ins
 
 from fem_reference import cli, metrics, report
 from fem_reference.assessment import error_bars
@@ -17,7 +18,7 @@ from fem_reference.report import gallery
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import Scene
-from fem_reference.solvers import fenicsx
+from fem_reference.solvers import fenicsx, recorded
 from fem_reference.solvers.common.load_steps import Attempt, Steps, march
 from fem_reference.solvers.fenicsx import Settings
 from fem_reference.studies import refinement
@@ -48,8 +49,7 @@ def swell(problem, _settings, sink) -> Outcome:
 @pytest.fixture
 def case(tmp_path, monkeypatch) -> Path:
     """The small scene, solved by ``swell``, without its page."""
-    monkeypatch.setattr(fenicsx, "require", lambda _: None)
-    monkeypatch.setattr(fenicsx, "solve", swell)
+    stand_ins.solve_by(monkeypatch, fenicsx, swell)
     monkeypatch.setattr(report, "write", lambda _, folder: folder)
     return small.write(tmp_path / "bar")
 
@@ -144,7 +144,7 @@ def test_a_run_that_failed_has_none(case, monkeypatch) -> None:
         sink(Frame(0, problem.surface.points, problem.fibres.points))
         return Outcome("diverged", "no")
 
-    monkeypatch.setattr(fenicsx, "solve", fail)
+    stand_ins.solve_by(monkeypatch, fenicsx, fail)
     status, facts = call(case, "run", "--error-bar")
     assert (status, facts["error_bars"]) == (cli.SOLVER_FAILED, [])
 
@@ -159,7 +159,7 @@ def test_a_coarser_run_that_fails_leaves_frames_without_a_bar(case, monkeypatch)
         sink(Frame(0, problem.surface.points, problem.fibres.points))
         return Outcome("diverged", "no")
 
-    monkeypatch.setattr(fenicsx, "solve", fail)
+    stand_ins.solve_by(monkeypatch, fenicsx, fail)
     _, facts = call(case, "run", "--error-bar")
     values = rows(facts, "change", "surface_deviation", "max")
     assert values.tolist()[1:] == [None] * 4
@@ -213,7 +213,7 @@ def test_load_steps_are_varied_where_time_matters(case) -> None:
     path.write_text(path.read_text().replace("every = 5", 'every = 5\ninterval = "20 ms"'))
     timed = scene_of(case, VISCOSITY)
     assert [entry.name for entry in refinement.variations(timed, Settings())] == ["load steps"]
-    assert refinement.variations(timed, object()) == ()
+    assert refinement.variations(timed, recorded.Settings(folder="frames", unit="mm")) == ()
 
 
 def test_where_no_bone_pressed_contact_has_no_error(case) -> None:

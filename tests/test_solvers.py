@@ -1,5 +1,7 @@
 """The solver contract: every solver meets the same small problem, and says the same kind of things about it."""
 
+import sys
+
 import numpy as np
 import pytest
 import shapes
@@ -8,27 +10,33 @@ from fem_reference import effects, solvers
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines, Surface, TetMesh
 from fem_reference.foundations.motion import Rotation, apply
+from fem_reference.foundations.records import Record, parse
 from fem_reference.io import files
+from fem_reference.problems import scalar
+from fem_reference.problems.body import Body, Prescribed
 from fem_reference.problems.muscle import AttachedVertices, Problem
+from fem_reference.problems.paths import Turn
+from fem_reference.problems.shapes import box
 from fem_reference.runs.store import Frame
+from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import SolverChoice
-
-pytestmark = pytest.mark.slow
+from fem_reference.solvers.common.frame_loop import carry
+from fem_reference.solvers.common.protocol import trades
 
 MUSCLE = (
     effects.find("neo_hooke").model_validate({"mu": "10 kPa"}),
     effects.find("incompressible").model_validate({"bulk": "10 MPa"}),
 )
 BEND = Rotation((1, 0, 0), (5, 5, 0), (0.0, 10.0), (0.0, 0.3))
-PBD = {"sub_iterations": 3, "solver_iterations": 2, "damping": 0.1, "stretch": 1.0, "volume": 1.0, "bending": 0.5}
-SPRINGS = {"stiffness": "1 N/mm", "density": "1060 kg/m3", "frame_time": "20 ms", "damping": "eq. 5.5"}
-SETTINGS = {"fenicsx": {"ranks": 1}, "pbd": PBD, "recorded": {"unit": "mm"}}
-ARAP = {"weights": "clamped cotangent", "iterations": 3}
-SETTINGS |= {"arap": ARAP | {"fixed": "remove", "rotations": "each", "volume_step": False}}
-SETTINGS |= {"arap_pbd": ARAP | {"volume_constraint": True}}
-SETTINGS |= {"line_of_action": {}, "mass_spring": SPRINGS}
-SETTINGS |= {"pbd_program": {"sub_iterations": 3, "damping": 0.01, "bending": 0.9, "voxels": 64, "anisotropy": 1.0}}
-SETTINGS["xpbd"] = {"frame_time": "20 ms", "sub_steps": 2, "sweeps": 2, "density": "1060 kg/m3", "stretch": "0.4 N/mm"}
+
+
+def offered(task: str) -> list:
+    """The names of the solvers for a ``task``, each slow where it says so."""
+    slow = {name: solvers.find(name, "tests", task).slow for name in solvers.names(task)}
+    return [pytest.param(name, marks=[pytest.mark.slow] if slow[name] else []) for name in slow]
+
+
+OFFERS = [(name, offer.task) for name in solvers.names() for offer in solvers.offers(name)]
 
 
 def problem(motion: Rotation | None = BEND, other: Rotation | None = None) -> Problem:
@@ -36,20 +44,49 @@ def problem(motion: Rotation | None = BEND, other: Rotation | None = None) -> Pr
 
 
 def solved(name: str, given: Problem, folder) -> tuple:
-    settings = dict(SETTINGS[name])
-    if name == "recorded":
-        for number in given.frames:
-            files.write_surface(folder / f"frame_{number}.vtp", given.surface, given.surface.points)
+    solver = solvers.find(name, "case.toml")
+    settings = dict(solver.example)
+    if "folder" in settings:  # of frames: the attached vertices move, and nothing else
         settings["folder"] = str(folder)
+        for number in given.frames:
+            points = np.array(given.surface.points)
+            carry(points, given, number)
+            files.write_surface(folder / f"frame_{number}.vtp", given.surface, points)
     frames: list[Frame] = []
     record = solvers.settings(SolverChoice(solver=name, **settings), "case.toml")
-    return solvers.find(name, "case.toml").solve(given, record, frames.append), frames
+    return solver.solve(given, record, frames.append), frames
 
 
-def test_every_solver_is_under_test() -> None:
-    assert sorted(SETTINGS) == solvers.names("solve")
-    assert solvers.names("solve_field") == ["fenicsx", "listing", "scikit_fem"]
-    assert solvers.names() == sorted({*solvers.names("solve"), *solvers.names("solve_field")})
+@pytest.mark.parametrize(("name", "task"), OFFERS)
+def test_an_offer_has_an_example_of_its_settings_and_ladders_of_values_that_they_take(name, task) -> None:
+    offer = solvers.find(name, "tests", task)
+    assert isinstance(solvers.settings(SolverChoice(solver=name, **offer.example), "case.toml", task), Record)
+    for key, ladder in trades(offer.settings).items():
+        assert len(set(ladder)) == len(ladder) > 1
+        for value in ladder:
+            changed = SolverChoice(solver=name, **offer.example | {key: value})
+            assert key in solvers.settings(changed, "case.toml", task).model_fields_set
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("", "solvers/unfinished: SOLVES is None, want a tuple of MuscleSolver, FieldSolver or BodySolver"),
+        ("SOLVES = ()", "SOLVES is .., want a tuple"),
+        ("SOLVES = len", "SOLVES is <built-in function len>, want a tuple"),
+        ("SOLVES = (MuscleSolver(settings=Settings, solve=len),)", "missing 1 required .* 'example'"),
+        ("SOLVES = (MuscleSolver(settings=Settings, example={}),)", "missing 1 required .* 'solve'"),
+    ],
+)
+def test_a_file_that_is_no_solver_is_named_with_what_it_lacks(text, problem, tmp_path, monkeypatch) -> None:
+    imports = "from fem_reference.solvers.common.protocol import MuscleSolver\nfrom fem_reference.solvers.pbd import Settings\n"
+    (tmp_path / "unfinished.py").write_text(imports + text)
+    monkeypatch.setattr(solvers, "__path__", [*solvers.__path__, str(tmp_path)])
+    monkeypatch.setitem(sys.modules, "fem_reference.solvers.unfinished", None)  # so that it is gone afterwards
+    del sys.modules["fem_reference.solvers.unfinished"]
+    assert "unfinished" in solvers.names()
+    with pytest.raises(TypeError, match=problem):
+        solvers.names("solve")
 
 
 def test_an_unknown_solver_is_named() -> None:
@@ -67,43 +104,72 @@ def test_a_solver_for_something_else_is_named(name, task) -> None:
         solvers.find(name, "case.toml: reference", task)
 
 
-@pytest.mark.parametrize("name", SETTINGS)
-def test_settings_are_strict(name) -> None:
-    choice = SolverChoice(solver=name, **SETTINGS[name], speed=11)
+@pytest.mark.parametrize(("name", "task"), OFFERS)
+def test_settings_are_strict(name, task) -> None:
+    choice = SolverChoice(solver=name, **solvers.find(name, "tests", task).example, speed=11)
     with pytest.raises(InputError, match="speed: got an unknown key"):
-        solvers.settings(choice, "case.toml: reference")
+        solvers.settings(choice, "case.toml: reference", task)
 
 
-@pytest.mark.parametrize("name", SETTINGS)
+@pytest.mark.parametrize("name", offered("solve"))
 def test_every_frame_is_reached_in_order_and_the_first_is_rest(name, tmp_path) -> None:
     given = problem()
     outcome, frames = solved(name, given, tmp_path)
     assert outcome.status == "converged"
     assert outcome.message
     assert [frame.number for frame in frames] == [0, 5, 10]
-    if name == "line_of_action":  # it has no surface, and begins as straight lines
-        assert frames[0].surface is None
+    if frames[0].surface is None:  # of a solver of lines, which begins as straight ones
+        assert all(frame.fibres is not None for frame in frames)
     else:
         assert frames[0].surface == pytest.approx(given.surface.points, abs=1e-9)
     assert all(np.isfinite(value) for value in outcome.cost.values())
 
 
-@pytest.mark.parametrize("name", ["arap", "arap_pbd", "fenicsx", "mass_spring", "pbd", "pbd_program", "xpbd"])
+@pytest.mark.parametrize("name", offered("solve"))
 def test_nothing_that_moves_moves_nothing(name, tmp_path) -> None:
     given = problem(motion=None)
     _, frames = solved(name, given, tmp_path)
     for frame in frames:
-        assert frame.surface == pytest.approx(given.surface.points, abs=1e-9)
+        moved, rest = (
+            (frame.surface, given.surface.points) if frame.surface is not None else (frame.fibres, frames[0].fibres)
+        )
+        assert moved == pytest.approx(rest, abs=1e-9)
 
 
-@pytest.mark.parametrize("name", ["arap", "arap_pbd", "fenicsx", "mass_spring", "pbd", "pbd_program", "xpbd"])
+@pytest.mark.parametrize("name", offered("solve"))
 def test_attached_vertices_follow_their_bones(name, tmp_path) -> None:
     given = problem()
     _, frames = solved(name, given, tmp_path)
     for frame in frames:
-        for attached in given.attached:
+        for attached in given.attached if frame.surface is not None else ():
             expected = apply(attached.bone.pose(frame.number), given.surface.points[attached.vertices])
             assert frame.surface[attached.vertices] == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", offered("solve_field"))
+def test_a_field_has_a_value_at_every_node_and_a_cost(name) -> None:
+    solver = solvers.find(name, "tests", "solve_field")
+    built = scalar.build(casefile.read("rod"))
+    solution = solver.solve_field(built, parse(solver.settings, solver.example, name))
+    assert solution.outcome.status == "converged"
+    assert solution.outcome.message
+    assert solution.values.shape == built.fixed.shape
+    assert np.isfinite(solution.values).all()
+    assert all(np.isfinite(value) for value in solution.outcome.cost.values())
+
+
+@pytest.mark.parametrize("name", offered("solve_body"))
+def test_a_body_turns_with_its_ends(name) -> None:
+    solver = solvers.find(name, "tests", "solve_body")
+    mesh, turn = box((1, 1, 2), (1.0, 2.0, 3.0), "tetrahedron"), Turn((0.0, 1.0, 0.0), 0.4, (0.0, 0.0, 0.0))
+    ends = tuple(Prescribed(end, end, (0, 1, 2), turn) for end in ("z0", "z1"))
+    body = Body(mesh, MUSCLE, ends, (0.0, 0.5, 1.0))
+    solved = solver.solve_body(body, parse(solver.settings, solver.example, name))
+    assert solved.outcome.status == "converged"
+    assert [state.frame for state in solved.states] == [0.0, 0.5, 1.0]
+    for state in solved.states:
+        assert state.points == pytest.approx(mesh.points + turn(mesh.points, state.frame), abs=1e-7)
+    assert all(np.isfinite(value) for value in solved.outcome.cost.values())
 
 
 def shuffled(given: Problem, seed: int) -> tuple[Problem, np.ndarray]:
@@ -121,6 +187,7 @@ def shuffled(given: Problem, seed: int) -> tuple[Problem, np.ndarray]:
     return Problem(**(vars(given) | {"surface": surface, "attached": attached, "mesh": mesh})), vertex_at
 
 
+@pytest.mark.slow
 def test_the_reference_does_not_depend_on_the_order_of_nodes(tmp_path) -> None:
     # PBD does, and says so: its constraints are projected one after the other.
     given = problem()

@@ -12,67 +12,15 @@ from fem_reference.runs.solved import Reached, Solved
 from fem_reference.runs.store import Outcome
 from fem_reference.verification import runner
 
-pytestmark = pytest.mark.slow
-
 ENTRIES = runner.entries()
-# Above some 4 s, or like another one: left to the verb verify.
-SLOW = {
-    "hertz_force",
-    "hertz_radius",
-    "hertz_pressure",
-    "cook_compressible_linear",
-    "cook_hexahedra",
-    "cook_quarter_load",
-    "cook_quarter_load_hexahedra",
-    "cook_full_load",
-    "beam_follower",
-    "ventricle_passive_inside_tetrahedra",
-    "ventricle_passive_outside_tetrahedra",
-    "ventricle_passive_inside_hexahedra",
-    "ventricle_passive_outside_hexahedra",
-    "ventricle_active_inside",
-    "ventricle_active_outside",
-    "inflation_sphere_pressure_tetrahedra",
-    "inflation_sphere_pressure_hexahedra",
-    "inflation_sphere_pressure_mooney_rivlin",
-    "inflation_tube_pressure",
-    "inflation_limit_stretch",
-    "inflation_fall_beyond_limit",
-    "torsion_moment_tetrahedra",
-    "torsion_moment_hexahedra",
-    "torsion_axial_force",
-}
-SLOW_NEGATIVE_CONTROLS = {
-    "hertz_force",
-    "hertz_radius",
-    "hertz_pressure",
-    "cook_quarter_load_hexahedra",
-    "beam_follower",
-    "ventricle_passive_inside_tetrahedra",
-    "ventricle_passive_outside_tetrahedra",
-    "ventricle_passive_inside_hexahedra",
-    "ventricle_passive_outside_hexahedra",
-    "ventricle_active_inside",
-    "ventricle_active_outside",
-    "inflation_sphere_pressure_tetrahedra",
-    "inflation_sphere_pressure_mooney_rivlin",
-    "inflation_limit_pressure",
-    "inflation_limit_stretch",
-    "torsion_moment_tetrahedra",
-    "torsion_moment_hexahedra",
-    "torsion_axial_force",
-}
 # Quadratic elements promise order 4 for the work of stresses; less is room for meshes that are not fine enough yet.
 FOURTH_ORDER = {"torsion", "inflation", "flexure"}
 # Where rounding alone is left, a negative control misses by far more than what is allowed; where a mesh is judged, clearly.
 ROUNDING = {"homogeneous", "fibres", "loads", "patch tests", "rigid motion"}
 
 
-def measured(name: str) -> bool:
-    return name not in SLOW
-
-
-@pytest.mark.parametrize("entry", [e for e in ENTRIES.values() if measured(e.name)], ids=lambda entry: entry.name)
+@pytest.mark.slow
+@pytest.mark.parametrize("entry", [e for e in ENTRIES.values() if not e.slow], ids=lambda entry: entry.name)
 def test_an_entry_finds_its_truth(entry: Entry, fem_lab) -> None:
     found = result(entry, entry.measure(fem_lab), 0.0, with_negative_control=False)
     assert found.word == "pass", (found.finding, found.truth, found.within)
@@ -80,8 +28,9 @@ def test_an_entry_finds_its_truth(entry: Entry, fem_lab) -> None:
         assert found.finding.order is None or found.finding.order > 3.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    "entry", [e for e in ENTRIES.values() if e.name not in SLOW_NEGATIVE_CONTROLS], ids=lambda entry: entry.name
+    "entry", [e for e in ENTRIES.values() if not e.slow_negative_control], ids=lambda entry: entry.name
 )
 def test_with_its_negative_control_it_misses_clearly(entry: Entry, fem_lab) -> None:
     found = result(entry, entry.with_negative_control(fem_lab), 0.0, with_negative_control=True)
@@ -117,7 +66,3 @@ def finest(measure: Callable[[Lab], object]) -> dict[str, int]:
 def test_a_negative_control_is_measured_on_the_finest_mesh(entry: Entry) -> None:
     # On a coarser one the right body may miss too, and the negative control would not be what fails.
     assert finest(entry.with_negative_control) == finest(entry.measure)
-
-
-def test_what_is_left_out_is_there() -> None:
-    assert ENTRIES.keys() >= SLOW | SLOW_NEGATIVE_CONTROLS

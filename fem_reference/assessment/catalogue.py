@@ -43,6 +43,8 @@ class Entry:
     ``measure`` finds the number that ``truth`` gives, both in ``unit``; it must come within ``within`` (of the truth's size where
     ``relative``, else in ``unit``), ``because`` says why so far and no further. ``source`` is where the truth is from, ``kind``
     what it is. ``with_negative_control`` measures the same with one thing wrong, which ``negative_control`` names: it must fail.
+    ``slow`` where a measurement takes above some 4 s, or is like another one, ``slow_negative_control`` where that does: tests
+    leave it to the verb verify.
     """
 
     name: str
@@ -58,6 +60,8 @@ class Entry:
     measure: Callable[[Lab], Finding]
     negative_control: str
     with_negative_control: Callable[[Lab], Finding]
+    slow: bool = False
+    slow_negative_control: bool = False
 
 
 @dataclass(frozen=True, eq=False)

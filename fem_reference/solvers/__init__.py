@@ -1,33 +1,26 @@
-"""Solvers: one file each, named as in scene files.
+"""Solvers: one file or folder each, named as in scene files.
 
-Contract (tests/test_solvers.py): a solver of muscles has ``Settings``, a strict record of its own settings, and
-``solve(problem, settings, sink) -> Outcome``, which sinks every requested frame as it is reached. A solver of scalar fields has
-``FieldSettings`` and ``solve_field(problem, settings) -> Solution``; one of bodies of any shape has ``BodySettings`` and
-``solve_body(body, settings) -> Solved``. Some are more than one. Physics that fails is a status with a
-sentence, never an exception; what was reached before stays.
+A file lists what it offers in ``SOLVES``: a ``MuscleSolver``, a ``FieldSolver``, a ``BodySolver``, or more than one of them
+(``common.protocol``; the contract is tests/test_solvers.py).
 """
 
 import importlib
 import pkgutil
-from typing import Any, Literal
+from typing import Any, Literal, overload
 
 from fem_reference.effects import Effect
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record, join, parse
 from fem_reference.scenes.muscle import SolverChoice
+from fem_reference.solvers.common.protocol import BodySolver, FieldSolver, MuscleSolver, Solver, Task, trades
 
-Task = Literal["solve", "solve_field", "solve_body"]
-_TASKS: dict[Task, tuple[str, str]] = {
-    "solve": ("Settings", "muscles"),
-    "solve_field": ("FieldSettings", "scalar fields"),
-    "solve_body": ("BodySettings", "finite element bodies"),
-}
+__all__ = ["check", "find", "names", "offers", "require", "settings", "takes_effects", "trades"]
 
 
 def names(task: Task | None = None) -> list[str]:
     """The solvers there are, as scene files name them: all, or those for a ``task``."""
     found = sorted(module.name for module in pkgutil.iter_modules(__path__) if not _is_shared(module.name))
-    return [name for name in found if task is None or hasattr(_module(name), task)]
+    return [name for name in found if task is None or any(offer.task == task for offer in offers(name))]
 
 
 def _is_shared(module: str) -> bool:
@@ -35,41 +28,53 @@ def _is_shared(module: str) -> bool:
     return module == "common" or module.endswith("_kernels")
 
 
-def _module(name: str) -> Any:
-    return importlib.import_module(f"{__name__}.{name}")
+def offers(name: str) -> tuple[Solver[Any], ...]:
+    """What the solver ``name`` offers, one entry a task; TypeError where its file does not say."""
+    found = vars(importlib.import_module(f"{__name__}.{name}")).get("SOLVES")
+    if not isinstance(found, tuple) or not found or not all(isinstance(offer, Solver) for offer in found):
+        want = "a tuple of MuscleSolver, FieldSolver or BodySolver (solvers/common/protocol.py)"
+        raise TypeError(f"solvers/{name}: SOLVES is {found!r}, want {want}")
+    return found
 
 
-def find(name: str, place: str, task: Task = "solve") -> Any:
-    """The module of the solver ``name`` for a ``task``; InputError at ``place`` where there is none."""
+@overload
+def find(name: str, place: str, task: Literal["solve"] = "solve") -> MuscleSolver[Any]: ...
+@overload
+def find(name: str, place: str, task: Literal["solve_field"]) -> FieldSolver[Any]: ...
+@overload
+def find(name: str, place: str, task: Literal["solve_body"]) -> BodySolver[Any]: ...
+@overload
+def find(name: str, place: str, task: Task) -> Solver[Any]: ...
+def find(name: str, place: str, task: Task = "solve") -> Solver[Any]:
+    """The solver ``name`` for a ``task``; InputError at ``place`` where there is none."""
     if name not in names():
         raise InputError(join(place, "solver"), f'"{name}"', f"one of {', '.join(names(task))}")
-    module = _module(name)
-    if not hasattr(module, task):
-        got = f'"{name}", which does not solve {_TASKS[task][1]}'
-        raise InputError(join(place, "solver"), got, f"one of {', '.join(names(task))}")
-    return module
+    for offer in offers(name):
+        if offer.task == task:
+            return offer
+    kinds: dict[Task, type[Solver[Any]]] = {kind.task: kind for kind in (MuscleSolver, FieldSolver, BodySolver)}
+    got = f'"{name}", which does not solve {kinds[task].solves}'
+    raise InputError(join(place, "solver"), got, f"one of {', '.join(names(task))}")
 
 
 def require(name: str, settings: Record, place: str) -> None:
-    """MissingSoftware where the solver ``name`` needs what is not installed; a module says so in ``require(settings)``."""
-    check = getattr(find(name, place), "require", None)
-    if check is not None:
-        check(settings)
+    """MissingSoftware where the solver ``name`` needs what is not installed."""
+    find(name, place).require(settings)
 
 
 def takes_effects(name: str) -> bool:
-    """Whether the solver ``name`` simulates the effects of a scene; one that does says which in ``check_effects``."""
-    return hasattr(_module(name), "check_effects")
+    """Whether the solver ``name`` simulates the effects of a scene."""
+    return any(isinstance(offer, MuscleSolver) and offer.check_effects is not None for offer in offers(name))
 
 
 def check(name: str, settings: Record, effects: tuple[Effect, ...], place: str) -> None:
-    """InputError below ``place`` where ``settings`` do not suit the ``effects``; a module says so in ``check_effects``."""
-    suits = getattr(find(name, place), "check_effects", None)
+    """InputError below ``place`` where ``settings`` do not suit the ``effects``."""
+    suits = find(name, place).check_effects
     if suits is not None:
         suits(settings, effects, place)
 
 
 def settings(choice: SolverChoice, place: str, task: Task = "solve") -> Record:
     """The settings of a choice, checked by its solver; ``place`` is where the scene makes the choice."""
-    record: type[Record] = getattr(find(choice.solver, place, task), _TASKS[task][0])
+    record: type[Record] = find(choice.solver, place, task).settings
     return parse(record, choice.settings, place)

@@ -24,8 +24,9 @@ from fem_reference.foundations.units import PositiveLength
 from fem_reference.problems.muscle import Setup
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers import arap_kernels
+from fem_reference.solvers.common.frame_loop import carry, follow, refused
+from fem_reference.solvers.common.protocol import MuscleSolver, Trade
 from fem_reference.solvers.common.state_checks import Trouble, trouble
-from fem_reference.solvers.pbd import carry
 
 Symmetric = Literal["cotangent", "clamped cotangent", "kirchhoff"]
 Weights = Literal[Symmetric, "tutte"]
@@ -53,7 +54,7 @@ class Settings(Record):
     fixed: Fixed
     rotations: Literal["each", "first only"]
     volume_step: bool
-    iterations: Annotated[int, Field(gt=0)]
+    iterations: Annotated[int, Field(gt=0), Trade((1, 3, 10, 30, 100))]
     tolerance: PositiveLength | None = None
 
 
@@ -168,38 +169,58 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
                 return Relaxed(points, count, True)
         return Relaxed(points, settings.iterations, settings.tolerance is None)
 
-    return march(setup, system, relax, sink, cost)
+    return alternate(setup, system, relax, sink, cost)
 
 
-def march(
+class Alternation:
+    """A surface on its way from frame number to frame number, whose free vertices ``relax`` as the attached ones have moved."""
+
+    advice = "a slower motion may help"
+
+    def __init__(
+        self, setup: Setup, system: System, relax: Callable[[Floats], Relaxed], cost: dict[str, float]
+    ) -> None:
+        self.setup, self.system, self.relax = setup, system, relax
+        self.relaxed = Relaxed(np.array(setup.surface.points), 0, True)
+        self.cost = cost | {"local_global_steps": 0, "frames_off_tolerance": 0}
+
+    def move(self, number: int) -> None:
+        """Carry the attached vertices there, and relax."""
+        points = self.relaxed.points
+        carry(points, self.setup, number)
+        self.relaxed = self.relax(points)
+        self.cost["local_global_steps"] += self.relaxed.iterations
+        self.cost["frames_off_tolerance"] += not self.relaxed.met
+
+    def trouble(self) -> Trouble | None:
+        """What is wrong with the surface, or with how it relaxed."""
+        return trouble(self.relaxed.points, self.setup.surface, self.system.attached) or self.relaxed.trouble
+
+    def frame(self, number: int) -> Frame:
+        """The surface and its energy."""
+        points = self.relaxed.points
+        return Frame(number, points.copy(), scalars={"arap_energy_mm2": self.system.cells.energy(points)})
+
+    def ending(self) -> Outcome:
+        """Out of steps where a frame did not meet the tolerance."""
+        first, last = self.setup.frames[0], self.setup.frames[-1]
+        done = f"{last - first} frames in {self.cost['local_global_steps']:.0f} iterations"
+        if missed := self.cost["frames_off_tolerance"]:
+            advice = "more iterations may help; without a tolerance their number is the method"
+            return Outcome("out of steps", f"{done}, {missed:.0f} did not meet the tolerance; {advice}")
+        return Outcome("converged", done)
+
+
+def alternate(
     setup: Setup, system: System, relax: Callable[[Floats], Relaxed], sink: Sink, cost: dict[str, float]
 ) -> Outcome:
     """Move the attached vertices and ``relax`` the others, frame number by frame number; what it costs is added to ``cost``."""
-    points, (first, *_, last) = np.array(setup.surface.points), setup.frames
-    sink(Frame(first, points.copy(), scalars={"arap_energy_mm2": system.cells.energy(points)}))
-    cost |= {"seconds_solve": 0.0, "iterations": 0, "local_global_steps": 0, "frames_off_tolerance": 0, "threads": 1}
+    model = Alternation(setup, system, relax, cost)
     if len(system.loose):
         why = f"vertex {system.loose[0]}: nothing but triangles without area or weight ties it to a attached vertex"
-        return Outcome("diverged", f"{why}; kirchhoff weights feel no areas", cost)
-    for iteration in range(first + 1, last + 1):
-        begin = time.perf_counter()
-        carry(points, setup, iteration)
-        relaxed = relax(points)
-        points = relaxed.points
-        cost["seconds_solve"] += time.perf_counter() - begin
-        cost["iterations"] += 1
-        cost["local_global_steps"] += relaxed.iterations
-        cost["frames_off_tolerance"] += not relaxed.met
-        cost["seconds_per_iteration"] = cost["seconds_solve"] / cost["iterations"]
-        if found := trouble(points, setup.surface, system.attached) or relaxed.trouble:
-            return Outcome(found.status, f"frame {iteration}: {found.sentence}; a slower motion may help", cost)
-        if iteration in setup.frames:
-            sink(Frame(iteration, points.copy(), scalars={"arap_energy_mm2": system.cells.energy(points)}))
-    done, missed = f"{last - first} frames in {cost['local_global_steps']:.0f} iterations", cost["frames_off_tolerance"]
-    if missed:
-        advice = "more iterations may help; without a tolerance their number is the method"
-        return Outcome("out of steps", f"{done}, {missed:.0f} did not meet the tolerance; {advice}", cost)
-    return Outcome("converged", done, cost)
+        hint = "kirchhoff weights feel no areas"
+        return refused(model, setup.frames[0], sink, Trouble("diverged", f"{why}; {hint}"))
+    return follow(model, setup.frames, sink)
 
 
 def scaled(points: Floats, triangles: Ints, free: Ints, volume: float) -> Floats:
@@ -268,3 +289,13 @@ def _untied(laplacian: Any, attached: Ints) -> Ints:
     """The vertices that no chain of edges of a weight other than 0 leads to a attached one; none where nothing is attached."""
     part = connected_components(laplacian != 0, directed=False)[1]
     return np.flatnonzero(~np.isin(part, part[attached])) if len(attached) else np.zeros(0, np.int64)
+
+
+_EXAMPLE = {
+    "weights": "clamped cotangent",
+    "fixed": "remove",
+    "rotations": "each",
+    "volume_step": False,
+    "iterations": 3,
+}
+SOLVES = (MuscleSolver(settings=Settings, solve=solve, example=_EXAMPLE),)

@@ -19,7 +19,8 @@ from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import PositiveLength
 from fem_reference.problems.muscle import Setup
 from fem_reference.runs.store import Outcome, Sink
-from fem_reference.solvers.arap import Cells, Relaxed, Symmetric, System, compile_kernels, farthest, march
+from fem_reference.solvers.arap import Cells, Relaxed, Symmetric, System, alternate, compile_kernels, farthest
+from fem_reference.solvers.common.protocol import MuscleSolver, Trade
 from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.pbd import Constraints, Stiffness
 from fem_reference.solvers.pbd_kernels import project_dihedrals, project_distances, project_volume, volume
@@ -50,7 +51,7 @@ class Settings(Record):
     """
 
     weights: Symmetric
-    iterations: Annotated[int, Field(gt=0)]
+    iterations: Annotated[int, Field(gt=0), Trade((1, 3, 10, 30, 100))]
     tolerance: PositiveLength | None = None
     volume_constraint: bool
     projections: Projections | None = None
@@ -76,7 +77,7 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
             return found
         return Relaxed(projected(found.points, rest, settings.projections), found.iterations, found.met, found.trouble)
 
-    return march(setup, system, relax, sink, cost)
+    return alternate(setup, system, relax, sink, cost)
 
 
 def minimise(system: System, points: Floats, settings: Settings, rest: Constraints) -> Relaxed:
@@ -163,3 +164,7 @@ def _compile_projections() -> float:
     rest = Constraints.at_rest(points, TET_FACES, nothing)
     projected(points, rest, Projections(sweeps=1, stretch=1, volume=1, bending=1))
     return time.perf_counter() - begin
+
+
+_EXAMPLE = {"weights": "clamped cotangent", "iterations": 3, "volume_constraint": True}
+SOLVES = (MuscleSolver(settings=Settings, solve=solve, example=_EXAMPLE),)

@@ -5,7 +5,6 @@ points it is as short as it can be. It has a length and no surface, and is judge
 shorter path round: where ends turn past what is opposite, it changes sides.
 """
 
-import time
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Self
@@ -21,6 +20,9 @@ from fem_reference.geometry.wrapping import Cylinder, Obstacle, Paths, Sphere, s
 from fem_reference.problems.muscle import Problem, RigidBody
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.scenes import bones
+from fem_reference.solvers.common.frame_loop import each
+from fem_reference.solvers.common.protocol import MuscleSolver
+from fem_reference.solvers.common.state_checks import Trouble
 
 # An end this deep [mm] in an obstacle is on its surface, but for rounding.
 _TOUCHES = 1e-6
@@ -97,25 +99,46 @@ class Wrap:
     name: str
 
 
+class Shortest:
+    """The ``lines`` of a muscle, at any frame as short as the ``wrap`` lets them be."""
+
+    advice = "a smaller radius may help"
+
+    def __init__(self, problem: Problem, settings: Settings) -> None:
+        self.problem, self.vias = problem, len(settings.via)
+        self.lines, self.wrap = _lines(problem, settings), _wrap(problem, settings)
+        self.cost = {"seconds_compile": 0.0}
+        self.inside: Trouble | None = None
+        self.found = Frame(problem.frames[0], None)
+
+    def move(self, number: int) -> None:
+        """Find the paths at a frame; InputError where a fixed point is inside the obstacle at the first."""
+        fixed = self.lines.at(number)
+        if self.wrap is not None and (inside := _inside(self.wrap, fixed, number)):
+            if number == self.problem.frames[0]:
+                raise InputError(f"line_of_action: {self.wrap.name}", inside, "an obstacle with all of them outside")
+            self.inside = Trouble("diverged", inside)
+        else:
+            self.found = _frame(self.lines, self.wrap, fixed, number, self.problem.fibres)
+
+    def trouble(self) -> Trouble | None:
+        """Whether a fixed point is inside the obstacle."""
+        return self.inside
+
+    def frame(self, _: int) -> Frame:
+        """The lines."""
+        return self.found
+
+    def ending(self) -> Outcome:
+        """Converged, as every line is; what they go through and around."""
+        kind = f"straight, through {self.vias} via-points" if self.vias else "straight"
+        around = "" if self.wrap is None else f" or around the {self.wrap.name} on {self.wrap.bone.name}"
+        return Outcome("converged", f"{len(self.lines.fixed)} lines, {kind}{around}; no surface")
+
+
 def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
     """The lines at every frame wanted, up to one with a fixed point inside the obstacle; InputError where that is the first."""
-    lines, wrap = _lines(problem, settings), _wrap(problem, settings)
-    cost = {"seconds_solve": 0.0, "seconds_compile": 0.0, "iterations": 0, "threads": 1}
-    for number in problem.frames:
-        begin = time.perf_counter()
-        fixed = lines.at(number)
-        if wrap is not None and (trouble := _inside(wrap, fixed, number)):
-            if number == problem.frames[0]:
-                raise InputError(f"line_of_action: {wrap.name}", trouble, "an obstacle with all of them outside")
-            return Outcome("diverged", f"frame {number}: {trouble}; a smaller radius may help", cost)
-        frame = _frame(lines, wrap, fixed, number, problem.fibres)
-        cost["seconds_solve"] += time.perf_counter() - begin
-        cost["iterations"] += 1
-        cost["seconds_per_iteration"] = cost["seconds_solve"] / cost["iterations"]
-        sink(frame)
-    kind = f"straight, through {len(settings.via)} via-points" if settings.via else "straight"
-    around = "" if wrap is None else f" or around the {wrap.name} on {wrap.bone.name}"
-    return Outcome("converged", f"{len(problem.fibres)} lines, {kind}{around}; no surface", cost)
+    return each(Shortest(problem, settings), problem.frames, sink)
 
 
 def _frame(lines: Lines, wrap: Wrap | None, fixed: Floats, number: int, fibres: Polylines) -> Frame:
@@ -217,3 +240,6 @@ def _index(bodies: tuple[RigidBody, ...], name: str, key: str) -> int:
     if name not in names:
         raise InputError(f"line_of_action: {key}", f'"{name}"', f"one of {', '.join(names)}")
     return names.index(name)
+
+
+SOLVES = (MuscleSolver(settings=Settings, solve=solve, example={}),)

@@ -11,6 +11,7 @@ from fem_reference.problems.scalar import FieldProblem, at
 from fem_reference.runs.scalar import Solution
 from fem_reference.runs.store import Outcome
 from fem_reference.solvers import listing_kernels
+from fem_reference.solvers.common.protocol import FieldSolver
 
 
 class FieldSettings(Record):
@@ -55,3 +56,6 @@ def _check_ends(problem: FieldProblem) -> None:
         raise InputError(
             "listing: boundary", "other conditions", "value 0 on the left and slope -1 on the right, as listing 4.1 has"
         )
+
+
+SOLVES = (FieldSolver(settings=FieldSettings, solve_field=solve_field, example={}),)

@@ -24,10 +24,11 @@ from fem_reference.problems.muscle import Problem
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers import collision_kernels
 from fem_reference.solvers.collision_kernels import Obstacle, move_out
-from fem_reference.solvers.common.state_checks import trouble
+from fem_reference.solvers.common.frame_loop import follow, other_clock, refused
+from fem_reference.solvers.common.protocol import MuscleSolver, Trade
+from fem_reference.solvers.common.state_checks import Trouble, trouble
 from fem_reference.solvers.pbd import Collision
 from fem_reference.solvers.spring_kernels import Network, PrescribedPath, advance, forces
-from fem_reference.solvers.xpbd import other_clock
 
 # Where no time step is asked for, it is this share of the greatest that is stable.
 SHARE_OF_STABLE = 0.9
@@ -62,7 +63,7 @@ class Settings(Record):
 
     stiffness: Stiffness
     density: Density
-    frame_time: Time
+    frame_time: Annotated[Time, Trade(("5 ms", "20 ms", "80 ms"))]
     damping: Annotated[float | Literal["eq. 5.5"] | None, BeforeValidator(_damping)] = None
     gravity: AccelerationVector | None = None
     collision: Collision | None = None
@@ -200,32 +201,58 @@ def _obstacles(problem: Problem, fixed: Ints, gap: float) -> list[Obstacle]:
     return [Obstacle(bone, problem.mesh.points, loose, gap) for bone in problem.bones]
 
 
+class Motion:
+    """The masses of a ``model`` on their way from frame number to frame number, each in as many ``steps`` of the same length."""
+
+    def __init__(self, model: Model, settings: Settings, wanted: float, seconds_compile: float) -> None:
+        """``wanted``: how many steps, rounded up, in a frame number."""
+        self.model, self.settings = model, settings
+        self.points = np.array(model.problem.mesh.points)
+        self.previous = self.points.copy()
+        self.rest = Surface(model.problem.mesh.points, boundary(model.problem.mesh.tets)[0])
+        self.steps = max(1, math.ceil(wanted - 1e-9))
+        self.time_step = settings.frame_time / self.steps
+        self.cost: dict[str, float] = {"seconds_compile": seconds_compile, "time_steps": 0}
+
+    @property
+    def advice(self) -> str:
+        """What may help: a stable time step, else what brings the masses to rest."""
+        limit = stable_time_step(self.model.network, self.model.fixed)
+        if self.time_step > limit:
+            return f"the time step of {self.time_step:.3g} s is above the stable one of {limit:.3g} s"
+        return "a longer frame_time or more damping may help"
+
+    def move(self, number: int) -> None:
+        """Take the steps of a frame number."""
+        self.model.move(self.points, self.previous, number, self.time_step, self.steps)
+        self.cost["time_steps"] += self.steps
+
+    def trouble(self) -> Trouble | None:
+        """What is wrong with the boundary of the tetrahedra."""
+        return trouble(self.points, self.rest, self.model.fixed)
+
+    def frame(self, number: int) -> Frame:
+        """What the masses make of surface and fibres."""
+        return self.model.frame(self.points, number)
+
+    def ending(self) -> Outcome:
+        """Converged, as every step is; how many tetrahedra are inside out in the end, and whether the scene has another clock."""
+        problem, frames = self.model.problem, self.model.problem.frames
+        steps = f"{frames[-1] - frames[0]} frame numbers of {self.steps} steps of {self.time_step:.3g} s"
+        notes = _inverted(self.points, problem.mesh.tets) + other_clock(problem, self.settings.frame_time)
+        return Outcome("converged", steps + notes)
+
+
 def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
     """Step from rest at the first of ``problem.frames`` to the last of them; each frame wanted goes into ``sink``."""
     seconds_compile, model = _compile(settings), Model.of(problem, settings)
-    limit = stable_time_step(model.network, model.fixed)
-    wanted = settings.frame_time / (settings.time_step or SHARE_OF_STABLE * limit)
-    points, first, last = np.array(problem.mesh.points), problem.frames[0], problem.frames[-1]
-    rest, previous = Surface(problem.mesh.points, boundary(problem.mesh.tets)[0]), points.copy()
-    sink(model.frame(points, first))
-    cost = {"seconds_solve": 0.0, "seconds_compile": seconds_compile, "iterations": 0, "time_steps": 0, "threads": 1}
+    longest = settings.time_step or SHARE_OF_STABLE * stable_time_step(model.network, model.fixed)
+    wanted = settings.frame_time / longest
+    motion = Motion(model, settings, wanted, seconds_compile)
     if wanted > _MOST_STEPS:
-        return Outcome("out of steps", _too_many(wanted, settings, model.network), cost)
-    steps = max(1, math.ceil(wanted - 1e-9))
-    time_step = settings.frame_time / steps
-    for number in range(first + 1, last + 1):
-        begin = time.perf_counter()
-        model.move(points, previous, number, time_step, steps)
-        cost["seconds_solve"] += time.perf_counter() - begin
-        cost["iterations"] += 1
-        cost["time_steps"] += steps
-        cost["seconds_per_iteration"] = cost["seconds_solve"] / cost["iterations"]
-        if found := trouble(points, rest, model.fixed):
-            return Outcome(found.status, f"frame {number}: {found.sentence}; {_advice(time_step, limit)}", cost)
-        if number in problem.frames:
-            sink(model.frame(points, number))
-    notes = _inverted(points, problem.mesh.tets) + other_clock(problem, settings.frame_time)
-    return Outcome("converged", f"{last - first} frame numbers of {steps} steps of {time_step:.3g} s{notes}", cost)
+        why = Trouble("out of steps", _too_many(wanted, settings, model.network))
+        return refused(motion, problem.frames[0], sink, why)
+    return follow(motion, problem.frames, sink)
 
 
 def _too_many(steps: float, settings: Settings, network: Network) -> str:
@@ -255,7 +282,5 @@ def _compile(settings: Settings) -> float:
     return time.perf_counter() - begin
 
 
-def _advice(time_step: float, limit: float) -> str:
-    if time_step > limit:
-        return f"the time step of {time_step:.3g} s is above the stable one of {limit:.3g} s"
-    return "a longer frame_time or more damping may help"
+_EXAMPLE = {"stiffness": "1 N/mm", "density": "1060 kg/m3", "frame_time": "20 ms", "damping": "eq. 5.5"}
+SOLVES = (MuscleSolver(settings=Settings, solve=solve, example=_EXAMPLE),)

@@ -8,7 +8,7 @@ in every sweep, where line 13 finds them once.
 """
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
 
@@ -16,14 +16,14 @@ import numpy as np
 from pydantic import Field
 
 from fem_reference.foundations.mesh import TET_FACES, Floats, Ints, Polylines
-from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import Length
 from fem_reference.problems.muscle import Problem, Setup
-from fem_reference.runs.store import Frame, Outcome, Sink
+from fem_reference.runs.store import Outcome, Sink
 from fem_reference.solvers import collision_kernels
 from fem_reference.solvers.collision_kernels import Obstacle, move_out
-from fem_reference.solvers.common.state_checks import trouble
+from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow
+from fem_reference.solvers.common.protocol import MuscleSolver, Trade
 from fem_reference.solvers.pbd_kernels import (
     dihedrals,
     distances,
@@ -35,8 +35,6 @@ from fem_reference.solvers.pbd_kernels import (
 )
 
 Stiffness = Annotated[float, Field(ge=0, le=1)]
-# Positions (n, 3) [mm], what is kept of their velocities (n, 3), and the frame number -> both after its iteration.
-Iterate = Callable[[Floats, Floats, int], tuple[Floats, Floats]]
 # Segments whose distances differ by less than this share of the size of the muscle are as near.
 _AS_NEAR = 1e-9
 
@@ -62,8 +60,8 @@ class Settings(Record):
     1 in the report's program, when it has fibres. ``collision``: contact with bones (lines 12 to 14).
     """
 
-    sub_iterations: Annotated[int, Field(gt=0)]
-    solver_iterations: Annotated[int, Field(gt=0)]
+    sub_iterations: Annotated[int, Field(gt=0), Trade((1, 3, 10))]
+    solver_iterations: Annotated[int, Field(gt=0), Trade((1, 3, 10, 30))]
     damping: Annotated[float, Field(ge=0, lt=1)]
     stretch: Stiffness
     volume: Stiffness
@@ -150,7 +148,7 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
             points, displacement = advance(points, displacement, constraints, settings, obstacles)
         return points, displacement
 
-    return follow(setup, iterate, sink, cost)
+    return follow(MovingSurface(setup, iterate, cost), setup.frames, sink)
 
 
 def _constraints(setup: Setup, settings: Settings) -> Constraints:
@@ -168,12 +166,6 @@ def obstacles_of(setup: Setup, gap: float) -> list[Obstacle]:
     loose = np.ones(len(setup.surface.points), bool)
     loose[setup.attached_vertices] = False
     return [Obstacle(bone, setup.surface.points, loose, gap) for bone in setup.bones]
-
-
-def carry(points: Floats, setup: Setup, frame: float) -> None:
-    """Put the attached vertices where their bones are at ``frame``."""
-    for entry in setup.attached:
-        points[entry.vertices] = apply(entry.bone.pose(frame), setup.surface.points[entry.vertices])
 
 
 def advance(
@@ -195,26 +187,6 @@ def advance(
     return moved, moved - points
 
 
-def follow(setup: Setup, iterate: Iterate, sink: Sink, cost: dict[str, float]) -> Outcome:
-    """Iterate from rest at the first of ``setup.frames`` to the last, into ``sink``; what that costs is added to ``cost``."""
-    points, attached, (first, *_, last) = np.array(setup.surface.points), setup.attached_vertices, setup.frames
-    kept = np.zeros(points.shape)
-    sink(Frame(first, points.copy()))
-    cost |= {"seconds_solve": 0.0, "iterations": 0, "threads": 1}
-    for iteration in range(first + 1, last + 1):
-        begin = time.perf_counter()
-        points, kept = iterate(points, kept, iteration)
-        cost["seconds_solve"] += time.perf_counter() - begin
-        cost["iterations"] += 1
-        cost["seconds_per_iteration"] = cost["seconds_solve"] / cost["iterations"]
-        if found := trouble(points, setup.surface, attached):
-            advice = "a slower motion, more steps or a lower stiffness may help"
-            return Outcome(found.status, f"frame {iteration}: {found.sentence}; {advice}", cost)
-        if iteration in setup.frames:
-            sink(Frame(iteration, points.copy()))
-    return Outcome("converged", f"{last - first} iterations", cost)
-
-
 def _compile(settings: Settings) -> float:
     """Run every compiled function once, on a tetrahedron; seconds."""
     begin = time.perf_counter()
@@ -226,3 +198,7 @@ def _compile(settings: Settings) -> float:
     if settings.collision is not None:
         collision_kernels.compile_all()
     return time.perf_counter() - begin
+
+
+_EXAMPLE = {"sub_iterations": 3, "solver_iterations": 2, "damping": 0.1, "stretch": 1.0, "volume": 1.0, "bending": 0.5}
+SOLVES = (MuscleSolver(settings=Settings, solve=solve, example=_EXAMPLE),)

@@ -46,7 +46,9 @@ from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record
 from fem_reference.problems.muscle import Problem, RigidBody, Setup
 from fem_reference.runs.store import Outcome, Sink
-from fem_reference.solvers.pbd import Constraints, along_fibres, carry, follow
+from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow
+from fem_reference.solvers.common.protocol import MuscleSolver, Trade
+from fem_reference.solvers.pbd import Constraints, along_fibres
 from fem_reference.solvers.pbd_kernels import distances, nearest_segments
 from fem_reference.solvers.program_kernels import (
     angles_of,
@@ -76,10 +78,10 @@ class Settings(Record):
     1 - |cos| of its angle to the nearest fibre to this power, 1 there; without it, as there without fibres, it is 1.
     """
 
-    sub_iterations: Annotated[int, Field(gt=0)]
+    sub_iterations: Annotated[int, Field(gt=0), Trade((1, 3, 10))]
     damping: Annotated[float, Field(ge=0, le=1)]
     bending: Annotated[float, Field(ge=0, le=1)]
-    voxels: Annotated[int, Field(gt=0, le=256)] | None = None
+    voxels: Annotated[Annotated[int, Field(gt=0, le=256)] | None, Trade((32, 64, 128))] = None
     anisotropy: Annotated[float, Field(ge=0)] | None = None
 
 
@@ -200,7 +202,7 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
             points, velocity = reached, (reached - points) * (1 / STEP)
         return points, velocity
 
-    return follow(setup, iterate, sink, cost)
+    return follow(MovingSurface(setup, iterate, cost), setup.frames, sink)
 
 
 def project(points: Floats, at: Constraints, bending: float) -> None:
@@ -231,3 +233,7 @@ def _compile(settings: Settings) -> float:
     if settings.anisotropy is not None:
         nearest_segments(points, points, points, 0.0)
     return time.perf_counter() - begin
+
+
+_EXAMPLE = {"sub_iterations": 3, "damping": 0.01, "bending": 0.9, "voxels": 64, "anisotropy": 1.0}
+SOLVES = (MuscleSolver(settings=Settings, solve=solve, example=_EXAMPLE),)

@@ -20,6 +20,7 @@ from fem_reference.io import files
 from fem_reference.problems.muscle import Setup
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.scenes.muscle import Candidate
+from fem_reference.solvers.common.protocol import MuscleSolver
 
 log = logging.getLogger(__name__)
 
@@ -271,3 +272,6 @@ def _check_at_rest(place: str, number: int, positions: Floats, rest: Surface) ->
         raise InputError(place, got, f"at most {limit:.3g} mm; the usual reason is another unit or another mesh")
     if away > AT_REST:
         log.warning("%s: %s, which goes into what is measured", place, got)
+
+
+SOLVES = (MuscleSolver(settings=Settings, solve=solve, example={"folder": "frames", "unit": "mm"}),)

@@ -36,7 +36,9 @@ from fem_reference.problems.muscle import Setup
 from fem_reference.runs.store import Outcome, Sink
 from fem_reference.solvers import collision_kernels
 from fem_reference.solvers.collision_kernels import Obstacle
-from fem_reference.solvers.pbd import carry, follow, hinges_of, obstacles_of
+from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow, other_clock
+from fem_reference.solvers.common.protocol import MuscleSolver, Trade
+from fem_reference.solvers.pbd import hinges_of, obstacles_of
 from fem_reference.solvers.pbd_kernels import dihedrals, distances, volume
 from fem_reference.solvers.xpbd_kernels import pull_dihedrals, pull_distances, pull_volume
 
@@ -63,8 +65,8 @@ class Settings(Record):
     """
 
     frame_time: Time
-    sub_steps: Annotated[int, Field(gt=0)]
-    sweeps: Annotated[int, Field(gt=0)]
+    sub_steps: Annotated[int, Field(gt=0), Trade((1, 3, 10, 30))]
+    sweeps: Annotated[int, Field(gt=0), Trade((1, 3, 10, 30))]
     density: Density
     stretch: Stiffness | None = None
     bending: BendingStiffness | None = None
@@ -213,15 +215,8 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
             points, velocities = advance(points, velocities, constraints, step, contacts)
         return points, velocities
 
-    outcome = follow(setup, iterate, sink, cost)
+    outcome = follow(MovingSurface(setup, iterate, cost), setup.frames, sink)
     return replace(outcome, message=outcome.message + other_clock(setup, settings.frame_time))
-
-
-def other_clock(setup: Setup, frame_time: float) -> str:
-    """What is to be said where the scene has an interval [s] other than a solver's ``frame_time`` [s]; empty where it has not."""
-    if setup.interval is None or math.isclose(setup.interval, frame_time):
-        return ""
-    return f"; from a frame number to the next it takes {frame_time:g} s, the scene {setup.interval:g} s"
 
 
 def _contacts(setup: Setup, settings: Settings) -> list[Contact]:
@@ -241,3 +236,7 @@ def _compile(settings: Settings) -> float:
     if settings.collision is not None:
         collision_kernels.compile_all()
     return time.perf_counter() - begin
+
+
+_EXAMPLE = {"frame_time": "20 ms", "sub_steps": 2, "sweeps": 2, "density": "1060 kg/m3", "stretch": "0.4 N/mm"}
+SOLVES = (MuscleSolver(settings=Settings, solve=solve, example=_EXAMPLE),)

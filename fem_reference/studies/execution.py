@@ -23,6 +23,7 @@ from fem_reference.runs import store
 from fem_reference.runs.key import code_hash, key, versions
 from fem_reference.runs.store import Frame, Run
 from fem_reference.scenes.muscle import Scene, SolverChoice
+from fem_reference.solvers import recorded
 
 log = logging.getLogger(__name__)
 
@@ -87,11 +88,11 @@ class Bench:
     def read(self, name: str, choice: SolverChoice, place: str) -> Run:
         """The run that somebody recorded, checked against the setup of the scene; it is read each time and not stored."""
         settings, frames, rest = self.settings(choice, place), list[Frame](), self.setup()
-        solver = solvers.find(choice.solver, place)
-        outcome = solver.solve(rest, settings, frames.append)
+        assert isinstance(settings, recorded.Settings)
+        outcome = recorded.solve(rest, settings, frames.append)
         positions = np.stack([frame.surface for frame in frames if frame.surface is not None])
         numbers = tuple(frame.number for frame in frames)
-        origin = self.origin(choice.solver, settings) | solver.origin(settings)
+        origin = self.origin(choice.solver, settings) | recorded.origin(settings)
         return Run(name, choice.solver, outcome, numbers, rest.surface, positions, origin=origin)
 
     def key(self, solver: str, settings: Record) -> str:

@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference import metrics
+from fem_reference import metrics, solvers
 from fem_reference.assessment import error_bars
 from fem_reference.assessment.error_bars import ErrorBars, Orders, Pair
 from fem_reference.effects import Effect
 from fem_reference.effects.contact import Contact, among
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.records import Record
 from fem_reference.metrics import MeasurementContext
 from fem_reference.runs.store import Run
 from fem_reference.scenes.bones import Bone
@@ -49,7 +50,7 @@ class Variation:
     changes: dict[str, Any]
 
 
-def variations(scene: Scene, settings: Any, *, pressed: bool = True) -> tuple[Variation, ...]:
+def variations(scene: Scene, settings: Record, *, pressed: bool = True) -> tuple[Variation, ...]:
     """What is varied apart from tetrahedra: of contact its stiffness and smoothing, and how well the distances to surfaces of bones
     are known and how far they are rounded, unless no bone ``pressed``; load steps, where the reference's ``settings`` have them,
     with drag or viscosity only: else a state does not depend on them.
@@ -60,7 +61,7 @@ def variations(scene: Scene, settings: Any, *, pressed: bool = True) -> tuple[Va
         found.append(Variation("contact smoothing", {"effect": _scaled(scene, "smoothing", 0.5)}))
         if any(bone.surface for bone in scene.bone):
             found.append(Variation("distances to bones", {"bone": _closer(scene)}))
-    if any("interval" in effect.needs for effect in scene.effects) and hasattr(settings, "largest_step"):
+    if any("interval" in effect.needs for effect in scene.effects) and "largest_step" in solvers.trades(type(settings)):
         found.append(Variation("load steps", _finer_steps(scene, settings)))
     return tuple(found)
 

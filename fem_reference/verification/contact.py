@@ -119,6 +119,8 @@ def _hertz_entry(name: str, title: str, unit: str, attribute: str, value: Any) -
         measure=partial(_measured, n=4, value=value),
         negative_control="a ball of twice the radius",
         with_negative_control=partial(_measured, n=4, value=value, radius=2 * RADIUS),
+        slow=True,
+        slow_negative_control=True,
     )
 
 

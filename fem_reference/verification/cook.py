@@ -143,6 +143,7 @@ ENTRIES = (
         because="discretisation by linear cells",
         negative_control="Poisson's ratio is 0.4999, at the same Young's modulus: it locks",
         with_negative_control=_with_negative_control(_NEARLY_LINEAR, 64),
+        slow=True,
     ),
     _tip_entry(
         "cook_nearly_incompressible",
@@ -163,6 +164,7 @@ ENTRIES = (
         because="discretisation: 0.02 % too stiff",
         negative_control=_STIFF,
         with_negative_control=_with_negative_control(Panel("NEARLY_INCOMPRESSIBLE", "Q2/Q1", SMALL, shear=1.02), 16),
+        slow=True,
     ),
     _tip_entry(
         "cook_constant_pressure",
@@ -183,6 +185,7 @@ ENTRIES = (
         because="discretisation, limited by the singular clamped corners: 0.17 % too stiff",
         negative_control="small strain, by linear extrapolation of a tiny load",
         with_negative_control=_with_negative_control(Panel("FINITE_QUARTER", "P2/P1", SMALL), 16),
+        slow=True,
     ),
     _tip_entry(
         "cook_quarter_load_hexahedra",
@@ -193,6 +196,8 @@ ENTRIES = (
         because="discretisation: 0.02 % too stiff",
         negative_control=_STIFF,
         with_negative_control=_with_negative_control(Panel("FINITE_QUARTER", "Q2/Q1", shear=1.02), 16),
+        slow=True,
+        slow_negative_control=True,
     ),
     _tip_entry(
         "cook_full_load",
@@ -203,6 +208,7 @@ ENTRIES = (
         because="discretisation (0.06 % too stiff) and 0.02 % that the truth leaves open: a clamped corner folds on fine meshes",
         negative_control="small strain, by linear extrapolation of a tiny load",
         with_negative_control=_with_negative_control(Panel("FINITE", "Q2/Q1", SMALL), 8),
+        slow=True,
     ),
     Entry(
         name="cook_p1_locks",

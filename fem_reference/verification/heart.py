@@ -171,6 +171,8 @@ def _passive_entry(heart: Heart, place: int, because: str) -> Entry:
         with_negative_control=partial(
             once, value=partial(replace(heart, stiff=1.2).passive_apex, point=point), count=3
         ),
+        slow=True,
+        slow_negative_control=True,
     )
 
 
@@ -188,6 +190,8 @@ def _active_entry(place: int, because: str) -> Entry:
         with_negative_control=partial(
             once, value=partial(replace(_HEXAHEDRA, active=0.5).active_apex, point=point), count=3
         ),
+        slow=True,
+        slow_negative_control=True,
     )
 
 
@@ -201,6 +205,8 @@ ENTRIES = (
         measure=partial(_ladder, value=_BEAM.beam_tip, counts=(2, 3), size=1.0),
         negative_control="5 % stiffer",
         with_negative_control=partial(once, value=replace(_BEAM, stiff=1.05).beam_tip, count=3),
+        slow=True,
+        slow_negative_control=True,
     ),
     *(_passive_entry(_TETRAHEDRA, place, "the mesh leaves 0.1 %") for place in (0, 1)),
     *(_passive_entry(_HEXAHEDRA, place, "the mesh leaves 0.1 %") for place in (0, 1)),

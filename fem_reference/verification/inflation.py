@@ -191,6 +191,8 @@ ENTRIES: tuple[Entry, ...] = (
         with_negative_control=partial(
             once, value=partial(_pressure, element="P2/P1", material=_NEO_HOOKE, degree=1), count=3
         ),
+        slow=True,
+        slow_negative_control=True,
     ),
     _FINITE(
         name="inflation_sphere_pressure_hexahedra",
@@ -206,6 +208,7 @@ ENTRIES: tuple[Entry, ...] = (
         with_negative_control=partial(
             once, value=partial(_pressure, element="Q2/Q1", material=_NEO_HOOKE, degree=1), count=2
         ),
+        slow=True,
     ),
     _FINITE(
         name="inflation_sphere_pressure_mooney_rivlin",
@@ -217,6 +220,8 @@ ENTRIES: tuple[Entry, ...] = (
         measure=partial(once, value=partial(_pressure, element="Q2/Q1", material=_MOONEY_RIVLIN), count=2),
         negative_control="neo-Hookean material of the same shear modulus",
         with_negative_control=partial(once, value=partial(_pressure, element="Q2/Q1", material=_NEO_HOOKE), count=2),
+        slow=True,
+        slow_negative_control=True,
     ),
     _FINITE(
         name="inflation_sphere_stretch",
@@ -241,6 +246,7 @@ ENTRIES: tuple[Entry, ...] = (
         with_negative_control=partial(
             once, value=partial(_limit_pressure, material=_NEARLY_INCOMPRESSIBLE, degree=1), count=2
         ),
+        slow_negative_control=True,
     ),
     _LIMIT(
         name="inflation_limit_stretch",
@@ -252,6 +258,8 @@ ENTRIES: tuple[Entry, ...] = (
         measure=partial(once, value=partial(_limit_stretch, material=_NEARLY_INCOMPRESSIBLE), count=2),
         negative_control="Mooney-Rivlin material of the same shear modulus, whose pressure goes on rising",
         with_negative_control=partial(once, value=partial(_limit_stretch, material=_MOONEY_RIVLIN), count=2),
+        slow=True,
+        slow_negative_control=True,
     ),
     _LIMIT(
         name="inflation_fall_beyond_limit",
@@ -263,6 +271,7 @@ ENTRIES: tuple[Entry, ...] = (
         measure=partial(once, value=partial(_fall, material=_NEARLY_INCOMPRESSIBLE), count=2),
         negative_control="Mooney-Rivlin material of the same shear modulus, whose pressure goes on rising",
         with_negative_control=partial(once, value=partial(_fall, material=_MOONEY_RIVLIN), count=2),
+        slow=True,
     ),
     _FINITE(
         name="inflation_tube_pressure",
@@ -276,6 +285,7 @@ ENTRIES: tuple[Entry, ...] = (
         ),
         negative_control="one end of the tube is free to move along it",
         with_negative_control=partial(once, value=partial(_tube_pressure, element="Q2/Q1", ends=("bottom",)), count=3),
+        slow=True,
     ),
     _FINITE(
         name="inflation_tube_axial_force",

@@ -109,6 +109,8 @@ ENTRIES: tuple[Entry, ...] = (
         with_negative_control=partial(
             once, value=partial(_moment, element="P2/P1", material=_NEO_HOOKE, degree=1), count=4
         ),
+        slow=True,
+        slow_negative_control=True,
     ),
     _MOMENT(
         name="torsion_moment_hexahedra",
@@ -127,6 +129,8 @@ ENTRIES: tuple[Entry, ...] = (
         with_negative_control=partial(
             once, value=partial(_moment, element="Q2/Q1", material=_NEO_HOOKE, degree=1), count=3
         ),
+        slow=True,
+        slow_negative_control=True,
     ),
     _FORCE(
         name="torsion_axial_force",
@@ -145,6 +149,8 @@ ENTRIES: tuple[Entry, ...] = (
         with_negative_control=partial(
             once, value=partial(_axial_force, element="Q2/Q1", material=_MOONEY_RIVLIN), count=3
         ),
+        slow=True,
+        slow_negative_control=True,
     ),
     _MOMENT(
         name="torsion_moment_mooney_rivlin",

@@ -1,1 +1,1 @@
-"""Shared by solvers: load steps, checks of states."""
+"""Shared by solvers: what a solver is, the loop over frames, load steps, checks of states."""

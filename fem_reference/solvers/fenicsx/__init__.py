@@ -25,6 +25,7 @@ from fem_reference.problems.body import Body, check_element
 from fem_reference.problems.muscle import Problem
 from fem_reference.problems.muscle_body import as_body
 from fem_reference.runs.store import Frame, Outcome, Sink
+from fem_reference.solvers.common.protocol import BodySolver, FieldSolver, MuscleSolver
 from fem_reference.solvers.fenicsx import resources
 from fem_reference.solvers.fenicsx.field import FieldSettings, solve_field
 from fem_reference.solvers.fenicsx.jobs import Job, stored_state
@@ -33,6 +34,7 @@ from fem_reference.solvers.fenicsx.session import present, session, shared, solv
 from fem_reference.solvers.fenicsx.settings import BodySettings, Settings
 
 __all__ = [
+    "SOLVES",
     "BodySettings",
     "FieldSettings",
     "Settings",
@@ -185,3 +187,17 @@ def _frame(event: dict[str, Any]) -> Frame:
         }
         places = arrays["surface"], arrays["fibres"], arrays["nodes"]
         return Frame(event["frame"], *places, scalars | pulls, note, stored_state(arrays))
+
+
+SOLVES = (
+    MuscleSolver(
+        settings=Settings,
+        solve=solve,
+        example={"ranks": 1},
+        require=require,
+        check_effects=check_effects,
+        slow=True,
+    ),
+    FieldSolver(settings=FieldSettings, solve_field=solve_field, example={}, require=require, slow=True),
+    BodySolver(settings=BodySettings, solve_body=solve_body, example={}, require=require, slow=True),
+)

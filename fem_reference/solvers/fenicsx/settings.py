@@ -1,11 +1,13 @@
 """Settings of the reference solver."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import Time
+from fem_reference.problems.body import ELEMENTS
+from fem_reference.solvers.common.protocol import Trade
 
 
 class BodySettings(Record):
@@ -25,12 +27,12 @@ class BodySettings(Record):
     from which ``results`` evaluates stress, pressure, det F and fibre stretch.
     """
 
-    element: str = "P2/P1"
+    element: Annotated[str, Trade(tuple(ELEMENTS))] = "P2/P1"
     first_step: float = Field(default=10.0, gt=0)
     smallest_step: float = Field(default=0.02, gt=0)
-    largest_step: float | None = Field(default=None, gt=0)
+    largest_step: Annotated[float | None, Trade((8.0, 4.0, 2.0, 1.0))] = Field(default=None, gt=0)
     newton_iterations: int = Field(default=14, gt=0)
-    residual: float = Field(default=1e-8, gt=0)
+    residual: Annotated[float, Trade((1e-4, 1e-6, 1e-8))] = Field(default=1e-8, gt=0)
     quadrature_degree: int | None = Field(default=None, gt=0)
     linear_solver: Literal["direct", "lagged", "multigrid"] | None = None
     precision: Literal["single", "double"] | None = None

@@ -3,7 +3,13 @@
 ``field`` has scalar fields; ``body`` has bodies, whose stress and stiffness are the derivatives that ``jets`` carry along.
 """
 
+from fem_reference.solvers.common.protocol import BodySolver, FieldSolver
 from fem_reference.solvers.scikit_fem.body import BodySettings, solve_body
 from fem_reference.solvers.scikit_fem.field import FieldSettings, assemble, errors, solve_field, space
 
-__all__ = ["BodySettings", "FieldSettings", "assemble", "errors", "solve_body", "solve_field", "space"]
+__all__ = ["SOLVES", "BodySettings", "FieldSettings", "assemble", "errors", "solve_body", "solve_field", "space"]
+
+SOLVES = (
+    FieldSolver(settings=FieldSettings, solve_field=solve_field, example={}),
+    BodySolver(settings=BodySettings, solve_body=solve_body, example={}),
+)

@@ -3,7 +3,7 @@
 import logging
 import time
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
@@ -12,10 +12,11 @@ from scipy.sparse.linalg import splu
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.records import Record
-from fem_reference.problems.body import Body, Prescribed, check
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed, check
 from fem_reference.runs.solved import Reached, Solved
 from fem_reference.runs.store import Outcome
 from fem_reference.solvers.common.load_steps import Attempt, Step, Steps, march
+from fem_reference.solvers.common.protocol import Trade
 from fem_reference.solvers.scikit_fem.equations import Equations
 
 log = logging.getLogger(__name__)
@@ -35,7 +36,7 @@ class BodySettings(Record):
     default what the element needs.
     """
 
-    element: str = "P2/P1"
+    element: Annotated[str, Trade(tuple(ELEMENTS))] = "P2/P1"
     first_step: float = Field(default=1e9, gt=0)
     smallest_step: float = Field(default=0.02, gt=0)
     newton_iterations: int = Field(default=14, gt=0)

@@ -1,0 +1,118 @@
+"""What a solver is: the calls it answers, and the records with which its file offers them."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal, Protocol
+
+from fem_reference.effects import Effect
+from fem_reference.foundations.records import Record
+from fem_reference.problems.body import Body
+from fem_reference.problems.muscle import Problem
+from fem_reference.problems.scalar import FieldProblem
+from fem_reference.runs.scalar import Solution
+from fem_reference.runs.solved import Solved
+from fem_reference.runs.store import Outcome, Sink
+
+Task = Literal["solve", "solve_field", "solve_body"]
+
+
+class SolveMuscle[S: Record](Protocol):
+    """Solves muscles."""
+
+    def __call__(self, problem: Problem, settings: S, sink: Sink, /) -> Outcome:
+        """Sink every requested frame as it is reached. Physics that fails is a status with a sentence and never an exception;
+        what was reached before stays.
+        """
+
+
+class SolveField[S: Record](Protocol):
+    """Solves scalar fields."""
+
+    def __call__(self, problem: FieldProblem, settings: S, /) -> Solution:
+        """The field at the nodes of the mesh, not-a-number where the status says that it failed."""
+
+
+class SolveBody[S: Record](Protocol):
+    """Solves bodies of any shape."""
+
+    def __call__(self, body: Body, settings: S, /) -> Solved:
+        """The states at the body's frames, as far as they were reached."""
+
+
+class CheckEffects[S: Record](Protocol):
+    """Checks settings against effects."""
+
+    def __call__(self, settings: S, effects: tuple[Effect, ...], place: str, /) -> None:
+        """InputError below ``place`` where the settings do not suit the effects of a scene."""
+
+
+def _nothing(_: Record) -> None:
+    """Nothing but what this package needs itself."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Solver[S: Record]:
+    """What a solver's file offers for one task.
+
+    ``settings``: the record of its own settings. ``example``: some of them, as scene files write them, which contract tests solve
+    with. ``require``: MissingSoftware where what it needs under such settings is not installed. ``slow``: it takes more than a few
+    seconds on a small problem.
+    """
+
+    task: ClassVar[Task]
+    solves: ClassVar[str]
+
+    settings: type[S]
+    example: Mapping[str, Any]
+    require: Callable[[S], None] = _nothing
+    slow: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class MuscleSolver[S: Record](Solver[S]):
+    """A solver of muscles; ``check_effects`` of one that simulates the effects of a scene, None of one that does not."""
+
+    task = "solve"
+    solves = "muscles"
+
+    solve: SolveMuscle[S]
+    check_effects: CheckEffects[S] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class FieldSolver[S: Record](Solver[S]):
+    """A solver of scalar fields."""
+
+    task = "solve_field"
+    solves = "scalar fields"
+
+    solve_field: SolveField[S]
+
+
+@dataclass(frozen=True, kw_only=True)
+class BodySolver[S: Record](Solver[S]):
+    """A solver of bodies of any shape."""
+
+    task = "solve_body"
+    solves = "finite element bodies"
+
+    solve_body: SolveBody[S]
+
+
+@dataclass(frozen=True)
+class Trade:
+    """Marks a key of settings that buys accuracy with time: a ``ladder`` of values worth a look, as scene files write them, from
+    the fastest to the most accurate. Some may be refused: elements for other cells or other effects.
+    """
+
+    ladder: tuple[float | str, ...]
+
+
+def trades(settings: type[Record]) -> dict[str, tuple[float | str, ...]]:
+    """The keys of ``settings`` that buy accuracy with time, each with its ladder."""
+    return {
+        key: entry.ladder
+        for key, field in settings.model_fields.items()
+        for entry in field.metadata
+        if isinstance(entry, Trade)
+    }
