@@ -46,7 +46,7 @@ class Entry:
     """
 
     name: str
-    family: str
+    group: str
     title: str
     unit: str
     truth: Callable[[], float]

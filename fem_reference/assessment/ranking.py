@@ -112,7 +112,7 @@ def facts(found: Iterable[Ranking]) -> list[dict[str, object]]:
             "value": _finite(place.deviation.value),
             "error_bar": _finite(place.deviation.bar),
             "rank": [place.first, place.last],
-            "cannot_be_told_from": list(place.alike),
+            "not_distinguishable_from": list(place.alike),
         }
         for one in found
         for place in one.places

@@ -269,5 +269,5 @@ def ranking_text(table: Table) -> str:
         if one.seconds_per_frame:
             text.insert(0, f"{1 / one.seconds_per_frame:.3g} frames/s")
         known = " (its error bar)" if one.of_reference and one.measures else ""
-        lines.append(f"{one.case}: {one.family}, {one.name}: {one.outcome.status}, {', '.join(text)}{known}")
+        lines.append(f"{one.case}: {one.kind}, {one.name}: {one.outcome.status}, {', '.join(text)}{known}")
     return "\n".join([*lines, *(f"{case}: left out, {reason}" for case, reason in table.missing.items())])

@@ -107,7 +107,7 @@ def _hertz_truth(name: str) -> float:
 def _hertz_entry(name: str, title: str, unit: str, attribute: str, value: Any) -> Entry:
     return Entry(
         name=f"hertz_{name}",
-        family="contact",
+        group="contact",
         title=f"A rigid ball pressed into a large body: {title}",
         unit=unit,
         truth=partial(_hertz_truth, attribute),
@@ -126,7 +126,7 @@ ENTRIES = (
     *(
         Entry(
             name=f"plate_{element.lower().replace('/', '_')}",
-            family="contact",
+            group="contact",
             title=f"A smooth plate on a block, by {element}: its force at half the height",
             unit="N",
             truth=_plate_truth,

@@ -106,7 +106,7 @@ _FREE = ("z0",)
 _UP = partial(ladder, size=THICKNESS / 2)
 _BLOCK = partial(
     Entry,
-    family="flexure",
+    group="flexure",
     relative=True,
     kind="closed form",
     source="Rivlin 1949, doi 10.1098/rspa.1949.0004; validation/rivlin.py Flexure",
