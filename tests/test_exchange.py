@@ -123,7 +123,7 @@ def test_the_scene_says_units_and_values(exported: Path, built: Problem) -> None
     assert [effect["name"] for effect in facts["effects"]] == ["neo_hooke", "incompressible"]
     assert facts["effects"][0]["parameters"] == {"mu": {"value": 0.01, "unit": "MPa"}}  # 10 kPa
     floor, lid = facts["bones"]
-    assert (floor["name"], floor["file"], floor["pushes"]) == ("floor", "bones/0.ply", False)
+    assert (floor["name"], floor["file"], floor["obstacle"]) == ("floor", "bones/0.ply", False)
     assert "motion" not in floor
     assert lid["motion"]["keyframes"][1] == {"frame": 10.0, "angle": 0.4}
     assert facts["mesh"]["tets"] == len(built.mesh.tets)

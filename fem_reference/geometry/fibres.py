@@ -71,8 +71,8 @@ class FibreField:
         found = self.locator.embed(points).interpolate(self.mesh, self.gradients)
         return np.asarray(found / np.maximum(np.linalg.norm(found, axis=1), np.finfo(float).tiny)[:, None])
 
-    def on_the_way(self, points: Floats) -> Bools:
-        """Which of ``points`` (m, 3) are in the mesh and not yet at an attachment, (m,)."""
+    def between_attachments(self, points: Floats) -> Bools:
+        """Which of ``points`` (m, 3) are in the mesh and at no attachment, (m,)."""
         embedding = self.locator.embed(points)
         values = embedding.interpolate(self.mesh, self.values)
         return np.asarray((embedding.outside == 0) & (values > _NEAR) & (values < 1 - _NEAR))
@@ -201,7 +201,7 @@ def _follow(field: FibreField, seeds: Floats, goal: Ints, sign: float) -> tuple[
         4 * int(field.locator.diagonal / abs(step))
     ):  # a line four times as long as the mesh goes in circles
         points = _runge_kutta(field, points, step)
-        goes_on = field.on_the_way(points)
+        goes_on = field.between_attachments(points)
         going, points = going[goes_on], points[goes_on]
         for i, point in zip(going, points, strict=True):
             lines[i].append(point)

@@ -119,9 +119,9 @@ def build(surface: Surface, spacing: float, margin: float, rounding: float = 0.0
 
     ``rounding`` [mm]: the standard deviation s of the Gaussian mean that is taken of it, as flat triangles are no smooth body
     to slide along; where the surface has a mean curvature of 1/r, that moves it inward by s^2/r. It counts as error.
-    The orientation of single triangles does not matter. InputError where the surface bounds no body, as ``check_closed`` says.
+    Single triangles may have any orientation. InputError where the surface bounds no body, as ``check_closed`` says.
     """
-    surface = _one_way(surface)
+    surface = _oriented(surface)
     low, shape = _extent(surface, spacing, margin)
     values = _on_nodes(surface, low, shape, spacing, margin)
     if rounding > 0:
@@ -191,7 +191,7 @@ def _write(path: Path, grid: Grid) -> None:
         part.replace(path)
 
 
-def _one_way(surface: Surface) -> Surface:
+def _oriented(surface: Surface) -> Surface:
     """A closed surface whose triangles are all oriented outward."""
     check_finite(surface)
     triangles, _ = igl.bfs_orient(surface.triangles)

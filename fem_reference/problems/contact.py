@@ -24,8 +24,8 @@ class Obstruction:
 
 @dataclass(frozen=True)
 class Contact:
-    """Frictionless contact of obstructions, with any sliding, on ``on``: the facets of a region, by name, or a skin. They push by a
-    pressure of the gap g, the signed distance (negative inside), that is zero beyond ``smoothing`` d [mm], ``k (d - g)^2 / (4 d)``
+    """Frictionless contact of obstructions, with any sliding, on ``on``: the facets of a region, by name, or a skin. Its
+    pressure is a function of the gap g, the signed distance (negative inside): zero beyond ``smoothing`` d [mm], ``k (d - g)^2 / (4 d)``
     from d to -d, and ``-k g`` deeper: the slope of an energy per rest area, twice differentiable. ``stiffness``: k [MPa/mm];
     pressed by p, a surface gets p / k deep.
 

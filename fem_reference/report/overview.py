@@ -24,7 +24,7 @@ from fem_reference.scenes.muscle import Scene
 from fem_reference.scenes.scalar import FieldScene
 
 # The statistics that are printed of a comparison; the page, JSON and CSV have them all.
-TOLD = (
+PRINTED = (
     ("volume", "deviation"),
     ("fibre_length", "max"),
     ("surface_deviation", "rms"),
@@ -209,7 +209,7 @@ def _worst(result: Comparison) -> list[str]:
         text = [
             f"{' '.join(key).replace('_', ' ')} {measure.values[measure.worst]:.4g} {measure.unit}"
             f" (frame {result.reference.numbers[measure.worst]})"
-            for key in TOLD
+            for key in PRINTED
             if (measure := find(measures, *key)) is not None
         ]
         lines.append(f"{name} at its worst: {', '.join(text)}")

@@ -141,7 +141,7 @@ def _needed(bench: Bench, reference: Run) -> tuple[Variation, ...]:
 
 
 def _pressed(reference: Run) -> bool:
-    """Whether a bone pressed: where none did, what bones are like does not matter."""
+    """Whether a bone pressed: where none did, the stiffness of contact changes nothing."""
     area = reference.scalars.get("contact_area")
     return area is None or bool(np.nanmax(area) > 0)
 

@@ -177,7 +177,7 @@ def _prestretched() -> tuple[Entry, ...]:
     )
     title = "Muscle prestretched by 1.2 and fixed: force"
     return (
-        _force("prestretch_held", title, fixed, (wrong[0], replace(fixed, material=wrong[1]))),
+        _force("prestretch_fixed", title, fixed, (wrong[0], replace(fixed, material=wrong[1]))),
         replace(released, truth=lambda: 1 / 1.2, source="The stretch that undoes the prestretch leaves no energy."),
     )
 

@@ -61,7 +61,7 @@ def volume(lab: Lab, element: str, bulk: float, error: float = 0.0) -> Finding:
     return Finding(states[STEPS].scalars["volume_ratio"], note=_note(states))
 
 
-def way_back(lab: Lab, element: str, bulk: float, *, growing: bool = False) -> Finding:
+def distance_from_rest(lab: Lab, element: str, bulk: float, *, growing: bool = False) -> Finding:
     """How far from rest [mm] any node is when the plate is back."""
     states = _smooth(lab, element, bulk, growing=growing)
     off = np.linalg.norm(states[-1].points - states[0].points, axis=1)
@@ -169,9 +169,9 @@ def _return_entry(name: str, element: str, bulk: float) -> Entry:
         because=f"{_EXACT}; of an elastic body nothing remembers the squeeze",
         kind="property",
         source="a hyperelastic body that nothing loads or moves is at rest",
-        measure=partial(way_back, element=element, bulk=bulk),
+        measure=partial(distance_from_rest, element=element, bulk=bulk),
         negative_control="load steps that may grow: they lead to the block turned by half a turn, with no energy and det F = 1",
-        with_negative_control=partial(way_back, element=element, bulk=bulk, growing=True),
+        with_negative_control=partial(distance_from_rest, element=element, bulk=bulk, growing=True),
     )
 
 
