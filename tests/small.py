@@ -11,7 +11,7 @@ from fem_reference.io import files
 
 CASE = """
 title = "A bar between two plates"
-proves = "the way from a scene file to a page"
+proves = "the steps from a scene file to a page"
 
 [muscle]
 surface = "bar.vtp"

@@ -10,7 +10,7 @@ from fem_reference.scenes import casefile
 
 pytestmark = pytest.mark.slow
 
-# The way there and back in its two ends and a middle; the bulk of the time is the number of frames.
+# The motion there and back at its two ends and a middle; the bulk of the time is the number of frames.
 FEW = {"frames.every": 100}
 # As its scene fills it, before tetrahedra are cut into eight.
 COARSE = {"muscle.refinements": 0}

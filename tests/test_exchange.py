@@ -93,7 +93,7 @@ def test_poses_of_every_bone_and_frame(exported: Path, built: Problem) -> None:
             assert np.array_equal(found[bone.name, frame], bone.pose(frame))
 
 
-def test_what_bones_hold(exported: Path, built: Problem) -> None:
+def test_what_is_attached(exported: Path, built: Problem) -> None:
     for attached in built.attached:
         vertices = [
             int(row[2])

@@ -76,7 +76,7 @@ def bent():
     return problem, *solved(problem, ranks=1)
 
 
-def test_there_and_back_forgets_the_way(bent) -> None:
+def test_there_and_back_ends_at_rest(bent) -> None:
     problem, outcome, frames = bent
     assert outcome.status == "converged"
     assert np.abs(frames[2].surface - problem.surface.points).max() > 5

@@ -160,7 +160,7 @@ def test_directions_follow_the_bar_and_the_ring() -> None:
     assert np.einsum("ij,ij->i", along, around).min() > np.cos(np.radians(5))
 
 
-def test_where_all_is_attached_by_one_bone_fibres_go_the_mean_way() -> None:
+def test_where_all_is_attached_by_one_bone_fibres_take_the_mean_direction() -> None:
     # The lowest layer of tets has all its corners on "bottom": the field has no slope there.
     bar = _bar()
     low = bar.points[bar.tets][:, :, 2].max(axis=1) < 6

@@ -22,7 +22,7 @@ def scene(folder, **tables):
     return fields.scene(folder, **({"domain": INTERVAL, "effect": [DIFFUSION], "boundary": ENDS} | tables))
 
 
-def test_what_ends_and_rims_hold(tmp_path) -> None:
+def test_what_is_prescribed_on_ends_and_rims(tmp_path) -> None:
     fixed = build(scene(tmp_path)).fixed
     assert fixed == pytest.approx([0, np.nan, np.nan, np.nan, 2], nan_ok=True)
     for order in (1, 2):

@@ -89,8 +89,8 @@ def test_everybody_is_measured_against_the_reference(case) -> None:
     # 8 s for the four frames after the first; nobody asked for its error bar.
     assert reference["seconds_per_frame"] == 2.0
     assert set(reference["worst"].values()) == {None}
-    # Nothing but what bones hold moves in a solver without constraints: in frame 20, where they are back at rest, the whole surface
-    # is 20 mm below the reference's, and so is that of the greatest displacement, 100 %.
+    # Nothing but attached vertices moves in a solver without constraints: in frame 20, where they are back at rest, the whole
+    # surface is 20 mm below the reference's, and so is that of the greatest displacement, 100 %.
     assert still["worst"]["surface_deviation.rms"] == pytest.approx({"value": 20.0, "frame": 20, "unit": "mm"})
     assert still["worst"]["surface_deviation.rms_percent"]["value"] == pytest.approx(100.0)
     assert facts["scenarios"][0]["travel_mm"] == pytest.approx(20.0)

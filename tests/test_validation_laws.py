@@ -138,7 +138,8 @@ def test_guccione_has_no_preferred_direction_across_the_fibre() -> None:
 
 
 def test_guccione_along_across_and_between() -> None:
-    # At J = 1: longer one way and shorter the other, E = (l^2 - 1)/2 in both; sheared along the fibre, E_fs = g/2, E_ss = g^2/2.
+    # At J = 1: longer along one axis and shorter along the other, E = (l^2 - 1)/2 in both;
+    # sheared along the fibre, E_fs = g/2, E_ss = g^2/2.
     law = LAWS["guccione"]
     longer, shorter = ((stretch**2 - 1) / 2 for stretch in (1.2, 1 / 1.2))
     along = 8 * longer**2 + 2 * shorter**2
@@ -236,7 +237,7 @@ def test_fibres_that_a_stretch_would_turn_are_refused() -> None:
         homogeneous.uniaxial(MUSCLE, 5.0, 1.2, FIBRE)
 
 
-def test_a_body_that_cannot_hold_the_pull_is_reported() -> None:
+def test_a_body_that_cannot_carry_the_pull_is_reported() -> None:
     with pytest.raises(ArithmeticError, match="no homogeneous state found"):
         homogeneous.pulled(ACTIVE, 1.0, 0.5)  # a fibre alone, that pulls with 0.19 MPa at most
 

@@ -127,7 +127,7 @@ def test_results_keep_their_order_and_every_thread_its_lab(monkeypatch) -> None:
     both, used = threading.Barrier(2, timeout=5), []
 
     def meet(lab):
-        both.wait()  # passes only when two entries are under way at once
+        both.wait()  # passes only when two entries are measured at once
         used.append((lab, threading.get_ident()))
         return Finding(1.0)
 
@@ -209,7 +209,7 @@ def test_a_thread_stops_after_its_entry_when_the_other_met_a_mistake(monkeypatch
             closed.set()
 
     def slow(_):
-        assert closed.wait(5)  # the labs close while this is still under way
+        assert closed.wait(5)  # the labs close while this is still measured
         measured.append("slow")
         return Finding(1.0)
 

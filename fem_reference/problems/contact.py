@@ -24,10 +24,10 @@ class Obstruction:
 
 @dataclass(frozen=True)
 class Contact:
-    """Frictionless contact of obstructions, with any sliding, on ``on``: the facets of a region, by name, or a skin. Its
-    pressure is a function of the gap g, the signed distance (negative inside): zero beyond ``smoothing`` d [mm], ``k (d - g)^2 / (4 d)``
-    from d to -d, and ``-k g`` deeper: the slope of an energy per rest area, twice differentiable. ``stiffness``: k [MPa/mm];
-    pressed by p, a surface gets p / k deep.
+    """Frictionless contact of obstructions, with any sliding, on ``on``: the facets of a region, by name, or a skin. The
+    pressure depends on the gap g, the signed distance (negative inside): zero beyond ``smoothing`` d [mm],
+    ``k (d - g)^2 / (4 d)`` from d to -d, and ``-k g`` deeper: the slope of an energy per rest area, twice differentiable.
+    ``stiffness``: k [MPa/mm]; pressed by p, a surface gets p / k deep.
 
     With ``relaxed``, two frame numbers, a point that is too near at the first of them for no pressure feels as much less depth
     there, and all of its depth from the second on: an overlap at rest is removed gradually.

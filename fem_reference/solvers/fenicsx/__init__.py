@@ -101,8 +101,8 @@ def _pass_on(problem: Problem, frame: Frame, sink: Sink, passed: list[int]) -> N
 
 def _with_attachment_errors(problem: Problem, frame: Frame) -> Frame:
     """The frame with how far attached surface vertices are from where their bones have them, ``attachment_error_rms``
-    and ``attachment_error_max`` [mm]: exact attachments are facets of tets, which cover them only roughly, and springs yield. As it is
-    where nothing is attached.
+    and ``attachment_error_max`` [mm]: exact attachments are facets of tets, which cover them only roughly, and springs
+    yield. As it is where nothing is attached.
     """
     surface = frame.surface
     if not problem.attached or surface is None:
