@@ -325,7 +325,7 @@ def test_what_febio_has_not_is_refused_before_any_work(
 
 
 def test_frames_come_back_from_febios_log(folder: Path, bar: Problem, tmp_path: Path) -> None:
-    """Its quadratic elements hold a quadratic motion exactly; so does every vertex of the surface, wherever in a tet it lies."""
+    """Its quadratic elements show a quadratic motion exactly; so does every vertex of the surface, wherever in a tet it lies."""
     scene = casefile.read(folder)
     assert isinstance(scene, Scene)
     inside = bar.surface.moved_to(5 + 0.9 * (bar.surface.points - 5))  # no vertex where a node is

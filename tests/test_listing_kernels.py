@@ -269,7 +269,7 @@ def test_heated_is_what_lies_above_the_average():
     assert kernels.right_side(points).tolist() == [0, 0, 1, 1, 0, 0, 0, 0]
 
 
-def test_rim_of_a_grid_is_what_uniform_holds():
+def test_rim_of_a_grid_is_what_uniform_fixes():
     points, bounds = kernels.uniform(49)
     assert len(bounds[0]) == 24
     assert np.array_equal(np.sort(bounds[0]), kernels.rim(kernels.delaunay(points)))

@@ -90,6 +90,6 @@ def test_an_edge_that_no_vertex_meets_is_found() -> None:
     assert_allclose(shared(cube, Wedge()), 0.5 * 0.5 * 1 * 4, rtol=0.05)
 
 
-def test_a_flat_surface_holds_nothing() -> None:
+def test_a_flat_surface_contains_nothing() -> None:
     assert shared(BALL.moved_to(BALL.points * [1, 1, 0]), floor(RADIUS + 1)) == 0
     assert shared(BALL.moved_to(BALL.points * 0), floor(RADIUS + 1)) == 0

@@ -213,7 +213,7 @@ def test_the_flood_does_not_lead_back():
     np.testing.assert_array_equal(flood(border), expected)
 
 
-def test_voxels_of_a_ball_hold_it():
+def test_voxels_of_a_ball_contain_it():
     # A triangle marks voxels whose corner is within 0.87 of its plane and 1.73 of its edges, all in voxels of 40 / 64 mm:
     # what is deeper than one diagonal is inside, what is more than three diagonals out of it is not.
     voxels = Voxels.of(ball(), 64)
@@ -380,7 +380,7 @@ def merged(parts):
     return Surface(np.vstack([part.points for part in parts]), np.vstack(triangles))
 
 
-def test_voxels_hold_what_the_program_attached(data):
+def test_voxels_contain_what_the_program_attached(data):
     # Exactly: every vertex in a voxel of the femur, and of those left every one in a voxel of the pelvis, which was both
     # hip bones and the sacrum in one. So voxels are made as there.
     bones = data / "hip" / "bones"

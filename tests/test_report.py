@@ -1,4 +1,4 @@
-"""The report says what the comparison holds, all of it, and opens without a network."""
+"""The report shows all of a comparison and opens without a network."""
 
 import csv
 import io
@@ -209,7 +209,7 @@ def test_what_is_not_finite_is_null(comparison):
     assert report.summary(replace(comparison, verdicts=(damaged,)))["verdicts"][0]["value"] is None
 
 
-def test_csv_holds_the_same_numbers(comparison, tmp_path):
+def test_csv_has_the_same_numbers(comparison, tmp_path):
     report.write(comparison, tmp_path / "out")
     rows = list(csv.DictReader(io.StringIO((tmp_path / "out" / "measures.csv").read_text())))
     printed = json.loads((tmp_path / "out" / "measures.json").read_text())["measures"]

@@ -1,4 +1,4 @@
-"""The page of the catalogue shows all that a result holds, opens without a network, and survives what is not a number."""
+"""The page of the catalogue shows all of a result, opens without a network, and survives what is not a number."""
 
 import json
 import math
@@ -118,7 +118,7 @@ def test_numbers_have_six_digits_where_value_and_truth_stand_beside_each_other()
     assert f"<td>1.5 {times} 10<sup>{minus}7</sup>&#8239;" in text
 
 
-def test_files_hold_the_same_numbers(tmp_path) -> None:
+def test_files_have_the_same_numbers(tmp_path) -> None:
     printed = verification(made(order=2.0, ladder=LADDER), made("tip", NAN))
     page = report.write_verification(printed, tmp_path / "new" / "reports", "verify")
     assert page == tmp_path / "new" / "reports" / "verify.html"

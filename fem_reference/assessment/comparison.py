@@ -28,7 +28,7 @@ _SHOWN = (
 class Comparison:
     """``deviations``: by candidate name, its measures against the reference. ``changes``: by run name (``"reference"`` among
     them), its measures against the rest state. ``extension_error`` [mm]: by frame, the greatest error over the fibres that the
-    extension makes on the reference's own surface. ``error_bars``: how well the reference is known, None without any.
+    extension makes on the reference's own surface. ``error_bars``: those of the reference, None without any.
     """
 
     scene: Scene
@@ -54,7 +54,7 @@ class Comparison:
         return found
 
     def _repr_html_(self) -> str:
-        """What notebooks show: the greatest deviation of each candidate, with its frame and how well it is known."""
+        """What notebooks show: the greatest deviation of each candidate, with its frame and its error bar."""
         rows = [
             (name, f"{one.metric}.{one.statistic}", f"{one.values[one.worst]:.4g} {one.unit}", self._known(one), number)
             for name, measures in self.deviations.items()

@@ -75,7 +75,7 @@ class ErrorBars:
 
     @property
     def of_deviations(self) -> tuple[Measure, ...]:
-        """How well deviations from the reference are known, as measures."""
+        """The error bars of deviations from the reference, as measures."""
         return tuple(
             Measure(bar.metric, bar.statistic, bar.unit, bar.values) for bar in self.bars if bar.of == "deviation"
         )

@@ -16,7 +16,7 @@ from fem_reference.scenes.muscle import Scene
 
 @dataclass(frozen=True, eq=False)
 class CurrentMeasures:
-    """A candidate, measured now against the ``reference``; ``error_bars``: how well that is known, None without any."""
+    """A candidate, measured now against the ``reference``; ``error_bars``: those of the reference, None without any."""
 
     scene: Scene
     candidate: Run

@@ -83,8 +83,8 @@ def _less(one: Deviation, other: Deviation) -> bool:
 
 
 def rankings(measured: dict[str, tuple[Measure, ...]], bars: Iterable[Measure]) -> tuple[Ranking, ...]:
-    """By each statistic of ``RANKED``, those of ``measured`` (measures against the reference by name) that have it; ``bars``: how
-    well deviations are known. None where nobody knows that.
+    """By each statistic of ``RANKED``, those of ``measured`` (measures against the reference by name) that have it; ``bars``: the
+    error bars of deviations; a statistic without one is left out.
     """
     known, found = tuple(bars), []
     for metric, statistic, title in RANKED:

@@ -96,7 +96,7 @@ def inflate(points: Floats, triangles: Ints, volume: float) -> Floats:
 def flip_edges(points: Floats, triangles: Ints, labels: Ints | None = None) -> Ints:
     """``triangles`` (m, 3) of a closed surface after flips towards Delaunay, until none is left (at most 20 passes).
 
-    Edges between triangles of different ``labels`` (m,) stay, so that the labels hold for the triangles that come out.
+    Edges between triangles of different ``labels`` (m,) stay, so that the labels are valid for the triangles that come out.
     """
     for _ in range(20):
         flipped = _flip_once(points, triangles, labels)

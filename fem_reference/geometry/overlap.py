@@ -25,7 +25,7 @@ def shared_volume(surface: Surface, counts: NDArray[np.bool_], distance: Distanc
     triangle is one that ``counts`` (m,); 0 where no triangle that counts comes into the body, as where it is swallowed whole. NaN
     where the surface has blown up beyond a cubic metre.
 
-    Space is cut into cubes, those that may hold a part of it into smaller ones, and 4000 to 8000 random points are drawn in
+    Space is cut into cubes, those that may contain a part of it into smaller ones, and 4000 to 8000 random points are drawn in
     these, the same every time. On average the count is exact. Its standard deviation is at most half of what one point stands
     for, times the root of the number of points in cubes on the border of the overlap.
     """
@@ -82,7 +82,7 @@ class _Sides:
             self.trees.append((tree, triangles))
 
     def may_count(self, centres: Floats, reach: float) -> NDArray[np.bool_]:
-        """Which of the balls of radius ``reach`` about ``centres`` (n, 3) may hold something that counts, (n,)."""
+        """Which of the balls of radius ``reach`` about ``centres`` (n, 3) may contain something that counts, (n,)."""
         counting, other = self._distances(centres)
         found = counting - other <= 2 * reach
         deep = found & (np.minimum(counting, other) > reach)

@@ -162,8 +162,8 @@ class ByCell:
 @dataclass(frozen=True, eq=False)
 class Body:
     """A body of ``mesh`` with its ``effects``; at ``frames[0]`` it rests. A load acts on the facets that its ``on`` names; by
-    ``contact``, where there is one, with every obstruction. ``interval`` [s]: from a frame number to the next, where time
-    matters.
+    ``contact``, where there is one, with every obstruction. ``interval`` [s]: from a frame number to the next, None where nothing
+    depends on time.
     """
 
     mesh: Cells

@@ -211,7 +211,7 @@ def _check_outside(scene: Scene, rest: Setup, contact: ContactEffect) -> None:
 
 
 def _distance_facts(rest: Setup) -> dict[str, float | str]:
-    """How well the distance to each bone of a file is known: spacing of its grid, root mean square and greatest error [mm]."""
+    """The distance grid of each bone of a file: its spacing, root mean square and greatest error [mm]."""
     grids = {bone.name: bone.shape for bone in rest.bones}
     return {
         f"{name}_distance_{key}_mm": getattr(grid, key)

@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 _EXACT = "exact attachments"
 
 # A scene whose tetrahedra are refined has the coarse member of its pair in them, before the last refinement. These orders make
-# bars hold 95 of 100 differences from finer solutions: docs/accuracy.md.
+# bars cover 95 of 100 differences from finer solutions: docs/accuracy.md.
 NESTED = Orders(general=1.9, volume=1.3, fibres=1.4, worst=1.1)
 # Another has a mesh of its own for it, larger by so much, and rims that are not graded: order 1, whatever the element (Grisvard
 # 1985, Elliptic Problems in Nonsmooth Domains).

@@ -13,7 +13,7 @@ from fem_reference.verification.parts import SYMMETRY, resistance
 
 GROUP = "viscosity"
 _ETA, _SECONDS = 0.02, 1.5  # MPa s; s from a frame number to the next
-_BULK = 1e6 * MU  # so high that the truth of incompressible material holds to 1e-6
+_BULK = 1e6 * MU  # so high that the truth of incompressible material is met to 1e-6
 _STEPS = (1 / 32, 1 / 64, 1 / 128)
 _SOURCE = "validation/viscosity.py"
 
