@@ -126,7 +126,7 @@ def test_a_step_through_a_plate_is_cut(fem_lab) -> None:
 
 
 @pytest.mark.parametrize("start", np.linspace(3.0, 33.0, 11))
-def test_no_way_through_a_thin_plate_is_missed(start: float) -> None:
+def test_no_path_through_a_thin_plate_is_missed(start: float) -> None:
     # A plate 1 mm thin, paths of 36 mm from 3 to 33 mm before it: at most half a millimetre deep, and out on the other side.
     plate = Obstruction("plate", Box((0.0, 0.0, 0.0), (90.0, 90.0, 1.0), 0.0), Slide((0.0, 0.0, 0.0)))
     starts, displacements = np.array([[0.3, 0.2, start], [0.0, 0.0, 40.0]]), np.array([[1.0, 2.0, -36.0]] * 2)

@@ -205,7 +205,7 @@ def test_a_rounder_slab_is_more_convex_where_it_bulges() -> None:
     assert_allclose(np.sort(turned[np.abs(turned) > 1e-9]), [-slope, -slope, 2 * slope], rtol=1e-10)
 
 
-def test_a_fold_beyond_half_a_turn_is_the_short_way_round() -> None:
+def test_a_fold_beyond_half_a_turn_is_the_smaller_angle() -> None:
     """An edge folded to 170 degrees one side and to 170 the other differs by 20, not by 340."""
     rest = np.array([[0.0, 0, 0], [0, 1, 0], [-1, 0.5, 0], [1, 0.5, -0.5]])
     tet = Surface(rest, np.array([[0, 1, 2], [1, 0, 3], [1, 3, 2], [0, 2, 3]]))

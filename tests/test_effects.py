@@ -209,7 +209,7 @@ def test_between() -> None:
     ]
 
 
-def test_effects_tell_what_they_are() -> None:
+def test_effects_state_what_they_are() -> None:
     gravity, pressure = make("gravity"), make("pressure")
     assert (gravity.title, pressure.title) == ("Gravity", "Pressure on top")
     assert gravity.parameters[1:] == [

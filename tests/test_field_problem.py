@@ -211,7 +211,7 @@ def test_peclet_is_a_parameter_of_the_rod(tmp_path, capsys) -> None:
     assert "runs/rod/listing" in out
 
 
-def test_show_tells_what_a_scalar_case_is_made_of(capsys) -> None:
+def test_show_reports_what_a_scalar_case_is_made_of(capsys) -> None:
     status, out, _ = spoken(capsys, "show", "rod_advection")
     assert status == cli.DONE
     assert "form: supg, mesh Peclet number up to 2.5" in out

@@ -344,7 +344,7 @@ def test_pictures_show_the_candidate_in_the_colours_of_the_bar(comparison, monke
         assert (pixels.max(axis=2) < 60).any()
 
 
-def test_curves_tell_where_a_run_is_not_a_number(comparison):
+def test_curves_show_where_a_run_is_not_a_number(comparison):
     drawn = {curve.title: curve.svg for curve in curves(comparison)}
     assert len(drawn) == 5
     assert "not a number" in drawn["Surface of torn: distance to the reference"]

@@ -164,7 +164,7 @@ def test_place_of_the_body_does_not_matter(ball: Grid) -> None:
         assert_allclose(one, other, atol=1e-9)
 
 
-def test_way_that_triangles_run_does_not_matter(ball: Grid) -> None:
+def test_triangles_may_have_any_orientation(ball: Grid) -> None:
     triangles = BALL.triangles.copy()
     triangles[100:200] = triangles[100:200, ::-1]
     assert_allclose(build(Surface(BALL.points, triangles), 1.0, 4.0).coefficients, ball.coefficients, atol=1e-9)
@@ -224,7 +224,7 @@ def test_store_gives_back_the_same_bits(counted: list[float], tmp_path: Path) ->
     assert len(list((tmp_path / "new").iterdir())) == 1
 
 
-def test_store_tells_surfaces_errors_and_margins_apart(counted: list[float], tmp_path: Path) -> None:
+def test_store_distinguishes_surfaces_errors_and_margins(counted: list[float], tmp_path: Path) -> None:
     cached(BALL, 0.1, 2.0, 0.0, tmp_path)
     cached(BALL, 0.2, 2.0, 0.0, tmp_path)
     cached(BALL, 0.1, 3.0, 0.0, tmp_path)

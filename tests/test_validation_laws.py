@@ -198,7 +198,7 @@ def test_stresses_tend_to_those_of_incompressible_matter(mode: str, power: int, 
 
 @pytest.mark.parametrize("stretch", [0.3, 0.9, 1.0, 1.2, 2.0])
 @pytest.mark.parametrize("bulk", [0.05, 10.0, 1000.0])
-def test_two_ways_to_a_uniaxial_state_meet(stretch: float, bulk: float) -> None:
+def test_two_paths_to_a_uniaxial_state_meet(stretch: float, bulk: float) -> None:
     state = homogeneous.uniaxial(neo_hooke(0.01), bulk, stretch)
     # the bulk modulus multiplies the rounding of J, 1e-16, in the stress
     assert np.linalg.det(state.F) == pytest.approx(loads.squeezed_volume(0.01, bulk, stretch), rel=1e-12)

@@ -287,7 +287,7 @@ def test_all_pass(verify) -> None:
     assert {"fem_reference", "python", "numpy"} <= set(facts["versions"])
 
 
-def test_without_names_all_are_measured_and_one_that_fails_tells(verify) -> None:
+def test_without_names_all_are_measured_and_one_that_fails_is_reported(verify) -> None:
     status, printed, facts = verify()
     assert status == cli.VERDICT_FAIL
     assert [row["name"] for row in facts["entries"]] == ["bar", "rod", "tip"]

@@ -39,7 +39,7 @@ def test_turning_a_body_costs_nothing() -> None:
     assert effect.stored is False
 
 
-def test_viscosity_does_not_see_which_way_material_lies_or_what_it_was_at_rest() -> None:
+def test_viscosity_does_not_see_the_orientation_of_the_material_or_what_it_was_at_rest() -> None:
     effect, at = make("viscosity"), state(np.eye(3))
     for F, other in zip(deformations(), deformations()[1:], strict=False):
         # Per volume before the step, of which f = F F_before^-1 is the only deformation.

@@ -186,8 +186,8 @@ def _spread(ticks: Floats, local: Floats) -> Floats:
 
 
 def grid(corners: Sequence[tuple[float, float]], across: Floats, along: Floats, order: int) -> Grid:
-    """The quadrilateral with ``corners`` [mm], counter-clockwise, cut at the ticks ``across`` of [0, 1] from the side between
-    the last corner and the first to the opposite one, and at ``along`` those sides; cells of degree ``order`` >= 2.
+    """A grid of cells of degree ``order`` >= 2 on the quadrilateral with ``corners`` [mm], counter-clockwise, clamped between the
+    last and the first: cut at the ticks ``across`` of [0, 1] from there to the opposite side, and at ``along`` these sides.
     """
     a, b, c, d = np.array(corners)
     local = _lobatto(order)
@@ -265,8 +265,8 @@ def _newton_step(body: Grid, matrix: Floats, residual: Floats, load: Floats) -> 
 
 
 def rest(body: Grid, law: Law, bulk: float, traction: tuple[float, float], steps: int = 1) -> Rested:
-    """Where ``body`` comes to rest under a dead ``traction`` [MPa] on the side opposite to the clamped one, put on in ``steps``;
-    ``bulk`` is K [MPa]. ArithmeticError where Newton does not get there.
+    """Where ``body`` comes to rest under a dead ``traction`` (2,) [MPa] on the side opposite to the clamped one, put on in
+    ``steps``; ``bulk`` is K [MPa]. ArithmeticError where Newton's method does not get there.
     """
     u, q = np.zeros_like(body.nodes), np.zeros((len(body.cells), body.pressures.shape[1]))
     for share in np.arange(1, steps + 1) / steps:

@@ -1,4 +1,4 @@
-"""Problems whose answers are known: entries of the verification catalogue and their results."""
+"""Entries of the verification catalogue, problems whose answers are known, and their results."""
 
 import math
 from collections.abc import Callable

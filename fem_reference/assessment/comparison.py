@@ -82,8 +82,20 @@ class Comparison:
 def compare(
     scene: Scene, setup: Setup, reference: Run, candidates: tuple[Run, ...], error_bars: ErrorBars | None = None
 ) -> Comparison:
-    """Measure and judge runs that all have the frames of the scene (``not a number`` where a run did not reach one); with
-    ``error_bars`` nothing is judged that they are too wide for. Of a run without a surface only what needs none is judged.
+    """Measure and judge runs of a scene.
+
+    Parameters
+    ----------
+    scene, setup
+        The scene, and its bodies and attachments as arrays.
+    reference
+        The run that counts as the truth.
+    candidates
+        Runs with all frames of the scene, NaN where one did not reach a frame. Of a run without a surface only what needs none is
+        judged.
+    error_bars
+        Those of the reference: nothing is judged that they are too wide for. None without any.
+
     """
     if not reference.has_surface:
         raise InputError(f"{reference.name}: surface", "a run of lines alone", "a reference that moves the surface")

@@ -74,8 +74,8 @@ class CurrentMeasures:
 
 
 def sample(points: Floats, count: int) -> Ints:
-    """At most ``count`` of the vertices ``points`` (n, 3), each as far as can be from those before it; the first is the one
-    furthest from the middle of all.
+    """Indices (k,) of at most ``count`` vertices of ``points`` (n, 3), each as far as can be from those before it; the first is the
+    one furthest from the middle of all.
     """
     chosen = [int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
     away = np.linalg.norm(points - points[chosen[0]], axis=1)

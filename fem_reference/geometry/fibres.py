@@ -1,6 +1,4 @@
-"""Directions of fibres in a muscle, and fibres traced along them: the lines of steepest ascent of a Laplace field from one
-attachment to the other.
-"""
+"""Fibre directions and traced fibres: the lines of steepest ascent of a Laplace field from one attachment to the other."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -79,10 +77,16 @@ class FibreField:
 
 
 def fibre_field(mesh: TetMesh, start: str, end: str) -> FibreField:
-    """The Laplace field that is 0 on the attachment ``start`` (a key of ``mesh.facets``), 1 on ``end``, without flux elsewhere;
-    linear elements.
+    """A Laplace field from one attachment to another, by linear elements.
 
-    On a coarse mesh attachments may touch: there it is 1/2.
+    Parameters
+    ----------
+    mesh
+        Tetrahedra of the muscle.
+    start, end
+        Keys of ``mesh.facets``: the field is 0 on ``start``, 1 on ``end``, without flux elsewhere; 1/2 where they touch, as they
+        may on a coarse mesh.
+
     """
     zeros, ones = np.unique(mesh.facets[start]), np.unique(mesh.facets[end])
     values = np.zeros(len(mesh.points))

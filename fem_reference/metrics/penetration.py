@@ -1,4 +1,4 @@
-"""How far a run's surface is inside the bones, and how much of the muscle; of the run alone, whatever the reference does.
+"""Depth and volume of a run's muscle inside the bones; of the run alone, whatever the reference does.
 
 By the same distance field as contact. Vertices attached to bones are exempt, and their neighbours.
 """

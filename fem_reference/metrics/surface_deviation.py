@@ -1,4 +1,4 @@
-"""How far the surface of a run is from the reference's: material (the same vertex) and geometric (the closest point).
+"""Distance of a run's surface from the reference's: material (the same vertex) and geometric (the closest point).
 
 A surface that slides along itself deviates materially and not geometrically. All means are weighted by the area
 around each vertex at rest.

@@ -1,4 +1,4 @@
-"""A comparison as something to read: one page that contains everything itself, and the same numbers as JSON and CSV."""
+"""Pages that contain everything themselves, and the same numbers as JSON and CSV."""
 
 import json
 from pathlib import Path

@@ -1,6 +1,4 @@
-"""The runs that the error bars of a reference are made of: on coarser tetrahedra, and there every other cause of numerical error
-halved.
-"""
+"""The runs that error bars are made of: coarser tetrahedra, and on these every other cause of numerical error halved."""
 
 import hashlib
 import logging

@@ -1,6 +1,4 @@
-"""Patch tests: what every element must represent exactly, whatever the shape of its cells: linear functions, and turns of any
-size.
-"""
+"""Patch tests: linear functions and turns of any size, which every element must represent whatever the shape of its cells."""
 
 from dataclasses import dataclass, replace
 

@@ -1,4 +1,4 @@
-"""How fast solvers are, in processor time, beside the speed of the machine and that of the report's own program.
+"""The speed of solvers in processor time, beside that of the machine and that of the report's own program.
 
 Processor time, of all threads together, is what a machine shared by many can report; and a ratio within one run is what compares
 with another.
