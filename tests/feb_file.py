@@ -26,7 +26,7 @@ def effects(*names: str) -> tuple[Any, ...]:
 
 
 def bar() -> Problem:
-    """A bar attached by a bone that slides and one that turns and pushes, beside one that rests; its fibres point anywhere."""
+    """A bar attached to a bone that slides and to an obstacle that turns, beside one that rests; its fibres point anywhere."""
     acts = effects("neo_hooke", "incompressible", "fibre_passive_febio", "contact")
     plain = shapes.bar((2, 2, 3), (10, 10, 30), {"bottom": SLIDES, "top": TURNS}, acts, FRAMES)
     ball = shapes.sphere(0, 5.0)

@@ -17,9 +17,9 @@ def box(cells: tuple[int, int, int], size: tuple[float, float, float]) -> TetMes
     corners = np.array(list(itertools.product(*(range(count) for count in cells)))) @ strides
     tets = []
     for order in itertools.permutations(range(3)):
-        way = np.cumsum([0, *(strides[axis] for axis in order)])
+        path = np.cumsum([0, *(strides[axis] for axis in order)])
         even = np.linalg.det(np.eye(3)[list(order)]) > 0
-        tets.append(corners[:, None] + (way if even else way[[0, 2, 1, 3]]))
+        tets.append(corners[:, None] + (path if even else path[[0, 2, 1, 3]]))
     mesh = TetMesh(points, np.concatenate(tets))
     faces, _ = boundary(mesh.tets)
     ends = {"bottom": 0.0, "top": size[2]}

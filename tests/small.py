@@ -11,7 +11,7 @@ from fem_reference.io import files
 
 CASE = """
 title = "A bar between two plates"
-proves = "the way from a scene file to a page"
+proves = "the steps from a scene file to a page"
 
 [muscle]
 surface = "bar.vtp"
@@ -86,7 +86,7 @@ because = "the bulk modulus is 1000 times the shear modulus"
 [negative_control]
 key = "effect[1].bulk"
 value = "5 kPa"
-because = "a body that gives way loses volume"
+because = "a body that yields loses volume"
 """
 
 

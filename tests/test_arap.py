@@ -333,7 +333,7 @@ def test_the_energy_of_a_frame_is_reported():
     assert frames[1].scalars["arap_energy_mm2"] == pytest.approx(expected, rel=1e-10)
 
 
-def test_what_nothing_or_all_holds_does_not_deform():
+def test_without_attachment_or_all_attached_it_does_not_deform():
     setup = attached_setup(None, SWING)
     outcome, frames = run(Setup(setup.surface, setup.bones, (), setup.frames, None))
     assert outcome.status == "converged"
@@ -366,7 +366,7 @@ def test_scaling_a_surface_that_encloses_nothing_leaves_it():
 
 
 def test_a_muscle_blown_up_by_scaling_is_an_outcome():
-    # A bar pressed to nothing in ten frames: what bones do not hold is scaled without end.
+    # A bar pressed to nothing in ten frames: what is not attached is scaled without end.
     down = Translation((0, 0, -1), (0.0, 10.0), (0.0, 31.0))
     given = shapes.bar((2, 2, 4), (10, 10, 30), {"bottom": None, "top": down}, (), tuple(range(11)))
     outcome, _ = run(given, weights="clamped cotangent", volume_step=True, iterations=4)

@@ -173,7 +173,7 @@ def test_both_at_once():
 
 
 def test_a_volume_out_of_reach_is_an_outcome():
-    # Bones hold every vertex, and move apart.
+    # Every vertex is attached to one of two bones, which move apart.
     setup = attached_setup(None, Translation((0, 0, 1), (0.0, 1.0), (0.0, 10.0)))
     upper = setup.surface.points[:, 2] > 0
     attached = tuple(
@@ -186,9 +186,9 @@ def test_a_volume_out_of_reach_is_an_outcome():
     assert list(frames) == [0]
 
 
-def pressed(way):
-    """A bar of 30 mm whose upper end goes down by ``way`` [mm] in one frame."""
-    down = Translation((0, 0, -1), (0.0, 1.0), (0.0, way))
+def pressed(travel):
+    """A bar of 30 mm whose upper end goes down by ``travel`` [mm] in one frame."""
+    down = Translation((0, 0, -1), (0.0, 1.0), (0.0, travel))
     return shapes.bar((2, 2, 4), (10, 10, 30), {"bottom": None, "top": down}, (), (0, 1))
 
 
@@ -199,10 +199,10 @@ def test_a_volume_at_another_root_is_an_outcome():
     assert list(frames) == [0]
 
 
-@pytest.mark.parametrize("way", [20.0, 30.0, 37.5])
-def test_the_root_nearest_to_the_minimum_is_taken(way):
-    # Where the volume crosses that of rest first, on a fine grid of multipliers either way.
-    given = pressed(way)
+@pytest.mark.parametrize("travel", [20.0, 30.0, 37.5])
+def test_the_root_nearest_to_the_minimum_is_taken(travel):
+    # Where the volume crosses that of rest first, on a fine grid of multipliers in both directions.
+    given = pressed(travel)
     system, rest = system_of(given, "clamped cotangent"), constraints_of(given)
     before = started(given)
     minimum = system.place(before, system.cells.rotations(before))

@@ -80,7 +80,7 @@ def own(tree: ast.AST) -> set[str]:
     return {name.split(".")[1] for name in imports(tree) if name.startswith("fem_reference.")} - {"__version__"}
 
 
-def test_packages_import_one_way_and_heavy_ones_have_one_door() -> None:
+def test_packages_import_in_one_order_and_heavy_ones_have_one_door() -> None:
     found = {path.name for path in PACKAGE.iterdir() if path.name != "__pycache__"}
     assert found == {*ORDER, "__init__.py", "__main__.py", "py.typed"}
     wrong = []

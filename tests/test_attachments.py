@@ -1,4 +1,4 @@
-"""Attachments: what each of the three ways selects on bodies where it can be counted, and the facets below."""
+"""Attachments: what each of the three kinds of selection finds on bodies where it can be counted, and the facets below."""
 
 from pathlib import Path
 from typing import Any
@@ -25,8 +25,8 @@ RING = [(6, 6), (14, 14), (14, 6), (6, 14), (10, 5), (10, 15)]  # [mm], not in t
 GROUND = FLOOR.moved_to(FLOOR.points + np.array([0, 0, 1.0]))  # right below the block
 
 
-def _pick(folder: Path, surface: Surface = BLOCK, bone: Surface = FLOOR, **way: Any) -> np.ndarray:
-    attachment = Attachment(name="origin", bone="floor", **way)
+def _pick(folder: Path, surface: Surface = BLOCK, bone: Surface = FLOOR, **selection: Any) -> np.ndarray:
+    attachment = Attachment(name="origin", bone="floor", **selection)
     return pick(Scene.model_construct(folder=folder, attachment=(attachment,)), 0, surface, bone)
 
 

@@ -48,7 +48,7 @@ def test_a_grid_that_refines_another_nests_in_it() -> None:
     big = tets_around(coarse.points[coarse.tets], small.mean(axis=1))
     inverse = np.linalg.inv(np.swapaxes(big[:, 1:] - big[:, :1], 1, 2))
     shares = np.einsum("nij,nkj->nki", inverse, small - big[:, :1])
-    # All four corners of each fine tet are in the one coarse tet that holds its middle.
+    # All four corners of each fine tet are in the one coarse tet that contains its middle.
     assert shares.min() > -1e-12
     assert shares.sum(axis=2).max() < 1 + 1e-12
 

@@ -39,10 +39,10 @@ def test_it_is_squeezed_homogeneously(run) -> None:
     at = run.positions[run.numbers.index(100)]
     height = np.ptp(at[:, 1])
     # Springs pull with a 100 000th of the shear modulus; an unstable mode would show as millimetres. The gap is 10 mm, where
-    # the plates press with 0.64 MPa a contact of 80 MPa/mm gives way by 0.01 mm on either side.
+    # the plates press with 0.64 MPa a contact of 80 MPa/mm yields by 0.01 mm on either side.
     assert 10 < height < 10.1
     stretch, force = homogeneous(height / 80)
-    assert np.ptp(at[:, 0]) / 100 == pytest.approx(stretch, rel=1e-3)  # contact gives way evenly
+    assert np.ptp(at[:, 0]) / 100 == pytest.approx(stretch, rel=1e-3)  # contact yields evenly
     assert np.ptp(at[:, 2]) / 100 == pytest.approx(stretch, rel=1e-3)
     rest = run.surface.points
     assert at[:, 0] == pytest.approx(stretch * rest[:, 0], abs=0.05)

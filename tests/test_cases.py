@@ -10,7 +10,7 @@ from fem_reference.scenes import casefile
 
 pytestmark = pytest.mark.slow
 
-# The way there and back in its two ends and a middle; the bulk of the time is the number of frames.
+# The motion there and back at its two ends and a middle; the bulk of the time is the number of frames.
 FEW = {"frames.every": 100}
 # As its scene fills it, before tetrahedra are cut into eight.
 COARSE = {"muscle.refinements": 0}
@@ -144,7 +144,7 @@ def test_gluteus_maximus_against_the_recorded_output(data, tmp_path) -> None:
     assert sorted(volume) == list(range(0, 301, 10))
     assert max(map(abs, volume.values())) < 0.5
     assert rows(facts, "surface_deviation", "max")[300] < 0.05
-    # The report's program states its greatest displacement, 132.5 mm at iteration 100, of vertices that both hold alike.
+    # The report's program states its greatest displacement, 132.5 mm at iteration 100, of vertices that both attach alike.
     assert rows(facts, "surface_deviation", "max")[100] == pytest.approx(132.5, abs=1)
 
 

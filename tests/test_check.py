@@ -101,7 +101,7 @@ def test_passes_on_the_same_run_and_fails_when_a_frame_is_moved(work, capsys) ->
     assert markdown.read_text().startswith("### fail: mine on bar")
 
 
-def test_where_nothing_can_be_said_it_is_reported_and_holds_nothing_up(work, capsys) -> None:
+def test_where_nothing_can_be_said_it_is_reported_and_fails_nothing(work, capsys) -> None:
     table = json.loads(work.baseline.read_text())
     rms = table["measures"]["surface_deviation.rms"]
     rms["within"] = max(rms["values"])  # somewhere in the bar of this reference, which is more than nothing

@@ -29,7 +29,7 @@ def claim(bar: float, error: float, statistic: str = "rms", case: str = "bar") -
 def test_cover_is_a_share_and_a_median_and_leaves_out_what_does_not_differ() -> None:
     found = Cover.of([claim(2, 1), claim(3, 1), claim(0.5, 1), claim(9, 1), claim(1, 0)])
     assert (found.count, found.share, found.median) == (4, 0.75, 2.5)
-    assert Cover.of([claim(NAN, 1), claim(2, 1)]).share == 0.5, "what nobody knows holds nothing"
+    assert Cover.of([claim(NAN, 1), claim(2, 1)]).share == 0.5, "what nobody knows covers nothing"
     assert np.isnan(Cover.of([claim(1, 0)]).share)
 
 

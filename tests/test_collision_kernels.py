@@ -1,4 +1,4 @@
-"""Bones that keep vertices out: the distance that compiled code samples, whom it is asked for, and the way out."""
+"""Bones that keep vertices out: the distance that compiled code samples, whom it is asked for, and the path out."""
 
 import numpy as np
 import pytest
@@ -93,7 +93,7 @@ def test_nobody_inside_a_bone_is_missed_and_few_are_asked(grid, kind) -> None:
     assert asked < (0.7 if kind == "grid" else 0.3) * 60 * len(points)  # of 6 mm, where the bone goes 3 mm a frame
 
 
-def test_a_vertex_goes_the_shortest_way_out() -> None:
+def test_a_vertex_takes_the_shortest_path_out() -> None:
     ball = RigidBody("ball", BALL, Translation((1, 0, 0), (0.0, 1.0), (0.0, 30.0)), solid=Sphere((0, 0, 0), 20.0))
     rest = np.array([[40.0, 0, 0], [40, 5, 0], [80, 0, 0], [40, 0, 5]])
     obstacle = collision.Obstacle(ball, rest, np.array([True, True, True, False]), 0.0)
@@ -105,7 +105,7 @@ def test_a_vertex_goes_the_shortest_way_out() -> None:
     assert_allclose(points, [*wanted, *rest[2:]], atol=1e-13)  # a few roundings of 50 mm
 
 
-def test_stiffness_is_the_share_of_the_way() -> None:
+def test_stiffness_is_the_share_of_the_depth() -> None:
     points = np.array([[0.0, 0, 5]])
     obstacle = collision.Obstacle(floor(), points, np.ones(1, bool), 0.0)
     points[0, 2] = -2.0
@@ -113,8 +113,8 @@ def test_stiffness_is_the_share_of_the_way() -> None:
     assert_allclose(points, [[0, 0, -1.5]], atol=1e-15)
 
 
-def test_several_bones_push_by_the_sum() -> None:
-    # Havlicek's response in report 6.1.1: in the corner of a floor and a wall both push at once.
+def test_several_obstacles_add_up() -> None:
+    # Havlicek's response in report 6.1.1: in the corner of a floor and a wall both act at once.
     points = np.array([[5.0, 0, 5]])
     free = np.ones(1, bool)
     corner = [collision.Obstacle(floor(normal=normal), points, free, 0.0) for normal in ((0, 0, 1), (1, 0, 0))]
@@ -143,7 +143,7 @@ def test_watched_vertices_are_asked_again() -> None:
     assert_array_equal(obstacle.near(points).vertices, [1])
 
 
-def test_in_the_middle_of_a_ball_there_is_no_way_out_but_no_harm() -> None:
+def test_in_the_middle_of_a_ball_there_is_no_path_out_but_no_harm() -> None:
     # The gradient of a spline vanishes on a ridge; nothing goes farther than it is deep.
     rest = np.array([[50.0, 0, 0]])
     obstacle = collision.Obstacle(

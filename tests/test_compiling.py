@@ -16,12 +16,12 @@ def test_only_what_was_left_half_done_long_ago_goes(tmp_path, monkeypatch) -> No
     handlers = {}
     monkeypatch.setattr(compiling.signal, "signal", handlers.__setitem__)
     long_ago = time.time() - 2 * compiling.PATIENCE
-    for name in ("done.c", "done.c.cached", "left.c", "under_way.c"):
+    for name in ("done.c", "done.c.cached", "left.c", "unfinished.c"):
         (tmp_path / name).write_text("")
     for name in ("done.c", "left.c"):
         os.utime(tmp_path / name, (long_ago, long_ago))
     compiling.prepare()
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["done.c", "done.c.cached", "under_way.c"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["done.c", "done.c.cached", "unfinished.c"]
     assert handlers[signal.SIGINT] is signal.SIG_IGN
     with pytest.raises(RuntimeError, match="asked to stop"):  # FFCx cleans up after an Exception
         handlers[signal.SIGTERM](signal.SIGTERM, None)

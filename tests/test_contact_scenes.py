@@ -1,4 +1,4 @@
-"""Contact in a scene: a bar that bends against a ball is pushed aside, starts outside it, and takes no step through it."""
+"""Contact in a scene: a bar that bends against a ball is pressed aside, starts outside it, and takes no step through it."""
 
 import importlib.util
 
@@ -50,18 +50,18 @@ def needs_fenicsx() -> None:
 
 
 @pytest.mark.usefixtures("needs_fenicsx")
-def test_a_bone_pushes_the_muscle_aside(tmp_path) -> None:
+def test_contact_displaces_the_muscle(tmp_path) -> None:
     free, deep = solved(scene(tmp_path / "free", -5.5, "[fibres]"))
-    pushed, shallow = solved(scene(tmp_path / "pushed", -5.5))
+    pressed, shallow = solved(scene(tmp_path / "pressed", -5.5))
     assert deep[-1] > 0.5
-    last = pushed[-1].scalars
+    last = pressed[-1].scalars
     # At a pressure p the surface gets p / stiffness deep where it is asked; vertices lie between such points, half a tet apart.
     assert 0 < last["contact_depth"] <= last["contact_pressure"] / 1.0 + 1e-9
     assert shallow[-1] < last["contact_depth"] + 0.05
     assert last["force_ball"] > 0
-    assert pushed[0].scalars["contact_area"] == 0
+    assert pressed[0].scalars["contact_area"] == 0
     assert "overlap_at_rest" not in last
-    assert free[0].surface == pytest.approx(pushed[0].surface, abs=1e-12)
+    assert free[0].surface == pytest.approx(pressed[0].surface, abs=1e-12)
 
 
 @pytest.mark.usefixtures("needs_fenicsx")
@@ -86,7 +86,7 @@ def test_what_overlaps_at_rest_is_relaxed_first_and_reported(tmp_path) -> None:
     assert depths[0] < first["contact_depth"] + 0.05
 
 
-def test_bones_push_only_what_they_do_not_hold(tmp_path) -> None:
+def test_attached_vertices_are_exempt_from_contact(tmp_path) -> None:
     case = scene(tmp_path / "bar", -5.5)
     rest = muscle.setup(case)
     body = as_body(muscle.build(case, rest))
@@ -98,7 +98,7 @@ def test_bones_push_only_what_they_do_not_hold(tmp_path) -> None:
     assert apply(turned, np.array([[5.0, 5, 30]])) == pytest.approx(np.array([[5, 5, 30]]))
 
 
-def test_only_some_bones_push(tmp_path) -> None:
+def test_only_some_bones_are_obstacles(tmp_path) -> None:
     some = CONTACT.replace("\n\n", '\nbones = ["ball"]\n\n')
     case = scene(tmp_path / "bar", -5.5, some)
     assert [entry.name for entry in as_body(muscle.build(case, muscle.setup(case))).obstructions] == ["ball"]
@@ -126,11 +126,11 @@ def test_a_step_through_a_plate_is_cut(fem_lab) -> None:
 
 
 @pytest.mark.parametrize("start", np.linspace(3.0, 33.0, 11))
-def test_no_way_through_a_thin_plate_is_missed(start: float) -> None:
-    # A plate 1 mm thin, ways of 36 mm from 3 to 33 mm before it: at most half a millimetre deep, and out on the other side.
+def test_no_path_through_a_thin_plate_is_missed(start: float) -> None:
+    # A plate 1 mm thin, paths of 36 mm from 3 to 33 mm before it: at most half a millimetre deep, and out on the other side.
     plate = Obstruction("plate", Box((0.0, 0.0, 0.0), (90.0, 90.0, 1.0), 0.0), Slide((0.0, 0.0, 0.0)))
-    starts, ways = np.array([[0.3, 0.2, start], [0.0, 0.0, 40.0]]), np.array([[1.0, 2.0, -36.0]] * 2)
-    through, short = nearest_on_path(plate, starts, ways, 0.1)
+    starts, displacements = np.array([[0.3, 0.2, start], [0.0, 0.0, 40.0]]), np.array([[1.0, 2.0, -36.0]] * 2)
+    through, short = nearest_on_path(plate, starts, displacements, 0.1)
     assert -0.5 <= through < -0.3
     assert 3.5 <= short < 4.2  # it ends 3.5 mm above the plate, up to nine tenths of the last gap after the last look
 
@@ -153,7 +153,7 @@ def test_what_relaxes_waits_for_the_first_frame(tmp_path) -> None:
     assert np.abs(body.prescribed[1].path(top, 5.0)).max() > 0.1
 
 
-def test_a_bone_that_pushes_and_an_attachment_have_names_of_their_own(tmp_path) -> None:
+def test_an_obstacle_and_an_attachment_have_names_of_their_own(tmp_path) -> None:
     path = tmp_path / "bar" / "case.toml"
     scene(tmp_path / "bar", -5.5)
     path.write_text(

@@ -128,7 +128,7 @@ def test_it_leaves_as_fast_as_its_drag_allows(leaning) -> None:
     assert 1 - steps[:-1] / steps[1:] == pytest.approx(rate, rel=0.1)
 
 
-def test_a_step_that_is_too_long_stays_in_the_unstable_state_and_tells(leaning, session) -> None:  # noqa: F811
+def test_a_step_that_is_too_long_stays_in_the_unstable_state_and_reports_it(leaning, session) -> None:  # noqa: F811
     # The bend grows by a factor e in 2.5 s.
     body, _ = leaning
     solved = session.solve(replace(body, frames=(0.0, 1.0, 40.0)), BodySettings(first_step=100.0, residual=1e-11))

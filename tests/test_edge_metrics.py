@@ -173,12 +173,12 @@ def test_edges_weigh_by_area() -> None:
     assert below < 0.95 <= within
 
 
-@pytest.mark.parametrize("way", [1, -1])
-def test_a_slab_bent_into_an_arc_has_known_angles(way: int) -> None:
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_slab_bent_into_an_arc_has_known_angles(sign: int) -> None:
     """By the angle a in n facets: a / n at the lines across, outward on one face and inward on the other, half of it at its
     two ends; the diagonals and the plane sides stay as they are.
     """
-    angle, (length, width, height) = way * 1.5, SIZE
+    angle, (length, width, height) = sign * 1.5, SIZE
     found = values(run_of(SLAB, bent(SLAB.points, angle)))
     step = np.degrees(abs(angle)) / CELLS
     cell, cap = length / CELLS * width / 2, width * height / 2  # a triangle of a face, and of an end
@@ -205,8 +205,8 @@ def test_a_rounder_slab_is_more_convex_where_it_bulges() -> None:
     assert_allclose(np.sort(turned[np.abs(turned) > 1e-9]), [-slope, -slope, 2 * slope], rtol=1e-10)
 
 
-def test_a_fold_beyond_half_a_turn_is_the_short_way_round() -> None:
-    """An edge folded to 170 degrees one way and to 170 the other differs by 20, not by 340."""
+def test_a_fold_beyond_half_a_turn_is_the_smaller_angle() -> None:
+    """An edge folded to 170 degrees one side and to 170 the other differs by 20, not by 340."""
     rest = np.array([[0.0, 0, 0], [0, 1, 0], [-1, 0.5, 0], [1, 0.5, -0.5]])
     tet = Surface(rest, np.array([[0, 1, 2], [1, 0, 3], [1, 3, 2], [0, 2, 3]]))
     edges = Edges.of(tet)

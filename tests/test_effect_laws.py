@@ -184,11 +184,11 @@ def test_incompressible_pressure_is_bulk_times_volume_change() -> None:
 # Loads, ramps, prestrain
 
 
-def test_damping_is_a_drag_against_the_way_of_a_step() -> None:
-    # Minus the slope in the displacement is the force: coefficient times way over time, against the way (0.1, -0.3, 0) mm.
+def test_damping_is_a_drag_against_the_displacement_of_a_step() -> None:
+    # Minus the slope in the displacement is the force: coefficient times displacement over time, against (0.1, -0.3, 0) mm.
     effect, at, slopes = make("damping"), state(np.eye(3)), []
-    for push in 1e-3 * np.eye(3):
-        ends = (replace(at, displacement=np.array(at.displacement) + sign * push) for sign in (1, -1))
+    for change in 1e-3 * np.eye(3):
+        ends = (replace(at, displacement=np.array(at.displacement) + sign * change) for sign in (1, -1))
         after, before = (effect.energy(end) for end in ends)
         slopes.append((before - after) / 2e-3)
     assert slopes == pytest.approx(

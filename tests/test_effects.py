@@ -74,8 +74,8 @@ def test_the_rest_state_has_no_stress(name: str) -> None:
     # of the order of 0.1 MPa. A stress that stayed at rest would be of the order of a parameter, 1e-2 MPa.
     effect, step = make(name), 1e-7
     amount = 0.0 if name in RAMPED else 1.0
-    for push in step * np.eye(9).reshape(9, 3, 3):
-        after, before = (effect.energy(state(np.eye(3) + sign * push, 0.0, amount=amount)) for sign in (1, -1))
+    for change in step * np.eye(9).reshape(9, 3, 3):
+        after, before = (effect.energy(state(np.eye(3) + sign * change, 0.0, amount=amount)) for sign in (1, -1))
         assert abs(after - before) / (2 * step) < 1e-7
 
 
@@ -209,7 +209,7 @@ def test_between() -> None:
     ]
 
 
-def test_effects_tell_what_they_are() -> None:
+def test_effects_state_what_they_are() -> None:
     gravity, pressure = make("gravity"), make("pressure")
     assert (gravity.title, pressure.title) == ("Gravity", "Pressure on top")
     assert gravity.parameters[1:] == [

@@ -57,7 +57,7 @@ def test_linear_functions_are_exact_inside_and_outside() -> None:
     assert_allclose(found.interpolate(mesh, mesh.points @ (1.0, 2.0, 3.0)), points @ (1.0, 2.0, 3.0), rtol=0, atol=1e-9)
 
 
-def test_inside_is_inside_and_outside_tells_the_distance() -> None:
+def test_inside_is_inside_and_outside_has_a_distance() -> None:
     mesh = _block()
     found = embed(mesh, np.array([[1.0, 2.0, 3.0], [15.0, 15.0, -2.0], [33.0, 34.0, 15.0]]))
     assert_allclose(found.outside, [0, 2, 5], rtol=0, atol=1e-12)  # behind a face; off an edge, a 3-4-5 triangle

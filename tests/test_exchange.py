@@ -93,7 +93,7 @@ def test_poses_of_every_bone_and_frame(exported: Path, built: Problem) -> None:
             assert np.array_equal(found[bone.name, frame], bone.pose(frame))
 
 
-def test_what_bones_hold(exported: Path, built: Problem) -> None:
+def test_what_is_attached(exported: Path, built: Problem) -> None:
     for attached in built.attached:
         vertices = [
             int(row[2])
@@ -123,7 +123,7 @@ def test_the_scene_says_units_and_values(exported: Path, built: Problem) -> None
     assert [effect["name"] for effect in facts["effects"]] == ["neo_hooke", "incompressible"]
     assert facts["effects"][0]["parameters"] == {"mu": {"value": 0.01, "unit": "MPa"}}  # 10 kPa
     floor, lid = facts["bones"]
-    assert (floor["name"], floor["file"], floor["pushes"]) == ("floor", "bones/0.ply", False)
+    assert (floor["name"], floor["file"], floor["obstacle"]) == ("floor", "bones/0.ply", False)
     assert "motion" not in floor
     assert lid["motion"]["keyframes"][1] == {"frame": 10.0, "angle": 0.4}
     assert facts["mesh"]["tets"] == len(built.mesh.tets)

@@ -119,10 +119,10 @@ def test_attached_nodes_are_all_of_an_end(feb: Element) -> None:
     """5 x 5 nodes of the 2 x 2 cells in a face: corners, and middles of edges and diagonals."""
     points = nodes(feb)
     for name, height in (("bottom", 0.0), ("top", 30.0)):
-        attached = [int(text) for text in feb.find(f"Mesh/NodeSet[@name='held_{name}']").text.split(",")]
+        attached = [int(text) for text in feb.find(f"Mesh/NodeSet[@name='attached_{name}']").text.split(",")]
         assert set(attached) == set(np.flatnonzero(np.isclose(points[: 1 + cells(feb, "muscle").max(), 2], height)))
         assert len(attached) == 25
-        assert feb.find(f"Boundary/bc[@node_set='held_{name}']/rb").text == f"bone_{name}"
+        assert feb.find(f"Boundary/bc[@node_set='attached_{name}']/rb").text == f"bone_{name}"
 
 
 def test_a_node_goes_with_one_bone(bar: Problem) -> None:
@@ -325,7 +325,7 @@ def test_what_febio_has_not_is_refused_before_any_work(
 
 
 def test_frames_come_back_from_febios_log(folder: Path, bar: Problem, tmp_path: Path) -> None:
-    """Its quadratic elements hold a quadratic motion exactly; so does every vertex of the surface, wherever in a tet it lies."""
+    """Its quadratic elements show a quadratic motion exactly; so does every vertex of the surface, wherever in a tet it lies."""
     scene = casefile.read(folder)
     assert isinstance(scene, Scene)
     inside = bar.surface.moved_to(5 + 0.9 * (bar.surface.points - 5))  # no vertex where a node is

@@ -99,8 +99,8 @@ def test_both_laws_of_fibres_together(bar: Problem) -> None:
 
 
 def test_an_end_attached_by_springs_is_attached_by_them_alone(feb: Element) -> None:
-    assert [entry.attrib["name"] for entry in feb.iterfind("Mesh/NodeSet")] == ["held_bottom"]
-    assert [entry.attrib["node_set"] for entry in feb.iterfind("Boundary/bc")] == ["held_bottom"]
+    assert [entry.attrib["name"] for entry in feb.iterfind("Mesh/NodeSet")] == ["attached_bottom"]
+    assert [entry.attrib["node_set"] for entry in feb.iterfind("Boundary/bc")] == ["attached_bottom"]
     springs = feb.find("Contact/contact[@type='tied-elastic']")
     wanted = {"laugon": 0, "two_pass": 0, "auto_penalty": 0, "symmetric_stiffness": 0, "penalty": STIFFNESS}
     assert {key: float(springs.find(key).text) for key in wanted} == wanted

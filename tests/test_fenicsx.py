@@ -76,7 +76,7 @@ def bent():
     return problem, *solved(problem, ranks=1)
 
 
-def test_there_and_back_forgets_the_way(bent) -> None:
+def test_there_and_back_ends_at_rest(bent) -> None:
     problem, outcome, frames = bent
     assert outcome.status == "converged"
     assert np.abs(frames[2].surface - problem.surface.points).max() > 5
@@ -169,7 +169,7 @@ def test_how_far_attached_vertices_are_off_is_recorded(bent) -> None:
     # On this body every attached vertex is a corner of a attached facet.
     _, _, frames = bent
     for frame in frames:
-        assert 0 <= frame.scalars["held_off_rms"] <= frame.scalars["held_off_max"] < 1e-9
+        assert 0 <= frame.scalars["attachment_error_rms"] <= frame.scalars["attachment_error_max"] < 1e-9
 
 
 def test_a_process_that_dies_is_a_status() -> None:

@@ -97,7 +97,7 @@ def test_a_block_on_springs_moves_by_the_load_over_their_stiffness(element, sess
 
 @pytest.mark.parametrize("element", ["P2/P1", "P2/P0"])
 def test_springs_at_points_beside_the_cells_take_the_load_and_its_moment(element, session) -> None:
-    # Points 0.05 mm below the face that springs hold, of uneven areas; the pull is off their middle: the block turns on them.
+    # Points 0.05 mm below the face that springs attach, of uneven areas; the pull is off their middle: the block turns on them.
     stiffness, load = 1e-4, 1e-7  # so soft that the block is rigid, and turns by a thousandth
     acting = (*FLESH, effect("traction", on="x1", force=f"0, 0, -{load} MPa", ramp=ONCE))
     mesh = box(element, (2, 2, 2), (1.0, 1.0, 1.0))
@@ -296,7 +296,7 @@ def test_a_time_limit_ends_one_body_and_not_the_session(session) -> None:  # noq
 
 
 def test_what_attachments_share_counts_once(session, tmp_path) -> None:
-    # Two regions meet in an edge and hold it both. Of a muscle, which has points to be followed, all forces are in balance.
+    # Two regions meet in an edge and both prescribe it. Of a muscle, which has points to be followed, all forces are in balance.
     fixed = (
         Prescribed("bottom", "z0", ALL, Rest()),
         Prescribed("side", "x0", ALL, Affine(((0.0, 0.0, 0.0), (0.0, 0.0, 0.1), (0.0, 0.0, -0.2)))),

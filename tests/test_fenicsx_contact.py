@@ -1,4 +1,4 @@
-"""Rigid bodies that push in FEniCSx: what they do balances, follows their pose, and is nothing where they are not."""
+"""Rigid bodies in contact in FEniCSx: what they do balances, follows their pose, and is nothing where they are not."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ def test_forces_and_moments_balance(fem_lab) -> None:
     assert state.forces["ball"][2] < -1e-4
     assert state.forces["ball"] + state.forces["ground"] == pytest.approx([0, 0, 0], abs=1e-11)
     assert state.moments["ball"] + state.moments["ground"] == pytest.approx([0, 0, 0], abs=1e-11)
-    # Without friction a ball pushes towards its centre: no moment about it.
+    # Without friction the forces on a ball act towards its centre: no moment about it.
     centre = np.array([0.3, 0.5, 1.35])
     assert state.moments["ball"] - np.cross(centre, state.forces["ball"]) == pytest.approx([0, 0, 0], abs=1e-12)
     assert 0 < state.scalars["contact_depth"] < 0.1

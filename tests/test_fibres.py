@@ -120,7 +120,7 @@ def test_the_lines_move_with_the_mesh(seed: int) -> None:
     assert_allclose(found.points, turn.apply(lines.points) + HIP, rtol=0, atol=1e-6)
 
 
-def test_lines_that_leave_the_body_give_way_to_others() -> None:
+def test_lines_that_leave_the_body_are_replaced_by_others() -> None:
     """Attached on one side of a bar, lines far from it bend along the skin; those that are given all arrive."""
     lines = trace(_on_one_side(_bar(), 15, 45), "bottom", "top", 12)
     begins, ends = lines.points[lines.offsets[:-1]], lines.points[lines.offsets[1:] - 1]
@@ -160,7 +160,7 @@ def test_directions_follow_the_bar_and_the_ring() -> None:
     assert np.einsum("ij,ij->i", along, around).min() > np.cos(np.radians(5))
 
 
-def test_where_all_is_attached_by_one_bone_fibres_go_the_mean_way() -> None:
+def test_where_all_is_attached_by_one_bone_fibres_take_the_mean_direction() -> None:
     # The lowest layer of tets has all its corners on "bottom": the field has no slope there.
     bar = _bar()
     low = bar.points[bar.tets][:, :, 2].max(axis=1) < 6

@@ -1,4 +1,4 @@
-"""The page of scalar examples shows all that an example holds, opens without a network, and survives what is not a number."""
+"""The page of scalar examples shows all of an example, opens without a network, and survives what is not a number."""
 
 import re
 from dataclasses import replace

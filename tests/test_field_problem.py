@@ -22,7 +22,7 @@ def scene(folder, **tables):
     return fields.scene(folder, **({"domain": INTERVAL, "effect": [DIFFUSION], "boundary": ENDS} | tables))
 
 
-def test_what_ends_and_rims_hold(tmp_path) -> None:
+def test_what_is_prescribed_on_ends_and_rims(tmp_path) -> None:
     fixed = build(scene(tmp_path)).fixed
     assert fixed == pytest.approx([0, np.nan, np.nan, np.nan, 2], nan_ok=True)
     for order in (1, 2):
@@ -211,7 +211,7 @@ def test_peclet_is_a_parameter_of_the_rod(tmp_path, capsys) -> None:
     assert "runs/rod/listing" in out
 
 
-def test_show_tells_what_a_scalar_case_is_made_of(capsys) -> None:
+def test_show_reports_what_a_scalar_case_is_made_of(capsys) -> None:
     status, out, _ = spoken(capsys, "show", "rod_advection")
     assert status == cli.DONE
     assert "form: supg, mesh Peclet number up to 2.5" in out

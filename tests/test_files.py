@@ -68,7 +68,7 @@ def segments(*cells: list[int]) -> str:
         (([0, 1], [1, 2], [3, 4], [4, 5, 6]), [[0, 1, 2], [3, 4, 5, 6]]),
         (([4, 5], [1, 2], [3, 4], [0, 1]), [[3, 4, 5], [0, 1, 2]]),  # in any order
         (([0, 1], [1, 2], [1, 3]), [[0, 1], [1, 2], [1, 3]]),  # where it branches, lines end
-        (([2, 1, 0], [3, 4]), [[2, 1, 0], [3, 4]]),  # the way of the file along the line
+        (([2, 1, 0], [3, 4]), [[2, 1, 0], [3, 4]]),  # in the file's direction along the line
     ],
 )
 def test_segments_become_lines(tmp_path: Path, cells: tuple[list[int], ...], want: list[list[int]]) -> None:

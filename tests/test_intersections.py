@@ -24,7 +24,7 @@ def _together(*surfaces: Surface) -> Surface:
 
 
 def _by_brute_force(surface: Surface) -> list[int]:
-    """Every edge against every triangle: begin + t way = a + u (b - a) + v (c - a), solved as three equations."""
+    """Every edge against every triangle: begin + t (end - begin) = a + u (b - a) + v (c - a), solved as three equations."""
     hit = set()
     for one, other in itertools.permutations(range(len(surface.triangles)), 2):
         a, b, c = surface.points[surface.triangles[other]]

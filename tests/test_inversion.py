@@ -54,16 +54,16 @@ def test_a_reflected_body_is_inside_out_all_over() -> None:
     assert_allclose(overlapping, 0, atol=1e-12)
 
 
-def test_a_cap_pushed_out_through_the_far_side_is_inside_out_where_it_comes_out() -> None:
+def test_a_cap_moved_out_through_the_far_side_is_inside_out_where_it_comes_out() -> None:
     """The top cap, mirrored down at z = 6 mm by 18 mm, ends at -14 mm: what lies beyond the sphere is turned inside out.
 
-    Down there the cap faces the part it pushed out, and so does the sphere where it is covered.
+    Down there the cap faces the part it went through, and so does the sphere where it is covered.
     """
     points = BALL.points.copy()
     cap = points[:, 2] > 6
     points[cap, 2] = 6 - 5 * (points[cap, 2] - 6)
-    pushed = BALL.moved_to(points)
-    found, centres = outer_windings(pushed), points[BALL.triangles].mean(axis=1)
+    moved = BALL.moved_to(points)
+    found, centres = outer_windings(moved), points[BALL.triangles].mean(axis=1)
     outside = np.linalg.norm(centres, axis=1) > 10.01
     whole = cap[BALL.triangles].all(axis=1)
     assert outside.any()

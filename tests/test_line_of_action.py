@@ -73,7 +73,7 @@ def test_via_points_go_with_their_bones() -> None:
         up, down = SWING.pose(frame.number), given.attached[0].bone.pose(frame.number)
         assert_allclose(frame.fibres[20], apply(up, low[None])[0], atol=1e-10)
         assert_allclose(frame.fibres[61], apply(up, high[None])[0], atol=1e-10)
-        # A quarter of the way along the straight fibre, which begins at the top, at z = 22.5.
+        # A quarter along the straight fibre, which begins at the top, at z = 22.5.
         quarter = apply(down, np.array([[4.0, 5, 22.5]]))
         path = np.vstack(
             [apply(up, np.array([[4.0, 5, 30]])), quarter, apply(up, high[None]), apply(down, [[4.0, 5, 0]])]

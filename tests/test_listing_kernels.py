@@ -242,9 +242,9 @@ def test_other_diagonals_change_the_square_plate():
     triangles, points, bounds = mesh("plate_square")
     drawn = kernels.fem2d(triangles, points, bounds)[0]
     rng = np.random.default_rng(0)
-    ways = [grid_triangles(np.full(361, way)) for way in (False, True)]
-    ways += [grid_triangles(rng.random(361) < 0.5) for _ in range(5)] + [kernels.delaunay(points)]
-    changes = [apart(kernels.fem2d(way, points, bounds)[0], drawn) for way in ways]
+    meshes = [grid_triangles(np.full(361, flip)) for flip in (False, True)]
+    meshes += [grid_triangles(rng.random(361) < 0.5) for _ in range(5)] + [kernels.delaunay(points)]
+    changes = [apart(kernels.fem2d(triangles, points, bounds)[0], drawn) for triangles in meshes]
     assert min(changes) > 0.1
     assert max(changes) > 1.0
 
@@ -269,7 +269,7 @@ def test_heated_is_what_lies_above_the_average():
     assert kernels.right_side(points).tolist() == [0, 0, 1, 1, 0, 0, 0, 0]
 
 
-def test_rim_of_a_grid_is_what_uniform_holds():
+def test_rim_of_a_grid_is_what_uniform_fixes():
     points, bounds = kernels.uniform(49)
     assert len(bounds[0]) == 24
     assert np.array_equal(np.sort(bounds[0]), kernels.rim(kernels.delaunay(points)))

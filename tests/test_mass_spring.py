@@ -125,10 +125,10 @@ def test_energy_is_kept_without_damping_and_lost_with_it(damping) -> None:
 def test_momentum_and_angular_momentum_are_kept() -> None:
     points, springs = tangle(2)
     previous = points - np.random.default_rng(3).normal(0, 1e-3, points.shape)
-    way, turn = np.sum(points - previous, axis=0), np.sum(np.cross(previous, points), axis=0)
+    momentum, turn = np.sum(points - previous, axis=0), np.sum(np.cross(previous, points), axis=0)
     advance(points, previous, springs, FREE, 0.5 * mass_spring.stable_time_step(springs, FREE.fixed), 1000)
     # Springs pull both ends alike and along themselves: only rounding of 1000 steps of numbers near 10 is left.
-    assert_allclose(np.sum(points - previous, axis=0), way, atol=1e-10)
+    assert_allclose(np.sum(points - previous, axis=0), momentum, atol=1e-10)
     assert_allclose(np.sum(np.cross(previous, points), axis=0), turn, atol=1e-9)
 
 
@@ -238,7 +238,7 @@ def test_moved_with_both_its_bones_a_muscle_comes_to_rest_undeformed() -> None:
     turn = Rotation((0, 1, 0), (0, 0, -20), (0.0, 5.0), (0.0, 0.5))
     given = bar(turn, (0, 60), turn)
     outcome, frames = solved(given)
-    # Swinging dies out with c / 2 m = 150 / s or more and 1.1 s are left: rounding of what pushes and pulls.
+    # Swinging dies out with c / 2 m = 150 / s or more and 1.1 s are left: rounding of the forces.
     assert_allclose(frames[-1].surface, apply(turn.pose(5), given.surface.points), atol=1e-6)
     assert frames[-1].scalars["unbalanced_max"] < 1e-6
     assert outcome.message.startswith("60 frame numbers of ")
@@ -328,9 +328,9 @@ def test_a_muscle_spread_too_wide_is_an_outcome() -> None:
     assert "the muscle is spread over " in outcome.message
 
 
-def pressed(way: float) -> Problem:
-    """A soft bar of two cells, 30 mm long, whose upper end goes down by ``way`` [mm] faster than the middle follows."""
-    down = Translation((0, 0, -1), (0.0, 1.0), (0.0, way))
+def pressed(travel: float) -> Problem:
+    """A soft bar of two cells, 30 mm long, whose upper end goes down by ``travel`` [mm] faster than the middle follows."""
+    down = Translation((0, 0, -1), (0.0, 1.0), (0.0, travel))
     return shapes.bar((1, 1, 2), (10, 10, 30), {"bottom": None, "top": down}, (), (0, 1))
 
 

@@ -1,4 +1,4 @@
-"""Surfaces and tetrahedra: closed forms of areas, volumes and qualities, and each way a surface is not usable."""
+"""Surfaces and tetrahedra: closed forms of areas, volumes and qualities, and each reason why a surface is not usable."""
 
 import numpy as np
 import pytest

@@ -193,8 +193,8 @@ def test_box_nests_under_coarser_block_meshes(box: Surface, size: float) -> None
 def test_box_fibres_are_straight_lie_apart_and_5_mm_inside(box: Surface) -> None:
     fibres = read_polylines(BOX / "fibres.vtk", 1.0)
     lines = np.split(fibres.points, fibres.offsets[1:-1])
-    ways = [np.unique(np.diff(line, axis=0), axis=0).tolist() for line in lines]
-    assert ways == [[[0, 10, 0]]] * 6 + [[[10, 0, 0]]] * 6
+    steps = [np.unique(np.diff(line, axis=0), axis=0).tolist() for line in lines]
+    assert steps == [[[0, 10, 0]]] * 6 + [[[10, 0, 0]]] * 6
     assert fibres.lengths().tolist() == pytest.approx([70] * 6 + [90] * 6)
     assert signed(fibres.points, box).max() == pytest.approx(-5, abs=1e-12)
     apart = [np.linalg.norm(one[:, None] - other, axis=2).min() for i, one in enumerate(lines) for other in lines[:i]]

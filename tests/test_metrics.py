@@ -347,7 +347,7 @@ def test_of_a_run_of_lines_alone_only_fibres_are_measured() -> None:
         assert set(found) == {f"fibre_length.{name}" for name in UNITS["fibre_length"]}
         assert_allclose(found["fibre_length.mean_percent"], [-10, 10], rtol=1e-10)
     assert measure(lines, still, CONTEXT, ["volume"]) == ()
-    # A reference that begins a little off the rest state, as overlaps with bones are pushed out first, has the same fibres.
+    # A reference that begins a little off the rest state, as overlaps with bones are removed first, has the same fibres.
     relaxed = replace(CONTEXT, fibres=Polylines(FIBRES.points + [0, 0, 0.2], FIBRES.offsets))
     moved = replace(still, fibres=relaxed.fibres)
     assert_allclose(_values(lines, moved, relaxed)["fibre_length.mean_percent"], [-10, 10], rtol=1e-10)

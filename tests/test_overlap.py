@@ -42,8 +42,8 @@ def test_a_ball_in_a_half_space_shares_a_cap(depth: float, within: float) -> Non
 
 @pytest.mark.parametrize(("apart", "within"), [(68, 0.04), (65, 0.03), (50, 0.01), (35, 0.01)])
 def test_two_balls_share_a_lens(apart: float, within: float) -> None:
-    way = Rotation.from_euler("xyz", [0.3, 1.0, -0.7]).apply([0, 0, apart])
-    assert_allclose(shared(BALL, Sphere(tuple(way), 20.0)), lens(RADIUS, 20.0, apart), rtol=within)
+    centre = Rotation.from_euler("xyz", [0.3, 1.0, -0.7]).apply([0, 0, apart])
+    assert_allclose(shared(BALL, Sphere(tuple(centre), 20.0)), lens(RADIUS, 20.0, apart), rtol=within)
 
 
 def test_a_body_that_passes_right_through_is_counted_whole() -> None:
@@ -90,6 +90,6 @@ def test_an_edge_that_no_vertex_meets_is_found() -> None:
     assert_allclose(shared(cube, Wedge()), 0.5 * 0.5 * 1 * 4, rtol=0.05)
 
 
-def test_a_flat_surface_holds_nothing() -> None:
+def test_a_flat_surface_contains_nothing() -> None:
     assert shared(BALL.moved_to(BALL.points * [1, 1, 0]), floor(RADIUS + 1)) == 0
     assert shared(BALL.moved_to(BALL.points * 0), floor(RADIUS + 1)) == 0

@@ -77,14 +77,14 @@ def test_hinges_are_the_edges_and_the_vertices_opposite():
 
 
 def test_free_flight_is_damped():
-    # With every stiffness 0 a step loses its share of velocity and moves on: way_n = (1 - damping)^n way_0.
+    # With every stiffness 0 a step loses its share of velocity and moves on: dx_n = (1 - damping)^n dx_0.
     surface = spindle()
     rest = pbd.Constraints.at_rest(surface.points, surface.triangles, [])
     settings = pbd.Settings(**USUAL | {"damping": 0.25, "stretch": 0, "volume": 0, "bending": 0})
-    points, way = np.array(surface.points), np.full(surface.points.shape, 2.0)
+    points, displacement = np.array(surface.points), np.full(surface.points.shape, 2.0)
     for _ in range(5):
-        points, way = pbd.advance(points, way, rest, settings)
-    np.testing.assert_allclose(way, 2 * 0.75**5, rtol=1e-12)  # a difference of coordinates of 30 mm
+        points, displacement = pbd.advance(points, displacement, rest, settings)
+    np.testing.assert_allclose(displacement, 2 * 0.75**5, rtol=1e-12)  # a difference of coordinates of 30 mm
     np.testing.assert_allclose(points - surface.points, 2 * sum(0.75**n for n in range(1, 6)), rtol=1e-12)
 
 
@@ -92,9 +92,9 @@ def test_a_turned_rest_state_stays_put():
     surface = spindle()
     turned = apply(TURN, surface.points)
     rest = pbd.Constraints.at_rest(surface.points, surface.triangles, [])
-    points, way = turned.copy(), np.zeros(turned.shape)
+    points, displacement = turned.copy(), np.zeros(turned.shape)
     for _ in range(100):
-        points, way = pbd.advance(points, way, rest, SETTINGS)
+        points, displacement = pbd.advance(points, displacement, rest, SETTINGS)
     np.testing.assert_allclose(points, turned, atol=1e-10)  # roundings of 1e-13 that drift for 100 steps
 
 
@@ -160,15 +160,15 @@ def test_volume_is_kept():
 def ball_against(last, back=None):
     """The spindle attached at its ends, and a ball of 8 mm that gets 10 mm into its side by frame 40, and is gone by ``back``."""
     setup = attached_setup(None, None, last=last)
-    frames, ways = ((0.0, 40.0), (0.0, 12.0)) if back is None else ((0.0, 40.0, float(back)), (0.0, 12.0, 0.0))
+    frames, distances = ((0.0, 40.0), (0.0, 12.0)) if back is None else ((0.0, 40.0, float(back)), (0.0, 12.0, 0.0))
     ball = RigidBody(
-        "ball", shapes.sphere(0, 8.0), Translation((-1, 0, 0), frames, ways), solid=Sphere((20, 0, 0), 8.0)
+        "ball", shapes.sphere(0, 8.0), Translation((-1, 0, 0), frames, distances), solid=Sphere((20, 0, 0), 8.0)
     )
     return Setup(setup.surface, (ball,), setup.attached, setup.frames, None)
 
 
 def deepest(setup, frames):
-    """How deep a vertex that nothing holds gets below the surface of a bone, over all frames [mm]."""
+    """How deep a free vertex gets below the surface of a bone, over all frames [mm]."""
     loose = np.setdiff1d(np.arange(len(setup.surface.points)), setup.attached_vertices)
     return max(
         -bone.shape.sample(apply(np.linalg.inv(bone.pose(number)), points[loose])).distance.min()
@@ -177,7 +177,7 @@ def deepest(setup, frames):
     )
 
 
-def test_bones_push_only_where_it_is_wanted():
+def test_bones_are_obstacles_only_where_it_is_wanted():
     setup = ball_against(40)
     _, through = run(setup)
     outcome, aside = run(setup, collision=CONTACT)
@@ -188,7 +188,7 @@ def test_bones_push_only_where_it_is_wanted():
     volumes = [enclosed_volume(aside[number], setup.surface.triangles) for number in (0, 40)]
     assert volumes[1] == pytest.approx(
         volumes[0], rel=0.02
-    )  # the volume is projected before and not after the ball pushes
+    )  # the volume is projected before and not after contact with the ball
 
 
 def test_a_gap_is_kept():
@@ -268,8 +268,8 @@ def test_edges_along_fibres_are_softer():
     # A bar with its fibre along z: by 40 % less stiff along it, by 40 % of cos 45 degrees less on the diagonals, not across.
     given = shapes.bar((2, 2, 6), (10, 10, 30), {"bottom": None, "top": SWING}, (), (0, 5))
     found = pbd._constraints(given, pbd.Settings(**USUAL, anisotropy=0.4))
-    ways = np.diff(given.surface.points[found.edges], axis=1)[:, 0]
-    cosine = np.abs(ways[:, 2]) / np.linalg.norm(ways, axis=1)
+    edges = np.diff(given.surface.points[found.edges], axis=1)[:, 0]
+    cosine = np.abs(edges[:, 2]) / np.linalg.norm(edges, axis=1)
     np.testing.assert_allclose(found.share, 1 - 0.4 * cosine, rtol=1e-14)
     assert {0.6, 0.717, 1.0} == set(np.round(found.share, 3).tolist())
     ends = [run(given, anisotropy=value)[1][5] for value in (None, 0.0, 0.4)]
@@ -322,7 +322,7 @@ def test_a_body_torn_apart_is_an_outcome():
 
 
 def test_a_body_turned_inside_out_is_an_outcome():
-    # One bone holds the lower half and one the upper, which goes by a whole length of 60 mm through the lower one.
+    # One bone has the lower half attached and one the upper, which goes by a whole length of 60 mm through the lower one.
     setup = attached_setup(None, Translation((0, 0, -1), (0.0, 3.0), (0.0, 60.0)))
     upper = setup.surface.points[:, 2] > 0
     attached = tuple(
@@ -336,7 +336,7 @@ def test_a_body_turned_inside_out_is_an_outcome():
 
 
 def pressed(pose, spacing):
-    """Where a ball of triangles, its distance on a grid along the axes, has pushed the spindle after 16 iterations."""
+    """Where a ball of triangles, its distance on a grid along the axes, has moved the spindle after 16 iterations."""
     setup = attached_setup(None, None, last=16, pose=pose)
     surface = shapes.sphere(2, 8.0)
     surface = surface.moved_to(apply(pose, surface.points + [20, 0, 0]))

@@ -158,7 +158,7 @@ def _error_left(name, error):
 
 @pytest.mark.parametrize(("angle", "rest"), [(0.1, 3.0), (3.0, 0.1)])
 def test_one_projection_turns_a_pair_no_further_than_it_may(angle, rest):
-    # The way along the gradient, sum g . dp, is the change of the angle to first order.
+    # The displacement along the gradient, sum g . dp, is the change of the angle to first order.
     before, hinges = folded(angle), np.array([[0, 1, 2, 3]])
     after = before.copy()
     kernels.project_dihedrals(after, np.ones(4), hinges, np.array([rest]), 1.0)

@@ -135,9 +135,9 @@ def test_six_volumes_and_their_gradient():
     points, triangles = np.array(surface.points), np.array(surface.triangles)
     value, gradient = six_volumes(points, triangles)
     assert value == pytest.approx(6 * enclosed_volume(points, triangles), rel=1e-12)
-    way = np.random.default_rng(2).normal(size=points.shape)
-    up, down = (six_volumes(points + step * way, triangles)[0] for step in (1e-3, -1e-3))
-    assert (gradient * way).sum() == pytest.approx((up - down) / 2e-3, rel=1e-5)
+    direction = np.random.default_rng(2).normal(size=points.shape)
+    up, down = (six_volumes(points + step * direction, triangles)[0] for step in (1e-3, -1e-3))
+    assert (gradient * direction).sum() == pytest.approx((up - down) / 2e-3, rel=1e-5)
 
 
 def test_points_without_volume_stay():
@@ -204,7 +204,7 @@ def test_voxels_that_a_triangle_marks_by_hand():
 
 
 def test_the_flood_does_not_lead_back():
-    # From the corner both ways within x = 0 are barred. By x = 1 it gets everywhere but to x = 0.
+    # From the corner both paths within x = 0 are barred. By x = 1 it gets everywhere but to x = 0.
     border = np.zeros((3, 3, 3), bool)
     border[0, 0, 1] = border[0, 1, 0] = True
     expected = np.ones((3, 3, 3), bool)
@@ -213,7 +213,7 @@ def test_the_flood_does_not_lead_back():
     np.testing.assert_array_equal(flood(border), expected)
 
 
-def test_voxels_of_a_ball_hold_it():
+def test_voxels_of_a_ball_contain_it():
     # A triangle marks voxels whose corner is within 0.87 of its plane and 1.73 of its edges, all in voxels of 40 / 64 mm:
     # what is deeper than one diagonal is inside, what is more than three diagonals out of it is not.
     voxels = Voxels.of(ball(), 64)
@@ -226,8 +226,8 @@ def test_voxels_of_a_ball_hold_it():
 
 def test_marching_out_by_hand():
     goals = np.array([[2, 2.5, 2], [0.5, 2.25, 2]])
-    ways = np.array([[0, -5.5, 0], [6.5, 0, 0]])
-    reached, too_far = march_out(np.ones((4, 4, 4), bool), goals, ways)
+    directions = np.array([[0, -5.5, 0], [6.5, 0, 0]])
+    reached, too_far = march_out(np.ones((4, 4, 4), bool), goals, directions)
     np.testing.assert_allclose(reached, [[2, -0.5, 2], [4.5, 2.25, 2]], atol=1e-12)
     assert not too_far.any()
 
@@ -304,8 +304,8 @@ def test_fibres_leave_edges_across_them_stiff():
     # Along z the bar has one fibre: an edge at an angle to it keeps 1 - |cos|, to the power asked for.
     bar = shapes.bar((2, 2, 4), (10, 10, 30), {"bottom": None, "top": SWING}, (), (0, 5))
     found = pbd_program.constraints_of(bar, pbd_program.Settings(**USUAL, anisotropy=2.0))
-    ways = bar.surface.points[found.edges[:, 1]] - bar.surface.points[found.edges[:, 0]]
-    cosines = np.abs(ways[:, 2]) / np.linalg.norm(ways, axis=1)
+    edges = bar.surface.points[found.edges[:, 1]] - bar.surface.points[found.edges[:, 0]]
+    cosines = np.abs(edges[:, 2]) / np.linalg.norm(edges, axis=1)
     np.testing.assert_allclose(found.share, (1 - cosines) ** 2, atol=1e-12)
     assert (pbd_program.constraints_of(bar, SETTINGS).share == 1).all()
     with_fibres, without = (run(bar, **changes)[1][5] for changes in ({"anisotropy": 1.0}, {}))
@@ -380,7 +380,7 @@ def merged(parts):
     return Surface(np.vstack([part.points for part in parts]), np.vstack(triangles))
 
 
-def test_voxels_hold_what_the_program_attached(data):
+def test_voxels_contain_what_the_program_attached(data):
     # Exactly: every vertex in a voxel of the femur, and of those left every one in a voxel of the pelvis, which was both
     # hip bones and the sacrum in one. So voxels are made as there.
     bones = data / "hip" / "bones"

@@ -1,4 +1,4 @@
-"""How deep a surface is in bones and how much of it: spheres and floors of known depth, moved bones, what bones hold, NaN."""
+"""How deep a surface is in bones and how much of it: spheres and floors of known depth, moved bones, attached vertices, NaN."""
 
 from dataclasses import replace
 
@@ -110,7 +110,7 @@ def test_the_deepest_bone_decides_and_volumes_add() -> None:
     assert "in stone" in both[0].where[0]
 
 
-def test_what_bones_hold_is_exempt_and_its_neighbours_in_triangles() -> None:
+def test_what_is_attached_is_exempt_and_its_neighbours_in_triangles() -> None:
     low = np.flatnonzero(BALL.points[:, 2] < LOW + 4)
     rest = Setup(BALL, (floor(LOW + 3),), (AttachedVertices("origin", floor(LOW + 3), low),), (0,), None)
     neighbours = {k for triangle in BALL.triangles.tolist() if set(triangle) & set(low.tolist()) for k in triangle}

@@ -199,13 +199,13 @@ def test_a_stiffness_of_an_attachment_reaches_the_body(bar) -> None:
     body = as_body(muscle.build(scene, muscle.setup(scene)))
     assert [entry.stiffness for entry in body.prescribed] == [None, 0.1]
     assert (body.prescribed[0].on, type(body.prescribed[1].on)) == ("origin", Skin)
-    # A load may still act on what springs hold, and what is free is free of both.
+    # A load may still act on what springs attach, and what is free is free of both.
     assert set(body.mesh.facets) == {"origin", "insertion", "free"}
 
 
 SQUEEZED = """
 title = "A box between plates"
-proves = "that bones may have a closed form and hold nothing"
+proves = "that bones may have a closed form and no attachment"
 fibres.polylines = { file = "mesh:box/fibres.vtk", unit = "mm" }
 
 [muscle]

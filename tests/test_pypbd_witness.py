@@ -1,4 +1,4 @@
-"""A witness for ``pbd`` and ``xpbd``: the library PositionBasedDynamics (pypbd) moves the same particles the same way.
+"""A witness for ``pbd`` and ``xpbd``: the library PositionBasedDynamics (pypbd) moves the same particles alike.
 
 Its distance constraints, plain and extended, and its dihedral constraint are the same algorithms in double precision, so that
 what may differ is rounding. Of volumes it knows that of a tetrahedron only: the smallest closed surface.
@@ -93,9 +93,9 @@ def test_a_cord_of_position_based_dynamics_falls_as_theirs(steps, rounding):
     theirs, edges, lengths, share = fallen("distance", SPRINGS / SPRINGS.max(), steps)
     cord = pbd.Constraints(INVERSE_MASSES, edges, lengths, share, NONE, 0.0, np.zeros((0, 4), np.int64), np.zeros(0))
     rules = pbd.Settings(sub_iterations=1, solver_iterations=SWEEPS, damping=0, stretch=1, volume=0, bending=0)
-    points, way = CORD.copy(), np.zeros(CORD.shape)
+    points, displacement = CORD.copy(), np.zeros(CORD.shape)
     for _ in range(steps):
-        points, way = pbd.advance(points, way + np.where(LOOSE, SECONDS**2 * GRAVITY, 0), cord, rules)
+        points, displacement = pbd.advance(points, displacement + np.where(LOOSE, SECONDS**2 * GRAVITY, 0), cord, rules)
     np.testing.assert_allclose(points, theirs, rtol=0, atol=rounding)
     assert np.abs(points - CORD).max() > (1 if steps == 100 else 1e-4)
 

@@ -42,7 +42,7 @@ def test_the_worst_frame_counts_with_the_bar_of_that_frame() -> None:
         ("one", 5.0, 0.9),
     ]
     assert (found.pairs, [place.rank for place in found.places]) == ((0, 1), ["1 to 2", "1 to 2"])
-    assert json.loads(json.dumps(facts([found]), allow_nan=False))[0]["cannot_be_told_from"] == ["one"]
+    assert json.loads(json.dumps(facts([found]), allow_nan=False))[0]["not_distinguishable_from"] == ["one"]
 
 
 @pytest.mark.parametrize("bars", [(), measures(max=[0.0, 0.1, 0.1])])

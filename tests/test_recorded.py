@@ -270,7 +270,7 @@ def test_an_index_of_a_file_that_is_not_there(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("first", "away"),
-    # A sphere of 30 mm times k is 30 |k - 1| mm from itself; pushed by (6, 0, 0) mm it is 6 mm away.
+    # A sphere of 30 mm times k is 30 |k - 1| mm from itself; moved by (6, 0, 0) mm it is 6 mm away.
     # Its box has a diagonal below 60 sqrt(3) = 104 mm (its vertices do not reach out on all axes), 5 % are 5.1 mm.
     [(REST.points / 1000, "30"), (REST.points * 10, "270"), (REST.points + np.array([6.0, 0, 0]), "6")],
 )

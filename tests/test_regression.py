@@ -33,7 +33,7 @@ BAR = 0.5
 
 
 def run(name: str, shifts) -> Run:
-    """A ball that is pushed by ``shifts`` (f, 3) [mm]."""
+    """A ball that is moved by ``shifts`` (f, 3) [mm]."""
     positions = REST.points + np.asarray(shifts, float)[:, None]
     inside = FIBRE.points + np.asarray(shifts, float)[:, None]
     return Run(name, "test", Outcome("converged", "done"), NUMBERS, REST, positions, FIBRE, inside)
@@ -41,7 +41,7 @@ def run(name: str, shifts) -> Run:
 
 REFERENCE = run("reference", [(0, 0, 0), (0, 0, 5), (0, 0, 10)])
 # 12 mm aside of the reference at the last frame.
-WAYS = [(0, 0, 0), (6, 0, 5), (12, 0, 10)]
+SHIFTS = [(0, 0, 0), (6, 0, 5), (12, 0, 10)]
 
 
 def bars(value: float = BAR) -> ErrorBars:
@@ -54,8 +54,8 @@ def bars(value: float = BAR) -> ErrorBars:
     return ErrorBars(NUMBERS, (4.0, 8.0), 1.5, tuple(made))
 
 
-def current(ways=WAYS, known: ErrorBars | None = None, **changes) -> CurrentMeasures:
-    return replace(CurrentMeasures.of(SCENE, SETUP, run("mine", ways), REFERENCE, known), **changes)
+def current(shifts=SHIFTS, known: ErrorBars | None = None, **changes) -> CurrentMeasures:
+    return replace(CurrentMeasures.of(SCENE, SETUP, run("mine", shifts), REFERENCE, known), **changes)
 
 
 def edited(path, change) -> None:
@@ -89,9 +89,9 @@ def test_the_same_run_passes(path) -> None:
 
 
 def test_one_frame_that_is_moved_by_2_mm_fails_at_that_frame(path) -> None:
-    ways = np.array(WAYS, float)
-    ways[1] += [0, 2, 0]
-    check = checked(path, current(ways, bars()))
+    shifts = np.array(SHIFTS, float)
+    shifts[1] += [0, 2, 0]
+    check = checked(path, current(shifts, bars()))
     moved = check.judgements[0]  # the worst first, and positions before all
     assert (check.word, moved.name, moved.word, moved.frame) == ("fail", "positions.moved", "fail", 10)
     # But for the rounding of positions in the file.
@@ -103,7 +103,7 @@ def test_one_frame_that_is_moved_by_2_mm_fails_at_that_frame(path) -> None:
 def test_a_frame_that_deviates_as_much_as_before_but_elsewhere_fails(path) -> None:
     # 12 mm aside in another direction: a chord of 2 mm of the circle around the reference.
     angle = 2 * math.asin(1 / 12)
-    check = checked(path, current([*WAYS[:2], (12 * math.cos(angle), 12 * math.sin(angle), 10)], bars()))
+    check = checked(path, current([*SHIFTS[:2], (12 * math.cos(angle), 12 * math.sin(angle), 10)], bars()))
     assert asked(check, "unchanged", "surface_deviation.rms").word == "pass"
     assert asked(check, "unchanged", "surface_deviation.max").word == "pass"
     moved = asked(check, "unchanged", "positions.moved")
@@ -127,12 +127,12 @@ def test_a_vertex_that_moves_between_the_sampled_ones_shows_in_the_statistics(pa
 
 def test_a_statistic_worse_by_more_than_its_tolerance_fails_at_the_frame_that_is_worst(path) -> None:
     edited(path, lambda table: table["measures"]["surface_deviation.rms"].update(tolerance=0.3))
-    check = checked(path, current([WAYS[0], (6.2, 0, 5), (12.4, 0, 10)], bars()))
+    check = checked(path, current([SHIFTS[0], (6.2, 0, 5), (12.4, 0, 10)], bars()))
     rms = asked(check, "unchanged", "surface_deviation.rms")
     assert (rms.word, rms.frame, rms.was) == ("fail", 20, 12.0)
     assert rms.current == pytest.approx(12.4)
     assert rms.used == pytest.approx(0.4 / 0.3)
-    check = checked(path, current([WAYS[0], (6.2, 0, 5), (12.2, 0, 10)], bars()))
+    check = checked(path, current([SHIFTS[0], (6.2, 0, 5), (12.2, 0, 10)], bars()))
     assert asked(check, "unchanged", "surface_deviation.rms").word == "pass"
 
 
@@ -182,7 +182,7 @@ def test_an_update_keeps_what_was_edited_so_that_accuracy_cannot_be_lost_in_smal
         del table["measures"]["volume.deviation"]
 
     edited(path, edit)
-    worse = current([*WAYS[:2], (13.1, 0, 10)], bars())
+    worse = current([*SHIFTS[:2], (13.1, 0, 10)], bars())
     assert asked(checked(path, worse), "unchanged", "surface_deviation.rms").word == "pass"
     made = baseline.update(path, worse)
     assert (made.measures["surface_deviation.rms"].tolerance, made.positions.tolerance) == (1.2, 5.0)
@@ -195,7 +195,7 @@ def test_an_update_keeps_what_was_edited_so_that_accuracy_cannot_be_lost_in_smal
 
 
 def test_what_comes_nearer_to_the_reference_is_within_and_has_changed(path) -> None:
-    check = checked(path, current([*WAYS[:2], (9, 0, 10)], bars()))
+    check = checked(path, current([*SHIFTS[:2], (9, 0, 10)], bars()))
     assert (check.answer("within"), check.answer("unchanged")) == ("pass", "fail")
 
 
@@ -249,9 +249,9 @@ def test_a_sample_spreads() -> None:
 def test_a_change_of_one_frame_is_a_few_lines_of_the_file(path) -> None:
     before = path.read_text().splitlines()
     assert list(json.loads(path.read_text())) == sorted(json.loads(path.read_text()))
-    ways = np.array(WAYS, float)
-    ways[1] += [0, 2, 0]
-    baseline.update(path, current(ways, bars()))
+    shifts = np.array(SHIFTS, float)
+    shifts[1] += [0, 2, 0]
+    baseline.update(path, current(shifts, bars()))
     after = path.read_text().splitlines()
     assert len(before) == len(after)
     changed = [line for line, other in zip(after, before, strict=True) if line != other]
@@ -261,7 +261,7 @@ def test_a_change_of_one_frame_is_a_few_lines_of_the_file(path) -> None:
 
 
 def test_a_run_of_lines_alone_is_checked_by_its_fibres(tmp_path) -> None:
-    lines = replace(run("mine", WAYS), has_surface=False, positions=np.full((3, *REST.points.shape), np.nan))
+    lines = replace(run("mine", SHIFTS), has_surface=False, positions=np.full((3, *REST.points.shape), np.nan))
     path, now = tmp_path / "ball.json", CurrentMeasures.of(SCENE, SETUP, lines, REFERENCE, bars())
     baseline.update(path, now)
     assert {name.split(".")[0] for name in json.loads(path.read_text())["measures"]} == {"fibre_length"}
@@ -275,7 +275,7 @@ def test_notes_say_what_else_is_different(path) -> None:
     edited(path, lambda table: table.update(reference="fenicsx-1", fem_reference="0.0.1"))
     other = replace(REFERENCE, positions=REFERENCE.positions + [3.0, 0, 0])
     check = regression.check(
-        baseline.read(path, SCENE, "mine"), CurrentMeasures.of(SCENE, SETUP, run("mine", WAYS), other, bars())
+        baseline.read(path, SCENE, "mine"), CurrentMeasures.of(SCENE, SETUP, run("mine", SHIFTS), other, bars())
     )
     assert "measured by fem_reference" in check.notes[0]
     assert check.notes[1] == "the reference is test, that of the baseline was fenicsx-1"
@@ -351,14 +351,14 @@ def test_a_vertex_that_is_not_there_is_named(path) -> None:
 
 def test_a_reference_without_an_interior_is_refused() -> None:
     with pytest.raises(InputError, match="reference: fibres: got a run without an interior"):
-        CurrentMeasures.of(SCENE, SETUP, run("mine", WAYS), replace(REFERENCE, fibres=None), None)
+        CurrentMeasures.of(SCENE, SETUP, run("mine", SHIFTS), replace(REFERENCE, fibres=None), None)
 
 
 @pytest.fixture
 def mixed(path) -> regression.Check:
     """A check with all three verdicts."""
     edited(path, lambda table: table["measures"]["fibre_length.rms"].update(within=0.1))
-    return checked(path, current([*WAYS[:2], (15, 0, 10)], bars()))
+    return checked(path, current([*SHIFTS[:2], (15, 0, 10)], bars()))
 
 
 def test_junit_has_a_case_for_each_judgement(mixed) -> None:

@@ -1,4 +1,4 @@
-"""The report says what the comparison holds, all of it, and opens without a network."""
+"""The report shows all of a comparison and opens without a network."""
 
 import csv
 import io
@@ -210,7 +210,7 @@ def test_what_is_not_finite_is_null(comparison):
     assert report.summary(replace(comparison, verdicts=(damaged,)))["verdicts"][0]["value"] is None
 
 
-def test_csv_holds_the_same_numbers(comparison, tmp_path):
+def test_csv_has_the_same_numbers(comparison, tmp_path):
     report.write(comparison, tmp_path / "out")
     rows = list(csv.DictReader(io.StringIO((tmp_path / "out" / "measures.csv").read_text())))
     printed = json.loads((tmp_path / "out" / "measures.json").read_text())["measures"]
@@ -345,7 +345,7 @@ def test_pictures_show_the_candidate_in_the_colours_of_the_bar(comparison, monke
         assert (pixels.max(axis=2) < 60).any()
 
 
-def test_curves_tell_where_a_run_is_not_a_number(comparison):
+def test_curves_show_where_a_run_is_not_a_number(comparison):
     drawn = {curve.title: curve.svg for curve in curves(comparison)}
     assert len(drawn) == 5
     assert "not a number" in drawn["Surface of torn: distance to the reference"]

@@ -105,7 +105,7 @@ def test_gradient_is_a_unit_vector_that_leads_to_the_surface(body: Obstacle) -> 
 def test_gradient_and_curvature_are_the_slopes_of_the_distance(body: Obstacle) -> None:
     points, step = _points(3), 1e-5
     found = body.sample(points)
-    steps = [(body.sample(points + step * way), body.sample(points - step * way)) for way in np.eye(3)]
+    steps = [(body.sample(points + step * axis), body.sample(points - step * axis)) for axis in np.eye(3)]
     slopes = np.stack([(after.distance - before.distance) / (2 * step) for after, before in steps], axis=1)
     bends = np.stack([(after.gradient - before.gradient) / (2 * step) for after, before in steps], axis=2)
     # Central differences are wrong by step^2 / curvature radius^3; on 4000 points few radii are below 0.02: 1e-5.
@@ -121,10 +121,10 @@ def test_gradient_and_curvature_are_the_slopes_of_the_distance(body: Obstacle) -
 
 
 def test_mean_curvature_of_a_ball_of_a_pipe_and_of_flats() -> None:
-    ways = shapes.sphere(1).points
+    directions = shapes.sphere(1).points
     # The trace is 2 / r beside a point and 1 / r beside a line, at the distance r from it.
     for r in (0.5, 3.0, 7.0):
-        curvature = BODIES["sphere"].sample(r * ways + [1, -1, 2]).curvature
+        curvature = BODIES["sphere"].sample(r * directions + [1, -1, 2]).curvature
         assert_allclose(np.trace(curvature, axis1=1, axis2=2), 2 / r)
         beside = np.array([START]) + 3.5 * AXIS + r * _perpendicular()
         assert_allclose(np.trace(BODIES["capsule"].sample(beside).curvature, axis1=1, axis2=2), 1 / r)

@@ -49,7 +49,7 @@ def test_a_square_on_a_face_keeps_its_area_and_outline(size: float) -> None:
     x, y, z = BOX.points.T
     square = np.flatnonzero((z == 80) & (np.abs(x - 40) <= 20) & (np.abs(y - 30) <= 20))
     surface, labels, wanted = _rimmed(BOX, {"square": square}, size)
-    # Vertices to 20 mm from the middle hold half a cell of 2.5 mm more: 42.5 mm, a side, less half a cell at two corners.
+    # Vertices to 20 mm from the middle take half a cell of 2.5 mm more: 42.5 mm, a side, less half a cell at two corners.
     assert_allclose(wanted["square"], 42.5**2, rtol=2e-3)
     assert_allclose(_area(surface, labels, 1), wanted["square"], rtol=1e-3)
     rim = _rim(surface, labels, 1)

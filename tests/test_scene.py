@@ -129,7 +129,7 @@ def edited(folder: Path, old: str, new: str) -> Path:
 # Reading scenes
 
 
-def test_scene_holds_what_the_file_says(bar: Path) -> None:
+def test_scene_has_what_the_file_says(bar: Path) -> None:
     scene = casefile.read(bar)
     assert (scene.name, scene.folder, scene.place) == ("bar", bar.resolve(), str(bar.resolve() / "case.toml"))
     assert (scene.muscle.unit, scene.muscle.tet_size) == pytest.approx((10.0, 20.0))

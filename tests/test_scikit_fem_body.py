@@ -105,7 +105,7 @@ def test_patch_test_on_crooked_cells(element, degree) -> None:
 
 
 @pytest.mark.parametrize("element", ["P2/P1", "Q1/P0"])
-def test_rotating_costs_nothing_and_holding_is_in_balance(element) -> None:
+def test_rotating_costs_nothing_and_reactions_balance(element) -> None:
 
     def turn(angle):
         return np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
@@ -190,12 +190,12 @@ def loaded(element: str) -> Body:
 def test_the_tangent_is_the_slope_of_the_forces(element) -> None:
     equations = Equations(loaded(element), element, None)
     random = np.random.default_rng(1)
-    here, way = 0.05 * random.normal(size=(2, equations.space.size))
+    here, direction = 0.05 * random.normal(size=(2, equations.space.size))
     step = 1e-5
-    late, early = (equations.assembled(here + sign * step * way, 1.0)[0] for sign in (1, -1))
+    late, early = (equations.assembled(here + sign * step * direction, 1.0)[0] for sign in (1, -1))
     _, tangent = equations.assembled(here, 1.0)
     # Central differences: step squared times third derivatives of about 1e3, and rounding of forces of about 10 N over the step.
-    assert tangent @ way == pytest.approx((late - early) / (2 * step), abs=1e-7)
+    assert tangent @ direction == pytest.approx((late - early) / (2 * step), abs=1e-7)
 
 
 @pytest.mark.parametrize("element", ["P2", "P2/P0", "Q2/Q1"])
@@ -203,10 +203,12 @@ def test_forces_are_the_slope_of_the_energy(element) -> None:
     given = loaded(element)
     equations = Equations(Body(given.mesh, given.effects[:-1], (), (0.0, 1.0), given.fibre), element, None)
     random = np.random.default_rng(2)
-    here, way = 0.03 * random.normal(size=(2, equations.space.size))
+    here, direction = 0.03 * random.normal(size=(2, equations.space.size))
     step = 1e-5
-    slope = (equations.energy(here + step * way, 1.0) - equations.energy(here - step * way, 1.0)) / (2 * step)
-    assert equations.assembled(here, 1.0)[0] @ way == pytest.approx(slope, abs=1e-7)
+    slope = (equations.energy(here + step * direction, 1.0) - equations.energy(here - step * direction, 1.0)) / (
+        2 * step
+    )
+    assert equations.assembled(here, 1.0)[0] @ direction == pytest.approx(slope, abs=1e-7)
 
 
 def test_newton_converges_quadratically(monkeypatch) -> None:
@@ -228,8 +230,8 @@ def test_newton_converges_quadratically(monkeypatch) -> None:
 
 
 def test_a_load_step_that_fails_is_cut_back() -> None:
-    push = moved("push", "z1", ALL, lambda points, frame: points * 0 + [0, 0, -2.4 * frame])
-    given = Body(box("Q1/P0", 2), law("Q1/P0"), (moved("ground", "z0", ALL), push), (0.0, 1.0))
+    lid = moved("lid", "z1", ALL, lambda points, frame: points * 0 + [0, 0, -2.4 * frame])
+    given = Body(box("Q1/P0", 2), law("Q1/P0"), (moved("ground", "z0", ALL), lid), (0.0, 1.0))
     state = solved(given, "Q1/P0", newton_iterations=3).last
     assert state.scalars["cut_backs"] >= 1
     whole = solved(given, "Q1/P0", newton_iterations=30, first_step=0.1).last
@@ -238,8 +240,8 @@ def test_a_load_step_that_fails_is_cut_back() -> None:
 
 def test_cells_turned_inside_out_are_a_status() -> None:
     # All eight corners are prescribed, so that there is nothing to solve: past half a step the top is below the bottom.
-    push = moved("push", "z1", ALL, lambda points, frame: points * 0 + [0, 0, -8.0 * frame])
-    given = Body(box("Q1"), law("Q1"), (moved("ground", "z0", ALL), push), (0.0, 0.25, 1.0))
+    lid = moved("lid", "z1", ALL, lambda points, frame: points * 0 + [0, 0, -8.0 * frame])
+    given = Body(box("Q1"), law("Q1"), (moved("ground", "z0", ALL), lid), (0.0, 0.25, 1.0))
     solution = solve_body(given, BodySettings(element="Q1"))
     assert solution.outcome.status == "inverted"
     assert "det F fell to -" in solution.outcome.message
@@ -247,7 +249,7 @@ def test_cells_turned_inside_out_are_a_status() -> None:
 
 
 def test_equations_without_a_solution_are_a_status() -> None:
-    # Nothing holds a body on which a force pulls.
+    # A body on which a force pulls is prescribed nowhere.
     pull = effect("traction", ramp=RAMP, on="z1", force="0, 0, 0.4 MPa")
     given = Body(box("P1"), (*law("P1"), pull), (), (0.0, 1.0))
     solution = solve_body(given, BodySettings(element="P1"))

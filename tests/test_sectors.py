@@ -1,4 +1,4 @@
-"""Sectors between sharp edges, and what attached vertices hold of the triangles around them."""
+"""Sectors between sharp edges, and how much of the triangles around them attached vertices take."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ def test_a_smooth_surface_has_one_sector_for_each_vertex() -> None:
     assert np.array_equal(np.unique(number, return_index=True)[1].size, len(ball.points))
 
 
-def test_the_vertices_of_a_face_hold_that_face_and_nothing_beside() -> None:
+def test_the_vertices_of_a_face_attach_that_face_and_nothing_beside() -> None:
     face = np.flatnonzero(BLOCK.points[:, 2] == 0)
     shares = attached_shares(BLOCK, face)
     on_face = (BLOCK.points[BLOCK.triangles][:, :, 2] == 0).all(axis=1)
@@ -32,20 +32,20 @@ def test_the_vertices_of_a_face_hold_that_face_and_nothing_beside() -> None:
 
 
 @pytest.mark.parametrize("point", [(0, 0, 0), (10, 0, 0), (10, 8, 0)])
-def test_a_vertex_that_holds_no_whole_triangle_holds_all_around_it(point: tuple[float, ...]) -> None:
+def test_a_vertex_without_a_whole_triangle_attaches_all_around_it(point: tuple[float, ...]) -> None:
     alone = np.flatnonzero((BLOCK.points == point).all(axis=1))
     areas = vertex_areas(BLOCK.points, BLOCK.triangles)
     assert_allclose(attached_area(BLOCK, attached_shares(BLOCK, alone)), areas[alone])
 
 
-def test_on_a_smooth_surface_every_vertex_holds_all_around_it() -> None:
+def test_on_a_smooth_surface_every_vertex_attaches_all_around_it() -> None:
     ball = shapes.sphere(3, 30.0)
     cap = np.flatnonzero(ball.points[:, 2] > 20)
     areas = vertex_areas(ball.points, ball.triangles)
     assert_allclose(attached_area(ball, attached_shares(ball, cap)), areas[cap].sum())
 
 
-def test_nothing_holds_nothing() -> None:
+def test_without_vertices_nothing_is_attached() -> None:
     assert not attached_shares(BLOCK, np.zeros(0, np.int64)).any()
 
 

@@ -30,8 +30,8 @@ def ball() -> Grid:
 def _shell(seed: int, low: float, high: float, count: int = 5000) -> Floats:
     """Random points (n, 3) between two radii about the origin."""
     random = np.random.default_rng(seed)
-    way = random.normal(size=(count, 3))
-    return way / np.linalg.norm(way, axis=1, keepdims=True) * random.uniform(low, high, (count, 1))
+    direction = random.normal(size=(count, 3))
+    return direction / np.linalg.norm(direction, axis=1, keepdims=True) * random.uniform(low, high, (count, 1))
 
 
 def test_exact_distance_of_a_cube_inside_and_outside() -> None:
@@ -92,7 +92,7 @@ def test_error_at_sharp_edges_falls_with_the_spacing() -> None:
 def test_gradient_and_curvature_are_the_slopes_of_the_distance(ball: Grid) -> None:
     points, step = _shell(5, 7.0, 13.0, 500), 1e-5
     found = ball.sample(points)
-    steps = [(ball.sample(points + step * way), ball.sample(points - step * way)) for way in np.eye(3)]
+    steps = [(ball.sample(points + step * axis), ball.sample(points - step * axis)) for axis in np.eye(3)]
     slopes = np.stack([(after.distance - before.distance) / (2 * step) for after, before in steps], axis=1)
     bends = np.stack([(after.gradient - before.gradient) / (2 * step) for after, before in steps], axis=2)
     # Round-off of a distance of 5 mm over the step is 1e-10; the third derivative jumps between cells: 1e-5 of about 1 / mm2.
@@ -164,7 +164,7 @@ def test_place_of_the_body_does_not_matter(ball: Grid) -> None:
         assert_allclose(one, other, atol=1e-9)
 
 
-def test_way_that_triangles_run_does_not_matter(ball: Grid) -> None:
+def test_triangles_may_have_any_orientation(ball: Grid) -> None:
     triangles = BALL.triangles.copy()
     triangles[100:200] = triangles[100:200, ::-1]
     assert_allclose(build(Surface(BALL.points, triangles), 1.0, 4.0).coefficients, ball.coefficients, atol=1e-9)
@@ -224,7 +224,7 @@ def test_store_gives_back_the_same_bits(counted: list[float], tmp_path: Path) ->
     assert len(list((tmp_path / "new").iterdir())) == 1
 
 
-def test_store_tells_surfaces_errors_and_margins_apart(counted: list[float], tmp_path: Path) -> None:
+def test_store_distinguishes_surfaces_errors_and_margins(counted: list[float], tmp_path: Path) -> None:
     cached(BALL, 0.1, 2.0, 0.0, tmp_path)
     cached(BALL, 0.2, 2.0, 0.0, tmp_path)
     cached(BALL, 0.1, 3.0, 0.0, tmp_path)

@@ -1,4 +1,4 @@
-"""Points on a surface that rigid bodies push on and springs pull at: a rule, each point carried by a tet."""
+"""Points on a surface that contact presses on and springs pull at: a rule, each point carried by a tet."""
 
 import numpy as np
 from numpy.testing import assert_allclose

@@ -46,7 +46,7 @@ def test_what_is_none(points, status, sentence):
 
 
 def test_what_bones_draw_out_may_be_as_wide_and_large():
-    # Thirty times as long, and as large: so are the ends that bones hold, of a diagonal of about 30 * 20 mm against 35 mm.
+    # Thirty times as long, and as large: so are the attached ends, of a diagonal of about 30 * 20 mm against 35 mm.
     points, ends = scaled(30, 1, 1), np.array([REST.points[:, 0].argmin(), REST.points[:, 0].argmax()])
     assert trouble(points, REST, ends) is None
     assert trouble(points, REST, NONE).status == "diverged"

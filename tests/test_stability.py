@@ -63,8 +63,8 @@ def column(element: str, cells: tuple[int, int, int], shortenings: list[float], 
     """Shortened at frame i by ``shortenings[i - 1]`` of its length."""
     mesh = shapes.box(cells, size, ELEMENTS[element][0])
     knots = tuple(enumerate([0.0, *shortenings]))
-    push = Affine(STILL, (0.0, 0.0, -size[2]), knots)
-    fixed = Prescribed("foot", "z0", (0, 1, 2), Rest()), Prescribed("head", "z1", (2,), push)
+    moved = Affine(STILL, (0.0, 0.0, -size[2]), knots)
+    fixed = Prescribed("foot", "z0", (0, 1, 2), Rest()), Prescribed("head", "z1", (2,), moved)
     return Body(mesh, flesh(element), fixed, tuple(float(frame) for frame, _ in knots))
 
 
@@ -138,11 +138,11 @@ def test_nobody_counts_where_a_load_may_have_no_energy(session) -> None:
 
 
 def test_ranks_count_alike() -> None:
-    # A bar of 2 x 2 x 20 mm, pushed together by 2 per cent between clamped ends, against Euler's 4 pi^2 / 12 / 100 = 3.3 per cent.
+    # A bar of 2 x 2 x 20 mm, shortened by 2 per cent between clamped ends, against Euler's 4 pi^2 / 12 / 100 = 3.3 per cent.
     found = {}
     for ranks in (1, 2):
-        push = {"bottom": None, "top": Translation((0, 0, -1), (0.0, 10.0), (0.0, 1.4))}
-        problem = bodies.bar((1, 1, 10), (2, 2, 20), push, flesh("P2/P1"), (0, 5, 10))
+        moved = {"bottom": None, "top": Translation((0, 0, -1), (0.0, 10.0), (0.0, 1.4))}
+        problem = bodies.bar((1, 1, 10), (2, 2, 20), moved, flesh("P2/P1"), (0, 5, 10))
         frames: list[Frame] = []
         outcome = fenicsx.solve(problem, Settings(ranks=ranks, first_step=100.0), frames.append)
         found[ranks] = [frame.scalars["negative_modes"] for frame in frames], frames[-1].note, outcome.message

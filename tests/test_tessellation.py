@@ -80,9 +80,9 @@ def test_a_half_space_is_a_slab_behind_its_plane_that_reaches_past_what_is_besid
     # Half of its eight corners lie in the plane, the others a tenth of the size behind it.
     assert np.sort(distance) == pytest.approx([-size / 10] * 4 + [0] * 4, abs=1e-12)
     # Seen along the normal, a ball twice as large as the points' own, about their middle, is covered.
-    way = np.divide(normal, np.linalg.norm(normal))
+    along = np.divide(normal, np.linalg.norm(normal))
     face = surface.points[distance > -1]
-    flat = face - [0, 50, 0] - ((face - [0, 50, 0]) @ way)[:, None] * way
+    flat = face - [0, 50, 0] - ((face - [0, 50, 0]) @ along)[:, None] * along
     assert (np.linalg.norm(flat, axis=1) > 2 * size / 2).all()
     assert np.abs(flat.mean(axis=0)).max() < 1e-12
 

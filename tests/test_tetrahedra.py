@@ -232,7 +232,7 @@ def test_what_a_mesher_must_not_give_is_named(points: np.ndarray, tets: list[lis
         tetrahedra._checked(TetMesh(points, np.array(tets)), SIXTH)
 
 
-def test_only_the_largest_part_is_kept_the_right_way_round() -> None:
+def test_only_the_largest_part_is_kept_outward() -> None:
     box = shapes.box((2, 2, 2), (1.0, 1.0, 1.0))
     apart, hinged = [27, 28, 29, 30], [0, 1, 27, 28]
     tets = np.concatenate([box.tets[:, [1, 0, 2, 3]], [apart, hinged]])

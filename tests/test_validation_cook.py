@@ -65,7 +65,7 @@ def test_a_clamped_beam_bends_as_timoshenko_says() -> None:
 
 def test_a_stretched_strip_thins_as_a_single_equation_says() -> None:
     """A strip 40 long and 1 high, pulled by T: away from the ends the stress across vanishes. Its stretches solve two equations
-    here; what the clamped end holds back dies out as exp(-pi x): from the middle to the end the stretch is even.
+    here; what the clamped end hinders dies out as exp(-pi x): from the middle to the end the stretch is even.
     """
     shear, bulk, pull = 1.0, 20.0, 0.5
     body = plane_strain.grid(
@@ -85,7 +85,7 @@ def test_a_stretched_strip_thins_as_a_single_equation_says() -> None:
     assert shear * J ** (-2 / 3) * (across - third / across) + bulk * (J - 1) * along == pytest.approx(0, abs=1e-6)
 
 
-def test_what_holds_is_what_pulls() -> None:
+def test_reaction_equals_load() -> None:
     found = cook.solve(plane_strain.neo_hooke(80.194), 400889.8, 6.25, order=3, layers=1, steps=2)
     np.testing.assert_allclose(found.fixed, (0, -100), atol=1e-6)
 

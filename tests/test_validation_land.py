@@ -65,7 +65,7 @@ def test_fibres_follow_the_derivatives_of_the_wall(inside: tuple[Floats, Floats,
 
 @pytest.mark.parametrize(("depth", "up"), [(0.0, 1.0), (0.25, 0.5**0.5), (0.5, 0.0), (0.75, -(0.5**0.5)), (1.0, -1.0)])
 def test_angle_through_the_wall(depth: float, up: float) -> None:
-    """Where the wall is vertical (z = 0) the fibre is (0, cos a, sin a) at y = 0: up inside, along +y half way, down outside."""
+    """Where the wall is vertical (z = 0) the fibre is (0, cos a, sin a) at y = 0: up inside, along +y halfway, down outside."""
     found = land.fibre(np.array([[7 + 3 * depth, 0.0, 0.0]]))
     np.testing.assert_allclose(found, [[0, np.sqrt(1 - up**2), up]], atol=1e-14)
 
@@ -101,9 +101,9 @@ def test_volume_of_the_wall() -> None:
 
 def test_published_results_stand_in_their_order() -> None:
     """The pressure moves the apex down and thins the wall; the active tension pulls it up and thickens it, as in the paper."""
-    for apices, way in ((land.PASSIVE_APICES, -1), (land.ACTIVE_APICES, 1)):
+    for apices, sign in ((land.PASSIVE_APICES, -1), (land.ACTIVE_APICES, 1)):
         inner, outer = apices
         assert inner > outer
-        assert np.sign(inner + 17) == np.sign(outer + 20) == way
+        assert np.sign(inner + 17) == np.sign(outer + 20) == sign
     assert land.PASSIVE_APICES[0] - land.PASSIVE_APICES[1] < 3
     assert land.ACTIVE_APICES[0] - land.ACTIVE_APICES[1] > 3

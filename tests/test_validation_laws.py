@@ -138,7 +138,8 @@ def test_guccione_has_no_preferred_direction_across_the_fibre() -> None:
 
 
 def test_guccione_along_across_and_between() -> None:
-    # At J = 1: longer one way and shorter the other, E = (l^2 - 1)/2 in both; sheared along the fibre, E_fs = g/2, E_ss = g^2/2.
+    # At J = 1: longer along one axis and shorter along the other, E = (l^2 - 1)/2 in both;
+    # sheared along the fibre, E_fs = g/2, E_ss = g^2/2.
     law = LAWS["guccione"]
     longer, shorter = ((stretch**2 - 1) / 2 for stretch in (1.2, 1 / 1.2))
     along = 8 * longer**2 + 2 * shorter**2
@@ -197,7 +198,7 @@ def test_stresses_tend_to_those_of_incompressible_matter(mode: str, power: int, 
 
 @pytest.mark.parametrize("stretch", [0.3, 0.9, 1.0, 1.2, 2.0])
 @pytest.mark.parametrize("bulk", [0.05, 10.0, 1000.0])
-def test_two_ways_to_a_uniaxial_state_meet(stretch: float, bulk: float) -> None:
+def test_two_paths_to_a_uniaxial_state_meet(stretch: float, bulk: float) -> None:
     state = homogeneous.uniaxial(neo_hooke(0.01), bulk, stretch)
     # the bulk modulus multiplies the rounding of J, 1e-16, in the stress
     assert np.linalg.det(state.F) == pytest.approx(loads.squeezed_volume(0.01, bulk, stretch), rel=1e-12)
@@ -236,7 +237,7 @@ def test_fibres_that_a_stretch_would_turn_are_refused() -> None:
         homogeneous.uniaxial(MUSCLE, 5.0, 1.2, FIBRE)
 
 
-def test_a_body_that_cannot_hold_the_pull_is_reported() -> None:
+def test_a_body_that_cannot_carry_the_pull_is_reported() -> None:
     with pytest.raises(ArithmeticError, match="no homogeneous state found"):
         homogeneous.pulled(ACTIVE, 1.0, 0.5)  # a fibre alone, that pulls with 0.19 MPa at most
 

@@ -18,7 +18,7 @@ def test_the_power_of_the_plates_is_stored_or_lost() -> None:
         assert power == pytest.approx((after - before) / (2 * dt) + 2 * eta * np.sum(D**2), rel=1e-8)
 
 
-def test_what_nothing_holds_creeps_back_at_the_rate_of_small_strain() -> None:
+def test_a_free_body_creeps_back_at_the_rate_of_small_strain() -> None:
     # The stretch whose force vanishes: its last part goes by exp(-mu t / eta), but for strains of 1e-4.
     mu, eta = 0.01, 0.2
 

@@ -24,7 +24,7 @@ ROUNDING = {"homogeneous", "fibres", "loads", "patch tests", "rigid motion"}
 def test_an_entry_finds_its_truth(entry: Entry, fem_lab) -> None:
     found = result(entry, entry.measure(fem_lab), 0.0, with_negative_control=False)
     assert found.word == "pass", (found.finding, found.truth, found.within)
-    if entry.family in FOURTH_ORDER:
+    if entry.group in FOURTH_ORDER:
         assert found.finding.order is None or found.finding.order > 3.5
 
 
@@ -35,7 +35,7 @@ def test_an_entry_finds_its_truth(entry: Entry, fem_lab) -> None:
 def test_with_its_negative_control_it_misses_clearly(entry: Entry, fem_lab) -> None:
     found = result(entry, entry.with_negative_control(fem_lab), 0.0, with_negative_control=True)
     assert found.word == "fail", (found.finding, found.truth, found.within)
-    assert found.error > (1000 if entry.family in ROUNDING else 1.5) * found.within
+    assert found.error > (1000 if entry.group in ROUNDING else 1.5) * found.within
 
 
 class Reading:

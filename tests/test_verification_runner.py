@@ -20,7 +20,7 @@ from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.verification import runner, truths
 
 
-def entry(name, measure=1.0, family="blocks", **changes) -> Entry:
+def entry(name, measure=1.0, group="blocks", **changes) -> Entry:
     """An entry whose truth is 1, within 0.1; ``measure`` is its value, or what is done with the lab."""
     printed = {
         "title": f"The {name}",
@@ -32,7 +32,7 @@ def entry(name, measure=1.0, family="blocks", **changes) -> Entry:
     numbers = {"truth": lambda: 1.0, "within": 0.1, "relative": False, "kind": "closed form"}
     measure = measure if callable(measure) else lambda _, value=measure: Finding(value)
     table = printed | numbers | {"measure": measure, "with_negative_control": lambda _: Finding(2.0)} | changes
-    return Entry(name=name, family=family, **table)
+    return Entry(name=name, group=group, **table)
 
 
 def raising(error) -> Entry:
@@ -83,7 +83,7 @@ def test_every_entry_there_is_says_what_a_reader_needs() -> None:
         assert one.name == name
         assert one.kind in get_args(Kind)
         assert one.within > 0, name
-        assert all(getattr(one, key).strip() for key in ("family", "title", "because", "source", "negative_control")), (
+        assert all(getattr(one, key).strip() for key in ("group", "title", "because", "source", "negative_control")), (
             name
         )
 
@@ -99,24 +99,24 @@ def test_every_entry_there_is_says_what_a_reader_needs() -> None:
         ([], ""),
     ],
 )
-def test_names_families_and_patterns_choose_in_the_order_of_the_catalogue(wanted, names) -> None:
-    bars = [entry("bar_end", family="bars"), entry("bar_middle", family="bars")]
-    known = catalogue(*bars, entry("tip", family="beams"), entry("beam_end", family="beams"))
+def test_names_groups_and_patterns_choose_in_the_order_of_the_catalogue(wanted, names) -> None:
+    bars = [entry("bar_end", group="bars"), entry("bar_middle", group="bars")]
+    known = catalogue(*bars, entry("tip", group="beams"), entry("beam_end", group="beams"))
     assert runner.choose(known, wanted, "NAME") == tuple(names.split())
 
 
 def test_a_name_that_is_not_there_is_reported_with_those_that_are() -> None:
-    known = catalogue(entry("bar"), entry("tip", family="beams"))
-    want = r'NAME: got "Bar", want an entry \(such as bar\), a family \(blocks, beams\) or a pattern of them'
+    known = catalogue(entry("bar"), entry("tip", group="beams"))
+    want = r'NAME: got "Bar", want an entry \(such as bar\), a group \(blocks, beams\) or a pattern of them'
     with pytest.raises(InputError, match=want):
         runner.choose(known, ["tip", "Bar"], "NAME")
 
 
 def test_an_unknown_name_is_answered_shortly_however_many_there_are() -> None:
-    known = catalogue(*(entry(f"bar_{i}") for i in range(100)), entry("tip", family="beams"))
+    known = catalogue(*(entry(f"bar_{i}") for i in range(100)), entry("tip", group="beams"))
     with pytest.raises(InputError) as refused:
         runner.choose(known, ["tipp"], "NAME")
-    assert refused.value.want == "an entry (such as tip), a family (blocks, beams) or a pattern of them"
+    assert refused.value.want == "an entry (such as tip), a group (blocks, beams) or a pattern of them"
     with pytest.raises(InputError) as refused:
         runner.choose(known, ["bar_100"], "NAME")
     assert refused.value.want.count("bar_") == 5
@@ -127,7 +127,7 @@ def test_results_keep_their_order_and_every_thread_its_lab(monkeypatch) -> None:
     both, used = threading.Barrier(2, timeout=5), []
 
     def meet(lab):
-        both.wait()  # passes only when two entries are under way at once
+        both.wait()  # passes only when two entries are measured at once
         used.append((lab, threading.get_ident()))
         return Finding(1.0)
 
@@ -209,7 +209,7 @@ def test_a_thread_stops_after_its_entry_when_the_other_met_a_mistake(monkeypatch
             closed.set()
 
     def slow(_):
-        assert closed.wait(5)  # the labs close while this is still under way
+        assert closed.wait(5)  # the labs close while this is still measured
         measured.append("slow")
         return Finding(1.0)
 
@@ -252,7 +252,7 @@ def test_progress_says_how_far_it_is(caplog, monkeypatch) -> None:
 @pytest.fixture
 def verify(monkeypatch, tmp_path, capsys):
     """Calls the verb on a small catalogue: the exit status, what is printed and the JSON."""
-    known = catalogue(entry("bar", family="bars"), entry("rod", family="bars", unit="N"), entry("tip", 3.0, "beams"))
+    known = catalogue(entry("bar", group="bars"), entry("rod", group="bars", unit="N"), entry("tip", 3.0, "beams"))
     made = ModuleType("fem_reference.verification.lab")
     made.lab = Labs()
     monkeypatch.setattr(runner, "entries", lambda: known)
@@ -287,7 +287,7 @@ def test_all_pass(verify) -> None:
     assert {"fem_reference", "python", "numpy"} <= set(facts["versions"])
 
 
-def test_without_names_all_are_measured_and_one_that_fails_tells(verify) -> None:
+def test_without_names_all_are_measured_and_one_that_fails_is_reported(verify) -> None:
     status, printed, facts = verify()
     assert status == cli.VERDICT_FAIL
     assert [row["name"] for row in facts["entries"]] == ["bar", "rod", "tip"]
@@ -315,7 +315,7 @@ def test_a_negative_control_is_measured_and_fails(verify, words, names) -> None:
 def test_an_unknown_name_is_bad_input(verify, words, place) -> None:
     status, printed, facts = verify(*words)
     assert status == cli.BAD_INPUT
-    assert f'{place}: got "nobody", want an entry, a family (bars, beams)' in printed.err
+    assert f'{place}: got "nobody", want an entry, a group (bars, beams)' in printed.err
     assert facts is None
     assert verify.made.lab.made == 0
 

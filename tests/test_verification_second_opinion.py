@@ -7,7 +7,7 @@ from fem_reference.runs.solved import Reached
 from fem_reference.verification.second_opinion import differences
 
 
-def test_each_way_to_differ_is_felt() -> None:
+def test_each_kind_of_difference_is_felt() -> None:
     rest = np.zeros((2, 3))
 
     def state(x: float = 2.0, energy: float = 4.0, force: float = 5.0, moment: float = 8.0) -> Reached:

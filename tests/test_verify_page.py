@@ -1,4 +1,4 @@
-"""The page of the catalogue shows all that a result holds, opens without a network, and survives what is not a number."""
+"""The page of the catalogue shows all of a result, opens without a network, and survives what is not a number."""
 
 import json
 import math
@@ -17,7 +17,7 @@ NAN = float("nan")
 LADDER = ((1.0, 2.16), (0.5, 2.04), (0.25, 2.01))
 
 
-def made(name="bar", value=2.01, *, with_negative_control=False, truth=2.0, family="long_blocks", **changes) -> Result:
+def made(name="bar", value=2.01, *, with_negative_control=False, truth=2.0, group="long_blocks", **changes) -> Result:
     """A result whose bound is 2 % of a truth of 2: 0.04."""
     given = {key: changes.pop(key) for key in ("order", "ladder", "note") if key in changes}
     printed = {"title": f"The <{name}>", "unit": "N mm", "because": "because & so", "source": "Ogden 1984, section 5.2"}
@@ -28,7 +28,7 @@ def made(name="bar", value=2.01, *, with_negative_control=False, truth=2.0, fami
         "kind": "closed form",
         "negative_control": "mu twice",
     }
-    entry = Entry(name=name, family=family, measure=None, with_negative_control=None, **(printed | numbers | changes))
+    entry = Entry(name=name, group=group, measure=None, with_negative_control=None, **(printed | numbers | changes))
     return result(entry, Finding(value, **given), 1.25, with_negative_control=with_negative_control)
 
 
@@ -38,12 +38,12 @@ def verification(*results: Result) -> Verification:
 
 def test_page_shows_everything_and_needs_no_network() -> None:
     one = made(order=2.0, ladder=LADDER, note="4 iterations <at most>")
-    two = made("tip", 1.5, family="beams", kind="published")
+    two = made("tip", 1.5, group="beams", kind="published")
     text = verify_page.render(verification(one, two))
     tags = read(text)
     assert tags.headings[0] == "Verification: problems whose answers are known"
     assert [heading.strip() for heading in tags.headings[1:]] == ["Long blocks", "Beams", "Convergence", "Made with"]
-    assert '<span class="badge fail">fail</span> 1 of 2 pass, in 2 families; 12.5 s.' in text
+    assert '<span class="badge fail">fail</span> 1 of 2 pass, in 2 groups; 12.5 s.' in text
     # The error 0.01 is a quarter of the bound 0.04.
     for printed in (
         "The &lt;bar&gt;",
@@ -82,7 +82,7 @@ def test_what_is_not_a_number_fails_and_is_reported() -> None:
     lost = made(value=NAN, note="ValueError: no root", ladder=((1.0, NAN), (0.5, 2.0)))
     text = verify_page.render(verification(lost))
     read(text)
-    assert "0 of 1 pass, in 1 family" in text
+    assert "0 of 1 pass, in 1 group" in text
     assert '<span class="bad">not a number</span>' in text
     assert '<p class="alarm"><b>Note:</b> ValueError: no root</p>' in text
     assert ">Convergence<" not in text
@@ -118,7 +118,7 @@ def test_numbers_have_six_digits_where_value_and_truth_stand_beside_each_other()
     assert f"<td>1.5 {times} 10<sup>{minus}7</sup>&#8239;" in text
 
 
-def test_files_hold_the_same_numbers(tmp_path) -> None:
+def test_files_have_the_same_numbers(tmp_path) -> None:
     printed = verification(made(order=2.0, ladder=LADDER), made("tip", NAN))
     page = report.write_verification(printed, tmp_path / "new" / "reports", "verify")
     assert page == tmp_path / "new" / "reports" / "verify.html"
@@ -127,7 +127,7 @@ def test_files_hold_the_same_numbers(tmp_path) -> None:
     assert stored == json.loads(json.dumps(verify_page.facts(printed)))
     assert (stored["verdict"], stored["passed"], stored["of"], stored["seconds"]) == ("fail", 1, 2, 12.5)
     row = stored["entries"][0]
-    assert (row["name"], row["family"], row["verdict"], row["kind"]) == ("bar", "long_blocks", "pass", "closed form")
+    assert (row["name"], row["group"], row["verdict"], row["kind"]) == ("bar", "long_blocks", "pass", "closed form")
     assert (row["value"], row["truth"], row["within"], row["order"], row["seconds"]) == (2.01, 2.0, 0.04, 2.0, 1.25)
     assert row["ladder"] == [list(step) for step in LADDER]
     assert row["error"] == pytest.approx(0.01, abs=1e-15)  # 2.01 - 2.0 to rounding

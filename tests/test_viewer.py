@@ -245,7 +245,7 @@ def test_the_slider_moves_the_mesh(opened, comparison):
                 np.testing.assert_allclose(mean, run.positions[i].mean(axis=0), rtol=0, atol=error + 2e-6)
             else:
                 assert (printed, mean) == ("no frame", [])
-    # The picture moves with it: 2 mm a frame, across the camera's way. Its half height at the target is half / cos(9 degrees);
+    # The picture moves with it: 2 mm a frame, across the direction of view. Its half height at the target is half / cos(9 degrees);
     # the middle of the body is a few percents off that where it is not the middle of the picture.
     pixels = np.linalg.norm(np.diff(middles, axis=0), axis=1)
     pixels_per_mm = (picture.shape[0] / 2) / (half / np.cos(np.radians(9)))

@@ -27,7 +27,7 @@ THICK = effect("viscosity", eta="20 kPa s")  # with mu = 10 kPa it creeps at 1/2
 
 
 def test_turning_a_body_costs_nothing() -> None:
-    # Whichever way it is turned before the step and after it; a state that is not turned back from where it was costs something.
+    # However it is turned before the step and after it; a state that is not turned back from where it was costs something.
     effect, at = make("viscosity"), state(np.eye(3))
     for F in deformations():
         one = effect.energy(replace(at, F=F))
@@ -39,7 +39,7 @@ def test_turning_a_body_costs_nothing() -> None:
     assert effect.stored is False
 
 
-def test_viscosity_does_not_see_which_way_material_lies_or_what_it_was_at_rest() -> None:
+def test_viscosity_does_not_see_the_orientation_of_the_material_or_what_it_was_at_rest() -> None:
     effect, at = make("viscosity"), state(np.eye(3))
     for F, other in zip(deformations(), deformations()[1:], strict=False):
         # Per volume before the step, of which f = F F_before^-1 is the only deformation.
@@ -57,16 +57,16 @@ def test_viscous_stress_is_twice_the_viscosity_times_the_rate_of_deformation() -
         F = (np.eye(3) + dt * L) @ before
         at, slope = replace(state(F), F_before=before, rate=1 / dt), np.empty((3, 3))
         for place in np.ndindex(3, 3):
-            push = np.zeros((3, 3))
-            push[place] = 1e-6
-            after, ahead = (effect.energy(replace(at, F=F + sign * push)) for sign in (1, -1))
+            change = np.zeros((3, 3))
+            change[place] = 1e-6
+            after, ahead = (effect.energy(replace(at, F=F + sign * change)) for sign in (1, -1))
             slope[place] = (after - ahead) / 2e-6
         stress = slope @ F.T / np.linalg.det(F)
         assert stress == pytest.approx(0.3 * (L + L.T), abs=1e-4)
     still = replace(state(before), F_before=before)
-    push = 1e-6 * TURN
-    assert effect.energy(replace(still, F=before + push)) == pytest.approx(
-        effect.energy(replace(still, F=before - push)), rel=1e-5
+    change = 1e-6 * TURN
+    assert effect.energy(replace(still, F=before + change)) == pytest.approx(
+        effect.energy(replace(still, F=before - change)), rel=1e-5
     )  # no slope where nothing moves, only a valley of second order
 
 

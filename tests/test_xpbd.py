@@ -91,16 +91,16 @@ def hung_by_pbd(seconds, sweeps):
         np.zeros(0),
     )
     rules = pbd.Settings(sub_iterations=1, solver_iterations=sweeps, damping=0.05, stretch=0.5, volume=0.0, bending=0.0)
-    points, way, fall = CHAIN.copy(), np.zeros(CHAIN.shape), np.zeros(CHAIN.shape)
+    points, displacement, fall = CHAIN.copy(), np.zeros(CHAIN.shape), np.zeros(CHAIN.shape)
     fall[1:, 2] = -GRAVITY * seconds**2 / (1 - rules.damping)
     for _ in range(1000):
-        points, way = pbd.advance(points, way + fall, chain, rules)
-    assert np.abs(way).max() < 1e-9
+        points, displacement = pbd.advance(points, displacement + fall, chain, rules)
+    assert np.abs(displacement).max() < 1e-9
     return CHAIN[-1, 2] - points[-1, 2]
 
 
 def test_a_hanging_chain_is_as_long_as_its_springs_say():
-    # A sweep takes the tension as it is on the way through the chain, and the next sweep less so: with time steps of up to
+    # A sweep takes the tension as it is while it goes through the chain, and the next sweep less so: with time steps of up to
     # 1.3 / sqrt(k / m) all but 1 part in 1000 is gone after the sweeps of each pair.
     for seconds, sweeps in STEPS:
         assert hung(seconds, sweeps) == pytest.approx(EXTENSION, rel=1e-3), (seconds, sweeps)
@@ -138,7 +138,7 @@ def test_damping_is_a_rate(seconds):
     assert velocities[0, 0] == pytest.approx(3 * math.exp(-0.7), rel=1e-12)
 
 
-def test_one_projection_leaves_what_the_spring_gives_way():
+def test_one_projection_leaves_what_the_spring_yields():
     # After one constraint's projection C = -a l: the spring is as long as its multiplier, a force times dt^2, stretches it.
     pair = graph([1e5, 2e5], [[0, 1]], 10, 0.5)
     multipliers, points = np.zeros(1), np.array([[0.0, 0, 0], [13, 0, 0]])
@@ -205,7 +205,7 @@ def test_a_balloon_is_as_large_as_membrane_and_filling_agree():
 def test_a_flap_hangs_where_its_weight_and_its_hinge_agree(seconds, sweeps):
     # One triangle is attached in the plane z = 0; the free corner of the other, 10 mm from the edge on stiff springs, sinks by the
     # angle t at which the hinge's moment k (change of angle) is the weight's m g 10 cos(t). It rests lifted by 0.5 rad. Directions
-    # are those on the way to the end of a step: 0.0003 off with a step of 1 ms, four times that with 2 ms.
+    # are those on the path to the end of a step: 0.0003 off with a step of 1 ms, four times that with 2 ms.
     lift, stiffness, mass = 0.5, 2.0, 5e-6
     points = np.array([[0.0, -5, 0], [0, 5, 0], [-10, 0, 0], [10 * math.cos(lift), 0, 10 * math.sin(lift)]])
     springs = graph([0, 0, 0, 1 / mass], [[0, 3], [1, 3]], math.hypot(5, 10), 0.0)
@@ -222,8 +222,8 @@ def test_a_flap_hangs_where_its_weight_and_its_hinge_agree(seconds, sweeps):
 
 
 @pytest.mark.parametrize(("seconds", "sweeps"), [(1e-3, 1), (4e-3, 1), (4e-3, 5)])
-def test_a_weight_lies_as_deep_as_the_bone_gives_way(seconds, sweeps):
-    # The bone pushes with its gap's depth over the softness: alone on it, one mass is solved by one projection.
+def test_a_weight_lies_as_deep_as_the_bone_yields(seconds, sweeps):
+    # The contact force is the gap's depth over the compliance: alone on it, one mass is solved by one projection.
     weight = graph([1 / MASS], [], 0, 0)
     bone = RigidBody("floor", icosahedron(), None, solid=HalfSpace((0, 0, 0), (0, 0, 1)))
     contact = xpbd.Contact(Obstacle(bone, np.array([[0.0, 0, 1]]), np.ones(1, bool), 0.0), np.array([2.0]))
@@ -243,7 +243,7 @@ def test_bones_never_pull():
         heights.append(points[0, 2])
     assert (
         -0.02 < min(heights) < 0
-    )  # of a way of 2 mm the share a / (w + a) = 0.01 at most, with a = 1e-3 mm/N / (1e-3 s)^2
+    )  # of a path of 2 mm the share a / (w + a) = 0.01 at most, with a = 1e-3 mm/N / (1e-3 s)^2
     assert velocities[0, 2] >= 0
     away = np.array([[0.0, 0, 5000]])
     points, velocities = xpbd.advance(points, away, weight, Step(1e-3, 3, 0.0), [contact])
@@ -283,7 +283,7 @@ def test_rest_stays_at_rest():
     np.testing.assert_allclose(frames[10], setup.surface.points, atol=1e-9)
 
 
-def test_bones_carry_what_they_hold_and_the_volume_is_kept():
+def test_bones_carry_what_is_attached_and_the_volume_is_kept():
     setup = muscle(SWING, last=20)
     outcome, frames = run(setup)
     assert outcome.status == "converged"
@@ -316,7 +316,7 @@ def test_the_state_in_the_end_knows_neither_steps_nor_sweeps():
         assert np.abs(other - ends[0]).max() < 0.01 * moved
 
 
-def test_bones_push():
+def test_bones_are_obstacles():
     ball = RigidBody(
         "ball", icosahedron(), Translation((-1, 0, 0), (0.0, 20.0), (0.0, 12.0)), solid=Sphere((20, 0, 0), 8.0)
     )
@@ -327,7 +327,7 @@ def test_bones_push():
         _, frames = run(setup, collision=collision)
         there = apply(np.linalg.inv(ball.pose(20)), frames[20][loose])
         depths.append(-ball.shape.sample(there).distance.min())
-    assert depths[0] < 0.1 < 4 < depths[1]  # 500 kPa/mm gives way by 0.1 mm under 50 kPa
+    assert depths[0] < 0.1 < 4 < depths[1]  # 500 kPa/mm yields by 0.1 mm under 50 kPa
 
 
 @pytest.mark.parametrize(

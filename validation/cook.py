@@ -44,8 +44,8 @@ COMPRESSIBLE = Membrane(shear=3 / 8, bulk=1.0, force=1.0, tip=22.61049, error=1e
 NEARLY_INCOMPRESSIBLE = Membrane(shear=1 / 2.9998, bulk=1 / 0.0006, force=1.0, tip=19.42829, error=1e-5)
 
 # Finite strain, W = mu/2 (J^(-2/3) tr C - 3) + K/2 (J - 1)^2. At the full load the material at the clamped corner (0, 44) is
-# squeezed beyond where a free surface stays smooth (least stretch 0.2 and falling with the grid), so that it folds in a way
-# that depends on the grid, and on finer ones Newton finds no balance. What is left to say: degrees 6, 8, 10 with 2 layers at
+# squeezed beyond where a free surface stays smooth (least stretch 0.2 and falling with the grid), so that how it folds
+# depends on the grid, and on finer ones Newton finds no balance. What is left to say: degrees 6, 8, 10 with 2 layers at
 # that corner give 6.9344, 6.9348, 6.9351; degrees 6, 7, 8 with 3 layers 6.9354, 6.9363, 6.9341. At a quarter of the load
 # nothing folds: (6, 3), (6, 4), (8, 4) give 1.945633, 1.945646, 1.945648.
 FINITE = Membrane(shear=80.194, bulk=400889.8, force=100.0, tip=6.935, error=1.5e-3)

@@ -2,7 +2,7 @@
 
 Source: Johnson 1985, Contact Mechanics, ch. 3.4 and 4.2, doi 10.1017/CBO9781139171731; after Hertz 1882,
 doi 10.1515/crll.1882.92.156.
-No reading error; the model holds while the contact is small beside the spheres, to a part of the order of ``(a / R)^2``.
+No reading error; the model is valid while the contact is small beside the spheres, to a part of the order of ``(a / R)^2``.
 """
 
 import math

@@ -30,7 +30,7 @@ class Homogeneous:
 
 
 def nominal_stress(law: Law, bulk: float, F: Floats, fibre: Floats) -> Floats:
-    """``dW/dF + K (J - 1) J F^-T`` (3, 3) [MPa]."""
+    """The stress ``P = dW/dF + K (J - 1) J F^-T`` (3, 3) [MPa] at ``F`` (3, 3), with a ``fibre`` (3,) and K = ``bulk`` [MPa]."""
     J = np.linalg.det(F)
     return np.asarray(law.stress(F, fibre) + bulk * (J - 1) * J * np.linalg.inv(F).T)
 

@@ -41,7 +41,7 @@ Law = Callable[[Floats], Response]
 class Grid:
     """Cells of a quadrilateral: ``nodes`` (n, 2) [mm] at rest and ``cells`` (m, k) of their indices; at the points of
     quadrature ``weights`` (m, q) [mm2], ``gradients`` (m, q, k, 2) [1/mm] of the shape functions and ``pressures`` (q, r), the
-    polynomials of the pressure; ``clamped``: the nodes of the first side; ``push`` (n,) [mm]: the integrals of the shape
+    polynomials of the pressure; ``clamped``: the nodes of the first side; ``load`` (n,) [mm]: the integrals of the shape
     functions over the opposite side.
     """
 
@@ -51,7 +51,7 @@ class Grid:
     gradients: Floats
     pressures: Floats
     clamped: Ints
-    push: Floats
+    load: Floats
     order: int
 
 
@@ -186,8 +186,8 @@ def _spread(ticks: Floats, local: Floats) -> Floats:
 
 
 def grid(corners: Sequence[tuple[float, float]], across: Floats, along: Floats, order: int) -> Grid:
-    """The quadrilateral with ``corners`` [mm], counter-clockwise, cut at the ticks ``across`` of [0, 1] from the side between
-    the last corner and the first to the opposite one, and at ``along`` those sides; cells of degree ``order`` >= 2.
+    """A grid of cells of degree ``order`` >= 2 on the quadrilateral with ``corners`` [mm], counter-clockwise, clamped between the
+    last and the first: cut at the ticks ``across`` of [0, 1] from there to the opposite side, and at ``along`` these sides.
     """
     a, b, c, d = np.array(corners)
     local = _lobatto(order)
@@ -203,11 +203,11 @@ def grid(corners: Sequence[tuple[float, float]], across: Floats, along: Floats, 
     jacobian = np.einsum("mki,qks->mqis", nodes[cells], shapes.derivatives)
     weights = shapes.weights * np.linalg.det(jacobian)
     gradients = np.einsum("qks,mqsi->mqki", shapes.derivatives, np.linalg.inv(jacobian), optimize=True)
-    push = np.zeros(len(nodes))
+    load = np.zeros(len(nodes))
     side = np.lib.stride_tricks.sliding_window_view(numbers[-1], order + 1)[::order]
     lengths = np.diff(along) * np.linalg.norm(c - b) / 2
-    np.add.at(push, side, np.outer(lengths, shapes.edge))
-    return Grid(nodes, cells, weights, gradients, shapes.pressures, numbers[0], push, order)
+    np.add.at(load, side, np.outer(lengths, shapes.edge))
+    return Grid(nodes, cells, weights, gradients, shapes.pressures, numbers[0], load, order)
 
 
 def _system(body: Grid, law: Law, bulk: float, u: Floats, q: Floats) -> tuple[Floats, Floats]:
@@ -265,12 +265,12 @@ def _newton_step(body: Grid, matrix: Floats, residual: Floats, load: Floats) -> 
 
 
 def rest(body: Grid, law: Law, bulk: float, traction: tuple[float, float], steps: int = 1) -> Rested:
-    """Where ``body`` comes to rest under a dead ``traction`` [MPa] on the side opposite to the clamped one, put on in ``steps``;
-    ``bulk`` is K [MPa]. ArithmeticError where Newton does not get there.
+    """Where ``body`` comes to rest under a dead ``traction`` (2,) [MPa] on the side opposite to the clamped one, put on in
+    ``steps``; ``bulk`` is K [MPa]. ArithmeticError where Newton's method does not get there.
     """
     u, q = np.zeros_like(body.nodes), np.zeros((len(body.cells), body.pressures.shape[1]))
     for share in np.arange(1, steps + 1) / steps:
-        u, q = _balance(body, law, bulk, share * np.outer(body.push, traction), (u, q))
+        u, q = _balance(body, law, bulk, share * np.outer(body.load, traction), (u, q))
     forces = _system(body, law, bulk, u, q)[1][:, : 2 * body.cells.shape[1]].reshape(*body.cells.shape, 2)
     return Rested(u, np.asarray(forces[np.isin(body.cells, body.clamped)].sum(axis=0)))
 

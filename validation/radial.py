@@ -48,7 +48,7 @@ def sphere_pressure(law: Law, bulk: float, radii: tuple[float, float], inner_str
 
     wall = _hollow(radii, inner_stretch, 2)
     _, P = _balanced(law, bulk, wall, gradient, 2)
-    return _pushing_out(wall, P, gradient, 2) / (inner_stretch * radii[0]) ** 2
+    return _work_of_expansion(wall, P, gradient, 2) / (inner_stretch * radii[0]) ** 2
 
 
 def tube(law: Law, bulk: float, radii: tuple[float, float], inner_stretch: float) -> tuple[float, float]:
@@ -62,7 +62,7 @@ def tube(law: Law, bulk: float, radii: tuple[float, float], inner_stretch: float
     wall = _hollow(radii, inner_stretch, 1)
     _, P = _balanced(law, bulk, wall, gradient, 1)
     force = 2 * np.pi * np.sum(wall.weights * wall.R * P[:, 2, 2])
-    return _pushing_out(wall, P, gradient, 1) / (inner_stretch * radii[0]), float(force)
+    return _work_of_expansion(wall, P, gradient, 1) / (inner_stretch * radii[0]), float(force)
 
 
 def _hollow(radii: tuple[float, float], inner_stretch: float, power: int) -> Wall:
@@ -109,6 +109,6 @@ def _around(wall: Wall, P: Floats, gradient: Gradient) -> Floats:
     return np.asarray(np.einsum("qij,qij->q", P, change))
 
 
-def _pushing_out(wall: Wall, P: Floats, gradient: Gradient, power: int) -> float:
+def _work_of_expansion(wall: Wall, P: Floats, gradient: Gradient, power: int) -> float:
     """The work [MPa mm^n] of moving every radius out by 1, which is that of the pressure on the inner face, ``p a^n``."""
     return float(np.sum(wall.weights * wall.R**power * _around(wall, P, gradient)))

@@ -1,4 +1,4 @@
-"""How displacement goes at the rim of a clamped area: u ~ r^lambda, r the distance from the rim.
+"""Exponents of the displacement at the rim of a clamped area: u ~ r^lambda, r the distance from the rim.
 
 Where a clamped face meets a free one at an angle ``a`` in the body, in plane strain, lambda is the smallest positive root of
 ``sin^2(lambda a) = ((k + 1)^2 - 4 lambda^2 sin^2 a) / (4 k)`` with ``k = 3 - 4 nu`` (Williams, J. Appl. Mech. 19 (1952) 526-528).

@@ -1,4 +1,4 @@
-"""Problems whose answers are known: entries of the verification catalogue and their results."""
+"""Entries of the verification catalogue, problems whose answers are known, and their results."""
 
 import math
 from collections.abc import Callable
@@ -48,7 +48,7 @@ class Entry:
     """
 
     name: str
-    family: str
+    group: str
     title: str
     unit: str
     truth: Callable[[], float]

@@ -1,6 +1,4 @@
-"""Claimed error bars against true errors: every error bar of a reference beside what a finer solution, which the bar does not
-know, differs by.
-"""
+"""Error bars of references beside their differences from finer solutions, which the bars do not know."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -69,7 +67,20 @@ class Claims:
 def claimed(
     case: str, of: Of, bars: ErrorBars, reference: tuple[Measure, ...], finer: tuple[Measure, ...]
 ) -> list[Claim]:
-    """The claims of ``bars`` about changes or deviations, whose measures a ``finer`` solution has otherwise than the reference."""
+    """The claims of error bars, each beside the difference that a finer solution shows.
+
+    Parameters
+    ----------
+    case
+        Its name.
+    of
+        ``"change"`` or ``"deviation"``: what is measured.
+    bars
+        Of the reference.
+    reference, finer
+        The measures of the two solutions.
+
+    """
     found = []
     for metric, statistic in CLAIMED:
         bar = bars.find(of, metric, statistic)

@@ -28,7 +28,7 @@ _SHOWN = (
 class Comparison:
     """``deviations``: by candidate name, its measures against the reference. ``changes``: by run name (``"reference"`` among
     them), its measures against the rest state. ``extension_error`` [mm]: by frame, the greatest error over the fibres that the
-    extension makes on the reference's own surface. ``error_bars``: how well the reference is known, None without any.
+    extension makes on the reference's own surface. ``error_bars``: those of the reference, None without any.
     """
 
     scene: Scene
@@ -54,7 +54,7 @@ class Comparison:
         return found
 
     def _repr_html_(self) -> str:
-        """What notebooks show: the greatest deviation of each candidate, with its frame and how well it is known."""
+        """What notebooks show: the greatest deviation of each candidate, with its frame and its error bar."""
         rows = [
             (name, f"{one.metric}.{one.statistic}", f"{one.values[one.worst]:.4g} {one.unit}", self._known(one), number)
             for name, measures in self.deviations.items()
@@ -82,8 +82,20 @@ class Comparison:
 def compare(
     scene: Scene, setup: Setup, reference: Run, candidates: tuple[Run, ...], error_bars: ErrorBars | None = None
 ) -> Comparison:
-    """Measure and judge runs that all have the frames of the scene (``not a number`` where a run did not reach one); with
-    ``error_bars`` nothing is judged that they are too wide for. Of a run without a surface only what needs none is judged.
+    """Measure and judge runs of a scene.
+
+    Parameters
+    ----------
+    scene, setup
+        The scene, and its bodies and attachments as arrays.
+    reference
+        The run that counts as the truth.
+    candidates
+        Runs with all frames of the scene, NaN where one did not reach a frame. Of a run without a surface only what needs none is
+        judged.
+    error_bars
+        Those of the reference: nothing is judged that they are too wide for. None without any.
+
     """
     if not reference.has_surface:
         raise InputError(f"{reference.name}: surface", "a run of lines alone", "a reference that moves the surface")

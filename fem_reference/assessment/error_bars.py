@@ -75,7 +75,7 @@ class ErrorBars:
 
     @property
     def of_deviations(self) -> tuple[Measure, ...]:
-        """How well deviations from the reference are known, as measures."""
+        """The error bars of deviations from the reference, as measures."""
         return tuple(
             Measure(bar.metric, bar.statistic, bar.unit, bar.values) for bar in self.bars if bar.of == "deviation"
         )
@@ -208,7 +208,18 @@ def _of_deviations(run: Run, other: Run, measured: _Measured) -> list[Floats]:
 
 
 def save(bars: ErrorBars, folder: Path, of: dict[str, str]) -> None:
-    """Store the bars beside the run in ``folder``, as good for what ``of`` names and nothing else."""
+    """Store error bars beside the run that they are of.
+
+    Parameters
+    ----------
+    bars
+        What is stored.
+    folder
+        Of the run.
+    of
+        What they are good for, by name: they are not read again where any of it is another.
+
+    """
     rows = [
         {"of": bar.of, "metric": bar.metric, "statistic": bar.statistic, "unit": bar.unit}
         | {"values": [_null(value) for value in bar.values]}

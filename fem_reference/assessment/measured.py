@@ -16,7 +16,7 @@ from fem_reference.scenes.muscle import Scene
 
 @dataclass(frozen=True, eq=False)
 class CurrentMeasures:
-    """A candidate, measured now against the ``reference``; ``error_bars``: how well that is known, None without any."""
+    """A candidate, measured now against the ``reference``; ``error_bars``: those of the reference, None without any."""
 
     scene: Scene
     candidate: Run
@@ -74,8 +74,8 @@ class CurrentMeasures:
 
 
 def sample(points: Floats, count: int) -> Ints:
-    """At most ``count`` of the vertices ``points`` (n, 3), each as far as can be from those before it; the first is the one
-    furthest from the middle of all.
+    """Indices (k,) of at most ``count`` vertices of ``points`` (n, 3), each as far as can be from those before it; the first is the
+    one furthest from the middle of all.
     """
     chosen = [int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
     away = np.linalg.norm(points - points[chosen[0]], axis=1)

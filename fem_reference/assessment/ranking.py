@@ -83,8 +83,8 @@ def _less(one: Deviation, other: Deviation) -> bool:
 
 
 def rankings(measured: dict[str, tuple[Measure, ...]], bars: Iterable[Measure]) -> tuple[Ranking, ...]:
-    """By each statistic of ``RANKED``, those of ``measured`` (measures against the reference by name) that have it; ``bars``: how
-    well deviations are known. None where nobody knows that.
+    """By each statistic of ``RANKED``, those of ``measured`` (measures against the reference by name) that have it; ``bars``: the
+    error bars of deviations; a statistic without one is left out.
     """
     known, found = tuple(bars), []
     for metric, statistic, title in RANKED:
@@ -112,7 +112,7 @@ def facts(found: Iterable[Ranking]) -> list[dict[str, object]]:
             "value": _finite(place.deviation.value),
             "error_bar": _finite(place.deviation.bar),
             "rank": [place.first, place.last],
-            "cannot_be_told_from": list(place.alike),
+            "not_distinguishable_from": list(place.alike),
         }
         for one in found
         for place in one.places

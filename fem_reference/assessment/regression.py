@@ -110,7 +110,7 @@ def check(baseline: Baseline, current: CurrentMeasures) -> Check:
 
 
 class _Frames(NamedTuple):
-    """Of each frame (f,): its value in the baseline and now, what is right now, and how well that is known."""
+    """Of each frame (f,): its value in the baseline and now, what is right now, and its error bar."""
 
     was: Floats
     current: Floats

@@ -1,4 +1,4 @@
-"""The families of models in Table 5.1 of the report, and the results of their solvers on scenes."""
+"""The kinds of solvers in Table 5.1 of the report, and the results of their solvers on scenes."""
 
 import tomllib
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from fem_reference.scenes.muscle import Candidate
 FILE = Path(__file__).with_suffix(".toml")
 
 
-class Family(Record):
+class SolverKind(Record):
     """A row of the report's table: its ``name``, the ``form`` of its model, the report's ``speed`` and ``precision`` in pluses and
     minuses, the numbers of its ``literature`` there; and who stands for it: ``candidates`` with the same settings on every scene,
     and those that cases bring themselves under a name like one of ``of_case``.
@@ -40,13 +40,13 @@ class ReportSpeed(Record):
 
 
 class _File(Record):
-    family: tuple[Family, ...]
+    kind: tuple[SolverKind, ...]
     report_speed: tuple[ReportSpeed, ...]
 
 
-def families() -> tuple[Family, ...]:
+def solver_kinds() -> tuple[SolverKind, ...]:
     """The rows of the report's table, in its order."""
-    return _file().family
+    return _file().kind
 
 
 def report_speeds() -> dict[str, ReportSpeed]:
@@ -60,11 +60,11 @@ def _file() -> _File:
 
 @dataclass(frozen=True, eq=False)
 class SolverResult:
-    """How ``solver`` (``family``, ``name``) did on a ``case``: its outcome, its time for a frame [s] where that is known, and its
+    """How ``solver`` (``kind``, ``name``) did on a ``case``: its outcome, its time for a frame [s] where that is known, and its
     ``measures`` against the reference; those of the reference itself are its error bars, none where nobody asked.
     """
 
-    family: str
+    kind: str
     name: str
     solver: str
     case: str
@@ -113,27 +113,27 @@ class Table:
     ``machines`` that runs were made on.
     """
 
-    families: tuple[Family, ...]
+    kinds: tuple[SolverKind, ...]
     scenarios: tuple[Scenario, ...]
     results: tuple[SolverResult, ...]
     missing: dict[str, str]
     versions: dict[str, str]
     machines: tuple[str, ...]
 
-    def of(self, family: str, case: str) -> list[SolverResult]:
-        """The results of a family on a case."""
-        return [one for one in self.results if (one.family, one.case) == (family, case)]
+    def of(self, kind: str, case: str) -> list[SolverResult]:
+        """The results of a kind on a case."""
+        return [one for one in self.results if (one.kind, one.case) == (kind, case)]
 
-    def names(self, family: str) -> list[str]:
-        """The solvers of a family, in order."""
-        return list(dict.fromkeys(one.name for one in self.results if one.family == family))
+    def names(self, kind: str) -> list[str]:
+        """The solvers of a kind, in order."""
+        return list(dict.fromkeys(one.name for one in self.results if one.kind == kind))
 
-    def over(self, family: str, name: str, metric: str, statistic: str) -> "Overall | None":
+    def over(self, kind: str, name: str, metric: str, statistic: str) -> "Overall | None":
         """The worst frames of ``name`` over all scenarios; None where it was measured on none."""
         found = [
             (value[0], one.case)
             for one in self.results
-            if (one.family, one.name) == (family, name) and (value := one.worst(metric, statistic)) is not None
+            if (one.kind, one.name) == (kind, name) and (value := one.worst(metric, statistic)) is not None
         ]
         finite = [(value, case) for value, case in found if not np.isnan(value)]
         lost = tuple(case for value, case in found if np.isnan(value))
@@ -148,12 +148,12 @@ class Table:
         bars = [measure for one in here if one.of_reference for measure in one.measures]
         return rankings({one.name: one.measures for one in here if not one.of_reference}, bars)
 
-    def speed(self, family: str, name: str) -> tuple[Scenario, float] | None:
+    def speed(self, kind: str, name: str) -> tuple[Scenario, float] | None:
         """The scenario of the most triangles on which the time for a frame [s] of ``name`` is known, and that time."""
         times = {
             one.case: one.seconds_per_frame
             for one in self.results
-            if (one.family, one.name) == (family, name) and one.seconds_per_frame is not None
+            if (one.kind, one.name) == (kind, name) and one.seconds_per_frame is not None
         }
         largest = max((one for one in self.scenarios if one.case in times), key=lambda one: one.triangles, default=None)
         return None if largest is None else (largest, times[largest.case])

@@ -1,4 +1,4 @@
-"""Advection: what is carried along by a flow."""
+"""Advection of a scalar by a flow."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Diffusion: what is conducted from high to low."""
+"""Diffusion of a scalar down its gradient."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""A fluid that presses on a part of the surface and stays perpendicular to it."""
+"""Fluid pressure on a part of the surface, perpendicular to it as it moves (a follower load)."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""Reaction: what decays, or grows, in proportion to itself."""
+"""Decay or growth of a scalar in proportion to itself."""
 
 from typing import Any
 

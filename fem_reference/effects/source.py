@@ -1,4 +1,4 @@
-"""Source: what is brought in from outside, everywhere or in the upper half."""
+"""A source of a scalar, everywhere or in the upper half."""
 
 from typing import Any, Literal
 

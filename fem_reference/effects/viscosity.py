@@ -1,5 +1,6 @@
-"""Viscosity of the matrix, in parallel with its elastic law (Kelvin and Voigt): short waves of an unstable state grow no faster
-than long ones.
+"""Viscosity of the matrix, in parallel with its elastic law (Kelvin and Voigt).
+
+Short waves of an unstable state grow no faster than long ones.
 """
 
 from typing import Any, ClassVar

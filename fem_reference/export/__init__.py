@@ -1,4 +1,4 @@
-"""A problem for solvers that are not ours: a folder of open formats, and FEBio's own. Frames come back by ``solvers.recorded``."""
+"""Export of a problem: a folder of open formats, and FEBio's own. Frames come back by ``solvers.recorded``."""
 
 import logging
 import os

@@ -128,7 +128,7 @@ def _motions(root: Element, problem: Problem) -> None:
     if exactly(problem):
         boundaries = SubElement(root, "Boundary")
         for attached in exactly(problem):
-            name = f"held_{attached.attachment}"
+            name = f"attached_{attached.attachment}"
             leaf(SubElement(boundaries, "bc", name=name, type="rigid", node_set=name), "rb", bone_id(attached.bone))
     rigid = SubElement(root, "Rigid")
     curves = _curve_numbers(problem)

@@ -129,7 +129,7 @@ class Mesh:
         for attached in exactly(self.problem):
             nodes = set(self._curved(self.problem.mesh.facets[attached.attachment]).ravel().tolist()) - taken
             taken |= nodes
-            name = f"held_{attached.attachment}"
+            name = f"attached_{attached.attachment}"
             SubElement(mesh, "NodeSet", name=name).text = ",".join(str(node + 1) for node in sorted(nodes))
 
     def _contact_surface(self, mesh: Element, cells: dict[str, Ints]) -> None:

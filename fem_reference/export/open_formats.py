@@ -78,8 +78,9 @@ def _write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]]
 def facts(scene: Scene, problem: Problem) -> dict[str, Any]:
     """What no mesh file says: units, conventions, frames, bones, attachments, effects with the unit of every parameter."""
     bones = [
-        entry.model_dump(mode="json", exclude_none=True, exclude={"surface", "unit"}) | {"file": name, "pushes": pushes}
-        for entry, name, pushes in zip(scene.bone, bone_files(problem), _are_obstacles(problem), strict=True)
+        entry.model_dump(mode="json", exclude_none=True, exclude={"surface", "unit"})
+        | {"file": name, "obstacle": obstacle}
+        for entry, name, obstacle in zip(scene.bone, bone_files(problem), _are_obstacles(problem), strict=True)
     ]
     return {
         "case": scene.name,

@@ -1,4 +1,4 @@
-"""The two errors that reach people: what they gave is not usable, or a part of the software is not installed."""
+"""The two exceptions of this package: input that is not usable, and software that is not installed."""
 
 
 class InputError(Exception):

@@ -1,4 +1,4 @@
-"""Where a law is meant: the range of a measure of deformation."""
+"""The range of deformation in which a law is valid."""
 
 from dataclasses import dataclass
 from math import inf

@@ -72,31 +72,31 @@ def fingerprint(*arrays: NDArray[Any]) -> str:
 
 
 def triangle_areas(points: Floats, triangles: Ints) -> Floats:
-    """Area of each triangle, (m,) [mm2]."""
+    """Area of each of the ``triangles`` (m, 3) between ``points`` (n, 3) [mm], (m,) [mm2]."""
     a, b, c = (points[triangles[:, corner]] for corner in range(3))
     return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
 
 
 def vertex_areas(points: Floats, triangles: Ints) -> Floats:
-    """A third of the area of the triangles around each point, (n,) [mm2]."""
+    """A third of the area of the ``triangles`` (m, 3) around each of the ``points`` (n, 3) [mm], (n,) [mm2]."""
     thirds = np.repeat(triangle_areas(points, triangles) / 3, 3)
     return np.bincount(triangles.ravel(), weights=thirds, minlength=len(points))
 
 
 def tet_volumes(points: Floats, tets: Ints) -> Floats:
-    """Signed volume of each tet, (k,) [mm3]."""
+    """Signed volume of each of the ``tets`` (k, 4) between ``points`` (n, 3) [mm], (k,) [mm3]."""
     a, b, c, d = (points[tets[:, corner]] for corner in range(4))
     return np.asarray(np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6)
 
 
 def tet_qualities(points: Floats, tets: Ints) -> Floats:
-    """Mean-ratio quality of each tet, (k,): 1 for a regular tet, 0 for a flat one (Liu and Joe 1994)."""
+    """Mean-ratio quality (k,) of ``tets`` (k, 4) between ``points`` (n, 3): 1 if regular, 0 if flat (Liu and Joe 1994)."""
     squares = sum(np.sum((points[tets[:, i]] - points[tets[:, j]]) ** 2, axis=1) for i in range(4) for j in range(i))
     return np.asarray(12 * np.cbrt(3 * np.abs(tet_volumes(points, tets))) ** 2 / squares)
 
 
 def boundary(tets: Ints) -> tuple[Ints, Ints]:
-    """The triangles (m, 3) that belong to one tet only, outward, and the tet (m,) that each belongs to."""
+    """The triangles (m, 3) that belong to one of the ``tets`` (k, 4) only, outward, and the tet (m,) that each belongs to."""
     faces = tets[:, TET_FACES].reshape(-1, 3)
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     alone = np.sort(first[count == 1])

@@ -64,5 +64,5 @@ RigidMotion = Rotation | Translation
 
 
 def apply(pose: Floats, points: Floats) -> Floats:
-    """Points (n, 3) moved by a 4 x 4 pose."""
+    """``points`` (n, 3) [mm] moved by a ``pose`` (4, 4), (n, 3)."""
     return np.asarray(points @ pose[:3, :3].T + pose[:3, 3])

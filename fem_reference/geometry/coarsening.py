@@ -54,7 +54,7 @@ def _invert(points: Floats, pole: Floats, radius: float) -> Floats:
 
 
 def slide(points: Floats, triangles: Ints) -> Floats:
-    """``points`` (n, 3) moved to the area-weighted mean of the triangles around them, along free directions only."""
+    """``points`` (n, 3) [mm] moved to the area-weighted means of the ``triangles`` (m, 3) around, along free directions only."""
     areas = triangle_areas(points, triangles)
     total = _around(areas, triangles, len(points))[:, None]
     pulled = _around(areas[:, None] * points[triangles].mean(axis=1), triangles, len(points))
@@ -63,7 +63,23 @@ def slide(points: Floats, triangles: Ints) -> Floats:
 
 
 def free_part(points: Floats, triangles: Ints, chosen: Ints, steps: Floats) -> Floats:
-    """What ``steps`` (k, 3) of the ``chosen`` points (k,) have along the free directions there, (k, 3)."""
+    """The part of displacements of points on a surface that does not leave it.
+
+    Parameters
+    ----------
+    points, triangles
+        The surface, (n, 3) [mm] and (m, 3).
+    chosen
+        Indices (k,) of the points that are displaced.
+    steps
+        Their displacements (k, 3) [mm].
+
+    Returns
+    -------
+    array (k, 3)
+        In a smooth place the part in the tangent plane, at a sharp edge that along the edge, at a corner 0.
+
+    """
     shares, directions = np.linalg.eigh(_normal_tensors(points, triangles))
     free = shares < _FREE * shares.sum(axis=1, keepdims=True)
     along = np.einsum("nij,ni->nj", directions[chosen], steps) * free[chosen]
@@ -84,7 +100,16 @@ def _normal_tensors(points: Floats, triangles: Ints) -> Floats:
 
 
 def inflate(points: Floats, triangles: Ints, volume: float) -> Floats:
-    """``points`` (n, 3) shifted by one distance along their normals, so that they enclose ``volume`` [mm3]."""
+    """Points of a surface shifted by one distance along their normals, until they enclose a volume.
+
+    Parameters
+    ----------
+    points, triangles
+        The surface, (n, 3) [mm] and (m, 3), closed and outward.
+    volume
+        To be enclosed [mm3].
+
+    """
     for _ in range(3):
         normals = _around(_normals(points, triangles), triangles, len(points))
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _TINY)
@@ -94,9 +119,20 @@ def inflate(points: Floats, triangles: Ints, volume: float) -> Floats:
 
 
 def flip_edges(points: Floats, triangles: Ints, labels: Ints | None = None) -> Ints:
-    """``triangles`` (m, 3) of a closed surface after flips towards Delaunay, until none is left (at most 20 passes).
+    """Flip edges of a closed surface towards Delaunay, until none is left to flip (at most 20 passes).
 
-    Edges between triangles of different ``labels`` (m,) stay, so that the labels hold for the triangles that come out.
+    Parameters
+    ----------
+    points, triangles
+        The surface, (n, 3) [mm] and (m, 3).
+    labels
+        Of triangles (m,), or None. Edges between different ones stay, so that the labels are valid for what is returned.
+
+    Returns
+    -------
+    array (m, 3)
+        Triangles between the same points.
+
     """
     for _ in range(20):
         flipped = _flip_once(points, triangles, labels)

@@ -1,4 +1,4 @@
-"""The edges of a closed surface: how long each is, and the angle of the two triangles that meet there."""
+"""The edges of a closed surface: their lengths and dihedral angles."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Which tetrahedron each point lies in, and where in it: what carries a solution to other points."""
+"""Point location in tetrahedra: the tetrahedron of each point and its barycentric coordinates, which carry a solution there."""
 
 from dataclasses import dataclass
 

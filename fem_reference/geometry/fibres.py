@@ -1,6 +1,4 @@
-"""Directions of fibres in a muscle, and fibres traced along them: the lines of steepest ascent of a Laplace field from one
-attachment to the other.
-"""
+"""Fibre directions and traced fibres: the lines of steepest ascent of a Laplace field from one attachment to the other."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -71,18 +69,24 @@ class FibreField:
         found = self.locator.embed(points).interpolate(self.mesh, self.gradients)
         return np.asarray(found / np.maximum(np.linalg.norm(found, axis=1), np.finfo(float).tiny)[:, None])
 
-    def on_the_way(self, points: Floats) -> Bools:
-        """Which of ``points`` (m, 3) are in the mesh and not yet at an attachment, (m,)."""
+    def between_attachments(self, points: Floats) -> Bools:
+        """Which of ``points`` (m, 3) are in the mesh and at no attachment, (m,)."""
         embedding = self.locator.embed(points)
         values = embedding.interpolate(self.mesh, self.values)
         return np.asarray((embedding.outside == 0) & (values > _NEAR) & (values < 1 - _NEAR))
 
 
 def fibre_field(mesh: TetMesh, start: str, end: str) -> FibreField:
-    """The Laplace field that is 0 on the attachment ``start`` (a key of ``mesh.facets``), 1 on ``end``, without flux elsewhere;
-    linear elements.
+    """A Laplace field from one attachment to another, by linear elements.
 
-    On a coarse mesh attachments may touch: there it is 1/2.
+    Parameters
+    ----------
+    mesh
+        Tetrahedra of the muscle.
+    start, end
+        Keys of ``mesh.facets``: the field is 0 on ``start``, 1 on ``end``, without flux elsewhere; 1/2 where they touch, as they
+        may on a coarse mesh.
+
     """
     zeros, ones = np.unique(mesh.facets[start]), np.unique(mesh.facets[end])
     values = np.zeros(len(mesh.points))
@@ -201,7 +205,7 @@ def _follow(field: FibreField, seeds: Floats, goal: Ints, sign: float) -> tuple[
         4 * int(field.locator.diagonal / abs(step))
     ):  # a line four times as long as the mesh goes in circles
         points = _runge_kutta(field, points, step)
-        goes_on = field.on_the_way(points)
+        goes_on = field.between_attachments(points)
         going, points = going[goes_on], points[goes_on]
         for i, point in zip(going, points, strict=True):
             lines[i].append(point)

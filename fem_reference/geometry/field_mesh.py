@@ -99,11 +99,28 @@ def share_above(mesh: FieldMesh, level: float) -> Floats:
 
 
 def stabilisation(mesh: FieldMesh, diffusion: float, velocity: Floats, order: int) -> tuple[float, Floats]:
-    """The greatest mesh Peclet number, and tau (m,) of the streamline upwind form: ``h / 2|v| (coth Pe - 1 / Pe)``.
+    """The mesh Peclet number and the parameter of streamline upwinding, ``tau = h / 2|v| (coth Pe - 1 / Pe)``.
 
-    ``Pe = |v| h / 2k``, with v the part of ``velocity`` (d,) along the cell and h the distance of nodes along it,
+    ``Pe = |v| h / 2k``, with v the part of the velocity along the cell and h the distance of nodes along it,
     ``2|v| / sum |v . grad lambda|`` over the order of the elements (Brooks and Hughes 1982, doi 10.1016/0045-7825(82)90071-8;
     h after Tezduyar 1986). On an interval it makes linear elements exact at their nodes for constant coefficients.
+
+    Parameters
+    ----------
+    mesh
+        Of m cells in d dimensions.
+    diffusion
+        The diffusivity k.
+    velocity
+        Of the flow, (d,).
+    order
+        Of the elements.
+
+    Returns
+    -------
+    peclet, tau
+        The greatest number of all cells, and the parameter of each (m,).
+
     """
     slopes = barycentric_gradients(mesh)
     rates = np.abs(slopes @ velocity).sum(axis=1) * order / 2  # |v| / h

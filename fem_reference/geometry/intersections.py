@@ -1,4 +1,4 @@
-"""Where a triangle surface passes through itself."""
+"""Self-intersections of a triangle surface."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -55,13 +55,22 @@ class _Cut:
 
 
 def refined(mesh: TetMesh, surface: Surface | None, rims: tuple[str, ...] = ()) -> TetMesh:
-    """Every tet of ``mesh`` in eight; facets of regions in four. Edges are cut in the middle, those that begin at a rim of the
-    regions ``rims`` at a quarter. Then all points of the boundary move onto ``surface`` and from there along their normals, so that
-    as much is enclosed, as far as tets stay sound; None: nowhere.
+    """Tetrahedra each cut into eight, and the facets of regions into four.
+
+    Parameters
+    ----------
+    mesh
+        The tetrahedra.
+    surface
+        What all boundary points then move onto, and from there along their normals, so that as much is enclosed, as far as
+        tetrahedra stay sound; None: they stay.
+    rims
+        Regions of ``mesh.facets``: edges that begin at their rims are cut at a quarter, all others in the middle.
+
     """
     cut = _cut(mesh, _on_rims(mesh, rims))
     points = np.concatenate([mesh.points, cut.points])
-    tets = _children(points, np.hstack([mesh.tets, len(mesh.points) + cut.of_tets]))
+    tets = _eighths(points, np.hstack([mesh.tets, len(mesh.points) + cut.of_tets]))
     keys = cut.ends[:, 0] * len(mesh.points) + cut.ends[:, 1]
     facets = {name: _quartered(faces, keys, len(mesh.points)) for name, faces in mesh.facets.items()}
     if surface is not None:
@@ -89,7 +98,7 @@ def _on_rims(mesh: TetMesh, rims: tuple[str, ...]) -> Bools:
     return found
 
 
-def _children(points: Floats, nodes: Ints) -> Ints:
+def _eighths(points: Floats, nodes: Ints) -> Ints:
     """The tets (8 k, 4) of tets with ten ``nodes`` (k, 10), eight after eight: the octahedron in the middle is cut along its
     shortest diagonal.
     """

@@ -1,4 +1,4 @@
-"""How much of a closed surface's inside lies within a rigid body: counted at random points, spread evenly over small cubes."""
+"""The volume of a closed surface's inside that lies within a rigid body, counted at random points."""
 
 from collections.abc import Callable
 
@@ -21,13 +21,27 @@ Distance = Callable[[Floats], Floats]
 
 
 def shared_volume(surface: Surface, counts: NDArray[np.bool_], distance: Distance) -> float:
-    """The volume [mm3] of what ``surface`` winds round, where ``distance`` of points (n, 3) [mm] is below zero, and the nearest
-    triangle is one that ``counts`` (m,); 0 where no triangle that counts comes into the body, as where it is swallowed whole. NaN
-    where the surface has blown up beyond a cubic metre.
+    """The volume of what a surface winds round inside a rigid body.
 
-    Space is cut into cubes, those that may hold a part of it into smaller ones, and 4000 to 8000 random points are drawn in
+    Space is cut into cubes, those that may contain a part of it into smaller ones, and 4000 to 8000 random points are drawn in
     these, the same every time. On average the count is exact. Its standard deviation is at most half of what one point stands
     for, times the root of the number of points in cubes on the border of the overlap.
+
+    Parameters
+    ----------
+    surface
+        Closed, of m triangles.
+    counts
+        Triangles (m,) that count: so does a point whose nearest triangle is one of these.
+    distance
+        Of points (n, 3) [mm] to the rigid body, (n,) [mm], negative inside.
+
+    Returns
+    -------
+    float
+        [mm3]; 0 where no triangle that counts comes into the body, as where it is swallowed whole; NaN where the surface has
+        blown up beyond a cubic metre.
+
     """
     extent = np.ptp(surface.points, axis=0)
     if extent.max() == 0 or not _touches(surface, counts, distance):
@@ -82,7 +96,7 @@ class _Sides:
             self.trees.append((tree, triangles))
 
     def may_count(self, centres: Floats, reach: float) -> NDArray[np.bool_]:
-        """Which of the balls of radius ``reach`` about ``centres`` (n, 3) may hold something that counts, (n,)."""
+        """Which of the balls of radius ``reach`` about ``centres`` (n, 3) may contain something that counts, (n,)."""
         counting, other = self._distances(centres)
         found = counting - other <= 2 * reach
         deep = found & (np.minimum(counting, other) > reach)

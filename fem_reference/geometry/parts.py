@@ -41,7 +41,21 @@ class Parts:
 
 
 def between(triangles: Ints, labels: Ints, count: int) -> Bools:
-    """Which of ``count`` points lie between triangles of different labels."""
+    """The points of a surface at which triangles of different labels meet.
+
+    Parameters
+    ----------
+    triangles, labels
+        (m, 3) and (m,).
+    count
+        Of the points, n.
+
+    Returns
+    -------
+    array (n,)
+        Of bool.
+
+    """
     low, high = np.full(count, np.iinfo(np.int64).max), np.full(count, -1)
     np.minimum.at(low, triangles.ravel(), np.repeat(labels, 3))
     np.maximum.at(high, triangles.ravel(), np.repeat(labels, 3))
@@ -49,7 +63,18 @@ def between(triangles: Ints, labels: Ints, count: int) -> Bools:
 
 
 def relaxed(parts: Parts, fine: Surface, size: float) -> Parts:
-    """The parts after short edges at rims collapsed, edges flipped and points slid, those of a rim along it only, on ``fine``."""
+    """Parts with well-shaped triangles: short edges at rims collapsed, edges flipped, points slid, those of a rim along it only.
+
+    Parameters
+    ----------
+    parts
+        Labelled triangles.
+    fine
+        The surface that the points stay on.
+    size
+        The edge length wanted [mm].
+
+    """
     for _ in range(_ROUNDS):
         parts = collapsed(parts, _SHORT * size)
         triangles = flip_edges(parts.points, parts.triangles, parts.labels)
@@ -170,9 +195,26 @@ def _flatness(points: Floats, triangles: Ints) -> Floats:
 
 
 def widened(parts: Parts, areas: list[float], volume: float, most: float) -> Floats:
-    """Points (n, 3) after the rim of each part moved outwards by one distance, so that it has its area of ``areas`` [mm2], and all
-    along their normals, so that they enclose ``volume`` [mm3]: a polygon in a circle is too small. The rims move by at most
-    ``most`` [mm] a round.
+    """Parts of given areas that enclose a given volume: a polygon in a circle is too small.
+
+    The rim of each part moves outwards by one distance, and all points along their normals.
+
+    Parameters
+    ----------
+    parts
+        Labelled triangles between n points.
+    areas
+        Of the parts from label 1 on [mm2].
+    volume
+        To be enclosed [mm3].
+    most
+        How far rims move in a round at most [mm].
+
+    Returns
+    -------
+    array (n, 3)
+        The points [mm].
+
     """
     for _ in range(_ROUNDS):
         points = np.array(parts.points)

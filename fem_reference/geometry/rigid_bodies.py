@@ -1,4 +1,4 @@
-"""Signed distance to rigid bodies of closed form: what an obstacle is asked, and the obstacles that need no mesh.
+"""Signed distance to rigid bodies of closed form, and the protocol that all obstacles meet.
 
 Each body answers in its own rest frame. Distances are negative inside; gradients are unit vectors that point away from the
 nearest part of the surface, curvatures the second derivatives. On ridges, where two parts are equally near, one of them

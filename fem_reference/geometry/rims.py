@@ -33,12 +33,26 @@ _TRIALS = 10  # of the level whose area is nearest
 
 
 def with_rims(coarse: Surface, fine: Surface, shares: Mapping[str, Floats], size: float) -> tuple[Surface, Ints]:
-    """``coarse`` with edges along the rim of each attachment, and the label (m,) of each of its triangles: 0 free, i + 1 attached
-    by attachment i.
+    """A coarse surface with edges along the rims of attachments.
 
-    ``shares`` (k, 3) say how far the corners of the triangles of ``fine`` are attached. They are smoothed over a tenth of ``size``
-    [mm], which drops single vertices and pinholes; the rim is the level of them that encloses the area they have. Vertices near
-    it move onto it and edges across it are cut there (Labelle and Shewchuk 2007, doi 10.1145/1276377.1276448, for surfaces).
+    The shares are smoothed over a tenth of ``size``, which drops single vertices and pinholes; the rim is the level of them that
+    encloses the area they have. Vertices near it move onto it and edges across it are cut there (Labelle and Shewchuk 2007,
+    doi 10.1145/1276377.1276448, for surfaces).
+
+    Parameters
+    ----------
+    coarse, fine
+        The surface to cut, and the one that attachments are defined on.
+    shares
+        By attachment, the attached shares (k, 3) of the corners of the triangles of ``fine``.
+    size
+        The edge length of ``coarse`` [mm].
+
+    Returns
+    -------
+    surface, labels
+        Of its m triangles the labels (m,): 0 free, i + 1 attached by attachment i.
+
     """
     parts = Parts(
         coarse.points, coarse.triangles, np.zeros(len(coarse.triangles), np.int64), np.zeros(len(coarse.points), bool)

@@ -1,4 +1,4 @@
-"""Smooth sectors around the vertices of a surface, and how far its triangles are attached."""
+"""Smooth sectors around the vertices of a surface, and the shares to which triangles are attached."""
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -54,6 +54,22 @@ def attached_area(surface: Surface, shares: Floats) -> float:
 
 
 def shares_at(points: Floats, surface: Surface, shares: Floats) -> Floats:
-    """The ``shares`` (m, 3) of the corners of ``surface`` at its points nearest to ``points`` (n, 3); (n,)."""
+    """Attached shares at the points of a surface that are nearest to given ones.
+
+    Parameters
+    ----------
+    points
+        (n, 3) [mm].
+    surface
+        Of m triangles.
+    shares
+        Of the corners of its triangles, (m, 3).
+
+    Returns
+    -------
+    array (n,)
+        From 0 to 1.
+
+    """
     nearest = distances(points, surface)
     return np.asarray(np.sum(shares[nearest.triangle] * nearest.barycentric, axis=1))

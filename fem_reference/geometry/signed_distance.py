@@ -99,13 +99,27 @@ class Grid:
 
 
 def build(surface: Surface, spacing: float, margin: float, rounding: float = 0.0) -> Grid:
-    """The distance to a closed ``surface``, negative inside, on nodes ``spacing`` apart, meant within ``margin`` of it [mm].
+    """Sample the signed distance to a closed surface on a grid.
 
-    ``rounding`` [mm]: the standard deviation s of the Gaussian mean that is taken of it, as flat triangles are no smooth body
-    to slide along; where the surface has a mean curvature of 1/r, that moves it inward by s^2/r. It counts as error.
-    The orientation of single triangles does not matter. InputError where the surface bounds no body, as ``check_closed`` says.
+    Parameters
+    ----------
+    surface
+        Closed; single triangles may have any orientation.
+    spacing
+        Of the nodes [mm].
+    margin
+        Around the surface in which the distance is wanted [mm].
+    rounding
+        The standard deviation s of the Gaussian mean that is taken of it [mm], as flat triangles are no smooth body to slide along;
+        where the surface has a mean curvature of 1/r, that moves it inward by s^2/r. It counts as error.
+
+    Raises
+    ------
+    InputError
+        Where the surface bounds no body, as ``check_closed`` says.
+
     """
-    surface = _one_way(surface)
+    surface = _oriented(surface)
     low, shape = _extent(surface, spacing, margin)
     values = _on_nodes(surface, low, shape, spacing, margin)
     if rounding > 0:
@@ -116,11 +130,18 @@ def build(surface: Surface, spacing: float, margin: float, rounding: float = 0.0
 
 
 def resolve(surface: Surface, error: float, margin: float) -> Grid:
-    """As ``build``, with the spacing halved until the grid's ``mean_error`` [mm] is at most ``error``, or ``MOST_NODES`` forbids
-    more: then its own errors say what it reached.
+    """As :func:`build`, with the spacing halved until the grid is as exact as wanted, or ``MOST_NODES`` forbids more.
 
     The largest error is no such measure: on sharp edges and thin rims, which a grid rounds, it falls only in proportion to the
     spacing, and in a slit narrower than a cell not at all.
+
+    Parameters
+    ----------
+    surface, margin
+        As of :func:`build`.
+    error
+        The ``mean_error`` [mm] that is wanted of the grid; its own says what it reached.
+
     """
     spacing = float(np.ptp(surface.points, axis=0).max()) / _FIRST_CELLS
     grid = build(surface, spacing, margin)
@@ -134,9 +155,17 @@ def resolve(surface: Surface, error: float, margin: float) -> Grid:
 
 
 def cached(surface: Surface, error: float, margin: float, rounding: float, folder: Path) -> Grid:
-    """As ``build`` with the spacing of ``resolve``, kept in ``folder`` under a hash of all that it depends on, this file among it.
+    """As :func:`build` with the spacing of :func:`resolve`, stored under a hash of all that it depends on, this file among it.
 
-    A file that is damaged is made anew.
+    Parameters
+    ----------
+    surface, margin, rounding
+        As of :func:`build`.
+    error
+        As of :func:`resolve`.
+    folder
+        Where grids are stored; a damaged file is made anew.
+
     """
     code = np.frombuffer(Path(__file__).read_bytes(), np.uint8)
     name = fingerprint(surface.points, surface.triangles, np.array([error, margin, rounding]), code)
@@ -175,7 +204,7 @@ def _write(path: Path, grid: Grid) -> None:
         part.replace(path)
 
 
-def _one_way(surface: Surface) -> Surface:
+def _oriented(surface: Surface) -> Surface:
     """A closed surface whose triangles are all oriented outward."""
     check_finite(surface)
     triangles, _ = igl.bfs_orient(surface.triangles)

@@ -1,4 +1,4 @@
-"""The skin of a body of tetrahedra as its surface has it: material points beside the tets, each with its area."""
+"""Material points on the surface of a body of tetrahedra, each with its area: where contact presses and springs pull."""
 
 from dataclasses import dataclass
 
@@ -30,14 +30,36 @@ def spacing(surface: Surface) -> float:
 
 
 def free_skin(surface: Surface, free: NDArray[np.bool_], mesh: TetMesh, apart: float) -> Skin:
-    """The triangles of a ``surface`` whose vertices are all ``free`` (n,), as what the tets of ``mesh`` carry along."""
+    """The material points of the free part of a surface.
+
+    Parameters
+    ----------
+    surface
+        Of n vertices.
+    free
+        Vertices (n,) that are free: a triangle belongs to the skin where all three of its vertices do.
+    mesh
+        The tetrahedra that carry the points.
+    apart
+        The distance of points [mm], on average and at most.
+
+    """
     triangles = surface.triangles[free[surface.triangles].all(axis=1)]
     return _skin(surface.points[triangles], np.ones(triangles.shape), mesh, apart)
 
 
 def attached_skin(surface: Surface, shares: Floats, mesh: TetMesh, apart: float) -> Skin:
-    """The part of a ``surface`` whose triangles are attached to the ``shares`` (m, 3) of their corners, linearly between them: the
-    areas are those attached.
+    """The material points of the attached part of a surface.
+
+    Parameters
+    ----------
+    surface
+        Of m triangles.
+    shares
+        Attached shares (m, 3) of their corners, linear between them: the areas of the points are those attached.
+    mesh, apart
+        As of :func:`free_skin`.
+
     """
     some = shares.any(axis=1)
     return _skin(surface.points[surface.triangles[some]], shares[some], mesh, apart)

@@ -16,10 +16,20 @@ _REACH, _THICKNESS = 1.5, 0.1
 
 
 def tessellated(solid: Obstacle, beside: Floats, place: str, turn: int = TURN) -> Surface:
-    """The outward surface of a ``solid`` with ``turn`` sides a full turn; errors in it name ``place``.
+    """The closed outward surface of a body of closed form.
 
-    A half-space has no end: it is a slab, closed as every other body is, that reaches past the points ``beside`` (n, 3) [mm]; of
-    its vertices only those in the plane lie on the body.
+    Parameters
+    ----------
+    solid
+        The body.
+    beside
+        Points (n, 3) [mm] that a half-space reaches past: having no end, it is a slab, of whose vertices only those in the plane
+        lie on the body.
+    place
+        What errors in the surface name.
+    turn
+        Sides to a full turn.
+
     """
     match solid:
         case HalfSpace():

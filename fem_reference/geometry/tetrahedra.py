@@ -44,13 +44,31 @@ _SHARES = (1.0, 0.9, 1.1, 0.8, 1.25)  # of the number of triangles wanted, tried
 
 
 def tetrahedralise(surface: Surface, size: float, shares: Mapping[str, Floats] | None = None) -> TetMesh:
-    """Tetrahedra of about ``size`` [mm] inside a closed outward ``surface``, with their ``maker``.
+    """Fill a closed surface with tetrahedra.
 
-    A surface finer than ``size`` is coarsened to it first, with edges along the rims of the attachments whose ``shares`` (m, 3)
-    of the corners are given. gmsh fills a surface that does not pass through itself and keeps its triangles: ``facets`` are
-    those of the attachments, by name; else they stay empty. The mesh moves with the surface: it is made in a frame that the
-    surface's own vertices span. Where gmsh cannot, fTetWild makes a mesh of its own near the surface, another one each time
-    (its issue 72). InputError where no mesher succeeds, and at once where ``size`` is far too small or too large.
+    A surface finer than ``size`` is coarsened to it first, with edges along the rims of attachments. gmsh fills a surface that
+    does not pass through itself and keeps its triangles. The mesh moves with the surface: it is made in a frame that the surface's
+    own vertices span. Where gmsh cannot, fTetWild makes a mesh of its own near the surface, another one each time (its issue 72).
+
+    Parameters
+    ----------
+    surface
+        Closed and outward, of m triangles.
+    size
+        The edge length wanted [mm].
+    shares
+        By attachment, the attached shares (m, 3) of the corners of triangles.
+
+    Returns
+    -------
+    TetMesh
+        With its ``maker``; by gmsh, ``facets`` by attachment, else none.
+
+    Raises
+    ------
+    InputError
+        Where no mesher succeeds, and at once where ``size`` is far too small or too large.
+
     """
     origin, axes = _own_frame(surface.points)
     local = np.round((surface.points - origin) @ axes, _ROUNDED) + 0.0  # + 0.0: no negative zeros

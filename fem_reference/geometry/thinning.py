@@ -1,4 +1,4 @@
-"""Fewer triangles for a picture of a surface, whatever it is like: holes, edges of three triangles and loose ends stay."""
+"""Fewer triangles for pictures of a surface of any kind: holes, edges of three triangles and loose ends stay."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What lies just outside each triangle of a closed surface: nothing, the same body again, or the body turned inside out."""
+"""Winding numbers just outside each triangle of a closed surface: outside the body, inside it again, or inside out."""
 
 import igl
 import numpy as np

@@ -120,8 +120,8 @@ def _around(starts: Floats, ends: Floats, middle: Floats, axes: Floats, radius: 
     """The paths that turn from starts to ends, by at most half a turn, about ``axes`` (n, 3) through ``middle`` (3,).
 
     Seen along the axis, points at distances d1, d2 from it and an angle t apart are joined by tangents of lengths
-    sqrt(d^2 - r^2) and an arc of r (t - acos(r / d1) - acos(r / d2)), or straight where that angle is not above 0. The way
-    along the axis is shared out evenly over the length so seen: unrolled, the path is a straight line.
+    sqrt(d^2 - r^2) and an arc of r (t - acos(r / d1) - acos(r / d2)), or straight where that angle is not above 0. The displacement
+    along the axis is spread evenly over the length so seen: unrolled, the path is a straight line.
     """
     one, other = _across(starts - middle, axes), _across(ends - middle, axes)
     sines, cosines = np.sum(np.cross(one, other) * axes, axis=1), np.sum(one * other, axis=1)

@@ -1,1 +1,1 @@
-"""The door to files: meshes read and written, texts written whole or not at all."""
+"""Reading and writing of files: meshes and texts, written whole or not at all."""

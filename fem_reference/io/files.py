@@ -1,4 +1,4 @@
-"""The door to file formats: surfaces, polylines and tetrahedra in, whole files or none out.
+"""Reading and writing of surfaces, polylines and tetrahedra in common mesh formats; files are written whole or not at all.
 
 A reader keeps the points of its file as they are: their order, their number, and float64 where the file has it.
 """
@@ -124,7 +124,7 @@ def write_tets(path: Path, mesh: TetMesh, positions: Floats) -> None:
 def write_field(
     path: Path, points: Floats, cells: Ints, data: dict[str, Floats], cell_data: dict[str, Floats] | None = None
 ) -> None:
-    """VTU or gmsh's MSH of ``cells`` (m, 2 to 4) between ``points`` (n, 1 to 3) with ``data`` (n, ...) and (m, ...) by name."""
+    """VTU or gmsh's MSH of ``cells`` (m, 2 to 4) between ``points`` (n, 1 to 3), with arrays by name: (n, ...) and (m, ...)."""
     import meshio
 
     space = np.pad(points, ((0, 0), (0, 3 - points.shape[1])))

@@ -1,4 +1,4 @@
-"""How differently a run's surface is bent at its edges: the angle between neighbouring triangles against the reference's.
+"""Dihedral angles at the edges of a run's surface against those of the reference.
 
 Against rest, the mean magnitude is the dihedral angle change of the report (eq. 5.23, Figs 6.18 to 6.20).
 """
@@ -15,8 +15,9 @@ UNITS = dict.fromkeys(("mean", "mean_magnitude", "rms", "p95", "max", "mean_magn
 
 
 def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Measure, ...]:
-    """Over the edges, of the angle less that of the reference [deg], in (-180, 180]: the signed ``mean`` (above zero: more
-    convex), the ``rms``, and of the magnitude the mean ``mean_magnitude``, the 95th percentile ``p95`` and the greatest ``max``.
+    """Statistics over the edges of the angle less that of the reference [deg], in (-180, 180]: the signed ``mean`` (above zero:
+    more convex), the ``rms``, and of the magnitude the mean ``mean_magnitude``, the 95th percentile ``p95`` and
+    the greatest ``max``.
 
     An edge weighs as the area around it at rest, a third of its two triangles. ``mean_magnitude_of_edges`` has every edge
     alike, as the report plots it. NaN in a frame where a triangle has collapsed: it has no angle.

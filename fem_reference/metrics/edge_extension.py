@@ -1,4 +1,4 @@
-"""How much longer or shorter the edges of a run's surface are than those of the reference, in per cent of their rest length.
+"""Lengths of the edges of a run's surface against those of the reference, in per cent of their rest length.
 
 Against rest this is the edge extension of the report (l / L of Figs 6.15 to 6.17) less one.
 """
@@ -15,8 +15,8 @@ UNITS = dict.fromkeys(("mean", "rms", "p95", "max", "mean_of_edges"), "%")
 
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")
 def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Measure, ...]:
-    """Over the edges, of (l - l_reference) / L with the length L at rest [%]: the signed ``mean``, the ``rms``, and of the
-    magnitude the 95th percentile ``p95`` and the greatest ``max``.
+    """Statistics over the edges of ``(l - l_reference) / L`` [%], L the length at rest: the signed ``mean``, the ``rms``, and
+    of the magnitude the 95th percentile ``p95`` and the greatest ``max``.
 
     An edge weighs as the area around it at rest, a third of its two triangles. ``mean_of_edges`` is the mean with every
     edge alike, as the report plots it.
@@ -36,7 +36,18 @@ def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Mea
 
 
 def worst_edges(edges: Edges, deviations: Floats, reference: Run) -> tuple[str, ...]:
-    """By frame the edge whose entry in ``deviations`` (f, e) is greatest in magnitude, and where the reference has it."""
+    """The edge of each frame that deviates most, in words.
+
+    Parameters
+    ----------
+    edges
+        Of the surface, e of them.
+    deviations
+        (f, e); the greatest in magnitude counts.
+    reference
+        Where the edge is in it is added.
+
+    """
     ends = edges.ends[np.argmax(np.abs(deviations), axis=1)]
     middles = reference.positions[np.arange(len(ends))[:, None], ends].mean(axis=1)
     return tuple(

@@ -1,4 +1,4 @@
-"""How much longer or shorter each fibre of a run is than the same fibre of the reference, frame by frame.
+"""Lengths of the fibres of a run against those of the reference, frame by frame.
 
 Two runs that both carry the measurement context's fibres inside themselves are measured on those; otherwise the surfaces of
 both go through the measurement context's extension, so that like is compared with like. A run of lines alone (a line of action)
@@ -22,7 +22,7 @@ OF_LINES = True
 
 @np.errstate(over="ignore", invalid="ignore")
 def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Measure, ...]:
-    """Over the fibres, of L - L_reference: the signed ``mean``, the ``rms`` and the greatest magnitude ``max`` [mm].
+    """Statistics over the fibres of ``L - L_reference``: the signed ``mean``, the ``rms`` and the greatest magnitude ``max`` [mm].
 
     And ``mean_percent``, ``rms_percent`` and ``max_percent`` of it in per cent of each fibre's length at rest.
     """

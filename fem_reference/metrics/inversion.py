@@ -1,4 +1,4 @@
-"""How much of a run's surface is turned inside out or lies within another part of the body, against the reference.
+"""Shares of a run's surface that are inside out or lie within another part of the body, against the reference.
 
 It is computed from the surface alone, so of every run; where a solver has an interior, its smallest det F says more.
 """

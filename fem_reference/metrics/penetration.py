@@ -1,7 +1,6 @@
-"""How far a run's surface is inside the bones, and how much of the muscle; of the run alone, whatever the reference does.
+"""Depth and volume of a run's muscle inside the bones; of the run alone, whatever the reference does.
 
-Asked of the same field of distances that contact uses. Attached vertices are exempt, and their neighbours: bones hold
-them.
+By the same distance field as contact. Vertices attached to bones are exempt, and their neighbours.
 """
 
 import logging

@@ -1,4 +1,4 @@
-"""How far the surface of a run is from the reference's: material (the same vertex) and geometric (the closest point).
+"""Distance of a run's surface from the reference's: material (the same vertex) and geometric (the closest point).
 
 A surface that slides along itself deviates materially and not geometrically. All means are weighted by the area
 around each vertex at rest.
@@ -24,7 +24,7 @@ def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Meas
     Hausdorff distance. Each also as ``..._percent`` of the reference's greatest displacement.
     """
     material = np.linalg.norm(run.positions - reference.positions, axis=2)
-    geometric = np.array([_both_ways(run, reference, frame) for frame in range(len(reference.positions))])
+    geometric = np.array([_both_directions(run, reference, frame) for frame in range(len(reference.positions))])
     areas, twice = context.areas, np.concatenate([context.areas, context.areas])
     values = {
         "rms": rms(material, areas),
@@ -42,7 +42,7 @@ def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Meas
     )
 
 
-def _both_ways(run: Run, reference: Run, frame: int) -> Floats:
+def _both_directions(run: Run, reference: Run, frame: int) -> Floats:
     """Distance (2n,) [mm] of the run's vertices to the reference's surface, then of the reference's to the run's.
 
     NaN where a position of the frame is not finite.

@@ -1,4 +1,4 @@
-"""How much volume a run loses or gains against the reference, frame by frame."""
+"""Volume of a run against that of the reference, frame by frame."""
 
 import numpy as np
 

@@ -29,10 +29,27 @@ _SAMPLES = np.array(
 
 
 def pick(scene: Scene, i: int, surface: Surface, bone_surface: Surface) -> Ints:
-    """The vertices (k,) of the muscle ``surface`` that ``scene.attachment[i]`` selects, sorted.
+    """The vertices of a muscle that an attachment of a scene selects.
 
-    ``bone_surface`` is the surface of the attachment's bone. InputError names the key of the scene, or the file and
-    row (comment lines not counted), that is not usable.
+    Parameters
+    ----------
+    scene, i
+        The selection is that of ``scene.attachment[i]``.
+    surface
+        The surface of the muscle.
+    bone_surface
+        The surface of the attachment's bone.
+
+    Returns
+    -------
+    array (k,)
+        Indices of vertices of ``surface``, sorted.
+
+    Raises
+    ------
+    InputError
+        Names the key of the scene, or the file and row (comment lines not counted), that is not usable.
+
     """
     attachment = scene.attachment[i]
     key = f"attachment[{i}]"
@@ -49,11 +66,22 @@ def pick(scene: Scene, i: int, surface: Surface, bone_surface: Surface) -> Ints:
 
 
 def facets_under(mesh: TetMesh, surface: Surface, shares: Floats) -> Ints:
-    """The boundary triangles (m, 3) of ``mesh``, outward, that lie under the attached part of ``surface``, where the tets do not
-    follow its rim.
+    """The facets of a mesh that lie under the attached part of a surface whose rim they do not follow.
 
-    A triangle does where the attached share at the closest point of the surface, averaged over seven samples, is above a half;
-    ``shares`` (k, 3) are those of the corners of the triangles of ``surface``.
+    Parameters
+    ----------
+    mesh
+        Tetrahedra inside ``surface``.
+    surface
+        The surface that the attachment is defined on.
+    shares
+        Attached shares (k, 3) of the corners of the triangles of ``surface``.
+
+    Returns
+    -------
+    array (m, 3)
+        Boundary triangles of ``mesh``, outward, whose attached share, averaged over seven samples, is above a half.
+
     """
     triangles, _ = boundary(mesh.tets)
     samples = np.einsum("qk,mkd->mqd", _SAMPLES, mesh.points[triangles]).reshape(-1, 3)

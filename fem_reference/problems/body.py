@@ -1,4 +1,4 @@
-"""A body as finite elements see it: cells straight or curved, what is prescribed where, and what acts.
+"""Bodies of any shape: straight or curved cells, boundary conditions, effects and contact.
 
 It knows no solver.
 """
@@ -91,8 +91,19 @@ def boundary_facets(mesh: "Cells") -> Ints:
 
 
 def check_element(element: str, kind: Kind, degree: int, effects: tuple[Effect, ...], place: str) -> None:
-    """InputError at ``place`` unless ``element`` is one for cells of a ``kind`` and ``degree``, and has a pressure if and only if
-    the effects bring one.
+    """Raise an InputError unless an element suits cells and effects.
+
+    Parameters
+    ----------
+    element
+        A key of ``ELEMENTS``, such as ``"P2/P1"``.
+    kind, degree
+        Of the cells; the displacement must be of this degree or above.
+    effects
+        The element must have a pressure if and only if one of them brings it.
+    place
+        What the error names.
+
     """
     if element not in ELEMENTS:
         raise InputError(place, f'"{element}"', f"one of {', '.join(ELEMENTS)}")
@@ -123,8 +134,21 @@ def reference_nodes(kind: Kind, degree: int) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """``points`` (n, 3) [mm] and ``cells`` (m, k) of their indices, each in the order of :func:`reference_nodes` of its ``kind``
-    and ``degree`` (1 straight, 2 curved); ``facets``: by name of a region of the surface, the corners (f, 3 or 4) of its facets.
+    """Cells between points: the mesh of a body.
+
+    Parameters
+    ----------
+    points
+        Positions (n, 3) [mm] at rest.
+    cells
+        Indices (m, k) of the points of each cell, in the order of :func:`reference_nodes`.
+    kind
+        ``"tetrahedron"`` or ``"hexahedron"``.
+    degree
+        1: straight cells; 2: curved ones.
+    facets
+        By name of a region of the surface, the corners (f, 3 or 4) of its facets.
+
     """
 
     points: Floats
@@ -136,9 +160,21 @@ class Cells:
 
 @dataclass(frozen=True, eq=False)
 class Prescribed:
-    """What is prescribed on the facets ``on``, or on a skin: along each of ``components`` (0, 1, 2 for x, y, z) the displacement
-    that ``path`` gives for rest points (n, 3) [mm] at a frame number, (n, 3) [mm]; a picklable callable. With a ``stiffness``
-    [MPa/mm] it is not exact: springs over the area pull towards it; a skin has no unknowns that could be prescribed exactly.
+    """A displacement that is prescribed on a part of the surface.
+
+    Parameters
+    ----------
+    name
+        By which the force on it is reported.
+    on
+        A region of ``Cells.facets``, or a skin.
+    components
+        The axes along which it is prescribed: 0, 1, 2 for x, y, z.
+    path
+        A picklable callable of rest points (n, 3) [mm] and a frame number; displacements (n, 3) [mm].
+    stiffness
+        [MPa/mm] of springs over the area that pull towards it; None: exact. A skin has springs only.
+
     """
 
     name: str
@@ -162,8 +198,8 @@ class ByCell:
 @dataclass(frozen=True, eq=False)
 class Body:
     """A body of ``mesh`` with its ``effects``; at ``frames[0]`` it rests. A load acts on the facets that its ``on`` names; by
-    ``contact``, where there is one, with every obstruction. ``interval`` [s]: from a frame number to the next, where time
-    matters.
+    ``contact``, where there is one, with every obstruction. ``interval`` [s]: from a frame number to the next, None where nothing
+    depends on time.
     """
 
     mesh: Cells

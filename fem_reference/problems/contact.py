@@ -24,10 +24,10 @@ class Obstruction:
 
 @dataclass(frozen=True)
 class Contact:
-    """Frictionless contact of obstructions, with any sliding, on ``on``: the facets of a region, by name, or a skin. They push by a
-    pressure of the gap g, the signed distance (negative inside), that is zero beyond ``smoothing`` d [mm], ``k (d - g)^2 / (4 d)``
-    from d to -d, and ``-k g`` deeper: the slope of an energy per rest area, twice differentiable. ``stiffness``: k [MPa/mm];
-    pressed by p, a surface gets p / k deep.
+    """Frictionless contact of obstructions, with any sliding, on ``on``: the facets of a region, by name, or a skin. The
+    pressure depends on the gap g, the signed distance (negative inside): zero beyond ``smoothing`` d [mm],
+    ``k (d - g)^2 / (4 d)`` from d to -d, and ``-k g`` deeper: the slope of an energy per rest area, twice differentiable.
+    ``stiffness``: k [MPa/mm]; pressed by p, a surface gets p / k deep.
 
     With ``relaxed``, two frame numbers, a point that is too near at the first of them for no pressure feels as much less depth
     there, and all of its depth from the second on: an overlap at rest is removed gradually.
@@ -64,18 +64,32 @@ class Nearby:
         self.touched = np.ones(count, bool)  # asked since the last settled state
 
     def ask(self, local: Floats) -> Ints:
-        """The points that may be near, at ``local`` (n, 3)."""
+        """Which points may be near, (k,), at positions ``local`` (n, 3) [mm] in the rest frame of the body."""
         moved = np.linalg.norm(local - self.asked, axis=1)
         return np.flatnonzero(~(self.gap - self.shape.steepest * moved > self.law.smoothing))
 
     def note(self, near: Ints, local: Floats, gap: Floats) -> None:
-        """What the points that were asked answered."""
+        """Keep the answer: the gaps (k,) [mm] of the points ``near`` (k,), at positions ``local`` (n, 3) [mm]."""
         self.gap[near], self.asked[near], self.touched[near] = np.minimum(gap, self.shape.reach), local[near], True
 
 
 def nearest_on_path(obstruction: Obstruction, starts: Floats, paths: Floats, least: float) -> Floats:
-    """The smallest gap (n,) [mm] on straight ``paths`` (n, 3) from ``starts`` (n, 3): each is walked in strides as long as the gap
-    allows without missing anything, at least ``least`` [mm].
+    """The smallest gap to an obstruction on straight paths, walked in strides that the gap allows without missing anything.
+
+    Parameters
+    ----------
+    obstruction
+        The body whose distance is sampled, in its rest frame.
+    starts, paths
+        Where the paths begin and what they add to that, (n, 3) each [mm].
+    least
+        The shortest stride [mm].
+
+    Returns
+    -------
+    array (n,)
+        Gaps [mm], negative inside.
+
     """
     smallest = np.full(len(starts), np.inf)
     lengths = np.linalg.norm(paths, axis=1)

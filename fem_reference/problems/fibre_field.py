@@ -19,8 +19,22 @@ TETS = 8000
 
 
 def of(scene: Scene, surface: Surface, fill: Callable[[float], TetMesh]) -> tuple[Polylines, Directions]:
-    """The fibres of a muscle ``surface``, and their direction anywhere: traced in tets that ``fill`` makes of a size [mm]; or
-    given, with the direction of the nearest.
+    """The fibres of a scene: traced, or given as polylines.
+
+    Parameters
+    ----------
+    scene
+        Says which.
+    surface
+        The closed surface of the muscle.
+    fill
+        Makes tetrahedra of a size [mm], in which fibres are traced.
+
+    Returns
+    -------
+    fibres, directions
+        The lines, and a callable for the direction at any point: of the field, or of the nearest given line.
+
     """
     if scene.fibres.polylines is not None:
         given = scene.fibres.polylines

@@ -1,4 +1,4 @@
-"""Scene -> everything a solver needs, as arrays: bodies, what is attached, effects, fibres, frames. It knows no solver."""
+"""Muscle scenes as arrays for solvers: bodies, attachments, effects, fibres, frames. It knows no solver."""
 
 import logging
 import time
@@ -79,7 +79,7 @@ class RigidBody:
         )
 
     def pose(self, frame: float) -> Floats:
-        """The 4 x 4 matrix that takes rest positions to positions at ``frame``."""
+        """The matrix (4, 4) that takes rest positions to positions at ``frame``."""
         return np.eye(4) if self.motion is None else self.motion.pose(frame)
 
 
@@ -211,7 +211,7 @@ def _check_outside(scene: Scene, rest: Setup, contact: ContactEffect) -> None:
 
 
 def _distance_facts(rest: Setup) -> dict[str, float | str]:
-    """How well the distance to each bone of a file is known: spacing of its grid, root mean square and greatest error [mm]."""
+    """The distance grid of each bone of a file: its spacing, root mean square and greatest error [mm]."""
     grids = {bone.name: bone.shape for bone in rest.bones}
     return {
         f"{name}_distance_{key}_mm": getattr(grid, key)

@@ -1,4 +1,4 @@
-"""Scalar scene -> everything a solver needs, as arrays: mesh, effects, what is fixed, what flows in. It knows no solver."""
+"""Scalar scenes as arrays for solvers: mesh, effects, boundary conditions. It knows no solver."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

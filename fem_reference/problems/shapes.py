@@ -114,7 +114,20 @@ _SIX = {face: face for face in ("x0", "x1", "y0", "y1", "z0", "z1")}
 
 
 def box(counts: Counts, size: tuple[float, float, float], kind: Kind, degree: int = 1) -> Cells:
-    """A box from the origin of ``size`` [mm], with its faces x0, x1, y0, y1, z0, z1."""
+    """A box from the origin, with its faces x0, x1, y0, y1, z0, z1.
+
+    Parameters
+    ----------
+    counts
+        Of cells along x, y, z; a tetrahedral box has six tetrahedra in each.
+    size
+        Edge lengths along x, y, z [mm].
+    kind
+        ``"tetrahedron"`` or ``"hexahedron"``.
+    degree
+        1: straight cells; 2: cells with nodes on their edges too.
+
+    """
     return mapped([Block(lambda unit: unit * size, counts, _SIX)], kind, degree)
 
 
@@ -134,9 +147,9 @@ def warped_box(
 
 
 def tube_quarter(inner: float, outer: float, length: float, counts: Counts, kind: Kind, degree: int) -> Cells:
-    """The quarter x, y >= 0 of a tube along z; ``counts`` of cells through its wall, around the quarter and along it.
+    """The quarter x, y >= 0 of a tube along z, of radii ``inner`` and ``outer`` and a ``length`` [mm].
 
-    Faces: inner, outer, x0, y0, bottom, top.
+    It has ``counts`` of cells through its wall, around the quarter and along it. Faces: inner, outer, x0, y0, bottom, top.
     """
 
     def place(unit: Floats) -> Floats:
@@ -148,9 +161,10 @@ def tube_quarter(inner: float, outer: float, length: float, counts: Counts, kind
 
 
 def sphere_octant(inner: float, outer: float, n: int, layers: int, kind: Kind, degree: int) -> Cells:
-    """The octant x, y, z >= 0 of a hollow sphere: three patches of n by n cells, ``layers`` of them through the wall.
+    """The octant x, y, z >= 0 of a hollow sphere of radii ``inner`` and ``outer`` [mm].
 
-    A patch is equiangular: great circles at equal angles. Faces: inner, outer, x0, y0, z0.
+    It has three patches of ``n`` by ``n`` cells, ``layers`` of them through the wall. A patch is equiangular: great circles at
+    equal angles. Faces: inner, outer, x0, y0, z0.
     """
 
     def patch(axis: int) -> Block:
@@ -208,9 +222,9 @@ def _disc(place: Map, half: float, counts: Counts, faces: dict[str, str], *, qua
 
 
 def cylinder(radius: float, length: float, rings: int, slices: int, kind: Kind, degree: int) -> Cells:
-    """A solid cylinder along z from the origin: ``rings`` of cells around a rounded square of twice as many a side.
+    """A solid cylinder of a ``radius`` and a ``length`` [mm] along z from the origin.
 
-    Faces: bottom, top, side.
+    It has ``rings`` of cells around a rounded square of twice as many a side, in ``slices``. Faces: bottom, top, side.
     """
     faces = {"z0": "bottom", "z1": "top", "x1": "side"}
     blocks = _disc(
@@ -248,8 +262,10 @@ def ventricle_quarter(counts: Counts, kind: Kind, degree: int) -> Cells:
 
 
 def ball_octant(core: float, outer: float, n: int, layers: int, kind: Kind, degree: int) -> Cells:
-    """The octant x, y, z >= 0 of a ball: a cube of n cells a side of length ``core`` at its centre, and around it layers of cells
-    that grow evenly from those of the cube to the sphere of radius ``outer``. Faces: outer, x0, y0, z0.
+    """The octant x, y, z >= 0 of a ball of radius ``outer`` [mm].
+
+    It has a cube of ``n`` cells a side of length ``core`` [mm] at its centre, and around it ``layers`` of cells that grow evenly
+    from those of the cube to the sphere. Faces: outer, x0, y0, z0.
     """
     size, far = core / n, outer - core
     growth = brentq(lambda q: size * (q**layers - 1) / (q - 1) - far, 1 + 1e-9, 1 + far / size)

@@ -1,4 +1,4 @@
-"""A comparison as something to read: one page that contains everything itself, and the same numbers as JSON and CSV."""
+"""Pages that contain everything themselves, and the same numbers as JSON and CSV."""
 
 import json
 from pathlib import Path
@@ -50,7 +50,7 @@ def write_verification(verification: Verification, folder: Path, name: str) -> P
 
 
 def write_ranking(table: Table, folder: Path, name: str) -> Path:
-    """Write the page ``name`` over families of models and its numbers as JSON into ``folder``; the path of the page."""
+    """Write the page ``name`` over the kinds of solvers and its numbers as JSON into ``folder``; the path of the page."""
     texts = {
         f"{name}.json": json.dumps(ranking_page.facts(table), indent=1, allow_nan=False),
         f"{name}.html": ranking_page.render(table),

@@ -1,4 +1,4 @@
-"""The page ``error-bars``: what is claimed to be known against what a finer solution says."""
+"""The page ``error-bars``: error bars of references against their differences from finer solutions."""
 
 import io
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Which moments are pictured, from where, and the program that draws them."""
+"""Pictures of a comparison: the choice of frames and views, and the job of the program that draws them."""
 
 import logging
 import subprocess

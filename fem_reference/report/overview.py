@@ -24,7 +24,7 @@ from fem_reference.scenes.muscle import Scene
 from fem_reference.scenes.scalar import FieldScene
 
 # The statistics that are printed of a comparison; the page, JSON and CSV have them all.
-TOLD = (
+PRINTED = (
     ("volume", "deviation"),
     ("fibre_length", "max"),
     ("surface_deviation", "rms"),
@@ -209,7 +209,7 @@ def _worst(result: Comparison) -> list[str]:
         text = [
             f"{' '.join(key).replace('_', ' ')} {measure.values[measure.worst]:.4g} {measure.unit}"
             f" (frame {result.reference.numbers[measure.worst]})"
-            for key in TOLD
+            for key in PRINTED
             if (measure := find(measures, *key)) is not None
         ]
         lines.append(f"{name} at its worst: {', '.join(text)}")
@@ -269,5 +269,5 @@ def ranking_text(table: Table) -> str:
         if one.seconds_per_frame:
             text.insert(0, f"{1 / one.seconds_per_frame:.3g} frames/s")
         known = " (its error bar)" if one.of_reference and one.measures else ""
-        lines.append(f"{one.case}: {one.family}, {one.name}: {one.outcome.status}, {', '.join(text)}{known}")
+        lines.append(f"{one.case}: {one.kind}, {one.name}: {one.outcome.status}, {', '.join(text)}{known}")
     return "\n".join([*lines, *(f"{case}: left out, {reason}" for case, reason in table.missing.items())])

@@ -1,4 +1,4 @@
-"""The page: what the template is filled with. It contains everything itself, and reads without a network."""
+"""The page of a comparison. It contains everything itself, and reads without a network."""
 
 import base64
 import json

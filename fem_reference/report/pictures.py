@@ -1,4 +1,4 @@
-"""Draws the pictures of a job file, as a program of its own: ``python -P pictures.py JOB.npz FOLDER``.
+"""The program that draws the pictures of a job file: ``python -P pictures.py JOB.npz FOLDER``.
 
 Without an OpenGL library VTK ends the process that draws, with no exception, hence the process of its own.
 

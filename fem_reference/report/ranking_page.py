@@ -66,8 +66,8 @@ def facts(table: Table) -> dict[str, Any]:
             for one in table.scenarios
         ],
         "missing": table.missing,
-        "report": [one.model_dump(mode="json", exclude={"candidate", "of_case"}) for one in table.families],
-        "standings": [_row(one) for one in table.results],
+        "report": [one.model_dump(mode="json", exclude={"candidate", "of_case"}) for one in table.kinds],
+        "results": [_row(one) for one in table.results],
         "rankings": {one.case: ranking.facts(table.rankings(one.case)) for one in table.scenarios},
         "versions": table.versions,
         "machines": list(table.machines),
@@ -81,7 +81,7 @@ def _row(one: SolverResult) -> dict[str, Any]:
         value = None if found is None else {"value": finite(found[0]), "frame": found[1], "unit": unit}
         worst[f"{metric}.{statistic}"] = value
     return {
-        **{name: getattr(one, name) for name in ("family", "name", "solver", "case", "seconds_per_frame")},
+        **{name: getattr(one, name) for name in ("kind", "name", "solver", "case", "seconds_per_frame")},
         "status": one.outcome.status,
         "message": one.outcome.message,
         "worst": worst,
@@ -117,7 +117,7 @@ def _colours(table: Table) -> dict[str, str]:
 def _label_of(one: SolverResult) -> str:
     """What distinguishes a solver from all others: somebody else's may have the name of one of ours."""
     ours = one.of_reference or one.solver != "recorded"
-    return one.name if ours else f"{one.name} ({one.family.lower()})"
+    return one.name if ours else f"{one.name} ({one.kind.lower()})"
 
 
 def _place(one: SolverResult) -> tuple[float, float] | None:

@@ -29,7 +29,7 @@ def facts(check: Check) -> dict[str, Any]:
                 "unit": one.unit,
                 "frame": one.frame,
                 "was": _null(one.was),
-                "today": _null(one.current),
+                "current": _null(one.current),
                 "allowed": _null(one.allowed),
                 "known_to": _null(one.known),
                 "why": one.why,

@@ -30,18 +30,18 @@ def share(one: Result) -> float:
     return one.error * math.inf if one.error else 0.0
 
 
-def overview(families: dict[str, list[Result]]) -> Curve:
-    """The error of every result as a share of its tolerance, family by family."""
-    results = [one for family in families.values() for one in family]
+def overview(groups: dict[str, list[Result]]) -> Curve:
+    """The error of every result as a share of its tolerance, group by group."""
+    results = [one for group in groups.values() for one in group]
     shown = [share(one) for one in results if LEAST <= share(one) <= GREATEST]
     low = 10.0 ** math.floor(math.log10(min([0.1, *shown]))) / 3
     high = 10.0 ** math.ceil(math.log10(max([3.0, *shown])))
 
     def draw(axes: Axes) -> None:
         row = 0
-        for family, members in families.items():
+        for group, members in groups.items():
             axes.text(
-                -0.01, row, words(family), transform=axes.get_yaxis_transform(), ha="right", va="center", weight="bold"
+                -0.01, row, words(group), transform=axes.get_yaxis_transform(), ha="right", va="center", weight="bold"
             )
             axes.axhline(row - 0.7, color="#dddddd", linewidth=0.8)
             for place, one in enumerate(members, row + 1):
@@ -54,7 +54,7 @@ def overview(families: dict[str, list[Result]]) -> Curve:
         axes.set_ylim(row - 0.3, -0.7)
         _style_overview(axes, (low, high))
 
-    rows = len(results) + len(families)
+    rows = len(results) + len(groups)
     title = "Error as a share of what is allowed"
     return _drawing("verify-overview", title, (9.6, 0.9 + _ROW * rows), draw)
 

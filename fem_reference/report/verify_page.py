@@ -41,11 +41,11 @@ class Verification:
         return f"verdict: {self.word}, {passed} of {len(self.results)} pass{note}, {self.seconds:.0f} s"
 
     @property
-    def families(self) -> dict[str, list[Result]]:
-        """The results by family, in the order of the catalogue."""
+    def groups(self) -> dict[str, list[Result]]:
+        """The results by group, in the order of the catalogue."""
         found: dict[str, list[Result]] = {}
         for one in self.results:
-            found.setdefault(one.entry.family, []).append(one)
+            found.setdefault(one.entry.group, []).append(one)
         return found
 
 
@@ -57,7 +57,7 @@ def render(verification: Verification) -> str:
         kinds=Counter(one.entry.kind for one in results),
         share=verify_figures.share,
         spent=duration(math.fsum(one.seconds for one in results)),
-        overview=verify_figures.overview(verification.families),
+        overview=verify_figures.overview(verification.groups),
         ladders=[verify_figures.convergence(one) for one in results if verify_figures.drawable(one)],
     )
 
@@ -78,7 +78,7 @@ def rows(results: Iterable[Result]) -> list[dict[str, Any]]:
     """Each result with its entry as names, numbers and sentences."""
     return [
         {
-            **{name: getattr(one.entry, name) for name in ("name", "family", "title", "unit", "kind")},
+            **{name: getattr(one.entry, name) for name in ("name", "group", "title", "unit", "kind")},
             "verdict": one.word,
             "value": finite(one.finding.value),
             "truth": finite(one.truth),

@@ -55,14 +55,30 @@ class Results:
         return tuple(self.states)
 
     def evaluate(self, points: Any, frame: float, names: Sequence[str] | None = None) -> dict[str, Floats]:
-        """By name, what is asked for at ``points`` (n, 3) [mm] of the rest state, at a ``frame``; by default all that there is.
+        """Results at points inside the muscle.
 
-        ``displacement`` (n, 3) [mm]; ``deformation_gradient`` F (n, 3, 3), ``F[i, k] = dx_i / dX_k``; ``det_F`` (n,); ``pressure``
-        (n,) [MPa], the pressure unknown of the mixed form, above 0 where the volume grows; ``fibre_stretch`` (n,), ``|F fibre|``,
-        the length of a fibre over that at rest; ``cauchy_stress`` (n, 3, 3) [MPa]; ``von_mises`` (n,) [MPa].
+        Parameters
+        ----------
+        points
+            (n, 3) [mm] in the rest state.
+        frame
+            A frame number of ``frames``.
+        names
+            What is wanted, by default all that there is: ``displacement`` (n, 3) [mm]; ``deformation_gradient`` F (n, 3, 3),
+            ``F[i, k] = dx_i / dX_k``; ``det_F`` (n,); ``pressure`` (n,) [MPa], that of the mixed form, above 0 where the volume
+            grows; ``fibre_stretch`` (n,), ``|F fibre|``; ``cauchy_stress`` (n, 3, 3) [MPa]; ``von_mises`` (n,) [MPa].
 
-        A point outside the tetrahedra has NaN everywhere. F and the stress jump from a tetrahedron to the next: at a point that
-        several share, they are those of one of these. Where det F is not above 0 there is no stress: NaN.
+        Returns
+        -------
+        dict
+            The arrays by name. A point outside the tetrahedra has NaN everywhere. F and the stress jump from a tetrahedron to the
+            next: at a point that several share, they are those of one of these. Where det F is not above 0 there is no stress: NaN.
+
+        Raises
+        ------
+        InputError
+            Where there is no such frame, or no such result of this run.
+
         """
         wanted = self._checked(names, self._state(frame))
         found = self._located(np.asarray(points, float))
@@ -77,7 +93,18 @@ class Results:
     def evaluate_in(
         self, tets: Ints, barycentric: Floats, frame: float, names: Sequence[str] | None = None
     ) -> dict[str, Floats]:
-        """As ``evaluate``, at points given by their tetrahedra (n,) and barycentric coordinates (n, 4) in them."""
+        """As :meth:`evaluate`, at points inside given tetrahedra.
+
+        Parameters
+        ----------
+        tets
+            Indices (n,) of the tetrahedra.
+        barycentric
+            Coordinates (n, 4) in them.
+        frame, names
+            As of :meth:`evaluate`.
+
+        """
         state = self._state(frame)
         wanted = self._checked(names, state)
         acting = [(effect, effect.amount(frame)) for effect in self.effects]
@@ -222,11 +249,25 @@ def von_mises(stress: Floats) -> Floats:
 
 
 def lagrange(barycentric: Floats, gradients: Floats, count: int) -> tuple[Floats, Floats]:
-    """The Lagrange functions (n, count) of a tetrahedron with 4 or 10 nodes, in the order of ``body.reference_nodes``, and
-    their gradients (n, count, 3) [1/mm], at barycentric coordinates (n, 4) whose gradients (n, 4, 3) [1/mm] are given.
+    """The Lagrange functions of a tetrahedron and their gradients.
 
     Of degree 2: ``L_i (2 L_i - 1)`` at corners, ``4 L_i L_j`` between two (Zienkiewicz and Taylor 2000, The Finite Element Method,
     vol. 1, 8.12).
+
+    Parameters
+    ----------
+    barycentric
+        Coordinates L (n, 4) of points.
+    gradients
+        Of the coordinates, (n, 4, 3) [1/mm].
+    count
+        Of nodes: 4 or 10, in the order of ``body.reference_nodes``.
+
+    Returns
+    -------
+    values, slopes
+        (n, count), and (n, count, 3) [1/mm].
+
     """
     if count == 4:
         return barycentric, gradients

@@ -48,13 +48,24 @@ class NodalState:
 
 
 def write_rest(folder: Path, mesh: TetMesh, fibre: Floats | None) -> None:
-    """What the states of the run in ``folder`` are states of: the mesh and the ``fibre`` directions (m, 3) of its tets."""
+    """Write what the states of a run are states of.
+
+    Parameters
+    ----------
+    folder
+        Of the run.
+    mesh
+        The tetrahedra at rest.
+    fibre
+        Unit vectors (m, 3) along the fibres in its tetrahedra, None without fibres.
+
+    """
     directions = np.zeros((0, 3)) if fibre is None else fibre
     _write(folder / FOLDER / "rest.npz", {"points": mesh.points, "tets": mesh.tets, "fibre": directions})
 
 
 def write(folder: Path, frame: int, state: NodalState) -> None:
-    """A state of the run in ``folder``."""
+    """Write the ``state`` at a ``frame`` number of the run in ``folder``."""
     _write(_place(folder, frame), state.arrays)
 
 

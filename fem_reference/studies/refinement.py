@@ -1,6 +1,4 @@
-"""The runs that the error bars of a reference are made of: on coarser tetrahedra, and there every other cause of numerical error
-halved.
-"""
+"""The runs that error bars are made of: coarser tetrahedra, and on these every other cause of numerical error halved."""
 
 import hashlib
 import logging
@@ -31,7 +29,7 @@ log = logging.getLogger(__name__)
 _EXACT = "exact attachments"
 
 # A scene whose tetrahedra are refined has the coarse member of its pair in them, before the last refinement. These orders make
-# bars hold 95 of 100 differences from finer solutions: docs/accuracy.md.
+# bars cover 95 of 100 differences from finer solutions: docs/accuracy.md.
 NESTED = Orders(general=1.9, volume=1.3, fibres=1.4, worst=1.1)
 # Another has a mesh of its own for it, larger by so much, and rims that are not graded: order 1, whatever the element (Grisvard
 # 1985, Elliptic Problems in Nonsmooth Domains).
@@ -142,7 +140,7 @@ def _needed(bench: Bench, reference: Run) -> tuple[Variation, ...]:
 
 
 def _pressed(reference: Run) -> bool:
-    """Whether a bone pressed: where none did, what bones are like does not matter."""
+    """Whether a bone pressed: where none did, the stiffness of contact changes nothing."""
     area = reference.scalars.get("contact_area")
     return area is None or bool(np.nanmax(area) > 0)
 

@@ -1,11 +1,11 @@
-"""Every family of Table 5.1 on every scenario: solved where that was not done before, timed, and measured against the reference."""
+"""Table 5.1 of the report on every scenario: each solver run where no run is stored, timed, and measured against the reference."""
 
 import logging
 from collections.abc import Iterable
 from fnmatch import fnmatch
 from pathlib import Path
 
-from fem_reference.assessment.solver_table import Family, Scenario, SolverResult, Table, families
+from fem_reference.assessment.solver_table import Scenario, SolverKind, SolverResult, Table, solver_kinds
 from fem_reference.foundations.errors import InputError
 from fem_reference.metrics import Measure, MeasurementContext, measure
 from fem_reference.runs.cost import seconds_per_frame
@@ -37,7 +37,7 @@ def stand(scenes: Iterable[Scene], store: Path, foreign: dict[str, list[Candidat
     """The table over ``scenes``, with runs in ``store``; ``foreign``: by case, what somebody else's solvers made of it, which is
     read before anything is solved.
     """
-    rows, scenarios, results, missing = families(), list[Scenario](), list[SolverResult](), dict[str, str]()
+    rows, scenarios, results, missing = solver_kinds(), list[Scenario](), list[SolverResult](), dict[str, str]()
     benches = [Bench(scene, store) for scene in scenes]
     read = {
         bench.scene.name: [bench.read(entry.name, entry, "--candidate") for entry in foreign.get(bench.scene.name, [])]
@@ -55,13 +55,13 @@ def stand(scenes: Iterable[Scene], store: Path, foreign: dict[str, list[Candidat
         scenarios.append(scenario)
         results += found
     if foreign:
-        rows = (*rows, Family(name=FOREIGN, form="", speed="", precision="", literature=""))
-    machines = tuple(dict.fromkeys(one.machine for one in results if one.family != FOREIGN))
+        rows = (*rows, SolverKind(name=FOREIGN, form="", speed="", precision="", literature=""))
+    machines = tuple(dict.fromkeys(one.machine for one in results if one.kind != FOREIGN))
     return Table(rows, tuple(scenarios), tuple(results), missing, versions(), machines)
 
 
-def chosen(scene: Scene, row: Family) -> list[tuple[Candidate, str]]:
-    """The solvers measured for a family on a scene, and the place that says so."""
+def chosen(scene: Scene, row: SolverKind) -> list[tuple[Candidate, str]]:
+    """The solvers measured for a kind on a scene, and the place that says so."""
     own = [
         (candidate, f"candidate[{i}]")
         for i, candidate in enumerate(scene.candidate)
@@ -70,7 +70,7 @@ def chosen(scene: Scene, row: Family) -> list[tuple[Candidate, str]]:
     return own + [(candidate, f"{row.name} of Table 5.1") for candidate in row.candidate]
 
 
-def _on(bench: Bench, rows: Iterable[Family], foreign: list[Run]) -> tuple[Scenario, list[SolverResult]]:
+def _on(bench: Bench, rows: Iterable[SolverKind], foreign: list[Run]) -> tuple[Scenario, list[SolverResult]]:
     """How everybody stands on the scene of a bench."""
     scene, numbers = bench.scene, bench.scene.frames.numbers
     reference = complete(bench.obtain("reference", scene.reference, "reference"), numbers)
@@ -79,18 +79,18 @@ def _on(bench: Bench, rows: Iterable[Family], foreign: list[Run]) -> tuple[Scena
     context = MeasurementContext.of(reference, reference.fibres, bench.setup().bones, bench.setup().free)
     found = [_result(scene, REFERENCE, reference, bars.of_deviations if bars else ())]
     meeting = [(row.name, *entry) for row in rows for entry in chosen(scene, row)]
-    for i, (family, candidate, place) in enumerate(meeting):
+    for i, (kind, candidate, place) in enumerate(meeting):
         log.info("%s: %s, solver %d of %d", scene.name, candidate.name, i + 1, len(meeting))
         run = complete(bench.obtain(candidate.name, candidate, place), numbers)
-        found.append(_result(scene, family, run, measure(run, reference, context, METRICS)))
+        found.append(_result(scene, kind, run, measure(run, reference, context, METRICS)))
     found += [_result(scene, FOREIGN, run, measure(run, reference, context, METRICS)) for run in foreign]
     triangles = len(reference.surface.triangles)
     return Scenario(scene.name, scene.title, triangles, context.travel, reference.outcome), found
 
 
-def _result(scene: Scene, family: str, run: Run, measures: tuple[Measure, ...]) -> SolverResult:
+def _result(scene: Scene, kind: str, run: Run, measures: tuple[Measure, ...]) -> SolverResult:
     return SolverResult(
-        family,
+        kind,
         run.name,
         run.solver,
         scene.name,
@@ -99,7 +99,7 @@ def _result(scene: Scene, family: str, run: Run, measures: tuple[Measure, ...]) 
         measures,
         run.numbers,
         str(run.origin["machine"]),
-        of_reference=family == REFERENCE,
+        of_reference=kind == REFERENCE,
     )
 
 

@@ -88,6 +88,16 @@ def read_run(folder: str | Path, case: Scene, *, unit: str | None = None) -> Run
     unit
         The unit of length of the frames, by default what ``candidate.toml`` says, else mm.
 
+    Returns
+    -------
+    Run
+        ``positions`` (f, n, 3) [mm] of the surface's vertices by frame number.
+
+    Raises
+    ------
+    InputError
+        Where a file cannot be read whole, or its vertices or its first frame are not those of the case.
+
     """
     choice = recorded.choice(Path(folder), unit)
     return Bench(case, STORE).read(choice.name, choice, "folder")
@@ -96,8 +106,24 @@ def read_run(folder: str | Path, case: Scene, *, unit: str | None = None) -> Run
 def error_bars(
     case: Scene, reference: Run, *, store: Path = STORE, progress: Progress | None = None
 ) -> ErrorBars | None:
-    """Find out how far each statistic of the ``reference`` of a ``case`` may be from the truth, from runs on larger tetrahedra and
-    with finer contact; None where the reference did not converge.
+    """Estimate how far each statistic of a reference may be from the truth, from runs on larger tetrahedra and with finer contact.
+
+    Parameters
+    ----------
+    case
+        The case of the reference.
+    reference
+        What :func:`solve` returned without a ``solver``.
+    store
+        The folder that runs are stored in; bars are kept beside the reference's run.
+    progress
+        Called with each line of progress.
+
+    Returns
+    -------
+    ErrorBars or None
+        By statistic a bar for each frame, in the unit of the statistic; None where the reference did not converge.
+
     """
     with _reported(progress):
         bench = Bench(case, store)
@@ -107,9 +133,24 @@ def error_bars(
 def compare(
     case: Scene, reference: Run, candidates: Sequence[Run] = (), *, error_bars: ErrorBars | None = None
 ) -> Comparison:
-    """Measure ``candidates`` against the ``reference`` of a ``case`` and judge what the case expects.
+    """Measure candidates against the reference of a case, and judge what the case expects.
 
-    ``comparison["pbd", "surface_deviation", "rms"]`` is a measure: its ``values`` by frame, its ``unit``, its ``worst`` frame.
+    Parameters
+    ----------
+    case
+        The case that all runs are of.
+    reference
+        The run that counts as the truth.
+    candidates
+        Runs to measure against it. A frame that a run did not reach is NaN, and never a pass.
+    error_bars
+        Those of the reference, from :func:`error_bars`. With them a verdict that they leave in doubt is inconclusive.
+
+    Returns
+    -------
+    Comparison
+        ``comparison["pbd", "surface_deviation", "rms"]`` is a measure: ``values`` (f,), ``unit``, ``worst`` frame.
+
     """
     numbers = case.frames.numbers
     runs = tuple(complete(run, numbers) for run in candidates)
@@ -117,8 +158,27 @@ def compare(
 
 
 def export_case(case: Scene, folder: str | Path, form: export.Format = "open") -> list[str]:
-    """Write all that a solver needs which is not ours into a new ``folder``, in open formats (``form`` ``"febio"``: FEBio's file
-    too); the names of the files.
+    """Write all that another program needs to solve a case.
+
+    Parameters
+    ----------
+    case
+        What :func:`load_case` read.
+    folder
+        A new or empty folder.
+    form
+        ``"open"``: PLY, VTU, MSH, VTK, CSV and JSON, lengths in mm; ``"febio"``: FEBio's input file too.
+
+    Returns
+    -------
+    list of str
+        The names of the files.
+
+    Raises
+    ------
+    InputError
+        Where ``folder`` is not empty, or FEBio has not the same effects.
+
     """
     return export.export(case, Bench(case, STORE).problem, Path(folder), form)
 

@@ -1,1 +1,1 @@
-"""The verification catalogue: one file per family of problems whose answers are known, each with its ``ENTRIES``."""
+"""The verification catalogue: one file per group of problems whose answers are known, each with its ``ENTRIES``."""

@@ -77,7 +77,7 @@ def _one() -> float:
 ENTRIES = (
     Entry(
         name="collapse_is_no_result",
-        family="collapse",
+        group="collapse",
         title="Squeezed to a tenth of its height, a block of the Poisson ratio 0.3 is no result, and its law is named, by P2/P1",
         unit="1",
         truth=_one,
@@ -92,7 +92,7 @@ ENTRIES = (
     ),
     Entry(
         name="law_outside_its_range",
-        family="collapse",
+        group="collapse",
         title="In how many states of a squeeze, from 1 to 0.4 of the height, less than half of the volume is left, by Q1/P0",
         unit="1",
         truth=_outside_truth,

@@ -20,7 +20,7 @@ from fem_reference.verification.parts import SYMMETRY, neo_hooke
 from fem_reference.verification.truths import find
 
 MU = 0.01  # [MPa]
-PLATE_BULK, PLATE_STIFFNESS, PLATE_WAY = 10.0, 1.0, 0.5  # [MPa], [MPa/mm] and [mm], on a cube of 1 mm
+PLATE_BULK, PLATE_STIFFNESS, PLATE_TRAVEL = 10.0, 1.0, 0.5  # [MPa], [MPa/mm] and [mm], on a cube of 1 mm
 RADIUS, APPROACH, BULK = 10.0, 0.1, 10.0  # of the ball [mm], and of the body [MPa]: pressed to a contact of 1 mm
 BALL_STIFFNESS, FAR, CORE = 2.0, 300.0, 1.2  # [MPa/mm]; where the body ends, and its finest part [mm]
 
@@ -47,7 +47,7 @@ def plate(lab: Lab, element: str, stiffness: float) -> Finding:
     """The force [N] of a smooth plate that is moved down on an eighth of a cube of 2 mm."""
     mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), ELEMENTS[element][0])
     law = Contact("z1", stiffness, 0.01)
-    above = Obstruction("plate", HalfSpace((0.0, 0.0, 1.0), (0.0, 0.0, -1.0)), Slide((0.0, 0.0, -PLATE_WAY)))
+    above = Obstruction("plate", HalfSpace((0.0, 0.0, 1.0), (0.0, 0.0, -1.0)), Slide((0.0, 0.0, -PLATE_TRAVEL)))
     body = Body(mesh, neo_hooke(MU, PLATE_BULK), SYMMETRY, (0.0, 1.0), contact=law, obstructions=(above,))
     state = lab.solve(body, element, first_step=0.2, residual=1e-12).last
     return Finding(float(state.forces["plate"][2]), note=f"{state.scalars['contact_depth']:.4f} mm deep")
@@ -58,9 +58,9 @@ def _plate_truth() -> float:
     force = partial(find("loads").squeeze_force, MU, PLATE_BULK, area=1.0)
 
     def apart(stretch: float) -> float:
-        return float(force(stretch=stretch)) + PLATE_STIFFNESS * (stretch - (1 - PLATE_WAY))
+        return float(force(stretch=stretch)) + PLATE_STIFFNESS * (stretch - (1 - PLATE_TRAVEL))
 
-    return float(force(stretch=brentq(apart, 1 - PLATE_WAY, 1.0, xtol=1e-15)))
+    return float(force(stretch=brentq(apart, 1 - PLATE_TRAVEL, 1.0, xtol=1e-15)))
 
 
 def pressed(lab: Lab, n: int, radius: float = RADIUS) -> Reached:
@@ -107,7 +107,7 @@ def _hertz_truth(name: str) -> float:
 def _hertz_entry(name: str, title: str, unit: str, attribute: str, value: Any) -> Entry:
     return Entry(
         name=f"hertz_{name}",
-        family="contact",
+        group="contact",
         title=f"A rigid ball pressed into a large body: {title}",
         unit=unit,
         truth=partial(_hertz_truth, attribute),
@@ -128,7 +128,7 @@ ENTRIES = (
     *(
         Entry(
             name=f"plate_{element.lower().replace('/', '_')}",
-            family="contact",
+            group="contact",
             title=f"A smooth plate on a block, by {element}: its force at half the height",
             unit="N",
             truth=_plate_truth,

@@ -20,7 +20,7 @@ from fem_reference.problems.paths import Rest
 from fem_reference.verification.parts import ladder, once, ramp, resistance
 from fem_reference.verification.truths import find
 
-FAMILY = "Cook's membrane"
+GROUP = "Cook's membrane"
 THICKNESS, HEIGHT = 2.0, 44.0  # of the panel, and of its clamped side [mm]
 SMALL = 1e-5  # the share of the load at which the answer is linear: terms of second order are some 1e-5 of it
 RESIDUAL = 1e-5  # at the whole load [N, mm3], where some 100 N act
@@ -92,7 +92,7 @@ def _tip_entry(name: str, title: str, panel: Panel, counts: tuple[int, ...], wit
     """An entry whose value is the tip; ``fields`` has ``because``, ``negative_control`` and ``with_negative_control``."""
     return Entry(
         name=name,
-        family=FAMILY,
+        group=GROUP,
         title=title,
         unit="mm",
         truth=panel.true_tip,
@@ -212,7 +212,7 @@ ENTRIES = (
     ),
     Entry(
         name="cook_p1_locks",
-        family=FAMILY,
+        group=GROUP,
         title="Linear tetrahedra lock at Poisson's ratio 0.4999: tip over where it should be, less than a half",
         unit="",
         truth=lambda: LOCKED / 2,
@@ -227,7 +227,7 @@ ENTRIES = (
     ),
     Entry(
         name="cook_taylor_hood",
-        family=FAMILY,
+        group=GROUP,
         title="On the mesh where linear tetrahedra lock, those of Taylor and Hood do not: tip over where it should be",
         unit="",
         truth=lambda: 1.0,

@@ -12,7 +12,7 @@ from fem_reference.verification.homogeneous import MU, NEO
 from fem_reference.verification.loads import FREE_FALL, MUSCLE
 from fem_reference.verification.parts import ramp, resistance
 
-FAMILY = "damping"
+GROUP = "damping"
 _SECONDS = 0.1  # from a frame number to the next
 
 
@@ -39,7 +39,7 @@ def _velocity(lab: Lab, seconds: float = _SECONDS) -> Finding:
 
 _FALL = Entry(
     name="damped_fall",
-    family=FAMILY,
+    group=GROUP,
     title="Free block, with a drag and its weight: the speed of its fastest node",
     unit="mm/s",
     truth=lambda: -float(truths.find("damping").terminal_velocity(MUSCLE * FREE_FALL, _DRAG)),
@@ -89,7 +89,7 @@ def _creep(lab: Lab, coefficient: float = _CREEP) -> Finding:
 
 _RELAXATION = Entry(
     name="damped_creep",
-    family=FAMILY,
+    group=GROUP,
     title="Bar in a smooth box that creeps back when its weight is gone: rate of the slowest mode, by load steps that are halved",
     unit="1/s",
     truth=_known_rate,

@@ -20,7 +20,7 @@ from fem_reference.verification.homogeneous import (
 )
 from fem_reference.verification.parts import ramp
 
-FAMILY = "fibres"
+GROUP = "fibres"
 STRESS, OPTIMUM = 0.3, 1.05  # the peak active stress [MPa] and the fibre stretch at which it is reached
 
 
@@ -81,7 +81,7 @@ def _free(fibres: Material) -> Specimen:
     return Specimen(NEO + fibres, "P2/P1", "pulled", 0.0)
 
 
-_force, _stretch = partial(force_entry, FAMILY), partial(stretch_entry, FAMILY)
+_force, _stretch = partial(force_entry, GROUP), partial(stretch_entry, GROUP)
 
 
 def _slack() -> Entry:
@@ -177,7 +177,7 @@ def _prestretched() -> tuple[Entry, ...]:
     )
     title = "Muscle prestretched by 1.2 and fixed: force"
     return (
-        _force("prestretch_held", title, fixed, (wrong[0], replace(fixed, material=wrong[1]))),
+        _force("prestretch_fixed", title, fixed, (wrong[0], replace(fixed, material=wrong[1]))),
         replace(released, truth=lambda: 1 / 1.2, source="The stretch that undoes the prestretch leaves no energy."),
     )
 

@@ -76,7 +76,7 @@ def circle(points: Floats) -> float:
 
 
 def _thickness(lab: Lab, n: int, faces: tuple[str, ...] = ("z0", "z1")) -> float:
-    """Between the curved faces, half-way between the ends [mm]."""
+    """Between the curved faces, halfway between the ends [mm]."""
     rest, state = bent(lab, n, "Q2/Q1", faces=faces)
     return float(np.ptp(state.points[rest[:, 1] == 0, 0]))
 
@@ -106,7 +106,7 @@ _FREE = ("z0",)
 _UP = partial(ladder, size=THICKNESS / 2)
 _BLOCK = partial(
     Entry,
-    family="flexure",
+    group="flexure",
     relative=True,
     kind="closed form",
     source="Rivlin 1949, doi 10.1098/rspa.1949.0004; validation/rivlin.py Flexure",
@@ -148,7 +148,7 @@ ENTRIES: tuple[Entry, ...] = (
     ),
     _BLOCK(
         name="flexure_thickness",
-        title="Bending a block, half as thick as long, by one radian: how thick it is half-way between its ends",
+        title="Bending a block, half as thick as long, by one radian: how thick it is halfway between its ends",
         unit="mm",
         truth=_true_thickness,
         within=3e-5,

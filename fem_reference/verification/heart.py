@@ -16,7 +16,7 @@ from fem_reference.problems.paths import Along, Rest
 from fem_reference.verification.parts import Value, once, ramp, resistance
 from fem_reference.verification.truths import find
 
-FAMILY = "heart benchmark"
+GROUP = "heart benchmark"
 BULK = 100.0  # [MPa], some 1e4 times the stresses: J is 1 within 1e-4 on average
 RESIDUAL = 1e-10  # [N, mm3]; the beam carries 2e-5 N
 SOURCE = "Land et al. 2015, doi 10.1098/rspa.2015.0641: readings of its figures at second hand, see validation/land.py"
@@ -133,7 +133,7 @@ def _entry(name: str, title: str, truth: Callable[[], float], within: float, **f
     """
     return Entry(
         name=name,
-        family=FAMILY,
+        group=GROUP,
         title=title,
         unit="mm",
         truth=truth,

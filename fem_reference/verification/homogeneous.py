@@ -130,28 +130,28 @@ SOURCE = "validation/homogeneous.py: balance by root finding (Ogden 1984, ch. 4.
 EXACT = "The element represents the exact answer: what is left is rounding and the residual of 1e-13 N that ends Newton's method."
 
 
-def force_entry(family: str, name: str, title: str, specimen: Specimen, control: tuple[str, Specimen]) -> Entry:
+def force_entry(group: str, name: str, title: str, specimen: Specimen, control: tuple[str, Specimen]) -> Entry:
     """The force on a ``specimen`` against its truth; ``control``: what is wrong with the other specimen."""
     negative_control, wrong = control
     numbers = ("N", specimen.known_force, 1e-11, True)
     return Entry(
-        name, family, title, *numbers, EXACT, "closed form", SOURCE, specimen.force, negative_control, wrong.force
+        name, group, title, *numbers, EXACT, "closed form", SOURCE, specimen.force, negative_control, wrong.force
     )
 
 
 def stretch_entry(
-    family: str, name: str, title: str, axis: int, specimen: Specimen, control: tuple[str, Specimen]
+    group: str, name: str, title: str, axis: int, specimen: Specimen, control: tuple[str, Specimen]
 ) -> Entry:
     """The stretch of a ``specimen`` along an axis against its truth."""
     negative_control, wrong = control
     measure, with_negative_control = (lambda lab: specimen.stretch(axis, lab)), (lambda lab: wrong.stretch(axis, lab))
     numbers = ("1", lambda: specimen.known_stretch(axis), 1e-11, True)
     return Entry(
-        name, family, title, *numbers, EXACT, "closed form", SOURCE, measure, negative_control, with_negative_control
+        name, group, title, *numbers, EXACT, "closed form", SOURCE, measure, negative_control, with_negative_control
     )
 
 
-FAMILY = "homogeneous"
+GROUP = "homogeneous"
 NEO, MOONEY, HEART = neo_hooke(), mooney_rivlin(0.003, 0.002), guccione(0.002)
 STIFFER = "Shear modulus 1 % too high.", neo_hooke(1.01 * MU)
 OTHER_LAW = "A neo-Hookean law of the same shear modulus.", NEO
@@ -170,7 +170,7 @@ def _isotropic(word: str, material: Material, mode: str, element: str, control: 
     specimen = Specimen(material, element, mode, amount)
     name = f"{word}_{mode}_{element}".lower().replace("-", "_").replace("/", "_")
     title = f"{word} block {words}, by {element}: force"
-    return force_entry(FAMILY, name, title, specimen, (control[0], replace(specimen, material=control[1])))
+    return force_entry(GROUP, name, title, specimen, (control[0], replace(specimen, material=control[1])))
 
 
 def _heart(name: str, words: str, fibre: Vector, other: Vector) -> Entry:
@@ -178,7 +178,7 @@ def _heart(name: str, words: str, fibre: Vector, other: Vector) -> Entry:
     specimen = Specimen(HEART, "P2/P1", "uniaxial", 1.15, fibre)
     title = f"Heart muscle (Guccione) stretched {words} its fibres: force"
     control = "Fibres turned by a right angle.", replace(specimen, fibre=other)
-    return force_entry(FAMILY, name, title, specimen, control)
+    return force_entry(GROUP, name, title, specimen, control)
 
 
 def _lateral() -> Entry:
@@ -186,7 +186,7 @@ def _lateral() -> Entry:
     specimen = Specimen(NEO, "P2", "uniaxial", 1.6, bulk=10 * MU)
     control = "Bulk modulus 1 % too high.", replace(specimen, bulk=10.1 * MU)
     title = "Compressible neo-Hookean block stretched along one axis, by P2: how much it thins"
-    return stretch_entry(FAMILY, "neo_hookean_thinning_p2", title, 1, specimen, control)
+    return stretch_entry(GROUP, "neo_hookean_thinning_p2", title, 1, specimen, control)
 
 
 ENTRIES = (

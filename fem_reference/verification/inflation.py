@@ -163,14 +163,14 @@ _TRUE_TUBE_PRESSURE, _TRUE_TUBE_FORCE = partial(_true_tube, 0), partial(_true_tu
 _UP = partial(ladder, size=INNER / 2)
 _FINITE = partial(
     Entry,
-    family="inflation",
+    group="inflation",
     relative=True,
     kind="closed form",
     source="Ogden 1984, ch. 5.3, with the finite bulk modulus; validation/radial.py",
 )
 _LIMIT = partial(
     Entry,
-    family="inflation",
+    group="inflation",
     relative=True,
     kind="closed form",
     source="Green and Zerna 1954, ch. 3; Ogden 1984, ch. 5.3.2; validation/rivlin.py Sphere",

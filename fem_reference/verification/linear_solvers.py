@@ -54,7 +54,7 @@ class Compared:
 
 _LAGGED = Entry(
     name="lagged_factorisation",
-    family="linear solvers",
+    group="linear solvers",
     title="Turned bar of muscle by lagged factorisations in double precision and by direct ones: largest difference of a node",
     unit="mm",
     truth=zero,

@@ -21,7 +21,7 @@ from fem_reference.verification.homogeneous import (
 )
 from fem_reference.verification.parts import SYMMETRY, ramp, resistance, zero
 
-FAMILY = "loads"
+GROUP = "loads"
 MUSCLE, FAT = 1.06e-9, 0.92e-9  # densities [tonne/mm3]
 FREE_FALL = 9810.0  # mm/s2
 FIXED = (Prescribed("z0", "z0", (0, 1, 2), Rest()),)
@@ -62,7 +62,7 @@ def _reaction(density: float, lab: Lab) -> Finding:
 
 _STANDING = Entry(
     name="standing_weight",
-    family=FAMILY,
+    group=GROUP,
     title="Block of muscle that stands and sags: force on its base",
     unit="N",
     truth=lambda: MUSCLE * FREE_FALL * float(np.prod(_LARGE)),
@@ -103,7 +103,7 @@ def _column(element: str, lab: Lab) -> Finding:
 
 _COLUMN = Entry(
     name="heavy_column",
-    family=FAMILY,
+    group=GROUP,
     title="Soft column in a smooth box that sinks under its own weight, by Q2: displacement of its top",
     unit="mm",
     truth=_known_top,
@@ -130,7 +130,7 @@ def _shrunk(load: Effect, lab: Lab) -> Finding:
 
 _HYDROSTATIC = Entry(
     name="pressed_volume",
-    family=FAMILY,
+    group=GROUP,
     title="Block in a fluid whose pressure is a tenth of its bulk modulus: volume over that at rest",
     unit="1",
     truth=lambda: float(truths.find("loads").pressed_volume(_COMPRESSIBLE, _FLUID)),
@@ -159,7 +159,7 @@ def _left_over(faces: tuple[str, ...], lab: Lab) -> Finding:
 
 _CLOSED = Entry(
     name="pressure_all_round",
-    family=FAMILY,
+    group=GROUP,
     title="Tilted block in a fluid that presses all round: what its two holders carry together",
     unit="N",
     truth=zero,
@@ -189,7 +189,7 @@ def _turned(load: Effect, lab: Lab) -> Finding:
 
 _FOLLOWER = Entry(
     name="pressure_turns",
-    family=FAMILY,
+    group=GROUP,
     title="Block that leans under a pressure on one side, turned by a quarter circle: largest difference to itself turned",
     unit="mm",
     truth=zero,
@@ -209,7 +209,7 @@ def _dead_pull() -> Entry:
     pulled = Specimen(NEO, "P2/P1", "pulled", MU, loads=(dead(MU),))
     follower = make("pressure", on="x1", pressure=f"{-MU} MPa", ramp=ramp())
     control = "The force spread over the area as it is now.", replace(pulled, loads=(follower,))
-    return stretch_entry(FAMILY, "dead_pull", "Block pulled by a dead force: how far it stretches", 0, pulled, control)
+    return stretch_entry(GROUP, "dead_pull", "Block pulled by a dead force: how far it stretches", 0, pulled, control)
 
 
 ENTRIES = (_STANDING, _COLUMN, _HYDROSTATIC, _CLOSED, _FOLLOWER, _dead_pull())

@@ -1,6 +1,4 @@
-"""Patch tests: what every element must represent exactly, whatever the shape of its cells: linear functions, and turns of any
-size.
-"""
+"""Patch tests: linear functions and turns of any size, which every element must represent whatever the shape of its cells."""
 
 from dataclasses import dataclass, replace
 
@@ -98,7 +96,7 @@ def _patch(element: str, degree: int = 1) -> Entry:
     patch, shape = Patch(element, degree), "curved" if degree == 2 else "distorted"
     return Entry(
         name=f"patch_{element.lower().replace('/', '_')}{'_curved' if degree == 2 else ''}",
-        family="patch tests",
+        group="patch tests",
         title=f"{element} on {shape} cells represents a stretch, a shear and a turn at once: largest error of a node",
         unit="mm",
         truth=zero,
@@ -116,7 +114,7 @@ def _patch(element: str, degree: int = 1) -> Entry:
 _STRAIGHT = ("P1", "P2", "P2/P1", "P2/P0", "Q1", "Q2", "Q1/P0", "Q2/Q1")
 _BLOCK = Entry(
     name="turned_block",
-    family="rigid motion",
+    group="rigid motion",
     title="Block whose surface is turned by 1 rad about an oblique axis in one step: largest error of a node",
     unit="mm",
     truth=zero,

@@ -18,7 +18,7 @@ from fem_reference.problems.paths import Rest
 from fem_reference.verification.parts import neo_hooke, ramp
 from fem_reference.verification.truths import find
 
-FAMILY = "rims of attachments"
+GROUP = "rims of attachments"
 ELEMENT = "Q2/Q1"
 MU, BULK = 0.01, 10.0  # [MPa]
 LOAD = 1e-4  # [MPa]
@@ -100,7 +100,7 @@ def _entry(name: str, title: str, rim: Rim, within: float, because: str) -> Entr
     other = replace(rim, grading=1.0 if graded else HALF)
     return Entry(
         name=name,
-        family=FAMILY,
+        group=GROUP,
         title=title,
         unit="",
         truth=rim.truth,

@@ -44,14 +44,12 @@ def collect(modules: Iterable[ModuleType]) -> dict[str, Entry]:
 
 
 def choose(catalogue: dict[str, Entry], wanted: Iterable[str], place: str) -> tuple[str, ...]:
-    """The names of the entries that ``wanted`` means, in the order of the catalogue: names of entries or families, or shell
+    """The names of the entries that ``wanted`` means, in the order of the catalogue: names of entries or groups, or shell
     patterns of them. InputError naming ``place`` where one means none.
     """
     chosen: set[str] = set()
     for text in wanted:
-        meant = {
-            name for name, entry in catalogue.items() if fnmatchcase(name, text) or fnmatchcase(entry.family, text)
-        }
+        meant = {name for name, entry in catalogue.items() if fnmatchcase(name, text) or fnmatchcase(entry.group, text)}
         if not meant:
             raise InputError(place, f'"{text}"', _known(catalogue, text))
         chosen |= meant
@@ -59,11 +57,11 @@ def choose(catalogue: dict[str, Entry], wanted: Iterable[str], place: str) -> tu
 
 
 def _known(catalogue: dict[str, Entry], text: str) -> str:
-    """What could have been meant by ``text``: the names closest to it, and every family."""
-    families = dict.fromkeys(entry.family for entry in catalogue.values())
+    """What could have been meant by ``text``: the names closest to it, and every group."""
+    groups = dict.fromkeys(entry.group for entry in catalogue.values())
     near = get_close_matches(text, catalogue, n=5)
     such = f" (such as {', '.join(near)})" if near else ""
-    return f"an entry{such}, a family ({', '.join(families)}) or a pattern of them"
+    return f"an entry{such}, a group ({', '.join(groups)}) or a pattern of them"
 
 
 def run(

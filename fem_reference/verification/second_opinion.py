@@ -71,7 +71,7 @@ class Sample:
 
 @dataclass(frozen=True, eq=False)
 class Borrowed:
-    """The ``body`` of an entry of another family, to be solved twice too; ``residual`` [N, mm3], without a ``quadrature`` degree
+    """The ``body`` of an entry of another group, to be solved twice too; ``residual`` [N, mm3], without a ``quadrature`` degree
     that of each solver.
     """
 
@@ -137,7 +137,7 @@ def _difference(first: dict[str, Floats], second: dict[str, Floats]) -> float:
 def _entry(name: str, title: str, sample: Sample | Borrowed, within: float, because: str) -> Entry:
     return Entry(
         name=f"second_opinion_{name}",
-        family="second opinion",
+        group="second opinion",
         title=f"{title} by {sample.element}: how far FEniCSx and scikit-fem differ",
         unit="1",
         truth=zero,
@@ -168,7 +168,7 @@ _STEEPER = "F is constant, so that every rule is exact: Newton's residual of 1e-
 
 
 def _specimen(name: str, words: str, specimen: Specimen) -> Entry:
-    """Of the families homogeneous, fibres and loads; ``words`` after "A block"."""
+    """Of the groups homogeneous, fibres and loads; ``words`` after "A block"."""
     return _entry(name, f"A block {words},", Borrowed(specimen.body, specimen.element), 1e-10, _STEEPER)
 
 

@@ -61,7 +61,7 @@ def volume(lab: Lab, element: str, bulk: float, error: float = 0.0) -> Finding:
     return Finding(states[STEPS].scalars["volume_ratio"], note=_note(states))
 
 
-def way_back(lab: Lab, element: str, bulk: float, *, growing: bool = False) -> Finding:
+def distance_from_rest(lab: Lab, element: str, bulk: float, *, growing: bool = False) -> Finding:
     """How far from rest [mm] any node is when the plate is back."""
     states = _smooth(lab, element, bulk, growing=growing)
     off = np.linalg.norm(states[-1].points - states[0].points, axis=1)
@@ -124,7 +124,7 @@ _EXACT = "the state is homogeneous, so that every element has it: Newton's resid
 def _force_entry(name: str, element: str, bulk: float) -> Entry:
     return Entry(
         name=name,
-        family="squeeze",
+        group="squeeze",
         title=f"Force of smooth plates that squeeze a block to a tenth of its height, K/mu = {bulk / MU:.0e}, {element}",
         unit="N",
         truth=partial(_force_truth, bulk),
@@ -142,7 +142,7 @@ def _force_entry(name: str, element: str, bulk: float) -> Entry:
 def _volume_entry(name: str, element: str, bulk: float) -> Entry:
     return Entry(
         name=name,
-        family="squeeze",
+        group="squeeze",
         title=f"Volume of that block over its volume at rest, K/mu = {bulk / MU:.0e}, {element}",
         unit="1",
         truth=partial(_volume_truth, bulk),
@@ -160,7 +160,7 @@ def _volume_entry(name: str, element: str, bulk: float) -> Entry:
 def _return_entry(name: str, element: str, bulk: float) -> Entry:
     return Entry(
         name=name,
-        family="squeeze",
+        group="squeeze",
         title=f"How far that block is from its rest state when the plates are back, K/mu = {bulk / MU:.0e}, {element}",
         unit="mm",
         truth=zero,
@@ -169,9 +169,9 @@ def _return_entry(name: str, element: str, bulk: float) -> Entry:
         because=f"{_EXACT}; of an elastic body nothing remembers the squeeze",
         kind="property",
         source="a hyperelastic body that nothing loads or moves is at rest",
-        measure=partial(way_back, element=element, bulk=bulk),
+        measure=partial(distance_from_rest, element=element, bulk=bulk),
         negative_control="load steps that may grow: they lead to the block turned by half a turn, with no energy and det F = 1",
-        with_negative_control=partial(way_back, element=element, bulk=bulk, growing=True),
+        with_negative_control=partial(distance_from_rest, element=element, bulk=bulk, growing=True),
     )
 
 
@@ -183,7 +183,7 @@ ENTRIES = (
     _return_entry("squeeze_return_k1e6", "P2/P1", 1e4),
     Entry(
         name="bonded_squeeze_is_inverted",
-        family="squeeze",
+        group="squeeze",
         title="Squeezed to 0.4 of its height between plates that it sticks to, Q1/P0 folds over at its corners, as reported",
         unit="1",
         truth=_one,
@@ -198,7 +198,7 @@ ENTRIES = (
     ),
     Entry(
         name="bonded_squeeze_stays_upright",
-        family="squeeze",
+        group="squeeze",
         title="Squeezed to 0.7 of its height between plates that it sticks to, Q2/Q1 keeps det F above zero everywhere",
         unit="1",
         truth=_one,
@@ -213,7 +213,7 @@ ENTRIES = (
     ),
     Entry(
         name="bonded_squeeze_with_vertices",
-        family="squeeze",
+        group="squeeze",
         title="Squeezed to 0.4 of its height between plates that it sticks to, P2/P1 keeps det F above zero everywhere",
         unit="1",
         truth=_one,

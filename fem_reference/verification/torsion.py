@@ -72,7 +72,7 @@ _NEO_HOOKE = partial(neo_hooke, MU, BULK)
 _MOONEY_RIVLIN = partial(mooney_rivlin, C1, C2, BULK)
 _CYLINDER = partial(
     Entry,
-    family="torsion",
+    group="torsion",
     relative=True,
     kind="closed form",
     source="Rivlin 1949, doi 10.1098/rsta.1949.0009; validation/rivlin.py Torsion",
@@ -81,7 +81,7 @@ _MOMENT = partial(_CYLINDER, unit="N mm")
 _FORCE = partial(_CYLINDER, unit="N")
 _SQUARE = partial(
     Entry,
-    family="torsion",
+    group="torsion",
     unit="N mm2",
     truth=_true_square_bar,
     relative=True,

@@ -1,4 +1,4 @@
-"""The door to ``validation/``: closed forms and published numbers, which know nothing of this package."""
+"""Access to ``validation/``: closed forms and published numbers, which know nothing of this package."""
 
 import importlib
 import importlib.util

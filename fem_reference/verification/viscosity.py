@@ -11,9 +11,9 @@ from fem_reference.verification import truths
 from fem_reference.verification.homogeneous import MU, NEO
 from fem_reference.verification.parts import SYMMETRY, resistance
 
-FAMILY = "viscosity"
+GROUP = "viscosity"
 _ETA, _SECONDS = 0.02, 1.5  # MPa s; s from a frame number to the next
-_BULK = 1e6 * MU  # so high that the truth of incompressible material holds to 1e-6
+_BULK = 1e6 * MU  # so high that the truth of incompressible material is met to 1e-6
 _STEPS = (1 / 32, 1 / 64, 1 / 128)
 _SOURCE = "validation/viscosity.py"
 
@@ -49,7 +49,7 @@ def _force(lab: Lab, eta: float = _ETA) -> Finding:
 
 _SQUEEZE = Entry(
     name="viscous_squeeze",
-    family=FAMILY,
+    group=GROUP,
     title="Viscous block that smooth plates squeeze to half its height: their force, by load steps that are halved",
     unit="N",
     truth=_known_force,
@@ -94,7 +94,7 @@ def _creep(lab: Lab, eta: float = _ETA) -> Finding:
 
 _CREEP = Entry(
     name="viscous_creep",
-    family=FAMILY,
+    group=GROUP,
     title="Viscous block that creeps back when its weight is gone: rate, by load steps that are halved",
     unit="1/s",
     truth=_known_rate,

@@ -102,9 +102,9 @@ def _pass_on(problem: Problem, frame: Frame, sink: Sink, passed: list[int]) -> N
 
 
 def _with_attachment_errors(problem: Problem, frame: Frame) -> Frame:
-    """The frame with how far the surface vertices attached to bones are from where the bones have them, ``held_off_rms`` and
-    ``held_off_max`` [mm]: exact attachments are facets of tets, which cover them only roughly, and springs yield. As it is
-    where nothing is attached.
+    """The frame with how far attached surface vertices are from where their bones have them, ``attachment_error_rms``
+    and ``attachment_error_max`` [mm]: exact attachments are facets of tets, which cover them only roughly, and springs
+    yield. As it is where nothing is attached.
     """
     surface = frame.surface
     if not problem.attached or surface is None:
@@ -119,7 +119,7 @@ def _with_attachment_errors(problem: Problem, frame: Frame) -> Frame:
             for attached in problem.attached
         ]
     )
-    scalars = {"held_off_rms": float(np.sqrt(np.mean(off**2))), "held_off_max": float(off.max())}
+    scalars = {"attachment_error_rms": float(np.sqrt(np.mean(off**2))), "attachment_error_max": float(off.max())}
     return replace(frame, scalars=frame.scalars | scalars)
 
 

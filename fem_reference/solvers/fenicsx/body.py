@@ -1,4 +1,4 @@
-"""A body as DOLFINx sees it: spaces, the weak form summed from the effects, what is prescribed, and Newton's method.
+"""A body in DOLFINx: spaces, the weak form summed from the effects, boundary conditions, and Newton's method.
 
 Every method is collective: all ranks call it and, where it returns a value, get the same one.
 """

@@ -1,6 +1,4 @@
-"""Boundary conditions on a region: exactly, by conditions on its unknowns, or by springs over its facets or at points of a skin;
-and the force that it takes.
-"""
+"""Boundary conditions on a region, exact or by springs over its facets or at points of a skin, and their reaction forces."""
 
 from typing import Any
 

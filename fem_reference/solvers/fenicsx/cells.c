@@ -13,7 +13,7 @@
 #define VARIABLES (3 * KINDS + (PRESSURES > 0))
 #define SECOND (VARIABLES * (VARIABLES + 1) / 2)
 #define UNKNOWNS (3 * NODES + PRESSURES)
-#define WIDE ((NODES + 3) / 4) /* vectors of four that hold a number for each node */
+#define WIDE ((NODES + 3) / 4) /* vectors of four with a number for each node */
 #define ROWS (POINTS * KINDS)
 
 typedef double vector __attribute__((vector_size(32), aligned(32)));

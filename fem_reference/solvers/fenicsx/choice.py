@@ -1,4 +1,4 @@
-"""Which solver of linear systems is taken."""
+"""Choice of the solver of linear systems."""
 
 from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolver
 from fem_reference.solvers.fenicsx.multigrid import Multigrid

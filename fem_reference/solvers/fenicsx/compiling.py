@@ -1,6 +1,4 @@
-"""Compilation of forms: patiently where another process compiles the same, past what one left half-done, and for this
-machine.
-"""
+"""Compilation of forms for this machine: it waits where another process compiles the same, and removes what one left half-done."""
 
 import hashlib
 import os

@@ -1,4 +1,4 @@
-"""Where det F is smallest: the check that a converged state is physically possible."""
+"""The smallest det F of a state: the check that a converged state is physically possible."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -1,4 +1,4 @@
-"""The one place where DOLFINx is imported: the PyPI wheel if it is there, else whatever build is installed (conda, Debian)."""
+"""The import of DOLFINx: the PyPI wheel if it is there, else whatever build is installed (conda, Debian)."""
 
 import contextlib
 

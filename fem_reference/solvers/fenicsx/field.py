@@ -1,4 +1,4 @@
-"""Scalar fields in FEniCSx, the side that needs none: Lagrange elements, assembled and solved in a process of its own."""
+"""Scalar fields by Lagrange elements of FEniCSx, solved in a process of its own; this module needs no FEniCSx."""
 
 import pickle
 import tempfile

@@ -41,7 +41,7 @@ class Form:
 
     ``energy`` that is stored and ``volume`` as integrals, det F as ``determinant``, the ``fibre_stretch`` that energies see (None
     without fibres); to be set: ``amounts`` by effect, ``rate``
-    [1/s] of the load step and the unknowns ``before`` it (None where time does not matter); ``rule``: points (q, 3) and weights
+    [1/s] of the load step and the unknowns ``before`` it (None where nothing depends on time); ``rule``: points (q, 3) and weights
     (q,) of the quadrature, of ``degree``; ``regions``: by name, this rank's facets.
     """
 

@@ -1,4 +1,4 @@
-"""What is passed to the process that solves, and what a frame brings back."""
+"""Messages between the caller and the process that solves: jobs and frames."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

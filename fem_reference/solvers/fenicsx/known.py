@@ -1,4 +1,4 @@
-"""States that were solved before: where everything that acts is as it was at an earlier frame, the state is that of then."""
+"""States of earlier frames, used again where loads and boundary conditions are the same."""
 
 from dataclasses import dataclass
 

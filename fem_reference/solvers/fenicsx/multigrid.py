@@ -1,5 +1,4 @@
-"""Systems of linear equations too large for a factorisation: FGMRES with two levels of elements, P2 and P1, and a mass matrix of
-the pressure.
+"""Systems of linear equations too large for a factorisation: FGMRES with two levels of elements, P2 and P1.
 
 The preconditioner is block triangular (Murphy, Golub and Wathen 2000, doi 10.1137/S1064827599355153). For the displacement: one
 cycle between the quadratic element and the linear one on the same cells, smoothed by Chebyshev polynomials, the coarse level

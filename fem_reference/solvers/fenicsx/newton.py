@@ -64,9 +64,9 @@ class Newton:
         return None, iterations
 
     def _begin(self, frame: float) -> float:
-        """The first iteration's system. An obstruction that jumps to its next pose would meet points that have not moved yet, push
-        them with forces that are no measure of anything, and send the first iteration astray: so that one starts from the settled
-        pushes, and is linear in how the obstructions go on.
+        """The first iteration's system. Obstructions at their next poses would meet points that have not moved yet, and forces
+        without meaning would lead it astray: it starts from the contact pressures of the last state, and is linear in the
+        motion of the obstructions.
         """
         moves = -self.system.missing()
         if self.system.contact is None:

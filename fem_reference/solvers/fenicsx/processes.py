@@ -64,7 +64,7 @@ class Process:
     def ending(self, kept: str) -> Outcome:
         """How it ended without a report; ``kept`` says what there is all the same."""
         code = self.process.wait()
-        self.listener.join(timeout=5)  # its last words may still be under way
+        self.listener.join(timeout=5)  # its last lines may still arrive
         if self.overran is not None:
             return Outcome("timed out", f"stopped after {self.overran:g} s, the time limit; {kept}")
         return Outcome("crashed", f"the FEniCSx process ended with exit status {code} ({self._reason()}); {kept}")

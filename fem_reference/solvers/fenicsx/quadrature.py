@@ -1,4 +1,4 @@
-"""Rules of quadrature: where in a cell the energies are looked at."""
+"""Quadrature rules for the energies in a cell."""
 
 import basix
 import numpy as np

@@ -1,4 +1,4 @@
-"""What a solution takes and what the machine has: unknowns, memory, free cores; needs no FEniCSx."""
+"""Unknowns and memory that a solution takes, memory and free cores that the machine has; needs no FEniCSx."""
 
 import os
 import time

@@ -1,4 +1,4 @@
-"""Whether a state is a stable equilibrium: how many directions there are in which its energy falls."""
+"""Stability of a state of equilibrium: the number of directions in which its energy falls."""
 
 import numpy as np
 from dolfinx import fem

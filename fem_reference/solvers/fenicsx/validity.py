@@ -1,4 +1,4 @@
-"""Whether the laws of a body are used where they are meant, and whether the body has collapsed: judged by means over cells.
+"""Checks of a state by means over cells: laws within the range that they are meant for, and no collapsed body.
 
 By means, since the strain at the rim of what is attached has no bound in the exact solution: det F at a vertex there may be far
 off in a cell that has kept its volume. A mean may be off there too, in single cells (0.37 and 1.9 in ``gluteus_maximus``, with a

@@ -1,1 +1,1 @@
-"""How fast solvers are: ``candidates`` of Table 5.1, and the finite element ``reference``, also against an earlier commit."""
+"""Benchmarks: the ``candidates`` of Table 5.1, and the finite element ``reference``, also against an earlier commit."""

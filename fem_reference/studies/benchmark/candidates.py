@@ -1,4 +1,4 @@
-"""How fast solvers are, in processor time, beside the speed of the machine and that of the report's own program.
+"""The speed of solvers in processor time, beside that of the machine and that of the report's own program.
 
 Processor time, of all threads together, is what a machine shared by many can report; and a ratio within one run is what compares
 with another.
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fem_reference import solvers
-from fem_reference.assessment.solver_table import families, report_speeds
+from fem_reference.assessment.solver_table import report_speeds, solver_kinds
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record
 from fem_reference.report.tables import finite
@@ -93,7 +93,7 @@ def measure(benches: Iterable[Bench]) -> tuple[list[Timing], Machine]:
 
 def _candidates(bench: Bench) -> list[tuple[Candidate, str]]:
     """Who iterates from frame number to frame number: what was recorded does not, nor do lines of action."""
-    found = [entry for row in families() for entry in chosen(bench.scene, row)]
+    found = [entry for row in solver_kinds() for entry in chosen(bench.scene, row)]
     return [entry for entry in found if entry[0].solver not in ("recorded", "line_of_action")]
 
 

@@ -1,4 +1,4 @@
-"""The families of models of Table 5.1 on scenes: who is measured, how fast, how far off, and what the page and the command say."""
+"""The kinds of solvers in Table 5.1 on scenes: who is measured, how fast, how far off, and what the page and the command say."""
 
 import json
 import math
@@ -11,7 +11,7 @@ import stand_ins
 
 from fem_reference import cli, report
 from fem_reference.assessment import solver_table
-from fem_reference.assessment.solver_table import Family, Overall, Scenario, SolverResult, Table
+from fem_reference.assessment.solver_table import Overall, Scenario, SolverKind, SolverResult, Table
 from fem_reference.metrics import Measure
 from fem_reference.report import overview, ranking_page
 from fem_reference.runs import store
@@ -27,8 +27,8 @@ pytestmark = pytest.mark.slow
 
 PBD = {"sub_iterations": 1, "solver_iterations": 1, "damping": 0.0, "stretch": 1.0, "volume": 1.0, "bending": 0.5}
 ROWS = (
-    Family(name="FEM", form="Volumetric model", speed="---", precision="+++", literature="[59]"),
-    Family(
+    SolverKind(name="FEM", form="Volumetric model", speed="---", precision="+++", literature="[59]"),
+    SolverKind(
         name="PBD",
         form="Surface model",
         speed="++",
@@ -50,10 +50,10 @@ def shift(problem, _, sink) -> Outcome:
 
 @pytest.fixture
 def case(tmp_path, monkeypatch):
-    """The small scene, its reference shifted, and a table of two families."""
+    """The small scene, its reference shifted, and a table of two kinds."""
     stand_ins.solve_by(monkeypatch, fenicsx, shift)
-    monkeypatch.setattr(table_5_1, "families", lambda: ROWS)
-    monkeypatch.setattr(candidates, "families", lambda: ROWS)
+    monkeypatch.setattr(table_5_1, "solver_kinds", lambda: ROWS)
+    monkeypatch.setattr(candidates, "solver_kinds", lambda: ROWS)
     return small.write(tmp_path / "bar")
 
 
@@ -65,7 +65,7 @@ def page(case, *words: str) -> tuple[int, dict, str]:
 
 def test_the_rows_are_those_of_the_report() -> None:
     # Table 5.1: algorithm, form, speed, precision.
-    assert [(row.name, row.form, row.speed, row.precision) for row in solver_table.families()] == [
+    assert [(row.name, row.form, row.speed, row.precision) for row in solver_table.solver_kinds()] == [
         ("Hill-type", "Single line", "+++", "---"),
         ("Via-points", "Polyline", "++", "--"),
         ("Wrap. obst.", "Complex curve", "+", "-"),
@@ -80,17 +80,17 @@ def test_the_rows_are_those_of_the_report() -> None:
 def test_everybody_is_measured_against_the_reference(case) -> None:
     status, facts, html = page(case)
     assert status == cli.DONE
-    assert [(one["family"], one["name"]) for one in facts["standings"]] == [
+    assert [(one["kind"], one["name"]) for one in facts["results"]] == [
         ("FEM", "reference"),
         ("PBD", "pbd"),
         ("PBD", "still"),
     ]
-    reference, _, still = facts["standings"]
+    reference, _, still = facts["results"]
     # 8 s for the four frames after the first; nobody asked for its error bar.
     assert reference["seconds_per_frame"] == 2.0
     assert set(reference["worst"].values()) == {None}
-    # Nothing but what bones hold moves in a solver without constraints: in frame 20, where they are back at rest, the whole surface
-    # is 20 mm below the reference's, and so is that of the greatest displacement, 100 %.
+    # Nothing but attached vertices moves in a solver without constraints: in frame 20, where they are back at rest, the whole
+    # surface is 20 mm below the reference's, and so is that of the greatest displacement, 100 %.
     assert still["worst"]["surface_deviation.rms"] == pytest.approx({"value": 20.0, "frame": 20, "unit": "mm"})
     assert still["worst"]["surface_deviation.rms_percent"]["value"] == pytest.approx(100.0)
     assert facts["scenarios"][0]["travel_mm"] == pytest.approx(20.0)
@@ -109,8 +109,8 @@ def test_a_foreign_solver_stands_in_the_same_table(case, tmp_path) -> None:
     (folder / "candidate.toml").write_text("seconds_per_frame = 0.5\nthreads = 3\n")
     status, facts, html = page(case, "--candidate", f"{case}={folder}")
     assert status == cli.DONE
-    mine = facts["standings"][-1]
-    assert (mine["family"], mine["name"], mine["solver"]) == ("Yours", "mine", "recorded")
+    mine = facts["results"][-1]
+    assert (mine["kind"], mine["name"], mine["solver"]) == ("Yours", "mine", "recorded")
     assert mine["seconds_per_frame"] == 0.5
     assert "3 threads" in html
     assert mine["worst"]["surface_deviation.rms"]["value"] == pytest.approx(0.25, abs=1e-4)  # files of single precision
