@@ -184,7 +184,7 @@ def spoken(capsys, *arguments: str) -> tuple[int, str, str]:
             ["run", "rod", "--set", "candidate[1].speed=2"],
             "candidate[1].speed: got nothing, want a key that this scene has",
         ),
-        (["run", "rod", "--set", "expect[0].measure=beauty"], 'expect[0].measure: got "beauty", want one of'),
+        (["run", "rod", "--set", "expect[0].metric=beauty"], 'expect[0].metric: got "beauty", want one of'),
         (["run", "rod", "--set", "expect[0].of=nobody"], 'expect[0].of: got "nobody", want one of reference'),
         (["run", "rod", "--set", "effect[0].name=neo_hooke"], 'got "neo_hooke", want one of advection, diffusion'),
         (["run", "hip_flexion", "--set", "effect[0].name=diffusion"], 'got "diffusion", want one of active_tension'),
@@ -203,7 +203,7 @@ def test_peclet_is_a_parameter_of_the_rod(tmp_path, capsys) -> None:
     arguments = ["run", "rod", "--solver", "listing", "--out", str(tmp_path), "--quiet"]
     status, out, _ = spoken(capsys, *arguments, "--set", "candidate[1].peclet=10")
     assert status == cli.VERDICT_FAIL
-    assert "listing min: -0.105\n" in out
+    assert "listing minimum: -0.105\n" in out
     for domain in ("{nodes=[0.0, 0.3, 1.0]}", "{interval={start=0.0, end=1.0, count=20}}"):  # given, and evenly spaced
         status, out, _ = spoken(capsys, *arguments, "--set", f"domain={domain}")
         assert status == cli.DONE
@@ -246,7 +246,7 @@ solver = "scikit_fem"
 form = "galerkin"
 [[expect]]
 of = "reference"
-measure = "max"
+metric = "maximum"
 truth = 0.0
 within = 1.0
 kind = "property"
@@ -267,7 +267,7 @@ def test_a_reference_that_fails_is_reported_in_full(tmp_path, capsys) -> None:
     )
     assert status == cli.SOLVER_FAILED
     assert "no unique solution" in out
-    assert "fail: reference max is not a number" in out
+    assert "fail: reference maximum is not a number" in out
     assert (tmp_path / "out" / tmp_path.name / "report.html").is_file()
     assert '"diverged"' in target.read_text()
 
@@ -277,6 +277,6 @@ def test_a_candidate_can_be_run_by_its_name(tmp_path, capsys) -> None:
         capsys, "run", "rod_advection", "--solver", "plain_galerkin", "--out", str(tmp_path), "--quiet"
     )
     assert status == cli.DONE
-    assert "pass: plain_galerkin min is -0.428571" in out
+    assert "pass: plain_galerkin minimum is -0.428571" in out
     state = json.loads((tmp_path / "runs" / "rod_advection" / "plain_galerkin" / "run.json").read_text())
     assert state["form"] == "galerkin", "what was solved, and not what the scene asks for"

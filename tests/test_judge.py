@@ -9,7 +9,7 @@ import pytest
 from fem_reference.assessment.judge import check, judge, overall, verdict
 from fem_reference.foundations.errors import InputError
 from fem_reference.metrics import Measure
-from fem_reference.scenes.muscle import Expectation
+from fem_reference.scenes.case import Expectation
 
 NUMBERS = (0, 10, 20)
 
@@ -31,7 +31,7 @@ def judged(values, unit="%", **changes):
 
 
 def checked(**changes) -> None:
-    check(SimpleNamespace(expect=(expectation(**changes),), place="case.toml", frames=SimpleNamespace(numbers=NUMBERS)))
+    check(SimpleNamespace(expect=(expectation(**changes),), place="case.toml", numbers=NUMBERS))
 
 
 def test_pass_only_within_the_tolerance() -> None:

@@ -11,7 +11,7 @@ from fem_reference.foundations.motion import Rotation, apply
 from fem_reference.io import files
 from fem_reference.problems.muscle import AttachedVertices, Problem
 from fem_reference.runs.store import Frame
-from fem_reference.scenes.muscle import SolverChoice
+from fem_reference.scenes.case import SolverChoice
 
 pytestmark = pytest.mark.slow
 

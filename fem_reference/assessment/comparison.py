@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from fem_reference.assessment.error_bars import ErrorBars, Of
-from fem_reference.assessment.judge import Verdict, Word, overall, verdict
+from fem_reference.assessment.judge import Verdict, Word, overall, resolved, verdict
 from fem_reference.assessment.ranking import Ranking, rankings
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.markup import table
@@ -13,7 +13,8 @@ from fem_reference.metrics import Measure, MeasurementContext, at_rest, find, me
 from fem_reference.metrics.fibre_length import extension_error
 from fem_reference.problems.muscle import Setup
 from fem_reference.runs.store import Run
-from fem_reference.scenes.muscle import Expectation, Scene
+from fem_reference.scenes.case import Expectation
+from fem_reference.scenes.muscle import MuscleCase
 
 # What a notebook shows of a candidate; the page has it all.
 _SHOWN = (
@@ -31,7 +32,7 @@ class Comparison:
     extension makes on the reference's own surface. ``error_bars``: how well the reference is known, None without any.
     """
 
-    scene: Scene
+    scene: MuscleCase
     setup: Setup
     reference: Run
     candidates: tuple[Run, ...]
@@ -80,7 +81,7 @@ class Comparison:
 
 
 def compare(
-    scene: Scene, setup: Setup, reference: Run, candidates: tuple[Run, ...], error_bars: ErrorBars | None = None
+    scene: MuscleCase, setup: Setup, reference: Run, candidates: tuple[Run, ...], error_bars: ErrorBars | None = None
 ) -> Comparison:
     """Measure and judge runs that all have the frames of the scene (``not a number`` where a run did not reach one); with
     ``error_bars`` nothing is judged that they are too wide for. Of a run without a surface only what needs none is judged.
@@ -103,7 +104,7 @@ def compare(
             reference.numbers,
             _bars(error_bars, expectation),
         )
-        for expectation in scene.expect
+        for expectation in map(resolved, scene.expect)
         for name in (deviations if expectation.of == "candidates" else [expectation.of])
         if _is_measured(expectation, measured.get(name, ()))
     )
@@ -111,9 +112,9 @@ def compare(
     return Comparison(scene, setup, reference, candidates, context, deviations, changes, error, verdicts, error_bars)
 
 
-def _check_expected(scene: Scene, measured: dict[str, tuple[Measure, ...]]) -> None:
+def _check_expected(scene: MuscleCase, measured: dict[str, tuple[Measure, ...]]) -> None:
     """InputError where a scene expects of a run by its name what is not measured of it, as it has no surface."""
-    for i, one in enumerate(scene.expect):
+    for i, one in enumerate(map(resolved, scene.expect)):
         if one.of in measured and not _is_measured(one, measured[one.of]):
             got = f"{one.metric}.{one.statistic} of {one.of}, which has no surface"
             raise InputError(join(scene.place, f"expect[{i}]"), got, "a measure of lines")
@@ -121,11 +122,11 @@ def _check_expected(scene: Scene, measured: dict[str, tuple[Measure, ...]]) -> N
 
 def _is_measured(expectation: Expectation, measures: tuple[Measure, ...]) -> bool:
     """Whether what is expected is among ``measures``: of a run without a surface much is not."""
-    return find(measures, expectation.metric, expectation.statistic) is not None
+    return find(measures, expectation.metric, str(expectation.statistic)) is not None
 
 
 def _bars(error_bars: ErrorBars | None, expectation: Expectation) -> Floats | None:
     """The error bars (f,) of what is expected; None without any of it."""
     of: Of = "change" if expectation.of == "reference" else "deviation"
-    found = None if error_bars is None else error_bars.find(of, expectation.metric, expectation.statistic)
+    found = None if error_bars is None else error_bars.find(of, expectation.metric, str(expectation.statistic))
     return None if found is None else found.values

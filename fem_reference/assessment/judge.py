@@ -10,7 +10,8 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import join
 from fem_reference.foundations.units import quantity
 from fem_reference.metrics import Measure, units
-from fem_reference.scenes.muscle import Expectation, Scene
+from fem_reference.scenes.case import Expectation
+from fem_reference.scenes.muscle import MuscleCase
 
 Word = Literal["pass", "fail", "inconclusive", "not judged"]
 _KINDS = {
@@ -18,6 +19,7 @@ _KINDS = {
     "%": ("a fraction", 100.0),
     "mm3": ("a volume", 1.0),
     "deg": ("an angle", 180 / math.pi),
+    "1": ("a number", 1.0),
 }
 
 
@@ -65,24 +67,36 @@ def overall(words: Iterable[Word]) -> Word:
     return next((word for word in order if word in found), "not judged")
 
 
-def check(scene: Scene) -> None:
+def check(scene: MuscleCase) -> None:
     """InputError unless every expectation of the scene is of a measure and a frame that there will be, in its unit."""
-    known, numbers = units(), scene.frames.numbers
-    for i, expectation in enumerate(scene.expect):
-        place, name = join(scene.place, f"expect[{i}]"), f"{expectation.metric}.{expectation.statistic}"
+    known, numbers = units(), scene.numbers
+    for i, entry in enumerate(scene.expect):
+        place, expectation = join(scene.place, f"expect[{i}]"), resolved(entry)
+        name = f"{expectation.metric}.{expectation.statistic}"
         if name not in known:
-            raise InputError(f"{place}: metric and statistic", f'"{name}"', f"one of {', '.join(sorted(known))}")
+            got = f'"{expectation.metric}"' if entry.statistic is None else f'"{name}"'
+            raise InputError(f"{place}: metric and statistic", got, f"one of {', '.join(sorted(known))}")
         for key in ("truth", "within"):
-            text = getattr(expectation, key)
+            given = getattr(expectation, key)
+            got = f'"{given}"' if isinstance(given, str) else repr(given)
             try:
-                value = _number(text, known[name])
+                value = _number(given, known[name])
             except ValueError as error:
-                raise InputError(f"{place}.{key}", f'"{text}"', str(error)) from error
+                raise InputError(f"{place}.{key}", got, str(error)) from error
             if key == "within" and value < 0:
-                raise InputError(f"{place}.{key}", f'"{text}"', "a tolerance of at least zero")
+                raise InputError(f"{place}.{key}", got, "a tolerance of at least zero")
         if expectation.frame != "any" and expectation.frame not in numbers:
             want = f'"any" or one of {numbers[0]}, {numbers[1]}, ..., {numbers[-1]}'
             raise InputError(f"{place}.frame", expectation.frame, want)
+
+
+def resolved(expectation: Expectation) -> Expectation:
+    """An ``expectation`` with its statistic: where it has none, the only one that its metric has."""
+    start = f"{expectation.metric}."
+    names = [name.removeprefix(start) for name in units() if name.startswith(start)]
+    if expectation.statistic is not None or len(names) != 1:
+        return expectation
+    return expectation.model_copy(update={"statistic": names[0]})
 
 
 def verdict(
@@ -111,6 +125,7 @@ def verdict(
     return Verdict(word, expectation, values[decides], truth, within, found.unit, frame, bar)
 
 
-def _number(text: str, unit: str) -> float:
+def _number(given: str | float, unit: str) -> float:
+    """A truth or tolerance in the ``unit`` of a measure; a bare number only where that has none."""
     kind, factor = _KINDS[unit]
-    return quantity(text, kind) * factor
+    return float(given) if unit == "1" and not isinstance(given, str) else quantity(given, kind) * factor

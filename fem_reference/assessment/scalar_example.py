@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs.scalar import FieldRun
-from fem_reference.scenes.scalar import FieldExpectation, FieldScene
+from fem_reference.scenes.case import Expectation
+from fem_reference.scenes.scalar import ScalarCase
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class FieldVerdict:
     """How an expectation came out."""
 
     word: str
-    expectation: FieldExpectation
+    expectation: Expectation
     value: float
 
 
@@ -44,7 +45,7 @@ class Ladder:
 class Example:
     """A case: its problem, its ``reference`` run and ``candidates`` (their measures against it), verdicts and convergence."""
 
-    scene: FieldScene
+    scene: ScalarCase
     problem: FieldProblem
     reference: FieldRun
     candidates: tuple[FieldRun, ...]

@@ -6,7 +6,7 @@ import os
 from fem_reference.cli.printing import DONE, SOLVER_FAILED, out, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.scenes import casefile
-from fem_reference.scenes.muscle import DATA_SETTING
+from fem_reference.scenes.case import DATA_SETTING
 from fem_reference.studies.benchmark import candidates, checkout, reference, reference_table
 from fem_reference.studies.execution import Bench
 

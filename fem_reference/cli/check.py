@@ -12,11 +12,11 @@ from fem_reference.assessment import baseline, regression
 from fem_reference.assessment.measured import CurrentMeasures
 from fem_reference.cli.choosing import check_names, checked_bench, choose, scene_of
 from fem_reference.cli.printing import DONE, SOLVER_FAILED, VERDICT_FAIL, write_output
-from fem_reference.foundations.errors import InputError
 from fem_reference.io import files
 from fem_reference.report import regression_texts
 from fem_reference.runs.store import Run
-from fem_reference.scenes.muscle import Candidate, Scene
+from fem_reference.scenes import casefile
+from fem_reference.scenes.case import Candidate
 from fem_reference.studies import refinement
 from fem_reference.studies.execution import Bench
 
@@ -37,9 +37,7 @@ def add_options(parser: argparse.ArgumentParser, unit: str) -> None:
 def check(options: argparse.Namespace) -> int:
     """Judge a candidate by its baseline, after having written that anew where it is asked for."""
     begin = time.perf_counter()
-    scene = scene_of(options)
-    if not isinstance(scene, Scene):
-        raise InputError("CASE", f'"{options.case}", a scalar case', "the case of a muscle")
+    scene = casefile.muscle(scene_of(options), "CASE")
     chosen = choose(scene, options.candidate, options.unit)
     check_names([chosen[0].name])
     bench = checked_bench(scene, options, [chosen])

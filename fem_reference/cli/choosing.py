@@ -7,23 +7,23 @@ from fem_reference.assessment import judge
 from fem_reference.cli.printing import out
 from fem_reference.foundations.errors import InputError
 from fem_reference.scenes import casefile
-from fem_reference.scenes.muscle import Candidate, Scene
-from fem_reference.scenes.scalar import FieldScene
+from fem_reference.scenes.case import Candidate, Case
+from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import recorded
 from fem_reference.studies.execution import Bench
 
 
-def scene_of(options: argparse.Namespace) -> Scene | FieldScene:
+def scene_of(options: argparse.Namespace) -> Case:
     """The scene of the case, with what ``--set`` changes of it."""
     return casefile.read(options.case, changes=dict(map(casefile.setting, options.set)))
 
 
-def own_candidates(scene: Scene) -> list[tuple[Candidate, str]]:
+def own_candidates(scene: MuscleCase) -> list[tuple[Candidate, str]]:
     """The candidates of the scene, each with its place."""
     return [(candidate, f"candidate[{i}]") for i, candidate in enumerate(scene.candidate)]
 
 
-def choose(scene: Scene, text: str, unit: str | None) -> tuple[Candidate, str]:
+def choose(scene: MuscleCase, text: str, unit: str | None) -> tuple[Candidate, str]:
     """The candidate of the scene with this name, else the recorded frames in this folder; and the place that chooses it."""
     names = [candidate.name for candidate in scene.candidate]
     if text in names:
@@ -46,7 +46,7 @@ def check_names(names: list[str]) -> None:
             raise InputError("--candidate", f'"{name}" twice', "folders and candidates of different names")
 
 
-def checked_bench(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> Bench:
+def checked_bench(scene: MuscleCase, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> Bench:
     """The bench of a scene whose expectations, reference and ``chosen`` candidates can all be read."""
     judge.check(scene)
     bench = Bench(scene, out(options) / "runs", options.ranks)

@@ -3,12 +3,11 @@
 import argparse
 from pathlib import Path
 
+from fem_reference.cli.choosing import scene_of
 from fem_reference.cli.printing import DONE, lines, out, write_output
 from fem_reference.export import FORMATS
 from fem_reference.export import export as write
-from fem_reference.foundations.errors import InputError
 from fem_reference.scenes import casefile
-from fem_reference.scenes.muscle import Scene
 from fem_reference.studies.execution import Bench
 
 
@@ -23,9 +22,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def export(options: argparse.Namespace) -> int:
     """Write a case for a solver that is not ours."""
-    scene = casefile.read(options.case, changes=dict(map(casefile.setting, options.set)))
-    if not isinstance(scene, Scene):
-        raise InputError(scene.place, "the scene of a scalar field", "the scene of a muscle")
+    scene = casefile.muscle(scene_of(options))
     bench = Bench(scene, out(options) / "runs")
     written = write(scene, bench.problem, options.to, options.format)
     facts = {"case": scene.name, "folder": str(options.to), "files": written}

@@ -8,8 +8,8 @@ from fem_reference import report
 from fem_reference.foundations.errors import InputError
 from fem_reference.report.overview import field_example_facts, field_facts, field_text
 from fem_reference.scenes import casefile
-from fem_reference.scenes.muscle import SolverChoice
-from fem_reference.scenes.scalar import FieldScene
+from fem_reference.scenes.case import SolverChoice
+from fem_reference.scenes.scalar import ScalarCase
 from fem_reference.studies import scalar
 
 PAGES = {
@@ -31,7 +31,7 @@ class Printed:
     word: str
 
 
-def run(scene: FieldScene, solver: str | None, out: Path) -> Printed:
+def run(scene: ScalarCase, solver: str | None, out: Path) -> Printed:
     """A scalar case by its reference, with a page, or by another ``solver`` or the candidate of that name: what can be measured
     without another run, judged.
     """
@@ -50,7 +50,7 @@ def run(scene: FieldScene, solver: str | None, out: Path) -> Printed:
     return Printed(facts, field_text(facts), _word([facts]))
 
 
-def compare(scene: FieldScene, candidates: list[str] | None, out: Path) -> Printed:
+def compare(scene: ScalarCase, candidates: list[str] | None, out: Path) -> Printed:
     """A scalar case with its reference, ``candidates`` (None for all) and convergence, on a page of its own."""
     known = [candidate.name for candidate in scene.candidate]
     for name in candidates or []:
@@ -65,7 +65,7 @@ def compare(scene: FieldScene, candidates: list[str] | None, out: Path) -> Print
 def page(name: str, out: Path) -> Printed:
     """The page ``name`` over several cases."""
     title, names = PAGES[name]
-    scenes = [scene for scene in map(casefile.read, names) if isinstance(scene, FieldScene)]
+    scenes = [scene for scene in map(casefile.read, names) if isinstance(scene, ScalarCase)]
     examples = tuple(scalar.example(scene, out / "runs") for scene in scenes)
     facts, path = [field_example_facts(example) for example in examples], out / f"{name}.html"
     report.write_examples(title, examples, path, differences=True)

@@ -24,8 +24,9 @@ from fem_reference.report.overview import (
 from fem_reference.report.ranking_page import facts as ranking_facts
 from fem_reference.runs import store
 from fem_reference.scenes import casefile
-from fem_reference.scenes.muscle import Candidate, Scene, SolverChoice
-from fem_reference.scenes.scalar import FieldScene
+from fem_reference.scenes.case import Candidate, SolverChoice
+from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.scenes.scalar import ScalarCase
 from fem_reference.solvers import recorded
 from fem_reference.studies import refinement, table_5_1, true_errors
 from fem_reference.studies.execution import Bench, complete
@@ -45,9 +46,10 @@ def demo(options: argparse.Namespace) -> int:
 def compare(options: argparse.Namespace) -> int:
     """Measure candidates against the reference."""
     scene = scene_of(options)
-    if isinstance(scene, FieldScene):
+    if isinstance(scene, ScalarCase):
         _refuse_error_bar(options)
         return _printed(scalar.compare(scene, options.candidate, out(options)), options)
+    scene = casefile.muscle(scene)
     wanted = options.candidate or [candidate.name for candidate in scene.candidate]
     return _judge(scene, options, [choose(scene, text, options.unit) for text in wanted])
 
@@ -55,9 +57,10 @@ def compare(options: argparse.Namespace) -> int:
 def run(options: argparse.Namespace) -> int:
     """Solve a case, and judge what it expects of the reference."""
     scene = scene_of(options)
-    if isinstance(scene, FieldScene):
+    if isinstance(scene, ScalarCase):
         _refuse_error_bar(options)
         return _printed(scalar.run(scene, options.solver, out(options)), options)
+    scene = casefile.muscle(scene)
     if options.solver is None or options.solver == scene.reference.solver:
         return _judge(scene, options, [])
     _refuse_error_bar(options)
@@ -72,7 +75,7 @@ def _refuse_error_bar(options: argparse.Namespace) -> None:
         raise InputError("--error-bar", "a scalar case or another solver", "the reference of a muscle")
 
 
-def _choice(scene: Scene, solver: str) -> SolverChoice:
+def _choice(scene: MuscleCase, solver: str) -> SolverChoice:
     """How the scene chooses ``solver``: its settings as a candidate, else no settings."""
     return next((entry for entry in scene.candidate if entry.solver == solver), SolverChoice(solver=solver))
 
@@ -153,7 +156,7 @@ def verify(options: argparse.Namespace) -> int:
     return status
 
 
-def _judge(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
+def _judge(scene: MuscleCase, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
     """Reference and candidates -> page, JSON and exit status. What is bad in the input shows before anything is solved."""
     check_names([entry.name for entry, _ in chosen])
     bench = checked_bench(scene, options, chosen)
@@ -163,7 +166,7 @@ def _judge(scene: Scene, options: argparse.Namespace, chosen: list[tuple[Candida
         entry.name: bench.obtain(entry.name, entry, place) for entry, place in chosen if entry.solver != "recorded"
     }
     bars = refinement.obtain(bench, reference) if options.error_bar else refinement.offered(bench, reference)
-    numbers = scene.frames.numbers
+    numbers = scene.numbers
     candidates = tuple(complete((read | solved)[entry.name], numbers) for entry, _ in chosen)
     result = comparison.compare(scene, bench.setup(), complete(reference, numbers), candidates, bars)
     page = report.write(result, out(options) / scene.name)
@@ -195,10 +198,11 @@ def _stored(folder: Path) -> str:
 def show(options: argparse.Namespace) -> int:
     """Say what a case is made of."""
     scene = scene_of(options)
-    if isinstance(scene, FieldScene):
+    if isinstance(scene, ScalarCase):
         facts = field_scene_facts(scene, FieldBench(scene, out(options)).problem)
         write_output(facts, "\n".join(lines(facts)), options)
         return DONE
+    scene = casefile.muscle(scene)
     bench = checked_bench(scene, options, own_candidates(scene))
     facts = scene_facts(scene, bench.setup())
     if options.out is not None:

@@ -20,8 +20,8 @@ from fem_reference.problems.scalar import FieldProblem
 from fem_reference.report.words import exact
 from fem_reference.runs.scalar import FieldRun
 from fem_reference.runs.store import Run
-from fem_reference.scenes.muscle import Scene
-from fem_reference.scenes.scalar import FieldScene
+from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.scenes.scalar import ScalarCase
 
 # The statistics that are printed of a comparison; the page, JSON and CSV have them all.
 TOLD = (
@@ -35,7 +35,7 @@ TOLD = (
 )
 
 
-def scene_facts(scene: Scene, setup: Setup) -> dict[str, Any]:
+def scene_facts(scene: MuscleCase, setup: Setup) -> dict[str, Any]:
     """Everything that a person asks of a case before solving it, as words and numbers by name."""
     surface = setup.surface
     return {
@@ -99,7 +99,7 @@ def _motion(motion: RigidMotion | None) -> str:
     return f"turns about ({x:g}, {y:g}, {z:g}) mm along {motion.axis}, rad at frame: {keys}"
 
 
-def field_scene_facts(scene: FieldScene, problem: FieldProblem) -> dict[str, Any]:
+def field_scene_facts(scene: ScalarCase, problem: FieldProblem) -> dict[str, Any]:
     """Everything that a person asks of a scalar case before solving it."""
     return {
         "case": scene.name,
@@ -114,7 +114,7 @@ def field_scene_facts(scene: FieldScene, problem: FieldProblem) -> dict[str, Any
         },
         "reference": scene.reference.solver,
         "candidates": {candidate.name: candidate.solver for candidate in scene.candidate},
-        "expects": [f"{e.of} {e.measure}: {e.truth:g} within {e.within:g} ({e.kind})" for e in scene.expect],
+        "expects": [f"{e.of} {e.metric}: {e.truth} within {e.within} ({e.kind})" for e in scene.expect],
     }
 
 
@@ -123,7 +123,7 @@ def _fixed(problem: FieldProblem) -> int:
 
 
 def field_facts(
-    scene: FieldScene, runs: Iterable[FieldRun], measures: Iterable[FieldMeasure], verdicts: Iterable[FieldVerdict]
+    scene: ScalarCase, runs: Iterable[FieldRun], measures: Iterable[FieldMeasure], verdicts: Iterable[FieldVerdict]
 ) -> dict[str, Any]:
     """What came of the runs of a scalar case, the first of them in front, as JSON has it."""
     listed, judged = list(runs), list(verdicts)
@@ -145,7 +145,7 @@ def field_facts(
             for entry in measures
         ],
         "verdicts": [
-            {"word": v.word, "of": v.expectation.of, "metric": v.expectation.measure, "truth": v.expectation.truth}
+            {"word": v.word, "of": v.expectation.of, "metric": v.expectation.metric, "truth": v.expectation.truth}
             | {"within": v.expectation.within, "value": v.value if math.isfinite(v.value) else None}
             for v in judged
         ],
@@ -158,7 +158,7 @@ def field_text(facts: dict[str, Any]) -> str:
     lines = [f"{facts['case']}: {facts['status']}, {facts['message']}"]
     lines += [f"{row['candidate']} {row['metric']}: {_number(row['value'])}" for row in facts["measures"]]
     lines += [
-        f"{v['word']}: {v['of']} {v['metric']} is {_number(v['value'])}, expected {v['truth']:.6g} within {v['within']:.3g}"
+        f"{v['word']}: {v['of']} {v['metric']} is {_number(v['value'])}, expected {v['truth']} within {v['within']}"
         for v in facts["verdicts"]
     ]
     return "\n".join([*lines, f"verdict: {facts['verdict']}", *(f"stored in {folder}" for folder in facts["runs"])])
@@ -237,7 +237,7 @@ def _bar(result: Comparison, bar: ErrorBar) -> str:
     return f"\N{PLUS-MINUS SIGN} {bar.values[bar.worst]:.2g} {bar.unit} at {at}"
 
 
-def run_facts(scene: Scene, run: Run) -> dict[str, Any]:
+def run_facts(scene: MuscleCase, run: Run) -> dict[str, Any]:
     """What came of a run that nothing was compared with."""
     return {
         "case": scene.name,

@@ -25,7 +25,7 @@ from fem_reference.report.viewer import view
 from fem_reference.report.words import listed, ratio, words
 from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
-from fem_reference.scenes.muscle import Scene
+from fem_reference.scenes.muscle import MuscleCase
 
 # The columns of the first table: metric, statistic, the words above a group and above the column, unit.
 COLUMNS = (
@@ -205,7 +205,7 @@ def _flat(table: Any, key: str = "") -> list[tuple[str, Any]]:
     return [(key, table if isinstance(table, str | float | int | None) else json.dumps(table, default=str))]
 
 
-def _changes(scene: Scene) -> list[tuple[str, Any, Any]]:
+def _changes(scene: MuscleCase) -> list[tuple[str, Any, Any]]:
     """Where the scene differs from its file: key, value in the file, value here."""
     try:
         in_file = dict(_flat(_table(casefile.read_muscle(scene.place))))
@@ -217,7 +217,7 @@ def _changes(scene: Scene) -> list[tuple[str, Any, Any]]:
     ]
 
 
-def _table(scene: Scene) -> dict[str, Any]:
+def _table(scene: MuscleCase) -> dict[str, Any]:
     """The scene as nested tables, entries of a list by their number."""
     listed_effects = {"effect": [effect.model_dump(mode="json") for effect in scene.effects]}
     return dict(_numbered(scene.model_dump(mode="json", exclude={"folder", "effect"}) | listed_effects))
@@ -231,6 +231,6 @@ def _numbered(value: Any) -> Any:
     return value
 
 
-def _scene_text(scene: Scene) -> str:
+def _scene_text(scene: MuscleCase) -> str:
     path = Path(scene.place)
     return path.read_text(encoding="utf-8") if path.is_file() else ""

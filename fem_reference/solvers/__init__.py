@@ -14,7 +14,7 @@ from typing import Any, Literal
 from fem_reference.effects import Effect
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record, join, parse
-from fem_reference.scenes.muscle import SolverChoice
+from fem_reference.scenes.case import SolverChoice
 
 Task = Literal["solve", "solve_field", "solve_body"]
 _TASKS: dict[Task, tuple[str, str]] = {

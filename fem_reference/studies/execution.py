@@ -20,7 +20,8 @@ from fem_reference.problems.muscle import Problem, Setup
 from fem_reference.runs import store
 from fem_reference.runs.key import code_hash, key, versions
 from fem_reference.runs.store import Frame, Run
-from fem_reference.scenes.muscle import Scene, SolverChoice
+from fem_reference.scenes.case import SolverChoice
+from fem_reference.scenes.muscle import MuscleCase
 
 log = logging.getLogger(__name__)
 
@@ -35,7 +36,7 @@ _MACHINE_ONLY = {
 class Bench:
     """A scene with what is made from it once and only when needed: its setup, its problem, and where its runs are stored."""
 
-    def __init__(self, scene: Scene, store: Path, ranks: int | None = None) -> None:
+    def __init__(self, scene: MuscleCase, store: Path, ranks: int | None = None) -> None:
         self.scene, self.store, self.ranks = scene, store, ranks
         self.setup: Callable[[], Setup] = cache(lambda: muscle.setup(scene))
         self.problem: Callable[[], Problem] = cache(lambda: _build(scene, self.setup()))
@@ -124,7 +125,7 @@ def _alone(folder: Path) -> Iterator[None]:
         lock.release()
 
 
-def _build(scene: Scene, setup: Setup) -> Problem:
+def _build(scene: MuscleCase, setup: Setup) -> Problem:
     size = scene.muscle.tet_size / 2**scene.muscle.refinements
     log.info("%s: filling the muscle with tetrahedra of %g mm", scene.name, size)
     built = muscle.build(scene, setup)

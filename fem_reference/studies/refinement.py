@@ -21,7 +21,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.metrics import MeasurementContext
 from fem_reference.runs.store import Run
 from fem_reference.scenes.bones import Bone
-from fem_reference.scenes.muscle import Scene
+from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx
 from fem_reference.studies.execution import Bench, complete
 
@@ -49,7 +49,7 @@ class Variation:
     changes: dict[str, Any]
 
 
-def variations(scene: Scene, settings: Any, *, pressed: bool = True) -> tuple[Variation, ...]:
+def variations(scene: MuscleCase, settings: Any, *, pressed: bool = True) -> tuple[Variation, ...]:
     """What is varied apart from tetrahedra: of contact its stiffness and smoothing, and how well the distances to surfaces of bones
     are known and how far they are rounded, unless no bone ``pressed``; load steps, where the reference's ``settings`` have them,
     with drag or viscosity only: else a state does not depend on them.
@@ -65,14 +65,14 @@ def variations(scene: Scene, settings: Any, *, pressed: bool = True) -> tuple[Va
     return tuple(found)
 
 
-def _finer_steps(scene: Scene, settings: Any) -> dict[str, Any]:
+def _finer_steps(scene: MuscleCase, settings: Any) -> dict[str, Any]:
     """At most half the load steps: no step goes beyond a frame, so that ``frames.every`` bounds it as well."""
     largest = min(scene.frames.every, settings.largest_step or math.inf) / 2
     steps = {"first_step": settings.first_step / 2, "largest_step": largest}
     return {"reference": scene.reference.model_copy(update=steps)}
 
 
-def _scaled(scene: Scene, key: str, factor: float) -> tuple[Effect, ...]:
+def _scaled(scene: MuscleCase, key: str, factor: float) -> tuple[Effect, ...]:
     """The effects of a scene, with this key of contact times ``factor``."""
     return tuple(
         effect.model_copy(update={key: factor * getattr(effect, key)}) if isinstance(effect, Contact) else effect
@@ -80,7 +80,7 @@ def _scaled(scene: Scene, key: str, factor: float) -> tuple[Effect, ...]:
     )
 
 
-def _closer(scene: Scene) -> tuple[Bone, ...]:
+def _closer(scene: MuscleCase) -> tuple[Bone, ...]:
     """The bones of a scene, the distances to their surfaces known twice as well and half as round; closed forms are exact."""
     halved = ("distance_error", "distance_rounding")
     return tuple(
@@ -146,7 +146,7 @@ def _pressed(reference: Run) -> bool:
     return area is None or bool(np.nanmax(area) > 0)
 
 
-def finer(bench: Bench, reference: Run, ratio: float) -> Scene:
+def finer(bench: Bench, reference: Run, ratio: float) -> MuscleCase:
     """The scene of a bench on tetrahedra of ``ratio`` times the size, with every other cause of error halved that its bars have."""
     scene, settings = bench.scene, bench.settings(bench.scene.reference, "reference")
     scene = scene.model_copy(
@@ -190,7 +190,7 @@ def _pair(bench: Bench, reference: Run, model: bool) -> Pair:
     return Pair(reference, coarse, sizes, orders, halved, runs.get(_EXACT))
 
 
-def _coarser(scene: Scene) -> tuple[Scene, tuple[float, float]]:
+def _coarser(scene: MuscleCase) -> tuple[MuscleCase, tuple[float, float]]:
     """The scene with larger tetrahedra, and the sizes [mm] of its own and of these."""
     size, refinements = scene.muscle.tet_size, scene.muscle.refinements
     if refinements:
@@ -202,7 +202,7 @@ def _coarser(scene: Scene) -> tuple[Scene, tuple[float, float]]:
     return scene.model_copy(update={"muscle": muscle}), sizes
 
 
-def _solved(bench: Bench, scene: Scene, name: str, reference: Run) -> Run:
+def _solved(bench: Bench, scene: MuscleCase, name: str, reference: Run) -> Run:
     """The reference's run of a changed scene, over the frames of ``reference``."""
     other = Bench(scene, bench.store, bench.ranks)
     try:

@@ -17,13 +17,18 @@ from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs import scalar
 from fem_reference.runs.key import code_hash, versions
 from fem_reference.runs.scalar import FieldRun, Solution
-from fem_reference.scenes.muscle import SolverChoice
-from fem_reference.scenes.scalar import Element, FieldScene
+from fem_reference.scenes.case import SolverChoice
+from fem_reference.scenes.scalar import Element, ScalarCase
 from fem_reference.solvers import scikit_fem
 
 log = logging.getLogger(__name__)
 
-_OF_ONE = ("min", "max", "nodal_error", "l2_error")  # measures of a run by itself; difference is from the reference
+_OF_ONE = (
+    "minimum",
+    "maximum",
+    "nodal_error",
+    "l2_error",
+)  # measures of a run by itself; difference is from the reference
 _REFINEMENTS = {2: 5, 3: 3}  # by vertices of a cell
 _MOST_CELLS = 100_000
 _EXACT = 1e-9  # errors below this share of the solution are rounding on fine meshes, and have no order
@@ -32,7 +37,7 @@ _EXACT = 1e-9  # errors below this share of the solution are rounding on fine me
 class FieldBench:
     """A scalar scene, its problem, and where its runs are stored."""
 
-    def __init__(self, scene: FieldScene, store: Path) -> None:
+    def __init__(self, scene: ScalarCase, store: Path) -> None:
         self.scene, self.store = scene, store / scene.name
         self.problem = field_problem.build(scene)
         _check_expectations(scene)
@@ -65,7 +70,7 @@ class FieldBench:
         }
 
 
-def example(scene: FieldScene, store: Path, candidates: Iterable[str] | None = None) -> Example:
+def example(scene: ScalarCase, store: Path, candidates: Iterable[str] | None = None) -> Example:
     """A case with its reference, the ``candidates`` named (by default all), their verdicts, and its convergence."""
     bench = FieldBench(scene, store)
     chosen = [entry for entry in scene.candidate if candidates is None or entry.name in candidates]
@@ -85,10 +90,10 @@ def example(scene: FieldScene, store: Path, candidates: Iterable[str] | None = N
     )
 
 
-def measure(scene: FieldScene, run: FieldRun, reference: FieldRun | None) -> tuple[FieldMeasure, ...]:
+def measure(scene: ScalarCase, run: FieldRun, reference: FieldRun | None) -> tuple[FieldMeasure, ...]:
     """Everything that can be measured of a run; ``reference`` None where there is none to compare with."""
     values = run.vertex_values
-    found = {"min": float(values.min()), "max": float(values.max())}
+    found = {"minimum": float(values.min()), "maximum": float(values.max())}
     if scene.exact is not None:
         exact = field_problem.at(scene.exact, run.problem.mesh.points)
         found["nodal_error"] = float(np.abs(values - exact).max())
@@ -98,13 +103,13 @@ def measure(scene: FieldScene, run: FieldRun, reference: FieldRun | None) -> tup
     return tuple(FieldMeasure(run.name, name, value) for name, value in found.items())
 
 
-def judged(scene: FieldScene, measures: Iterable[FieldMeasure]) -> tuple[FieldVerdict, ...]:
+def judged(scene: ScalarCase, measures: Iterable[FieldMeasure]) -> tuple[FieldVerdict, ...]:
     """The verdict on each expectation of what was measured."""
     values = {(entry.of, entry.measure): entry.value for entry in measures}
     return tuple(
-        FieldVerdict(judge(values[key], expectation.truth, expectation.within), expectation, values[key])
+        FieldVerdict(judge(values[key], float(expectation.truth), float(expectation.within)), expectation, values[key])
         for expectation in scene.expect
-        if (key := (expectation.of, expectation.measure)) in values
+        if (key := (expectation.of, expectation.metric)) in values
     )
 
 
@@ -113,23 +118,23 @@ def _difference(values: np.ndarray, reference: np.ndarray) -> float:
     return float(np.abs(values - reference).max() / (scale if scale > 0 else 1.0))
 
 
-def _choices(scene: FieldScene) -> list[tuple[str, SolverChoice, str]]:
+def _choices(scene: ScalarCase) -> list[tuple[str, SolverChoice, str]]:
     """Every run that the scene names: its name, who makes it, and where the scene says so."""
     candidates = [(entry.name, entry, f"candidate[{i}]") for i, entry in enumerate(scene.candidate)]
     return [("reference", scene.reference, "reference"), *candidates]
 
 
-def _check_expectations(scene: FieldScene) -> None:
+def _check_expectations(scene: ScalarCase) -> None:
     """InputError unless every expectation is of a measure that there will be."""
     known = [name for name in _OF_ONE if scene.exact is not None or not name.endswith("_error")]
     for i, expectation in enumerate(scene.expect):
         names = known if expectation.of == "reference" else [*known, "difference"]
-        if expectation.measure not in names:
-            place = join(scene.place, f"expect[{i}].measure")
-            raise InputError(place, f'"{expectation.measure}"', f"one of {', '.join(names)}")
+        if expectation.metric not in names:
+            place = join(scene.place, f"expect[{i}].metric")
+            raise InputError(place, f'"{expectation.metric}"', f"one of {', '.join(names)}")
 
 
-def _ladders(scene: FieldScene) -> Iterable[Ladder]:
+def _ladders(scene: ScalarCase) -> Iterable[Ladder]:
     """The convergence of the reference solver with elements of order 1 and 2."""
     coarse = field_problem.build(scene)
     kind = coarse.mesh.cells.shape[1]
@@ -158,7 +163,7 @@ def _ladders(scene: FieldScene) -> Iterable[Ladder]:
         yield Ladder(f"P{order}", tuple(len(built.mesh.cells) for built, _ in steps), errors, measured, against)
 
 
-def _error(scene: FieldScene, finest: Callable[[], Solution]) -> tuple[Callable[[FieldProblem, Solution], float], str]:
+def _error(scene: ScalarCase, finest: Callable[[], Solution]) -> tuple[Callable[[FieldProblem, Solution], float], str]:
     """How far a solution is from the truth, and what that is."""
     exact = scene.exact
     if exact is not None:

@@ -14,7 +14,8 @@ from fem_reference.problems.body import Body
 from fem_reference.runs.solved import Solved
 from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
-from fem_reference.scenes.muscle import Scene, SolverChoice
+from fem_reference.scenes.case import SolverChoice
+from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx, recorded
 from fem_reference.studies import refinement
 from fem_reference.studies.execution import Bench, complete
@@ -23,7 +24,7 @@ Progress = Callable[[str], object]
 STORE = Path("reports/runs")
 
 
-def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Scene:
+def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> MuscleCase:
     """Read the case of a muscle.
 
     Parameters
@@ -43,7 +44,12 @@ def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Sce
 
 
 def solve(
-    case: Scene, solver: str | None = None, *, store: Path = STORE, progress: Progress | None = None, **settings: Any
+    case: MuscleCase,
+    solver: str | None = None,
+    *,
+    store: Path = STORE,
+    progress: Progress | None = None,
+    **settings: Any,
 ) -> Run:
     """Solve a case, or take up what was solved before: a run is stored by all that determines it.
 
@@ -76,7 +82,7 @@ def solve(
         return Bench(case, store).obtain(name, choice, f'solver "{choice.solver}"')
 
 
-def read_run(folder: str | Path, case: Scene, *, unit: str | None = None) -> Run:
+def read_run(folder: str | Path, case: MuscleCase, *, unit: str | None = None) -> Run:
     """Read frames that another program wrote, and check them against the case.
 
     Parameters
@@ -94,7 +100,7 @@ def read_run(folder: str | Path, case: Scene, *, unit: str | None = None) -> Run
 
 
 def error_bars(
-    case: Scene, reference: Run, *, store: Path = STORE, progress: Progress | None = None
+    case: MuscleCase, reference: Run, *, store: Path = STORE, progress: Progress | None = None
 ) -> ErrorBars | None:
     """Find out how far each statistic of the ``reference`` of a ``case`` may be from the truth, from runs on larger tetrahedra and
     with finer contact; None where the reference did not converge.
@@ -105,18 +111,18 @@ def error_bars(
 
 
 def compare(
-    case: Scene, reference: Run, candidates: Sequence[Run] = (), *, error_bars: ErrorBars | None = None
+    case: MuscleCase, reference: Run, candidates: Sequence[Run] = (), *, error_bars: ErrorBars | None = None
 ) -> Comparison:
     """Measure ``candidates`` against the ``reference`` of a ``case`` and judge what the case expects.
 
     ``comparison["pbd", "surface_deviation", "rms"]`` is a measure: its ``values`` by frame, its ``unit``, its ``worst`` frame.
     """
-    numbers = case.frames.numbers
+    numbers = case.numbers
     runs = tuple(complete(run, numbers) for run in candidates)
     return comparison.compare(case, Bench(case, STORE).setup(), complete(reference, numbers), runs, error_bars)
 
 
-def export_case(case: Scene, folder: str | Path, form: export.Format = "open") -> list[str]:
+def export_case(case: MuscleCase, folder: str | Path, form: export.Format = "open") -> list[str]:
     """Write all that a solver needs which is not ours into a new ``folder``, in open formats (``form`` ``"febio"``: FEBio's file
     too); the names of the files.
     """

@@ -19,7 +19,8 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record
 from fem_reference.report.tables import finite
 from fem_reference.runs.store import Frame
-from fem_reference.scenes.muscle import Candidate, Scene
+from fem_reference.scenes.case import Candidate
+from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies.execution import Bench
 from fem_reference.studies.table_5_1 import chosen
 
@@ -64,7 +65,7 @@ class Machine:
     multiplied: float
 
 
-def check(scene: Scene) -> None:
+def check(scene: MuscleCase) -> None:
     """InputError unless a scene is long enough to be timed."""
     if scene.frames.last - scene.frames.first <= WARM_UP:
         raise InputError(f"{scene.place}: frames.last", scene.frames.last, f"more than {WARM_UP} frame numbers")
