@@ -37,7 +37,7 @@ def expectation(of: str, truth: str) -> Expectation:
 
 
 def scene(*expectations: Expectation) -> SimpleNamespace:
-    return SimpleNamespace(expect=expectations, place="case.toml")
+    return SimpleNamespace(expect=expectations, place="case.toml", standards=lambda _: {"reference", "itself"})
 
 
 def test_candidates_are_measured_against_the_reference_and_all_against_rest() -> None:

@@ -1,7 +1,9 @@
 """A reference and its candidates, measured and judged: what reports are written from."""
 
 from dataclasses import dataclass
+from typing import Any
 
+from fem_reference.assessment.convergence import Ladder
 from fem_reference.assessment.error_bars import ErrorBars, Of
 from fem_reference.assessment.judge import Verdict, Word, overall, resolved, verdict
 from fem_reference.assessment.ranking import Ranking, rankings
@@ -9,12 +11,10 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.markup import table
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import join
-from fem_reference.metrics import Measure, MeasurementContext, at_rest, find, measure
+from fem_reference.metrics import Context, Measure, at_rest, context_of, find, measure, names
 from fem_reference.metrics.fibre_length import extension_error
-from fem_reference.problems.muscle import Setup
 from fem_reference.runs.store import Run
-from fem_reference.scenes.case import Expectation
-from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.scenes.case import Case, Expectation
 
 # What a notebook shows of a candidate; the page has it all.
 _SHOWN = (
@@ -22,26 +22,36 @@ _SHOWN = (
     ("fibre_length", "rms_percent"),
     ("surface_deviation", "rms"),
     ("surface_deviation", "max"),
+    ("difference", "max"),
+    ("l2_error", "norm"),
 )
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """``deviations``: by candidate name, its measures against the reference. ``changes``: by run name (``"reference"`` among
-    them), its measures against the rest state. ``extension_error`` [mm]: by frame, the greatest error over the fibres that the
-    extension makes on the reference's own surface. ``error_bars``: how well the reference is known, None without any.
+    """``setup``: the muscle's ``Setup`` or the ``FieldProblem``. ``deviations``: by candidate name, its measures against the
+    reference. ``changes``: by run name (``"reference"`` among them), its measures against the rest state; of a field, which has
+    none, those that need no reference. ``extension_error`` [mm]: by frame, the greatest error over the fibres that the extension
+    makes on the reference's own surface, None where there is none. ``error_bars``: how well the reference is known, None without
+    any; ``ladders``: how it converges, where that was measured.
     """
 
-    scene: MuscleCase
-    setup: Setup
+    scene: Case
+    setup: Any
     reference: Run
     candidates: tuple[Run, ...]
-    context: MeasurementContext
+    context: Context
     deviations: dict[str, tuple[Measure, ...]]
     changes: dict[str, tuple[Measure, ...]]
-    extension_error: Measure
+    extension_error: Measure | None
     verdicts: tuple[Verdict, ...]
     error_bars: ErrorBars | None = None
+    ladders: tuple[Ladder, ...] = ()
+
+    @property
+    def runs(self) -> tuple[Run, ...]:
+        """Every run, the reference first."""
+        return (self.reference, *self.candidates)
 
     def __getitem__(self, key: tuple[str, str, str]) -> Measure:
         """The measure of a candidate by its name, a metric and a statistic, such as ``"mine", "volume", "deviation"``; of
@@ -81,20 +91,15 @@ class Comparison:
 
 
 def compare(
-    scene: MuscleCase, setup: Setup, reference: Run, candidates: tuple[Run, ...], error_bars: ErrorBars | None = None
+    scene: Case, setup: Any, reference: Run, candidates: tuple[Run, ...], error_bars: ErrorBars | None = None
 ) -> Comparison:
     """Measure and judge runs that all have the frames of the scene (``not a number`` where a run did not reach one); with
-    ``error_bars`` nothing is judged that they are too wide for. Of a run without a surface only what needs none is judged.
+    ``error_bars`` nothing is judged that they are too wide for. Of a run only what it carries is judged.
     """
-    if not reference.has_surface:
-        raise InputError(f"{reference.name}: surface", "a run of lines alone", "a reference that moves the surface")
-    if reference.fibres is None:
-        raise InputError(
-            f"{reference.name}: fibres", "a run without an interior", "a reference that carries the fibres"
-        )
-    context = MeasurementContext.of(reference, reference.fibres, setup.bones, setup.free)
-    deviations = {run.name: measure(run, reference, context) for run in candidates}
-    changes = {run.name: measure(run, at_rest(run), context) for run in (reference, *candidates)}
+    context, runs = context_of(setup, reference), (reference, *candidates)
+    candidate, alone = names(scene.standards("candidates")), names(scene.standards("reference"))
+    deviations = {run.name: measure(run, reference, context, candidate) for run in candidates}
+    changes = {run.name: measure(run, at_rest(run), context, alone) for run in runs}
     measured = {"reference": changes["reference"]} | deviations
     _check_expected(scene, measured)
     verdicts = tuple(
@@ -108,11 +113,22 @@ def compare(
         for name in (deviations if expectation.of == "candidates" else [expectation.of])
         if _is_measured(expectation, measured.get(name, ()))
     )
-    error = extension_error(reference, context)
+    error = extension_error(reference, context) if "lines" in reference.carries else None
     return Comparison(scene, setup, reference, candidates, context, deviations, changes, error, verdicts, error_bars)
 
 
-def _check_expected(scene: MuscleCase, measured: dict[str, tuple[Measure, ...]]) -> None:
+def alone(scene: Case, setup: Any, run: Run) -> tuple[tuple[Measure, ...], tuple[Verdict, ...]]:
+    """What can be measured and judged of a ``run`` without a reference: of a muscle nothing, whose measures all take their
+    context from one.
+    """
+    if "reference" in scene.standards("reference"):
+        return (), ()
+    measures = measure(run, run, context_of(setup, run), names(scene.standards("reference")))
+    expected = [one for one in map(resolved, scene.expect) if one.of == run.name and _is_measured(one, measures)]
+    return measures, tuple(verdict(one, measures, run.numbers) for one in expected)
+
+
+def _check_expected(scene: Case, measured: dict[str, tuple[Measure, ...]]) -> None:
     """InputError where a scene expects of a run by its name what is not measured of it, as it has no surface."""
     for i, one in enumerate(map(resolved, scene.expect)):
         if one.of in measured and not _is_measured(one, measured[one.of]):

@@ -10,8 +10,7 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import join
 from fem_reference.foundations.units import quantity
 from fem_reference.metrics import Measure, units
-from fem_reference.scenes.case import Expectation
-from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.scenes.case import Case, Expectation
 
 Word = Literal["pass", "fail", "inconclusive", "not judged"]
 _KINDS = {
@@ -67,12 +66,13 @@ def overall(words: Iterable[Word]) -> Word:
     return next((word for word in order if word in found), "not judged")
 
 
-def check(scene: MuscleCase) -> None:
+def check(scene: Case) -> None:
     """InputError unless every expectation of the scene is of a measure and a frame that there will be, in its unit."""
-    known, numbers = units(), scene.numbers
+    numbers = scene.numbers
     for i, entry in enumerate(scene.expect):
         place, expectation = join(scene.place, f"expect[{i}]"), resolved(entry)
         name = f"{expectation.metric}.{expectation.statistic}"
+        known = units(scene.carries, scene.standards(expectation.of))
         if name not in known:
             got = f'"{expectation.metric}"' if entry.statistic is None else f'"{name}"'
             raise InputError(f"{place}: metric and statistic", got, f"one of {', '.join(sorted(known))}")
@@ -86,7 +86,8 @@ def check(scene: MuscleCase) -> None:
             if key == "within" and value < 0:
                 raise InputError(f"{place}.{key}", got, "a tolerance of at least zero")
         if expectation.frame != "any" and expectation.frame not in numbers:
-            want = f'"any" or one of {numbers[0]}, {numbers[1]}, ..., {numbers[-1]}'
+            listed = [str(number) for number in (numbers if len(numbers) < 3 else [*numbers[:2], "...", numbers[-1]])]
+            want = f'"any" or one of {", ".join(listed)}'
             raise InputError(f"{place}.frame", expectation.frame, want)
 
 

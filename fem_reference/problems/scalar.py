@@ -50,6 +50,16 @@ class FieldProblem:
     exact: str | None = None
 
     @property
+    def form(self) -> str:
+        """The weak form: galerkin, or supg where it is stabilised."""
+        return "galerkin" if self.tau is None else "supg"
+
+    @property
+    def mesh_facts(self) -> dict[str, float]:
+        """What the mesh is like."""
+        return {"cells": float(len(self.mesh.cells)), "nodes": float(len(self.fixed)), "mesh_peclet": self.peclet}
+
+    @property
     def diffusion(self) -> float:
         """The diffusion coefficient."""
         return next(effect.coefficient for effect in self.effects if isinstance(effect, Diffusion))

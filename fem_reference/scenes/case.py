@@ -20,6 +20,12 @@ DATA_SETTING = "FEM_REFERENCE_DATA"
 DELAUNAY = "delaunay"  # where a file of triangles may stand: no file
 
 
+# What a run is measured against: the reference (of itself, its rest state), the exact solution, or nothing else.
+Standard = Literal["reference", "exact", "itself"]
+# What a run has that can be measured.
+Part = Literal["surface", "lines", "field"]
+
+
 def home(package: Path) -> Path:
     """Where cases/ and meshes/ are: inside an installed package, beside it in a checkout."""
     return package if (package / "cases").is_dir() else package.parent
@@ -88,8 +94,9 @@ class Case(Record):
     folder: Path = Field(exclude=True)
     place: str = Field(default="case", exclude=True)
 
-    # What a solver of it is asked for, the keys that determine its solution, and those of them that name files.
+    # What a solver of it is asked for, what its runs have, the keys that determine its solution, and those of them that name files.
     task: ClassVar[Literal["solve", "solve_field"]]
+    carries: ClassVar[frozenset[Part]]
     determined_by: ClassVar[frozenset[str]]
     naming_files: ClassVar[frozenset[str]]
 
@@ -107,6 +114,10 @@ class Case(Record):
     def numbers(self) -> tuple[int, ...]:
         """The frame numbers wanted."""
         raise NotImplementedError(f"{type(self).__name__} has no frames")
+
+    def standards(self, of: str) -> frozenset[Standard]:  # noqa: ARG002
+        """What a run is measured against, ``of`` a candidate or the ``"reference"``."""
+        return frozenset({"reference", "itself"})
 
     @property
     def facts(self) -> dict[str, str]:

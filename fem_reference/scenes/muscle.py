@@ -126,6 +126,7 @@ class MuscleCase(Case):
     frames: Frames
 
     task = "solve"
+    carries = frozenset({"surface", "lines"})
     determined_by = frozenset({"muscle", "bone", "attachment", "fibres", "frames"})
     naming_files = frozenset({"surface", "file"})
 

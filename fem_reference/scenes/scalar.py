@@ -8,7 +8,7 @@ from pydantic import Field, field_validator, model_validator
 from fem_reference.effects import FieldEffect
 from fem_reference.foundations.formula import Formula
 from fem_reference.foundations.records import Record
-from fem_reference.scenes.case import Case
+from fem_reference.scenes.case import Case, Standard
 
 
 class Interval(Record):
@@ -110,6 +110,7 @@ class ScalarCase(Case):
     exact: Formula | None = None
 
     task = "solve_field"
+    carries = frozenset({"field"})
     determined_by = frozenset({"domain", "boundary", "element"})
     naming_files = frozenset({"points", "triangles", "file", "bounds"})
 
@@ -122,6 +123,15 @@ class ScalarCase(Case):
     def numbers(self) -> tuple[int, ...]:
         """The one frame that a steady field has."""
         return (0,)
+
+    def standards(self, of: str) -> frozenset[Standard]:
+        """What a run is measured against, ``of`` a candidate or the ``"reference"``: a field has no rest state."""
+        found: set[Standard] = {"itself"}
+        if self.exact is not None:
+            found.add("exact")
+        if of != "reference":
+            found.add("reference")
+        return frozenset(found)
 
     @property
     def facts(self) -> dict[str, str]:

@@ -50,9 +50,9 @@ def find(name: str, place: str, task: Task = "solve") -> Any:
     return module
 
 
-def require(name: str, settings: Record, place: str) -> None:
+def require(name: str, settings: Record, place: str, task: Task = "solve") -> None:
     """MissingSoftware where the solver ``name`` needs what is not installed; a module says so in ``require(settings)``."""
-    check = getattr(find(name, place), "require", None)
+    check = getattr(find(name, place, task), "require", None) if task == "solve" else None
     if check is not None:
         check(settings)
 
@@ -62,9 +62,9 @@ def takes_effects(name: str) -> bool:
     return hasattr(_module(name), "check_effects")
 
 
-def check(name: str, settings: Record, effects: tuple[Effect, ...], place: str) -> None:
+def check(name: str, settings: Record, effects: tuple[Effect, ...], place: str, task: Task = "solve") -> None:
     """InputError below ``place`` where ``settings`` do not suit the ``effects``; a module says so in ``check_effects``."""
-    suits = getattr(find(name, place), "check_effects", None)
+    suits = getattr(find(name, place, task), "check_effects", None) if task == "solve" else None
     if suits is not None:
         suits(settings, effects, place)
 

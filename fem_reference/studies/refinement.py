@@ -89,7 +89,7 @@ def _closer(scene: MuscleCase) -> tuple[Bone, ...]:
     )
 
 
-def obtain(bench: Bench, reference: Run, *, model: bool = True) -> ErrorBars | None:
+def obtain(bench: Bench[MuscleCase], reference: Run, *, model: bool = True) -> ErrorBars | None:
     """The error bars of the ``reference`` of a bench: from runs in the store where they are, else solved now; stored beside it.
     With ``model``, also what exact attachments would change. None for a run that did not converge, and for one without an interior.
     """
@@ -107,16 +107,16 @@ def obtain(bench: Bench, reference: Run, *, model: bool = True) -> ErrorBars | N
     return bars
 
 
-def offered(bench: Bench, reference: Run) -> ErrorBars | None:
+def offered(bench: Bench[MuscleCase], reference: Run) -> ErrorBars | None:
     """The error bars where nobody asked for them: those that are stored, or new ones where they cost less than a fifth of the
-    reference; else None.
+    reference; else None, as of what did not converge or has no interior.
     """
     found = stored(reference)
     if found is not None:
         return found
-    _, (fine, coarse) = _coarser(bench.scene)
-    if reference.outcome.status != "converged":
+    if reference.outcome.status != "converged" or reference.fibres is None:
         return None
+    _, (fine, coarse) = _coarser(bench.scene)
     count = 1 + len(_needed(bench, reference))
     if count * (fine / coarse) ** 3 > CHEAP:
         return None
@@ -134,7 +134,7 @@ def stored(reference: Run) -> ErrorBars | None:
     return bars if bars is None or bars.numbers == reference.numbers else None
 
 
-def _needed(bench: Bench, reference: Run) -> tuple[Variation, ...]:
+def _needed(bench: Bench[MuscleCase], reference: Run) -> tuple[Variation, ...]:
     """What has to be varied."""
     settings = bench.settings(bench.scene.reference, "reference")
     return variations(bench.scene, settings, pressed=_pressed(reference))
@@ -146,7 +146,7 @@ def _pressed(reference: Run) -> bool:
     return area is None or bool(np.nanmax(area) > 0)
 
 
-def finer(bench: Bench, reference: Run, ratio: float) -> MuscleCase:
+def finer(bench: Bench[MuscleCase], reference: Run, ratio: float) -> MuscleCase:
     """The scene of a bench on tetrahedra of ``ratio`` times the size, with every other cause of error halved that its bars have."""
     scene, settings = bench.scene, bench.settings(bench.scene.reference, "reference")
     scene = scene.model_copy(
@@ -157,7 +157,7 @@ def finer(bench: Bench, reference: Run, ratio: float) -> MuscleCase:
     return scene
 
 
-def _pair(bench: Bench, reference: Run, model: bool) -> Pair:
+def _pair(bench: Bench[MuscleCase], reference: Run, model: bool) -> Pair:
     coarser, sizes = _coarser(bench.scene)
     orders = NESTED if bench.scene.muscle.refinements else UNRELATED
     varied = _needed(bench, reference)
@@ -202,7 +202,7 @@ def _coarser(scene: MuscleCase) -> tuple[MuscleCase, tuple[float, float]]:
     return scene.model_copy(update={"muscle": muscle}), sizes
 
 
-def _solved(bench: Bench, scene: MuscleCase, name: str, reference: Run) -> Run:
+def _solved(bench: Bench[MuscleCase], scene: MuscleCase, name: str, reference: Run) -> Run:
     """The reference's run of a changed scene, over the frames of ``reference``."""
     other = Bench(scene, bench.store, bench.ranks)
     try:

@@ -71,7 +71,7 @@ def chosen(scene: MuscleCase, row: Family) -> list[tuple[Candidate, str]]:
     return own + [(candidate, f"{row.name} of Table 5.1") for candidate in row.candidate]
 
 
-def _on(bench: Bench, rows: Iterable[Family], foreign: list[Run]) -> tuple[Scenario, list[SolverResult]]:
+def _on(bench: Bench[MuscleCase], rows: Iterable[Family], foreign: list[Run]) -> tuple[Scenario, list[SolverResult]]:
     """How everybody stands on the scene of a bench."""
     scene, numbers = bench.scene, bench.scene.numbers
     reference = complete(bench.obtain("reference", scene.reference, "reference"), numbers)

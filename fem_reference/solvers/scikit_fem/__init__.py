@@ -4,6 +4,6 @@
 """
 
 from fem_reference.solvers.scikit_fem.body import BodySettings, solve_body
-from fem_reference.solvers.scikit_fem.field import FieldSettings, assemble, errors, solve_field, space
+from fem_reference.solvers.scikit_fem.field import FieldSettings, assemble, solve_field, space
 
-__all__ = ["BodySettings", "FieldSettings", "assemble", "errors", "solve_body", "solve_field", "space"]
+__all__ = ["BodySettings", "FieldSettings", "assemble", "solve_body", "solve_field", "space"]

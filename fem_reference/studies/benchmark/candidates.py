@@ -71,7 +71,7 @@ def check(scene: MuscleCase) -> None:
         raise InputError(f"{scene.place}: frames.last", scene.frames.last, f"more than {WARM_UP} frame numbers")
 
 
-def measure(benches: Iterable[Bench]) -> tuple[list[Timing], Machine]:
+def measure(benches: Iterable[Bench[MuscleCase]]) -> tuple[list[Timing], Machine]:
     """Every candidate of Table 5.1 that iterates on every scene of ``benches``, each repeat with a look at the machine; one that
     fails has times that are not numbers.
     """
@@ -92,18 +92,18 @@ def measure(benches: Iterable[Bench]) -> tuple[list[Timing], Machine]:
     return timings, Machine(*(max(getattr(one, key) for one in machines) for key in ("copied", "multiplied")))
 
 
-def _candidates(bench: Bench) -> list[tuple[Candidate, str]]:
+def _candidates(bench: Bench[MuscleCase]) -> list[tuple[Candidate, str]]:
     """Who iterates from frame number to frame number: what was recorded does not, nor do lines of action."""
     found = [entry for row in families() for entry in chosen(bench.scene, row)]
     return [entry for entry in found if entry[0].solver not in ("recorded", "line_of_action")]
 
 
-def _task(bench: Bench, candidate: Candidate, place: str) -> Callable[[int], str]:
+def _task(bench: Bench[MuscleCase], candidate: Candidate, place: str) -> Callable[[int], str]:
     """The solver's work as a function of how many iterations; it returns how it ended."""
     return partial(_solve, bench, candidate.solver, bench.settings(candidate, place))
 
 
-def _solve(bench: Bench, solver: str, settings: Record, iterations: int) -> str:
+def _solve(bench: Bench[MuscleCase], solver: str, settings: Record, iterations: int) -> str:
     built = bench.problem()
     first = built.frames[0]
 
@@ -115,7 +115,7 @@ def _solve(bench: Bench, solver: str, settings: Record, iterations: int) -> str:
     return str(ended.status)
 
 
-def _per_iteration(task: Callable[[int], str], bench: Bench) -> float:
+def _per_iteration(task: Callable[[int], str], bench: Bench[MuscleCase]) -> float:
     """CPU time [s] for an iteration; not a number where the solver failed, or took too little to be speed."""
     frames = bench.scene.frames
     count = min(ITERATIONS, frames.last - frames.first)
