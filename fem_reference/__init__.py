@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from fem_reference.problems.body import Body, Cells, Prescribed
     from fem_reference.problems.shapes import box
     from fem_reference.runs.store import Run
+    from fem_reference.scenes.case import Case
     from fem_reference.scenes.casefile import cases
-    from fem_reference.scenes.muscle import Scene as Case
     from fem_reference.studies.workflow import (
         compare,
         error_bars,
@@ -65,7 +65,7 @@ _WORKFLOW = "fem_reference.studies.workflow"
 # Where each public name stands: found when it is asked for, so that importing the package loads nothing.
 _PLACES = {
     "Body": ("fem_reference.problems.body", "Body"),
-    "Case": ("fem_reference.scenes.muscle", "Scene"),
+    "Case": ("fem_reference.scenes.case", "Case"),
     "Cells": ("fem_reference.problems.body", "Cells"),
     "Comparison": ("fem_reference.assessment.comparison", "Comparison"),
     "ErrorBars": ("fem_reference.assessment.error_bars", "ErrorBars"),

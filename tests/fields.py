@@ -9,7 +9,7 @@ from scipy.spatial import Delaunay
 
 from fem_reference import effects
 from fem_reference.foundations.records import parse
-from fem_reference.scenes.scalar import FieldScene, FieldSceneFile
+from fem_reference.scenes.scalar import ScalarCase
 
 _HARMLESS = {
     "title": "a test",
@@ -19,7 +19,7 @@ _HARMLESS = {
     "expect": [
         {
             "of": "reference",
-            "measure": "least value",
+            "metric": "minimum",
             "truth": 0.0,
             "within": 0.0,
             "kind": "property",
@@ -30,15 +30,14 @@ _HARMLESS = {
 }
 
 
-def scene(folder: Path, **tables: Any) -> FieldScene:
+def scene(folder: Path, **tables: Any) -> ScalarCase:
     """The scene of ``domain``, ``effect``, ``boundary``, ``element`` (else P1, galerkin) and ``exact``, as a file has them."""
     acting = tuple(
         parse(effects.find(table["name"]), {key: value for key, value in table.items() if key != "name"}, "effect")
         for table in tables["effect"]
     )
     filled = _HARMLESS | {"boundary": (), "element": element()} | tables | {"effect": acting}
-    inside = parse(FieldSceneFile, filled, "case.toml")
-    return FieldScene(name=folder.name, folder=folder, **dict(inside))
+    return parse(ScalarCase, filled | {"name": folder.name, "folder": folder}, "case.toml")
 
 
 def element(order: int = 1, form: str = "galerkin") -> dict[str, Any]:

@@ -14,7 +14,7 @@ from fem_reference.foundations.mesh import Surface, check_closed, triangle_areas
 from fem_reference.geometry.sectors import attached_shares
 from fem_reference.io import files
 from fem_reference.problems.attachments import facets_under, pick
-from fem_reference.scenes.muscle import Attachment, Scene
+from fem_reference.scenes.muscle import Attachment, MuscleCase
 
 BLOCK = shapes.skin(shapes.box((10, 10, 2), (20.0, 20.0, 4.0)))
 FLOOR = Surface(np.array([[-50.0, -50, -1], [50, -50, -1], [0, 80, -1]]), np.array([[0, 1, 2]]))
@@ -27,7 +27,9 @@ GROUND = FLOOR.moved_to(FLOOR.points + np.array([0, 0, 1.0]))  # right below the
 
 def _pick(folder: Path, surface: Surface = BLOCK, bone: Surface = FLOOR, **selection: Any) -> np.ndarray:
     attachment = Attachment(name="origin", bone="floor", **selection)
-    return pick(Scene.model_construct(folder=folder, attachment=(attachment,)), 0, surface, bone)
+    return pick(
+        MuscleCase.model_construct(folder=folder, place="case.toml", attachment=(attachment,)), 0, surface, bone
+    )
 
 
 def _listed(folder: Path, text: str, **keys: Any) -> np.ndarray:

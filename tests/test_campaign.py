@@ -14,7 +14,7 @@ import small
 
 from fem_reference.foundations.subprocesses import command
 from fem_reference.scenes import casefile
-from fem_reference.scenes.muscle import SolverChoice
+from fem_reference.scenes.case import SolverChoice
 from fem_reference.studies import cost
 from fem_reference.studies.campaign import Workers, carry_out
 from fem_reference.studies.ladders import Trial

@@ -5,7 +5,6 @@ import json
 import pytest
 
 from fem_reference import cli
-from fem_reference.cli import scalar
 from fem_reference.scenes import casefile
 
 pytestmark = pytest.mark.slow
@@ -40,20 +39,21 @@ UNSOLVED = "iliacus"
 
 
 @pytest.mark.parametrize("name", FIELDS)
-def test_scalar_cases_with_negative_control_fail(name, tmp_path) -> None:
-    printed = scalar.run(casefile.read(name, with_negative_control=True), solver_of(name), tmp_path)
-    assert printed.word == "fail"
-    assert [v["of"] for v in printed.facts["verdicts"] if v["word"] == "fail"] == [FIELDS[name]]
+def test_scalar_cases_with_negative_control_fail(name, tmp_path, monkeypatch) -> None:
+    changed = casefile.read(name, with_negative_control=True)
+    status, facts = run(changed, tmp_path, monkeypatch, *solver_of(name))
+    assert (status, facts["verdict"]) == (cli.VERDICT_FAIL, "fail")
+    assert [v["of"] for v in facts["verdicts"] if v["verdict"] == "fail"] == [FIELDS[name]]
 
 
-def solver_of(name: str) -> str | None:
-    return None if FIELDS[name] == "reference" else FIELDS[name]
+def solver_of(name: str) -> list[str]:
+    return [] if FIELDS[name] == "reference" else ["--solver", FIELDS[name]]
 
 
 @pytest.mark.parametrize("name", [name for name in FIELDS if name != "surface_figure"])
-def test_scalar_cases_by_the_listing_alone(name, tmp_path) -> None:
-    printed = scalar.run(casefile.read(name), solver_of(name), tmp_path)
-    assert (printed.word, printed.facts["verdict"], printed.facts["status"]) == ("pass", "pass", "converged")
+def test_scalar_cases_by_the_listing_alone(name, tmp_path, monkeypatch) -> None:
+    status, facts = run(casefile.read(name), tmp_path, monkeypatch, *solver_of(name))
+    assert (status, facts["verdict"], facts["status"]) == (cli.DONE, "pass", "converged")
 
 
 def test_the_page_of_the_octave_examples(tmp_path) -> None:
@@ -69,8 +69,6 @@ def test_the_page_of_the_octave_examples(tmp_path) -> None:
             row["value"] for row in case["measures"] if (row["candidate"], row["metric"]) == ("fenicsx", "difference")
         ]
         assert apart < 1e-9
-        folder = tmp_path / "runs" / case["case"] / "reference"
-        assert (folder / "field.vtu").is_file()
     orders = {
         (case["case"], ladder["element"]): ladder["order"] for case in facts["cases"] for ladder in case["convergence"]
     }
@@ -79,14 +77,19 @@ def test_the_page_of_the_octave_examples(tmp_path) -> None:
         assert orders[name, "P1"] == pytest.approx(2, abs=0.1)
     assert orders["rod", "P2"] is None, "a parabola lies in the space: what is left is rounding"
     assert orders["surface_figure", "P1"] < 1.5, "a surface does not feel a value attached at a point"
+    stored = [path.parent for path in (tmp_path / "runs").glob("*/run.json")]
+    assert len(stored) == 3 * len(FIELDS)
+    assert all(
+        (folder / "field.pvd").is_file() and (folder / "field" / "frame_0000.vtu").is_file() for folder in stored
+    )
     page = (tmp_path / "octave-examples.html").read_text()
     assert page.count("<h2") >= len(FIELDS) + 1
 
 
-def run(scene, folder, monkeypatch):
+def run(scene, folder, monkeypatch, *more: str):
     monkeypatch.setattr(casefile, "read", lambda _, **__: scene)
     target = folder / "facts.json"
-    status = cli.main(["run", scene.name, "--out", str(folder), "--json", str(target), "--quiet"])
+    status = cli.main(["run", scene.name, "--out", str(folder), "--json", str(target), "--quiet", *more])
     return status, json.loads(target.read_text())
 
 

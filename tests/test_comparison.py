@@ -12,7 +12,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines
 from fem_reference.problems.muscle import Setup
 from fem_reference.runs.store import Outcome, Run
-from fem_reference.scenes.muscle import Expectation
+from fem_reference.scenes.case import Expectation
 
 REST = shapes.sphere(2, 10.0)
 FIBRE = Polylines(np.array([[0.0, 0, -5], [0, 0, 5]]), np.array([0, 2]))
@@ -37,7 +37,7 @@ def expectation(of: str, truth: str) -> Expectation:
 
 
 def scene(*expectations: Expectation) -> SimpleNamespace:
-    return SimpleNamespace(expect=expectations, place="case.toml")
+    return SimpleNamespace(expect=expectations, place="case.toml", standards=lambda _: {"reference", "itself"})
 
 
 def test_candidates_are_measured_against_the_reference_and_all_against_rest() -> None:

@@ -24,7 +24,7 @@ from fem_reference.metrics import (
     units,
 )
 from fem_reference.runs.store import Outcome, Run
-from fem_reference.scenes.muscle import Expectation
+from fem_reference.scenes.case import Expectation
 
 SIZE = (12.0, 7.0, 3.0)
 CELLS = 6

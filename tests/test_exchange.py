@@ -27,7 +27,7 @@ from fem_reference.problems.muscle import Problem
 from fem_reference.runs.cost import seconds_per_frame
 from fem_reference.runs.store import Outcome, Run
 from fem_reference.scenes import casefile
-from fem_reference.scenes.muscle import Scene
+from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import recorded
 from fem_reference.studies.execution import Bench
 
@@ -35,14 +35,14 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+def scene(tmp_path_factory: pytest.TempPathFactory) -> MuscleCase:
     read = casefile.read(small.write(tmp_path_factory.mktemp("case") / "bar"))
-    assert isinstance(read, Scene)
+    assert isinstance(read, MuscleCase)
     return read
 
 
 @pytest.fixture(scope="module")
-def built(scene: Scene) -> Problem:
+def built(scene: MuscleCase) -> Problem:
     """The small scene, with a direction of fibres in each tet, no two the same."""
     bar = muscle.build(scene, muscle.setup(scene))
     along = np.random.default_rng(6).normal(size=(len(bar.mesh.tets), 3))
@@ -50,7 +50,7 @@ def built(scene: Scene) -> Problem:
 
 
 @pytest.fixture(scope="module")
-def exported(scene: Scene, built: Problem, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def exported(scene: MuscleCase, built: Problem, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("export") / "bar"
     export.export(scene, lambda: built, folder, "open")
     return folder
@@ -130,7 +130,7 @@ def test_the_scene_says_units_and_values(exported: Path, built: Problem) -> None
 
 
 @pytest.mark.parametrize("name", sorted(acting.PARAMETERS))
-def test_every_effect_can_be_stated(scene: Scene, built: Problem, name: str) -> None:
+def test_every_effect_can_be_stated(scene: MuscleCase, built: Problem, name: str) -> None:
     effect = parse(acting.effects.find(name), acting.PARAMETERS[name], "test")
     (printed,) = open_formats.facts(scene, replace(built, effects=(effect,)))["effects"]
     assert printed["name"] == name
@@ -171,7 +171,7 @@ def test_the_example_of_a_candidate_is_one(exported: Path) -> None:
     assert every.keys() == recorded.About.model_fields.keys()
 
 
-def test_a_folder_that_is_in_use_is_refused_before_any_work(scene: Scene, tmp_path: Path) -> None:
+def test_a_folder_that_is_in_use_is_refused_before_any_work(scene: MuscleCase, tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("work of months")
     with pytest.raises(
         InputError, match=r"--to: got .*, which is not empty, want a folder that is not there yet, or empty"
@@ -182,7 +182,7 @@ def test_a_folder_that_is_in_use_is_refused_before_any_work(scene: Scene, tmp_pa
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
 
 
-def test_an_export_that_fails_leaves_nothing(scene: Scene, built: Problem, tmp_path: Path, monkeypatch) -> None:
+def test_an_export_that_fails_leaves_nothing(scene: MuscleCase, built: Problem, tmp_path: Path, monkeypatch) -> None:
     def fails(*_: object) -> None:
         raise OSError("no space left")
 
@@ -204,7 +204,9 @@ def foreign(exported: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_a_foreign_solver_is_judged(scene: Scene, built: Problem, foreign: Path, tmp_path: Path, monkeypatch) -> None:
+def test_a_foreign_solver_is_judged(
+    scene: MuscleCase, built: Problem, foreign: Path, tmp_path: Path, monkeypatch
+) -> None:
     """Against a reference that slides by 1 mm a frame number. Bodies turned as a whole keep volume and fibre lengths."""
     slid = np.multiply.outer(np.array(built.frames, float), [0, 0, 1.0])
 
@@ -245,7 +247,7 @@ def test_gluteus_maximus_goes_out_and_comes_back(data: Path, tmp_path: Path) -> 
     """From metres in float64: rounding is below 1e-9 mm at 500 mm. 1218 vertices are on the pelvis (its case)."""
     assert (data / "hip").is_dir()
     large = casefile.read("gluteus_maximus", changes={"muscle.tet_size": "20 mm", "frames.every": 100})
-    assert isinstance(large, Scene)
+    assert isinstance(large, MuscleCase)
     rest = muscle.setup(large)
     export.export(large, lambda: muscle.build(large, rest), tmp_path / "export", "open")
     script = Path(__file__).with_name("foreign_solver.py")
@@ -258,13 +260,13 @@ def test_gluteus_maximus_goes_out_and_comes_back(data: Path, tmp_path: Path) -> 
         assert np.allclose(frame.surface, moved, rtol=0, atol=1e-9)
 
 
-def test_the_unit_of_a_foreign_solver_is_its_own(scene: Scene, foreign: Path, tmp_path: Path, capsys) -> None:
+def test_the_unit_of_a_foreign_solver_is_its_own(scene: MuscleCase, foreign: Path, tmp_path: Path, capsys) -> None:
     words = ["compare", scene.place, "--candidate", str(foreign), "--unit", "mm", "--out", str(tmp_path), "--quiet"]
     assert cli.main(words) == cli.BAD_INPUT
     assert 'candidate.toml: unit: got "m", want what --unit or the case says, a unit of 1 mm' in capsys.readouterr().err
 
 
-def test_the_verb(scene: Scene, tmp_path: Path, capsys) -> None:
+def test_the_verb(scene: MuscleCase, tmp_path: Path, capsys) -> None:
     words = ["export", scene.place, "--quiet", "--to", str(tmp_path / "new" / "bar"), "--set", "muscle.tet_size=9 mm"]
     assert cli.main([*words, "--json", str(tmp_path / "facts.json")]) == cli.DONE
     printed = json.loads((tmp_path / "facts.json").read_text())

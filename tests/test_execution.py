@@ -14,7 +14,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.runs import key
 from fem_reference.runs.store import Outcome, Run
 from fem_reference.scenes import casefile
-from fem_reference.scenes.muscle import SolverChoice
+from fem_reference.scenes.case import SolverChoice
 from fem_reference.studies import execution
 from fem_reference.studies.execution import Bench, complete
 
@@ -62,7 +62,7 @@ def test_the_key_changes_with_every_file_that_the_solver_reaches(tmp_path) -> No
         "fenicsx": {"solvers/fenicsx/worker.py", "solvers/fenicsx/cells.c", "solvers/common/load_steps.py"},
     }
     both = {"problems/muscle.py", "effects/neo_hooke.py", "runs/store.py", "solvers/__init__.py", "geometry/skins.py"}
-    neither = {"metrics/volume.py", "cli/verbs.py", "assessment/judge.py", "solvers/listing.py"}
+    neither = {"metrics/volume.py", "cli/run.py", "assessment/judge.py", "solvers/listing.py"}
     for name in sorted(set.union(both, neither, *reached.values())):
         text = (copy / name).read_bytes()
         (copy / name).write_bytes(text + b"\n")

@@ -30,7 +30,7 @@ from fem_reference.foundations.mesh import tet_volumes, triangle_areas
 from fem_reference.foundations.motion import apply
 from fem_reference.problems.muscle import Problem
 from fem_reference.scenes import casefile
-from fem_reference.scenes.muscle import Scene
+from fem_reference.scenes.muscle import MuscleCase
 
 
 @pytest.fixture(scope="module")
@@ -318,7 +318,7 @@ def test_what_febio_has_not_is_refused_before_any_work(
     folder: Path, tmp_path: Path, changes: dict[str, Any], match: str
 ) -> None:
     scene = casefile.read(folder, changes=changes)
-    assert isinstance(scene, Scene)
+    assert isinstance(scene, MuscleCase)
     with pytest.raises(InputError, match=match):
         export.export(scene, lambda: pytest.fail("built"), tmp_path / "bar", "febio")
     assert list(tmp_path.iterdir()) == []
@@ -327,7 +327,7 @@ def test_what_febio_has_not_is_refused_before_any_work(
 def test_frames_come_back_from_febios_log(folder: Path, bar: Problem, tmp_path: Path) -> None:
     """Its quadratic elements show a quadratic motion exactly; so does every vertex of the surface, wherever in a tet it lies."""
     scene = casefile.read(folder)
-    assert isinstance(scene, Scene)
+    assert isinstance(scene, MuscleCase)
     inside = bar.surface.moved_to(5 + 0.9 * (bar.surface.points - 5))  # no vertex where a node is
     export.export(scene, lambda: replace(bar, surface=inside, bones=bar.bones[:2]), tmp_path / "bar", "febio")
     feb = ElementTree.parse(tmp_path / "bar" / "scene.feb").getroot()

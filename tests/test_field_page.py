@@ -8,12 +8,14 @@ import fields
 import numpy as np
 import pytest
 
-from fem_reference.assessment.scalar_example import Example, FieldMeasure, FieldVerdict, Ladder
+from fem_reference.assessment.comparison import Comparison
+from fem_reference.assessment.convergence import Ladder
+from fem_reference.assessment.judge import Verdict
 from fem_reference.foundations.errors import InputError
+from fem_reference.metrics import FieldContext, Measure
 from fem_reference.problems import scalar as field_problem
 from fem_reference.report import field_figures, field_page
-from fem_reference.runs.scalar import FieldRun, Solution
-from fem_reference.runs.store import Outcome
+from fem_reference.runs.store import Outcome, Run
 
 pytestmark = pytest.mark.slow
 
@@ -60,7 +62,7 @@ def read(text: str) -> Tags:
     return tags
 
 
-def example_of(folder, values=None, **tables) -> Example:
+def example_of(folder, values=None, **tables) -> Comparison:
     """The scene in ``folder`` with a reference of zeros at the vertices and the ``listing`` of ``values``, else also zeros."""
     folder.mkdir()
     tables = {"effect": [DIFFUSION, SOURCE], "boundary": ()} | tables
@@ -71,33 +73,40 @@ def example_of(folder, values=None, **tables) -> Example:
     base = np.linspace(0.0, -2.0, len(problem.fixed))
     values = base if values is None else values(base)
     done = Outcome("converged", "done", {"seconds_assembly": 0.25, "seconds_solve": 0.5})
-    reference = FieldRun("reference", "fenicsx", problem, Solution(base, done))
-    listed = Solution(values, Outcome("converged", "as listed"), form="as listed")
-    listing = FieldRun("listing", "listing", problem, listed)
-    return Example(
+    reference = run_of("reference", "fenicsx", problem, base, done)
+    listing = run_of("listing", "listing", problem, values, Outcome("converged", "as listed"), form="as listed")
+    return Comparison(
         scene,
         problem,
         reference,
         (listing,),
-        (FieldMeasure("listing", "nodal_error", 0.03125), FieldMeasure("reference", "min", NAN)),
-        (FieldVerdict("pass", scene.expect[0], 0.375),),
-        LADDERS,
-        "pass",
+        FieldContext(problem.exact),
+        {"listing": (Measure("nodal_error", "max", "1", np.array([0.03125])),)},
+        {"reference": (Measure("minimum", "value", "1", np.array([NAN])),)},
+        None,
+        (Verdict("pass", scene.expect[0], 0.375, 0.0, 0.5, "1", 0),),
+        ladders=LADDERS,
     )
 
 
-def rod(folder, values=None, **tables) -> Example:
+def run_of(name, solver, problem, values, outcome, **origin) -> Run:
+    """A run of one frame with ``values`` at the nodes."""
+    shown = {"has_surface": False, "mesh": problem.mesh, "fields": {"psi": values[None]}}
+    return Run(name, solver, outcome, (0,), origin=origin, **shown)
+
+
+def rod(folder, values=None, **tables) -> Comparison:
     fixed = {"boundary": [{"on": "left", "value": "0"}], "exact": "x**2/2 - 2*x"}
     interval = {"interval": {"start": 0.0, "end": 1.0, "count": 20, "seed": 1}}
     return example_of(folder, values, **({"domain": interval} | fixed | tables))
 
 
-def plate(folder, values=None, **tables) -> Example:
+def plate(folder, values=None, **tables) -> Comparison:
     square = {"domain": lambda path: fields.square(path, 5), "boundary": [{"on": "rim", "value": "0"}]}
     return example_of(folder, values, **(square | tables))
 
 
-def ball(folder, values=None) -> Example:
+def ball(folder, values=None) -> Comparison:
     (folder.parent / "bounds.csv").write_text("1,2\n0,0\n")
     bounds = [{"bounds": str(folder.parent / "bounds.csv")}]
     return example_of(folder, values, domain=lambda path: fields.sphere(path, 1), boundary=bounds)
@@ -143,8 +152,8 @@ def test_every_id_on_the_page_is_unique_and_every_reference_meets_one(tmp_path):
 @pytest.mark.parametrize("make", [rod, plate, ball])
 def test_a_run_that_is_not_a_number_is_reported_and_not_drawn(tmp_path, make):
     lost = make(tmp_path / "lost", lambda base: base * NAN)
-    run = replace(lost.candidates[0], solution=Solution(base_of(lost) * NAN, Outcome("diverged", "it blew <up>")))
-    text = field_page.render("Lost", (replace(lost, candidates=(run,), word="fail"),), differences=False)
+    run = replace(lost.candidates[0], fields=nowhere(lost), outcome=Outcome("diverged", "it blew <up>"))
+    text = field_page.render("Lost", (replace(lost, candidates=(run,)),), differences=False)
     read(text)
     assert "it blew &lt;up&gt;" in text
     assert '<span class="bad">not a number</span>' in text
@@ -152,14 +161,14 @@ def test_a_run_that_is_not_a_number_is_reported_and_not_drawn(tmp_path, make):
     assert text.count("nothing to draw") == (0 if make is rod else 2)
 
 
-def base_of(example: Example):
-    return example.reference.solution.values
+def nowhere(example: Comparison):
+    return {"psi": example.reference.values * NAN}
 
 
 def test_nothing_but_a_diverged_reference_has_a_page(tmp_path):
     lost = rod(tmp_path / "rod")
-    reference = replace(lost.reference, solution=Solution(base_of(lost) * NAN, Outcome("diverged", "no")))
-    alone = replace(lost, reference=reference, candidates=(), measures=(), verdicts=(), ladders=(LADDERS[1],))
+    reference = replace(lost.reference, fields=nowhere(lost), outcome=Outcome("diverged", "no"))
+    alone = replace(lost, reference=reference, candidates=(), deviations={}, verdicts=(), ladders=(LADDERS[1],))
     text = field_page.render("Alone", (alone,), differences=False)
     read(text)
     assert "there is a reference alone" in text
@@ -182,7 +191,9 @@ def test_the_first_sentence_says_how_far_listing_and_equation_part(tmp_path):
 
 def test_the_worst_example_gives_the_word(tmp_path):
     good = rod(tmp_path / "rod")
-    text = field_page.render("Both", (good, replace(plate(tmp_path / "plate"), word="fail")), differences=False)
+    other = plate(tmp_path / "plate")
+    bad = replace(other, verdicts=(replace(other.verdicts[0], word="fail"),))
+    text = field_page.render("Both", (good, bad), differences=False)
     assert '<p class="lead"><span class="badge fail">fail</span> over 2 examples.' in text
 
 

@@ -1,15 +1,16 @@
 """Pass, fail and inconclusive; and that what is expected is read strictly."""
 
 import math
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from fem_reference.assessment.judge import check, judge, overall, verdict
+from fem_reference.assessment.judge import check, judge, overall, resolved, verdict
 from fem_reference.foundations.errors import InputError
 from fem_reference.metrics import Measure
-from fem_reference.scenes.muscle import Expectation
+from fem_reference.scenes.case import Expectation
 
 NUMBERS = (0, 10, 20)
 
@@ -30,8 +31,12 @@ def judged(values, unit="%", **changes):
     return verdict(expectation(**changes), [Measure("volume", "deviation", unit, np.array(values))], NUMBERS)
 
 
-def checked(**changes) -> None:
-    check(SimpleNamespace(expect=(expectation(**changes),), place="case.toml", frames=SimpleNamespace(numbers=NUMBERS)))
+def checked(carries=("surface", "lines"), against=("reference", "itself"), **changes) -> None:
+    case = {"carries": carries, "standards": lambda _: against, "numbers": NUMBERS, "place": "case.toml"}
+    check(SimpleNamespace(expect=(expectation(**changes),), **case))
+
+
+scalar = partial(checked, ("field",), ("itself", "exact"))
 
 
 def test_pass_only_within_the_tolerance() -> None:
@@ -124,3 +129,20 @@ def test_a_measure_that_does_not_exist_is_named() -> None:
         InputError, match=r'expect\[0\]: metric and statistic: got "volume.median", want one of .*volume.deviation'
     ):
         checked(statistic="median")
+
+
+def test_a_metric_with_one_number_needs_no_statistic_and_no_unit() -> None:
+    one = {"metric": "nodal_error", "statistic": None, "truth": 0.0, "within": 1e-9}
+    measures = [Measure("nodal_error", "max", "1", np.array([0.0, 2e-9, 0.0]))]
+    found = verdict(resolved(expectation(**one)), measures, NUMBERS)
+    assert (found.word, found.frame, found.within) == ("fail", 10, 1e-9)
+    scalar(**one)
+    scalar(**one | {"truth": "0.5"})
+    with pytest.raises(InputError, match=r'expect\[0\].truth: got "1 mm", want a number, such as "0.5"'):
+        scalar(**one | {"truth": "1 mm"})
+    with pytest.raises(InputError, match=r"expect\[0\].within: got 0.5, want a fraction with its unit"):
+        checked(within=0.5)
+    with pytest.raises(
+        InputError, match=r'expect\[0\]: metric and statistic: got "volume", want one of .*volume.deviation'
+    ):
+        checked(statistic=None)

@@ -15,7 +15,7 @@ from fem_reference.geometry.block import fill
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.intersections import self_intersections
 from fem_reference.io.files import read_polylines, read_surface
-from fem_reference.scenes.muscle import HOME
+from fem_reference.scenes.case import HOME
 
 pytestmark = pytest.mark.slow
 

@@ -136,6 +136,9 @@ def test_of_the_run_alone_whatever_it_is_compared_with() -> None:
     class Scene:
         expect, place = (), "case.toml"
 
+        def standards(self, _: str) -> set[str]:
+            return {"reference", "itself"}
+
     found = compare(Scene(), rest, reference, (replace(pressed, name=name),))
     depths = [
         next(one.values.tolist() for one in measures if (one.metric, one.statistic) == ("penetration", "deepest"))

@@ -15,7 +15,7 @@ from fem_reference.geometry.tetrahedra import tetrahedralise
 from fem_reference.io import files
 from fem_reference.problems import fibre_field, muscle
 from fem_reference.problems.muscle_body import as_body
-from fem_reference.report.overview import scene_facts
+from fem_reference.report.overview import case_facts
 from fem_reference.runs.store import Frame
 from fem_reference.scenes import casefile
 from fem_reference.solvers import fenicsx
@@ -311,7 +311,7 @@ def test_what_is_no_block_is_refused_at_the_key_of_the_surface(bar) -> None:
 
 
 def test_show_says_what_bones_are_and_how_they_move(squeezed, bar) -> None:
-    facts = scene_facts(squeezed, muscle.setup(squeezed))
+    facts = case_facts(squeezed, muscle.setup(squeezed))
     assert facts["muscle"]["mesher"] == "block"
     assert facts["attachments"] == {}
     assert facts["bones"] == {
@@ -320,7 +320,7 @@ def test_show_says_what_bones_are_and_how_they_move(squeezed, bar) -> None:
         "mm at frame: 0 at 0, 40 at 100",
     }
     turning = casefile.read(bar)
-    assert "turns about (5, 5, 30) mm along" in scene_facts(turning, muscle.setup(turning))["bones"]["lid"]
+    assert "turns about (5, 5, 30) mm along" in case_facts(turning, muscle.setup(turning))["bones"]["lid"]
 
 
 def test_a_frame_of_a_body_attached_by_nothing_states_nothing_of_attachments(squeezed) -> None:

@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 from fem_reference import metrics, solvers
-from fem_reference.cli.parser import parser
+from fem_reference.cli._parser import parser
 
 README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
 

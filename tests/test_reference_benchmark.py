@@ -11,7 +11,7 @@ import small
 
 from fem_reference import cli
 from fem_reference.problems.body import ByCell, check
-from fem_reference.scenes.muscle import DATA_SETTING
+from fem_reference.scenes.case import DATA_SETTING
 from fem_reference.studies.benchmark import checkout, reference, reference_table, timing
 from fem_reference.studies.benchmark.checkout import Commit
 from fem_reference.studies.benchmark.reference import BEFORE, NOW, Taken, Timing

@@ -17,7 +17,7 @@ from fem_reference.foundations.mesh import vertex_areas
 from fem_reference.report import gallery
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
-from fem_reference.scenes.muscle import Scene
+from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx, recorded
 from fem_reference.solvers.common.load_steps import Attempt, Steps, march
 from fem_reference.solvers.fenicsx import Settings
@@ -69,7 +69,7 @@ def rows(facts, of, metric, statistic):
     return np.array([row["value"] for row in found])
 
 
-def scene_of(case: Path, more: str = "") -> Scene:
+def scene_of(case: Path, more: str = "") -> MuscleCase:
     path = case / "case.toml"
     path.write_text(path.read_text() + more)
     return casefile.read_muscle(case)

@@ -19,7 +19,7 @@ from fem_reference.problems.paths import Turn
 from fem_reference.problems.shapes import box
 from fem_reference.runs.store import Frame
 from fem_reference.scenes import casefile
-from fem_reference.scenes.muscle import SolverChoice
+from fem_reference.scenes.case import SolverChoice
 from fem_reference.solvers.common.frame_loop import carry
 from fem_reference.solvers.common.protocol import trades
 

@@ -17,7 +17,7 @@ from fem_reference.report import overview, ranking_page
 from fem_reference.runs import store
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
-from fem_reference.scenes.muscle import Candidate
+from fem_reference.scenes.case import Candidate
 from fem_reference.solvers import fenicsx, pbd
 from fem_reference.studies import table_5_1
 from fem_reference.studies.benchmark import candidates

@@ -17,7 +17,7 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import Record, parse
 from fem_reference.io import files
 from fem_reference.metrics import Measure
-from fem_reference.scenes.muscle import Scene
+from fem_reference.scenes.muscle import MuscleCase
 
 log = logging.getLogger(__name__)
 
@@ -81,13 +81,13 @@ class Baseline(Record):
     scene: str
 
 
-def check(path: Path, scene: Scene, candidate: str) -> None:
+def check(path: Path, scene: MuscleCase, candidate: str) -> None:
     """InputError where an update of ``path`` would write over what is damaged, or of another case or candidate."""
     if path.exists():
         _check_whose(path, _read(path), scene, candidate)
 
 
-def read(path: Path, scene: Scene, candidate: str) -> Baseline:
+def read(path: Path, scene: MuscleCase, candidate: str) -> Baseline:
     """The baseline in ``path``; InputError where there is none, or it is damaged, or of another case, scene or candidate."""
     baseline = _read(path)
     _check_whose(path, baseline, scene, candidate)
@@ -95,7 +95,7 @@ def read(path: Path, scene: Scene, candidate: str) -> Baseline:
         got = f"{baseline.scene[:16]}..., while {scene.place} is {scene.key[:16]}..."
         want = "the key of this scene (it was changed since; --update takes the current measures)"
         raise InputError(f"{path}: scene", got, want)
-    if baseline.frames != scene.frames.numbers:
+    if baseline.frames != scene.numbers:
         raise InputError(f"{path}: frames", f"{len(baseline.frames)} others", "the frame numbers of the scene")
     return baseline
 
@@ -146,7 +146,7 @@ def _check_shape(place: str, baseline: Baseline) -> None:
         raise InputError(f"{place}: positions.values", "another number of them", want)
 
 
-def _check_whose(path: Path, baseline: Baseline, scene: Scene, candidate: str) -> None:
+def _check_whose(path: Path, baseline: Baseline, scene: MuscleCase, candidate: str) -> None:
     """InputError where a baseline is of another case or candidate."""
     for key, got, want in (("case", baseline.case, scene.name), ("candidate", baseline.candidate, candidate)):
         if got != want:

@@ -10,7 +10,7 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import join
 from fem_reference.foundations.units import quantity
 from fem_reference.metrics import Measure, units
-from fem_reference.scenes.muscle import Expectation, Scene
+from fem_reference.scenes.case import Case, Expectation
 
 Word = Literal["pass", "fail", "inconclusive", "not judged"]
 _KINDS = {
@@ -19,6 +19,7 @@ _KINDS = {
     "mm3": ("a volume", 1.0),
     "deg": ("an angle", 180 / math.pi),
     "s": ("a time", 1.0),
+    "1": ("a number", 1.0),
 }
 
 
@@ -66,24 +67,38 @@ def overall(words: Iterable[Word]) -> Word:
     return next((word for word in order if word in found), "not judged")
 
 
-def check(scene: Scene) -> None:
+def check(scene: Case) -> None:
     """InputError unless every expectation of the scene is of a measure and a frame that there will be, in its unit."""
-    known, numbers = units(), scene.frames.numbers
-    for i, expectation in enumerate(scene.expect):
-        place, name = join(scene.place, f"expect[{i}]"), f"{expectation.metric}.{expectation.statistic}"
+    numbers = scene.numbers
+    for i, entry in enumerate(scene.expect):
+        place, expectation = join(scene.place, f"expect[{i}]"), resolved(entry)
+        name = f"{expectation.metric}.{expectation.statistic}"
+        known = units(scene.carries, scene.standards(expectation.of))
         if name not in known:
-            raise InputError(f"{place}: metric and statistic", f'"{name}"', f"one of {', '.join(sorted(known))}")
+            got = f'"{expectation.metric}"' if entry.statistic is None else f'"{name}"'
+            raise InputError(f"{place}: metric and statistic", got, f"one of {', '.join(sorted(known))}")
         for key in ("truth", "within"):
-            text = getattr(expectation, key)
+            given = getattr(expectation, key)
+            got = f'"{given}"' if isinstance(given, str) else repr(given)
             try:
-                value = in_unit(text, known[name])
+                value = in_unit(given, known[name])
             except ValueError as error:
-                raise InputError(f"{place}.{key}", f'"{text}"', str(error)) from error
+                raise InputError(f"{place}.{key}", got, str(error)) from error
             if key == "within" and value < 0:
-                raise InputError(f"{place}.{key}", f'"{text}"', "a tolerance of at least zero")
+                raise InputError(f"{place}.{key}", got, "a tolerance of at least zero")
         if expectation.frame != "any" and expectation.frame not in numbers:
-            want = f'"any" or one of {numbers[0]}, {numbers[1]}, ..., {numbers[-1]}'
+            listed = [str(number) for number in (numbers if len(numbers) < 3 else [*numbers[:2], "...", numbers[-1]])]
+            want = f'"any" or one of {", ".join(listed)}'
             raise InputError(f"{place}.frame", expectation.frame, want)
+
+
+def resolved(expectation: Expectation) -> Expectation:
+    """An ``expectation`` with its statistic: where it has none, the only one that its metric has."""
+    start = f"{expectation.metric}."
+    names = [name.removeprefix(start) for name in units() if name.startswith(start)]
+    if expectation.statistic is not None or len(names) != 1:
+        return expectation
+    return expectation.model_copy(update={"statistic": names[0]})
 
 
 def verdict(
@@ -112,7 +127,7 @@ def verdict(
     return Verdict(word, expectation, values[decides], truth, within, found.unit, frame, bar)
 
 
-def in_unit(text: str, unit: str) -> float:
-    """A quantity as text in the unit of a metric; ValueError where it is none of that kind."""
+def in_unit(given: str | float, unit: str) -> float:
+    """A quantity in the ``unit`` of a measure, a bare number only where that has none; ValueError where it is none of that kind."""
     kind, factor = _KINDS[unit]
-    return quantity(text, kind) * factor
+    return float(given) if unit == "1" and not isinstance(given, str) else quantity(given, kind) * factor

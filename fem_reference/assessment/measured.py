@@ -11,14 +11,14 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.metrics import Measure, MeasurementContext
 from fem_reference.problems.muscle import Setup
 from fem_reference.runs.store import Run
-from fem_reference.scenes.muscle import Scene
+from fem_reference.scenes.muscle import MuscleCase
 
 
 @dataclass(frozen=True, eq=False)
 class CurrentMeasures:
     """A candidate, measured now against the ``reference``; ``error_bars``: those of the reference, None without any."""
 
-    scene: Scene
+    scene: MuscleCase
     candidate: Run
     reference: Run
     measures: tuple[Measure, ...]
@@ -26,7 +26,7 @@ class CurrentMeasures:
 
     @classmethod
     def of(
-        cls, scene: Scene, setup: Setup, candidate: Run, reference: Run, error_bars: ErrorBars | None = None
+        cls, scene: MuscleCase, setup: Setup, candidate: Run, reference: Run, error_bars: ErrorBars | None = None
     ) -> "CurrentMeasures":
         """Measure a candidate and its reference, which both have the frames of the scene."""
         if reference.fibres is None:

@@ -11,7 +11,7 @@ from fem_reference.assessment.ranking import Ranking, rankings
 from fem_reference.foundations.records import Record, parse
 from fem_reference.metrics import Measure, find
 from fem_reference.runs.store import Outcome
-from fem_reference.scenes.muscle import Candidate
+from fem_reference.scenes.case import Candidate
 
 FILE = Path(__file__).with_suffix(".toml")
 

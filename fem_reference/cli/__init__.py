@@ -7,9 +7,8 @@ import signal
 import sys
 from pathlib import Path
 
-from fem_reference.cli import verbs
-from fem_reference.cli.parser import parser
-from fem_reference.cli.printing import (
+from fem_reference.cli._parser import parser
+from fem_reference.cli._printing import (
     BAD_INPUT,
     DONE,
     INTERRUPTED,
@@ -50,7 +49,7 @@ def main(arguments: list[str]) -> int:
 
 def _check_outputs(options: argparse.Namespace) -> None:
     """InputError where an output cannot be written, before anything is measured; makes nothing."""
-    _check_folder("--out", out(options), written=options.verb is not verbs.list_all)
+    _check_folder("--out", out(options), written=options.writes)
     if getattr(options, "to", None) is not None:
         _check_folder("--to", options.to.absolute().parent, written=True)
     written = ["json", "junit", "markdown", *(["baseline"] if getattr(options, "update", False) else [])]

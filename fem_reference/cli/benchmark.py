@@ -3,14 +3,17 @@
 import argparse
 import os
 
-from fem_reference.cli.printing import DONE, SOLVER_FAILED, out, write_output
+from fem_reference.cli._printing import DONE, SOLVER_FAILED, out, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.scenes import casefile
-from fem_reference.scenes.muscle import DATA_SETTING
+from fem_reference.scenes.case import DATA_SETTING
 from fem_reference.studies.benchmark import candidates, checkout, reference, reference_table
 from fem_reference.studies.execution import Bench
 
 TIMED, TIMED_WITH_DATA = ("hip_flexion", "box_squeeze"), ("gluteus_maximus", "box_squeeze_report")
+
+
+HELP = "time the solvers of Table 5.1 in processor time, beside the machine's own speed, or the reference by phase"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -35,7 +38,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--ranks", type=int, metavar="N", help=ranks)
 
 
-def benchmark(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     """Time the solvers of Table 5.1, or the reference."""
     if options.reference:
         return _time_reference(options)

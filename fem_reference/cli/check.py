@@ -10,59 +10,64 @@ from pathlib import Path
 
 from fem_reference.assessment import baseline, regression
 from fem_reference.assessment.measured import CurrentMeasures
-from fem_reference.cli.choosing import check_names, checked_bench, choose, scene_of
-from fem_reference.cli.printing import DONE, SOLVER_FAILED, VERDICT_FAIL, write_output
-from fem_reference.foundations.errors import InputError
+from fem_reference.cli._choosing import check_names, checked_bench, choose, scene_of
+from fem_reference.cli._parser import UNIT, add_case, add_error_bar, add_ranks
+from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, write_output
 from fem_reference.io import files
 from fem_reference.report import regression_texts
 from fem_reference.runs.store import Run
-from fem_reference.scenes.muscle import Candidate, Scene
+from fem_reference.scenes import casefile
+from fem_reference.scenes.case import Candidate
+from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import refinement
 from fem_reference.studies.execution import Bench
 
+HELP = "judge a candidate by its own past and by the reference, for a pipeline"
 
-def add_options(parser: argparse.ArgumentParser, unit: str) -> None:
-    """The options that only this verb has, and ``--unit`` with its help."""
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of the verb."""
+    add_case(parser)
     either = "a candidate of the case or a folder of frames"
     parser.add_argument("--candidate", required=True, metavar="NAME|DIR", help=either)
-    parser.add_argument("--unit", help=unit)
+    parser.add_argument("--unit", help=UNIT)
     past = "its measures as they were, JSON"
     parser.add_argument("--baseline", type=Path, required=True, metavar="FILE", help=past)
     anew = "write the baseline anew from the current measures; its tolerances and limits stay"
     parser.add_argument("--update", action="store_true", help=anew)
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write the judgements as JUnit XML")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the worst of them for a pull request")
+    add_error_bar(parser)
+    add_ranks(parser)
 
 
-def check(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     """Judge a candidate by its baseline, after having written that anew where it is asked for."""
     begin = time.perf_counter()
-    scene = scene_of(options)
-    if not isinstance(scene, Scene):
-        raise InputError("CASE", f'"{options.case}", a scalar case', "the case of a muscle")
+    scene = casefile.muscle(scene_of(options), "CASE")
     chosen = choose(scene, options.candidate, options.unit)
     check_names([chosen[0].name])
     bench = checked_bench(scene, options, [chosen])
     # What is wrong with the baseline shows before anything is solved.
     (baseline.check if options.update else baseline.read)(options.baseline, scene, chosen[0].name)
-    run, reference = _runs(bench, chosen)
-    failed = [one for one in (reference, run) if one.outcome.status != "converged"]
+    candidate, reference = _runs(bench, chosen)
+    failed = [one for one in (reference, candidate) if one.outcome.status != "converged"]
     if failed:
         why = [f"{one.name}: {one.outcome.status}, {one.outcome.message}" for one in failed]
-        facts = {"case": scene.name, "candidate": run.name, "verdict": "failed", "notes": why, "judgements": []}
-        lost = regression_texts.lost(scene.name, run.name, why)
+        facts = {"case": scene.name, "candidate": candidate.name, "verdict": "failed", "notes": why, "judgements": []}
+        lost = regression_texts.lost(scene.name, candidate.name, why)
         _write({options.junit: lost.junit, options.markdown: lost.markdown})
         write_output(facts, "\n".join([*why, "verdict: failed"]), options)
         return SOLVER_FAILED
     bars = refinement.obtain(bench, reference) if options.error_bar else refinement.offered(bench, reference)
-    return _printed(CurrentMeasures.of(scene, bench.setup(), run, reference, bars), options, begin)
+    return _printed(CurrentMeasures.of(scene, bench.setup(), candidate, reference, bars), options, begin)
 
 
-def _runs(bench: Bench, chosen: tuple[Candidate, str]) -> tuple[Run, Run]:
+def _runs(bench: Bench[MuscleCase], chosen: tuple[Candidate, str]) -> tuple[Run, Run]:
     """The candidate, first as it may be bad input, and the reference."""
     entry, place = chosen
-    run = bench.obtain(entry.name, entry, place)
-    return run, bench.obtain("reference", bench.scene.reference, "reference")
+    candidate = bench.obtain(entry.name, entry, place)
+    return candidate, bench.obtain("reference", bench.scene.reference, "reference")
 
 
 def _printed(current: CurrentMeasures, options: argparse.Namespace, begin: float) -> int:

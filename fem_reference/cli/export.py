@@ -3,17 +3,19 @@
 import argparse
 from pathlib import Path
 
-from fem_reference.cli.printing import DONE, lines, out, write_output
-from fem_reference.export import FORMATS
-from fem_reference.export import export as write
-from fem_reference.foundations.errors import InputError
+from fem_reference.cli._choosing import scene_of
+from fem_reference.cli._parser import add_case
+from fem_reference.cli._printing import DONE, lines, out, write_output
+from fem_reference.export import FORMATS, export
 from fem_reference.scenes import casefile
-from fem_reference.scenes.muscle import Scene
 from fem_reference.studies.execution import Bench
+
+HELP = "write all that a solver needs which is not ours, in open formats"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb: where to, and in which formats."""
+    add_case(parser)
     parser.add_argument(
         "--to", type=Path, required=True, metavar="DIR", help="a folder that is not there yet, or empty"
     )
@@ -21,13 +23,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--format", choices=FORMATS, default="open", help=forms)
 
 
-def export(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     """Write a case for a solver that is not ours."""
-    scene = casefile.read(options.case, changes=dict(map(casefile.setting, options.set)))
-    if not isinstance(scene, Scene):
-        raise InputError(scene.place, "the scene of a scalar field", "the scene of a muscle")
+    scene = casefile.muscle(scene_of(options))
     bench = Bench(scene, out(options) / "runs")
-    written = write(scene, bench.problem, options.to, options.format)
+    written = export(scene, bench.problem, options.to, options.format)
     facts = {"case": scene.name, "folder": str(options.to), "files": written}
     write_output(facts, "\n".join(lines(facts)), options)
     return DONE

@@ -6,7 +6,8 @@ from pathlib import Path
 from fem_reference.assessment.cost_study import CaseStudy, load
 from fem_reference.assessment.judge import in_unit
 from fem_reference.assessment.recommendation import Expected, Recommendation, recommend
-from fem_reference.cli.printing import DONE, VERDICT_FAIL, out, write_output
+from fem_reference.cli._parser import add_case
+from fem_reference.cli._printing import DONE, VERDICT_FAIL, out, write_output
 from fem_reference.cli.study import PAGE
 from fem_reference.foundations.errors import InputError
 from fem_reference.report.study_page import MAIN, title_of
@@ -15,9 +16,12 @@ from fem_reference.scenes import casefile
 from fem_reference.studies.execution import Bench
 from fem_reference.studies.features import features
 
+HELP = "which solver and setting to take for an error or a time, out of what studies measured"
+
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """The options that this verb has."""
+    add_case(parser)
     error = "the greatest error that you can do with, in the unit of the metric, such as '2 mm' or '1 %%'"
     parser.add_argument("--error", metavar="VALUE", help=error)
     parser.add_argument(
@@ -28,9 +32,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def advise(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     """Recommend a setting; the exit status is 1 where none meets what is asked."""
-    scene = casefile.read_muscle(options.case, changes=dict(map(casefile.setting, options.set)))
+    scene = casefile.muscle(scene_of(options))
     studies = read(out(options))
     known = {name for study in studies for name in study.units}
     if options.metric not in known:

@@ -4,7 +4,7 @@ import argparse
 
 from fem_reference import report
 from fem_reference.assessment.cost_study import facts
-from fem_reference.cli.printing import DONE, SOLVER_FAILED, out, write_output
+from fem_reference.cli._printing import DONE, SOLVER_FAILED, out, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import study_page
 from fem_reference.scenes import casefile
@@ -12,6 +12,7 @@ from fem_reference.studies import cost
 from fem_reference.studies.campaign import Workers
 
 PAGE = "study"
+HELP = "what accuracy costs in time: reference and candidates over ladders of settings, and the page"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -30,7 +31,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--only", choices=cost.PARTS, help=only)
 
 
-def study(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     """Measure what accuracy costs on cases, and write the page; one on each case, and one on all where there are several."""
     if options.workers < 1:
         raise InputError("--workers", options.workers, "1 or more")

@@ -11,7 +11,7 @@ from fem_reference.export import febio, open_formats, texts
 from fem_reference.foundations.errors import InputError
 from fem_reference.io import files
 from fem_reference.problems.muscle import Problem
-from fem_reference.scenes.muscle import Scene
+from fem_reference.scenes.muscle import MuscleCase
 
 log = logging.getLogger(__name__)
 
@@ -27,7 +27,7 @@ def check(folder: Path) -> None:
         raise InputError("--to", f'"{folder}", which is not empty', "a folder that is not there yet, or empty")
 
 
-def export(scene: Scene, build: Callable[[], Problem], folder: Path, form: Format) -> list[str]:
+def export(scene: MuscleCase, build: Callable[[], Problem], folder: Path, form: Format) -> list[str]:
     """Write the problem that ``build`` makes of a ``scene`` into ``folder``, whole or not at all; the names of its files.
 
     ``"febio"`` adds FEBio's own file to the open ones. InputError where the folder is not free, or FEBio has not the same.
@@ -50,7 +50,7 @@ def export(scene: Scene, build: Callable[[], Problem], folder: Path, form: Forma
     return written
 
 
-def _write(scene: Scene, problem: Problem, folder: Path, form: Format) -> None:
+def _write(scene: MuscleCase, problem: Problem, folder: Path, form: Format) -> None:
     open_formats.write(scene, problem, folder)
     files.write_text(folder / "candidate.toml", texts.candidate())
     if form == "febio":

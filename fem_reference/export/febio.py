@@ -28,7 +28,7 @@ from fem_reference.foundations.motion import Rotation
 from fem_reference.foundations.records import join
 from fem_reference.io import files
 from fem_reference.problems.muscle import Problem, RigidBody
-from fem_reference.scenes.muscle import Scene
+from fem_reference.scenes.muscle import MuscleCase
 
 # What FEBio has in the same form.
 SAME = (NeoHooke, MooneyRivlin, Incompressible, IncompressiblePenalty, FibrePassive, FibrePassiveFebio, Contact)
@@ -37,7 +37,7 @@ LONGEST_STEP = 2.0  # [frame numbers], that of the runs whose results FEBIO.md c
 TOLERANCES = {"dtol": 1e-3, "etol": 1e-5}
 
 
-def check(scene: Scene) -> None:
+def check(scene: MuscleCase) -> None:
     """InputError where a scene has an effect that FEBio has not, or not in the same form."""
     for i, effect in enumerate(scene.effects):
         if not isinstance(effect, SAME):

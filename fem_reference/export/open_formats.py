@@ -16,7 +16,7 @@ from fem_reference.foundations.mesh import Floats, Polylines, Surface
 from fem_reference.geometry.embedding import embed
 from fem_reference.io import files
 from fem_reference.problems.muscle import Problem
-from fem_reference.scenes.muscle import Scene
+from fem_reference.scenes.muscle import MuscleCase
 
 UNITS = {"length": "mm", "force": "N", "pressure": "MPa", "time": "s", "mass": "tonne", "angle": "rad"}
 CONVENTIONS = {
@@ -26,7 +26,7 @@ CONVENTIONS = {
 }
 
 
-def write(scene: Scene, problem: Problem, folder: Path) -> None:
+def write(scene: MuscleCase, problem: Problem, folder: Path) -> None:
     """Every file of the export of a ``problem`` but those that explain it, into ``folder``."""
     (folder / "bones").mkdir()
     write_ply(folder / "muscle.ply", problem.surface)
@@ -75,7 +75,7 @@ def _write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]]
     files.write_text(path, text.getvalue())
 
 
-def facts(scene: Scene, problem: Problem) -> dict[str, Any]:
+def facts(scene: MuscleCase, problem: Problem) -> dict[str, Any]:
     """What no mesh file says: units, conventions, frames, bones, attachments, effects with the unit of every parameter."""
     bones = [
         entry.model_dump(mode="json", exclude_none=True, exclude={"surface", "unit"})

@@ -4,7 +4,7 @@ from pathlib import Path
 from string import Template
 
 from fem_reference import __version__
-from fem_reference.scenes.muscle import Scene
+from fem_reference.scenes.muscle import MuscleCase
 
 _FEBIO_FILES = """\
 | `scene.feb` | the same for FEBio (format 4.0); `FEBIO.md` says what is the same and what is not |
@@ -12,13 +12,13 @@ _FEBIO_FILES = """\
 """
 
 
-def readme(scene: Scene, *, febio: bool) -> str:
+def readme(scene: MuscleCase, *, febio: bool) -> str:
     """How to read the files of an export; with FEBio's among them or without."""
     more = _FEBIO_FILES if febio else ""
     return _filled("README.md", title=scene.title, name=scene.name, version=__version__, more=more)
 
 
-def febio_readme(scene: Scene) -> str:
+def febio_readme(scene: MuscleCase) -> str:
     """What of a scene is the same in FEBio and what is not."""
     return _filled("FEBIO.md", title=scene.title, first=str(scene.frames.first))
 

@@ -73,11 +73,17 @@ def _keys(table: object, path: tuple[int | str, ...]) -> tuple[int | str, ...]:
 
 
 def _known(record: Any, path: tuple[int | str, ...]) -> list[str]:
-    """The keys of the record that ``path`` leads to (a list index stays in the same record)."""
+    """The keys that files have of the record that ``path`` leads to (a list index stays in the same record)."""
     for part in path:
         if isinstance(part, str) and part in getattr(record, "model_fields", {}):
             record = _record_inside(record.model_fields[part].annotation)
-    return sorted(getattr(record, "model_fields", {}))
+    return keys(record)
+
+
+def keys(record: Any) -> list[str]:
+    """The keys that files have of a ``record``; none of what is no record."""
+    fields = getattr(record, "model_fields", {})
+    return sorted(name for name in fields if not fields[name].exclude)
 
 
 def _record_inside(annotation: Any) -> Any:

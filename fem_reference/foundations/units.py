@@ -19,6 +19,7 @@ _INSIDE = {
     "an angle": "rad",
     "a pressure": "MPa",
     "a fraction": "",
+    "a number": "",
     "a time": "s",
     "a volume": "mm^3",
     "a density": "tonne/mm^3",
@@ -31,6 +32,8 @@ _INSIDE = {
     "a bending stiffness": "N*mm",
     "a rate": "1/s",
 }
+# How the unit of what has none may be written.
+_WRITTEN = {"a fraction": ("", "%", "percent"), "a number": ("",)}
 # A number, then what may be a unit.
 _NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.ASCII)
 # Where an exponent follows a unit without a sign for it, as in m3.
@@ -50,10 +53,10 @@ def quantity(text: object, kind: str) -> float:
     >>> quantity("30 kPa", "a pressure"), quantity("2 cm", "a length"), quantity("0.5 %", "a fraction")
     (0.03, 20.0, 0.005)
     """
-    wrong = ValueError(f"{kind} with its unit, such as {_EXAMPLE[kind]}")
+    wrong = ValueError(f"{kind}{' with its unit' if kind != 'a number' else ''}, such as {_EXAMPLE[kind]}")
     number, unit = _split(text)
     unit = _EXPONENT.sub("^", unit)
-    if not number or (kind == "a fraction" and unit not in ("", "%", "percent")):
+    if not number or unit not in _WRITTEN.get(kind, (unit,)):
         raise wrong
     try:
         read = _registry().Quantity(float(number), _registry().parse_units(unit))
@@ -77,6 +80,7 @@ _EXAMPLE = {
     "an angle": '"30 deg"',
     "a pressure": '"30 kPa"',
     "a fraction": '"0.5 %"',
+    "a number": '"0.5"',
     "a time": '"0.01 s"',
     "a volume": '"3 ml"',
     "a density": '"1060 kg/m3"',

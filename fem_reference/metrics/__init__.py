@@ -1,21 +1,27 @@
 """Metrics: one file each, named as in scene files and JSON. A metric does not know the solver of a run.
 
-Contract (tests/test_metrics.py): zero against itself, a known change gives a known value, NaN stays NaN, units stated. One
-metric, penetration, is of the run alone: against itself too it is what it is.
+Contract (tests/test_metrics.py): zero against itself, a known change gives a known value, NaN stays NaN, units stated. Each
+declares the unit of every statistic (``UNITS``), what of a run it is ``OF`` (its surface, its lines, its field) and what it is
+measured ``AGAINST``: the reference (or the rest state), the exact solution, or nothing but the run itself.
 """
 
 import importlib
 import pkgutil
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
+from functools import singledispatch
+from typing import Any, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.foundations.mesh import Floats, Polylines, vertex_areas
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, Ints, Polylines, vertex_areas
 from fem_reference.geometry.extension import Extension
-from fem_reference.problems.muscle import RigidBody
+from fem_reference.problems.muscle import RigidBody, Setup
+from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs.store import Run
+from fem_reference.scenes.case import Part, Standard
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,36 +72,86 @@ class MeasurementContext:
         )
 
 
-def names() -> list[str]:
-    """The metrics there are."""
-    return sorted(module.name for module in pkgutil.iter_modules(__path__))
+@dataclass(frozen=True)
+class FieldContext:
+    """What every run of a scalar case is measured with: the formula of the ``exact`` solution, None where it is not known."""
+
+    exact: str | None
 
 
-def units() -> dict[str, str]:
-    """The unit of every ``metric.statistic`` there is."""
-    modules = {name: importlib.import_module(f"{__name__}.{name}") for name in names()}
-    return {f"{name}.{statistic}": unit for name, module in modules.items() for statistic, unit in module.UNITS.items()}
+Context = MeasurementContext | FieldContext
+
+
+@singledispatch
+def context_of(setup: object, reference: Run) -> Any:
+    """The :data:`Context` of the runs of a case from its ``setup`` and its ``reference``; InputError where that does not have what
+    others are measured against.
+    """
+    raise TypeError(f"{type(setup).__name__} of {reference.name}: got no setup of a case")
+
+
+@context_of.register
+def _(setup: Setup, reference: Run) -> MeasurementContext:
+    if not reference.has_surface:
+        raise InputError(f"{reference.name}: surface", "a run of lines alone", "a reference that moves the surface")
+    if reference.fibres is None:
+        raise InputError(
+            f"{reference.name}: fibres", "a run without an interior", "a reference that carries the fibres"
+        )
+    return MeasurementContext.of(reference, reference.fibres, setup.bones, setup.free)
+
+
+@context_of.register
+def _(setup: FieldProblem, reference: Run) -> FieldContext:  # noqa: ARG001
+    return FieldContext(setup.exact)
+
+
+class Metric(Protocol):
+    """What the module of a metric has."""
+
+    UNITS: dict[str, str]
+    OF: Part
+    AGAINST: Standard
+
+    def measure(self, run: Run, reference: Run, context: Any, /) -> tuple[Measure, ...]:
+        """Every statistic of ``run`` against ``reference``, frame by frame."""
+
+
+def metric(name: str) -> Metric:
+    """The metric ``name``."""
+    return cast(Metric, importlib.import_module(f"{__name__}.{name}"))
+
+
+def names(against: Collection[Standard] | None = None) -> list[str]:
+    """The metrics there are: all, or those measured ``against`` one of these."""
+    found = sorted(module.name for module in pkgutil.iter_modules(__path__))
+    return [name for name in found if against is None or metric(name).AGAINST in against]
+
+
+def units(of: Collection[Part] | None = None, against: Collection[Standard] | None = None) -> dict[str, str]:
+    """The unit of every ``metric.statistic`` there is: all, or those ``of`` such parts and ``against`` such standards."""
+    chosen = {name: metric(name) for name in names(against)}
+    return {
+        f"{name}.{statistic}": unit
+        for name, found in chosen.items()
+        if of is None or found.OF in of
+        for statistic, unit in found.UNITS.items()
+    }
 
 
 def of_itself(name: str) -> bool:
     """Whether the metric ``name`` says something of a run alone, whatever it is measured against."""
-    return getattr(importlib.import_module(f"{__name__}.{name}"), "OF_ITSELF", False)
+    return metric(name).AGAINST != "reference"
 
 
-def of_lines(name: str) -> bool:
-    """Whether the metric ``name`` is of the fibres alone, so that it needs no surface."""
-    return getattr(importlib.import_module(f"{__name__}.{name}"), "OF_LINES", False)
-
-
-def measure(
-    run: Run, reference: Run, context: MeasurementContext, wanted: Iterable[str] | None = None
-) -> tuple[Measure, ...]:
+def measure(run: Run, reference: Run, context: Context, wanted: Iterable[str] | None = None) -> tuple[Measure, ...]:
     """Every statistic of every metric (or of those ``wanted``) of ``run`` against ``reference``, frame by frame; both must have
-    the same frames. Of a run without a surface only what needs none.
+    the same frames. Of a run only what it carries.
     """
-    chosen = [name for name in (names() if wanted is None else wanted) if run.has_surface or of_lines(name)]
-    modules = (importlib.import_module(f"{__name__}.{name}") for name in chosen)
-    return tuple(statistic for module in modules for statistic in module.measure(run, reference, context))
+    chosen = map(metric, names() if wanted is None else wanted)
+    return tuple(
+        statistic for found in chosen if found.OF in run.carries for statistic in found.measure(run, reference, context)
+    )
 
 
 def find(measures: Iterable[Measure], metric: str, statistic: str) -> Measure | None:
@@ -109,6 +165,12 @@ def at_rest(run: Run) -> Run:
     still = np.broadcast_to(run.surface.points, (frames, *run.surface.points.shape))
     fibres = None if run.fibres is None else np.broadcast_to(run.fibres.points, (frames, *run.fibres.points.shape))
     return Run("rest", "rest", run.outcome, run.numbers, run.surface, still, run.fibres, fibres)
+
+
+def at_vertices(run: Run, vertices: Ints) -> tuple[str, ...]:
+    """Where ``vertices`` (f,) of the mesh of a field are, in words."""
+    places = (", ".join(f"{x:.4g}" for x in run.points[vertex]) for vertex in vertices)
+    return tuple(f"vertex {vertex} at ({place})" for vertex, place in zip(vertices, places, strict=True))
 
 
 def rms(deviations: Floats, weights: Floats) -> Floats:

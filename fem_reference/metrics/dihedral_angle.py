@@ -12,6 +12,7 @@ from fem_reference.metrics.edge_extension import worst_edges
 from fem_reference.runs.store import Run
 
 UNITS = dict.fromkeys(("mean", "mean_magnitude", "rms", "p95", "max", "mean_magnitude_of_edges"), "deg")
+OF, AGAINST = "surface", "reference"
 
 
 def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Measure, ...]:

@@ -11,6 +11,7 @@ from fem_reference.metrics import Measure, MeasurementContext, percentile, rms
 from fem_reference.runs.store import Run
 
 UNITS = dict.fromkeys(("mean", "rms", "p95", "max", "mean_of_edges"), "%")
+OF, AGAINST = "surface", "reference"
 
 
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")

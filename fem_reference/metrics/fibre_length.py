@@ -13,11 +13,11 @@ from fem_reference.metrics import Measure, MeasurementContext
 from fem_reference.runs.store import Run
 
 UNITS = {"mean": "mm", "rms": "mm", "max": "mm", "mean_percent": "%", "rms_percent": "%", "max_percent": "%"}
+OF, AGAINST = "lines", "reference"
 # Fibre points of a run this close [mm] to the measurement context's are the same points, after a file of single precision.
 _SAME = 1e-3
 # And where a run has its lines alone: a reference whose overlaps with bones were removed begins that far from the rest state.
 _RELAXED = 5.0
-OF_LINES = True
 
 
 @np.errstate(over="ignore", invalid="ignore")

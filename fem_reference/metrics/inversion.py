@@ -13,6 +13,7 @@ from fem_reference.metrics import Measure, MeasurementContext
 from fem_reference.runs.store import Run
 
 UNITS = {"inside_out": "%", "overlapping": "%"}
+OF, AGAINST = "surface", "reference"
 
 
 def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Measure, ...]:

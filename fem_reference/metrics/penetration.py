@@ -18,7 +18,7 @@ from fem_reference.problems.muscle import RigidBody
 from fem_reference.runs.store import Run
 
 UNITS = {"deepest": "mm", "volume": "mm3"}
-OF_ITSELF = True
+OF, AGAINST = "surface", "itself"
 
 log = logging.getLogger(__name__)
 

@@ -13,6 +13,7 @@ from fem_reference.runs.store import Run
 
 _STATISTICS = ("rms", "p95", "max", "distance_mean", "distance_rms", "hausdorff")
 UNITS = dict.fromkeys(_STATISTICS, "mm") | {f"{name}_percent": "%" for name in _STATISTICS}
+OF, AGAINST = "surface", "reference"
 
 
 @np.errstate(over="ignore", invalid="ignore")

@@ -7,6 +7,7 @@ from fem_reference.metrics import Measure, MeasurementContext
 from fem_reference.runs.store import Run
 
 UNITS = {"deviation": "%", "deviation_volume": "mm3"}
+OF, AGAINST = "surface", "reference"
 
 
 @np.errstate(over="ignore", invalid="ignore")

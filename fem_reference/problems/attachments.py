@@ -12,7 +12,7 @@ from fem_reference.geometry.distance import distances
 from fem_reference.geometry.patches import draped, fan
 from fem_reference.geometry.sectors import shares_at
 from fem_reference.io import files
-from fem_reference.scenes.muscle import Outline, Scene, VertexList
+from fem_reference.scenes.muscle import MuscleCase, Outline, VertexList
 
 # Where a triangle is sampled: its middle, near its corners, near the middles of its sides.
 _SAMPLES = np.array(
@@ -28,7 +28,7 @@ _SAMPLES = np.array(
 )
 
 
-def pick(scene: Scene, i: int, surface: Surface, bone_surface: Surface) -> Ints:
+def pick(scene: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> Ints:
     """The vertices of a muscle that an attachment of a scene selects.
 
     Parameters

@@ -10,7 +10,7 @@ from fem_reference.geometry.distance import distances
 from fem_reference.geometry.fibres import Directions, NearestLine, fibre_field, trace
 from fem_reference.geometry.signed_distance import signed_distances
 from fem_reference.io import files
-from fem_reference.scenes.muscle import Scene
+from fem_reference.scenes.muscle import MuscleCase
 
 log = logging.getLogger(__name__)
 
@@ -18,7 +18,7 @@ log = logging.getLogger(__name__)
 TETS = 8000
 
 
-def of(scene: Scene, surface: Surface, fill: Callable[[float], TetMesh]) -> tuple[Polylines, Directions]:
+def of(scene: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh]) -> tuple[Polylines, Directions]:
     """The fibres of a scene: traced, or given as polylines.
 
     Parameters

@@ -44,7 +44,7 @@ from fem_reference.io import files
 from fem_reference.problems import fibre_field
 from fem_reference.problems.attachments import facets_under, pick
 from fem_reference.scenes.bones import Bone
-from fem_reference.scenes.muscle import Scene
+from fem_reference.scenes.muscle import MuscleCase
 
 log = logging.getLogger(__name__)
 
@@ -154,7 +154,7 @@ class Problem(Setup):
         return among(self.effects)
 
 
-def setup(scene: Scene) -> Setup:
+def setup(scene: MuscleCase) -> Setup:
     """Read and check the surfaces of a scene and choose its attachments; InputError names what is not usable."""
     place = join(scene.place, "muscle.surface")
     surface = files.read_surface(scene.file(scene.muscle.surface, "muscle.surface"), scene.muscle.unit)
@@ -163,7 +163,7 @@ def setup(scene: Scene) -> Setup:
     return Setup(surface, bones, _attached(scene, surface, bones), scene.frames.numbers, scene.frames.interval)
 
 
-def build(scene: Scene, rest: Setup) -> Problem:
+def build(scene: MuscleCase, rest: Setup) -> Problem:
     """The whole problem of a scene: its setup ``rest``, filled with tetrahedra and fibres."""
     begin = time.perf_counter()
     contact = among(scene.effects)
@@ -203,7 +203,7 @@ def build(scene: Scene, rest: Setup) -> Problem:
     )
 
 
-def _check_outside(scene: Scene, rest: Setup, contact: ContactEffect) -> None:
+def _check_outside(scene: MuscleCase, rest: Setup, contact: ContactEffect) -> None:
     """InputError where a bone in contact is wholly inside the muscle: nothing moves it out."""
     for i, bone in enumerate(rest.bones):
         if contact.is_by(bone.name) and signed_distances(bone.surface.points, rest.surface).max() < 0:
@@ -221,7 +221,7 @@ def _distance_facts(rest: Setup) -> dict[str, float | str]:
     }
 
 
-def _filled(scene: Scene, rest: Setup, size: float) -> TetMesh:
+def _filled(scene: MuscleCase, rest: Setup, size: float) -> TetMesh:
     """Tets of a ``size`` [mm], with the facets of each attachment: up to its rim where the mesher keeps it, else those
     under it.
     """
@@ -233,7 +233,7 @@ def _filled(scene: Scene, rest: Setup, size: float) -> TetMesh:
     return replace(mesh, facets={name: facets_under(mesh, rest.surface, attached) for name, attached in shares.items()})
 
 
-def _body(scene: Scene, i: int, muscle: Surface) -> RigidBody:
+def _body(scene: MuscleCase, i: int, muscle: Surface) -> RigidBody:
     bone, form = scene.bone[i], solid(scene.bone[i])
     motion = bone.motion.poses() if bone.motion else None
     if form is not None:
@@ -246,7 +246,7 @@ def _body(scene: Scene, i: int, muscle: Surface) -> RigidBody:
     return RigidBody(bone.name, surface, motion, bone.distance_error, bone.distance_rounding)
 
 
-def _attached(scene: Scene, surface: Surface, bones: tuple[RigidBody, ...]) -> tuple[AttachedVertices, ...]:
+def _attached(scene: MuscleCase, surface: Surface, bones: tuple[RigidBody, ...]) -> tuple[AttachedVertices, ...]:
     by_name = {bone.name: bone for bone in bones}
     taken = np.zeros(len(surface.points), bool)
     attached = []

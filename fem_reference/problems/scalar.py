@@ -19,7 +19,7 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.records import join
 from fem_reference.geometry.field_mesh import FieldMesh, check, refined, share_above, stabilisation
 from fem_reference.io import files
-from fem_reference.scenes.scalar import Boundary, FieldScene, Interval, MeshFiles
+from fem_reference.scenes.scalar import Boundary, Interval, MeshFiles, ScalarCase
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +50,16 @@ class FieldProblem:
     exact: str | None = None
 
     @property
+    def form(self) -> str:
+        """The weak form: galerkin, or supg where it is stabilised."""
+        return "galerkin" if self.tau is None else "supg"
+
+    @property
+    def mesh_facts(self) -> dict[str, float]:
+        """What the mesh is like."""
+        return {"cells": float(len(self.mesh.cells)), "nodes": float(len(self.fixed)), "mesh_peclet": self.peclet}
+
+    @property
     def diffusion(self) -> float:
         """The diffusion coefficient."""
         return next(effect.coefficient for effect in self.effects if isinstance(effect, Diffusion))
@@ -60,7 +70,7 @@ class FieldProblem:
         return next((effect for effect in self.effects if isinstance(effect, Advection)), None)
 
 
-def build(scene: FieldScene, refinements: int = 0) -> FieldProblem:
+def build(scene: ScalarCase, refinements: int = 0) -> FieldProblem:
     """The problem of a scene, its mesh refined so many times; InputError names what is not usable."""
     mesh = check(_mesh(scene))
     _check_effects(scene, mesh)
@@ -89,7 +99,7 @@ def build(scene: FieldScene, refinements: int = 0) -> FieldProblem:
     )
 
 
-def _mesh(scene: FieldScene) -> FieldMesh:
+def _mesh(scene: ScalarCase) -> FieldMesh:
     domain = scene.domain
     if domain.mesh is not None:
         return _mesh_files(scene, domain.mesh)
@@ -108,7 +118,7 @@ def _nodes(interval: Interval) -> Floats:
     return np.array([interval.start, *np.sort(inside), interval.end])
 
 
-def _mesh_files(scene: FieldScene, given: MeshFiles) -> FieldMesh:
+def _mesh_files(scene: ScalarCase, given: MeshFiles) -> FieldMesh:
     path = scene.file(given.points, "domain.mesh.points")
     points = _numbers(path)
     if points.shape[1] not in (2, 3):
@@ -152,7 +162,7 @@ def _whole_numbers(path: Path, values: Floats) -> Ints:
     return np.asarray(values.astype(np.int64))
 
 
-def _check_effects(scene: FieldScene, mesh: FieldMesh) -> None:
+def _check_effects(scene: ScalarCase, mesh: FieldMesh) -> None:
     dimension = mesh.points.shape[1]
     if not any(isinstance(effect, Diffusion) for effect in scene.effects):
         raise InputError(join(scene.place, "effect"), "no diffusion", "an effect with name diffusion")
@@ -194,7 +204,7 @@ def at(formula: str, points: Floats) -> Floats:
     return np.asarray(np.broadcast_to(values, len(points)), dtype=np.float64)
 
 
-def _given(scene: FieldScene, mesh: FieldMesh) -> Floats:
+def _given(scene: ScalarCase, mesh: FieldMesh) -> Floats:
     """The values (n,) that files of bounds prescribe at vertices, NaN where they prescribe none."""
     values = np.full(len(mesh.points), np.nan)
     for i, entry in enumerate(scene.boundary):
@@ -224,7 +234,7 @@ def _between(mesh: FieldMesh, values: Floats) -> Floats:
     return middles
 
 
-def _fixed(scene: FieldScene, mesh: FieldMesh, given: Floats) -> Floats:
+def _fixed(scene: ScalarCase, mesh: FieldMesh, given: Floats) -> Floats:
     """The value at each node, NaN where it is free; InputError where two conditions disagree on one."""
     fixed = given if scene.element.order == 1 else np.concatenate([given, _between(mesh, given)])
     nodes, sloped = mesh.nodes[scene.element.order], np.empty(0, np.int64)
@@ -290,7 +300,7 @@ def _flux(entry: Boundary, mesh: FieldMesh) -> Flux:
     return Flux(_facets(entry, mesh), entry.slope)
 
 
-def _check_unique(scene: FieldScene, fixed: Floats) -> None:
+def _check_unique(scene: ScalarCase, fixed: Floats) -> None:
     """InputError where a constant can be added to the solution."""
     if np.isnan(fixed).all() and not any(isinstance(effect, Reaction) and effect.rate for effect in scene.effects):
         raise InputError(

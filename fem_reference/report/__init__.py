@@ -7,7 +7,6 @@ from fem_reference.assessment import cost_study
 from fem_reference.assessment.claims import Claims
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.cost_study import Study
-from fem_reference.assessment.scalar_example import Example
 from fem_reference.assessment.solver_table import Table
 from fem_reference.io import files
 from fem_reference.report import claims_page, field_page, page, ranking_page, study_page, verify_page
@@ -26,13 +25,20 @@ def write(comparison: Comparison, folder: Path) -> Path:
     texts = {
         "measures.json": json.dumps(numbers, indent=1, allow_nan=False),
         "measures.csv": as_csv(numbers["measures"]),
-        "report.html": page.render(comparison),
+        "report.html": _page(comparison),
     }
     _write(texts, folder)
     return folder / "report.html"
 
 
-def write_examples(title: str, examples: tuple[Example, ...], path: Path, *, differences: bool) -> None:
+def _page(comparison: Comparison) -> str:
+    """The page of a comparison: of fields on meshes, or of bodies that move."""
+    if "field" in comparison.reference.carries:
+        return field_page.render(comparison.scene.title, (comparison,), differences=False)
+    return page.render(comparison)
+
+
+def write_examples(title: str, examples: tuple[Comparison, ...], path: Path, *, differences: bool) -> None:
     """Write the page of scalar cases; with ``differences`` the table of where the report's listings and text part."""
     text = field_page.render(title, examples, differences)
     path.parent.mkdir(parents=True, exist_ok=True)

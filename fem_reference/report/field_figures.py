@@ -18,12 +18,13 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
-from fem_reference.assessment.scalar_example import Example, Ladder
+from fem_reference.assessment.comparison import Comparison
+from fem_reference.assessment.convergence import Ladder
 from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.field_mesh import FieldMesh
 from fem_reference.problems.scalar import at
 from fem_reference.report.curves import LOOK, PALETTE, REFERENCE, inline
-from fem_reference.runs.scalar import FieldRun
+from fem_reference.runs.store import Run
 
 VALUES, DIFFERENCES = "viridis", "RdBu_r"
 _DPI = 150
@@ -41,19 +42,19 @@ class Drawing:
     missing: str = ""
 
 
-def rival(example: Example) -> FieldRun | None:
+def rival(example: Comparison) -> Run | None:
     """The run to be shown beside the reference: the listing, else the first candidate."""
     listings = [run for run in example.candidates if run.solver == "listing"]
     return next(iter([*listings, *example.candidates]), None)
 
 
-def drawings(example: Example) -> list[Drawing]:
+def drawings(example: Comparison) -> list[Drawing]:
     """What shows the solutions of an example: lines over an interval, maps and views of triangles."""
-    dimension = example.problem.mesh.points.shape[1]
+    dimension = example.setup.mesh.points.shape[1]
     return _lines(example) if dimension == 1 else list(_panels(example, _plate if dimension == 2 else _body))
 
 
-def convergence(example: Example) -> Drawing:
+def convergence(example: Comparison) -> Drawing:
     """Error over number of cells, a line for each element."""
 
     def draw(axes: Axes) -> None:
@@ -76,17 +77,17 @@ def _positive(ladder: Ladder) -> tuple[Floats, Floats]:
     return cells[kept], errors[kept]
 
 
-def _lines(example: Example) -> list[Drawing]:
-    name, exact = example.scene.name, example.scene.exact
-    known = [run for run in example.runs if np.isfinite(run.vertex_values).all()]
+def _lines(example: Comparison) -> list[Drawing]:
+    name, exact = example.scene.name, example.setup.exact
+    known = [run for run in example.runs if np.isfinite(run.vertex_values[-1]).all()]
     if not known:
         return [Drawing("Solution", missing="no run has values that are numbers")]
 
     def solutions(axes: Axes) -> None:
         for i, run in sorted(enumerate(known), key=lambda entry: entry[1].solver != "listing"):
-            axes.plot(*_sorted(run, run.vertex_values), label=run.name, **_look(i, run))
+            axes.plot(*_sorted(run, run.vertex_values[-1]), label=run.name, **_look(i, run))
         if exact is not None:
-            ends = example.problem.mesh.points[:, 0].min(), example.problem.mesh.points[:, 0].max()
+            ends = example.setup.mesh.points[:, 0].min(), example.setup.mesh.points[:, 0].max()
             x = np.linspace(*ends, 300)
             axes.plot(x, at(exact, x[:, None]), color="red", linewidth=1.2, label=f"exact, {exact}")
         axes.set_xlabel("x")
@@ -95,14 +96,14 @@ def _lines(example: Example) -> list[Drawing]:
     return [*drawn, _distances(example, known)]
 
 
-def _distances(example: Example, known: list[FieldRun]) -> Drawing:
+def _distances(example: Comparison, known: list[Run]) -> Drawing:
     """The distance of every run to the exact solution at the nodes, or of the candidates to the reference."""
-    exact, runs, base = example.scene.exact, known, example.reference.vertex_values
+    exact, runs, base = example.setup.exact, known, example.reference.vertex_values[-1]
     if exact is not None:
-        base, title = at(exact, example.problem.mesh.points), "Distance to the exact solution at the nodes"
+        base, title = at(exact, example.setup.mesh.points), "Distance to the exact solution at the nodes"
     else:
         runs, title = [run for run in known if run is not example.reference], "Distance to the reference at the nodes"
-    apart = [np.abs(run.vertex_values - base) for run in runs]
+    apart = [np.abs(run.vertex_values[-1] - base) for run in runs]
     if not any(np.isfinite(values).all() and values.max() > 0 for values in apart):
         return Drawing(title, missing="it is zero everywhere, or not a number")
 
@@ -116,13 +117,13 @@ def _distances(example: Example, known: list[FieldRun]) -> Drawing:
     return _svg(f"{example.scene.name}-distance", title, draw)
 
 
-def _sorted(run: FieldRun, values: Floats) -> tuple[Floats, Floats]:
-    x = run.problem.mesh.points[:, 0]
+def _sorted(run: Run, values: Floats) -> tuple[Floats, Floats]:
+    x = run.points[:, 0]
     order = np.argsort(x)
     return x[order], values[order]
 
 
-def _look(i: int, run: FieldRun) -> dict[str, Any]:
+def _look(i: int, run: Run) -> dict[str, Any]:
     """The listing as its own ``plot`` command draws it, the others by their place."""
     if run.solver == "listing":
         return dict(_LISTING)
@@ -143,13 +144,13 @@ def _svg(name: str, title: str, draw: Callable[[Axes], None]) -> Drawing:
     return Drawing(title, inline(text.getvalue(), name, title))
 
 
-def _panels(example: Example, draw: Callable[[Figure, Example, Floats, str], None]) -> Iterator[Drawing]:
+def _panels(example: Comparison, draw: Callable[[Figure, Comparison, Floats, str], None]) -> Iterator[Drawing]:
     """The rival, the reference and their difference, each drawn by ``draw``."""
     reference, other = example.reference, rival(example)
-    wanted = [(_called(reference), reference.vertex_values, VALUES)]
+    wanted = [(_called(reference), reference.vertex_values[-1], VALUES)]
     if other is not None:
-        wanted.insert(0, (_called(other), other.vertex_values, VALUES))
-        apart = other.vertex_values - reference.vertex_values
+        wanted.insert(0, (_called(other), other.vertex_values[-1], VALUES))
+        apart = other.vertex_values[-1] - reference.vertex_values[-1]
         wanted.append((f"Difference: {other.name} minus reference", apart, DIFFERENCES))
     for title, values, colours in wanted:
         if np.isfinite(values).all():
@@ -158,7 +159,7 @@ def _panels(example: Example, draw: Callable[[Figure, Example, Floats, str], Non
             yield Drawing(title, missing="its values are not a number, so that there is nothing to draw")
 
 
-def _called(run: FieldRun) -> str:
+def _called(run: Run) -> str:
     name = run.name.capitalize()
     return name if run.name == run.solver else f"{name} ({run.solver})"
 
@@ -176,9 +177,9 @@ def _webp(title: str, draw: Callable[[Figure], None]) -> Drawing:
     return Drawing(title, f'<img src="{source}" width="{width}" height="{height}" alt="">')
 
 
-def _plate(figure: Figure, example: Example, values: Floats, colours: str) -> None:
+def _plate(figure: Figure, example: Comparison, values: Floats, colours: str) -> None:
     """A map with the triangles on it, and the values as heights above the plate."""
-    mesh, scale = example.problem.mesh, _scale(values, colours)
+    mesh, scale = example.setup.mesh, _scale(values, colours)
     x, y = mesh.points.T
     axes: Any = figure.add_subplot(1, 2, 1)
     shown = axes.tripcolor(x, y, mesh.cells, values, shading="gouraud", cmap=colours, norm=scale)
@@ -238,10 +239,10 @@ def _windows(points: Floats, anchors: Floats) -> list[_Window]:
     return windows
 
 
-def _body(figure: Figure, example: Example, values: Floats, colours: str) -> None:
+def _body(figure: Figure, example: Comparison, values: Floats, colours: str) -> None:
     """A surface in space seen along z from the side of its anchors, y up, every window with its own colours."""
-    mesh = example.problem.mesh
-    anchors = mesh.points[~np.isnan(example.problem.fixed[: len(mesh.points)])]
+    mesh = example.setup.mesh
+    anchors = mesh.points[~np.isnan(example.setup.fixed[: len(mesh.points)])]
     behind = len(anchors) > 0 and anchors[:, 2].mean() < mesh.points[:, 2].mean()
     side = np.array([-1.0, 1.0, -1.0]) if behind else np.ones(3)
     turned = FieldMesh(mesh.points * side, mesh.cells, mesh.place)

@@ -2,17 +2,16 @@
 
 import tomllib
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 
-from fem_reference.assessment.judge import Word, overall
-from fem_reference.assessment.scalar_example import Example
+from fem_reference.assessment.comparison import Comparison
+from fem_reference.assessment.judge import overall
 from fem_reference.foundations.records import Record, parse
 from fem_reference.report import field_figures
 from fem_reference.report.templates import template
 from fem_reference.report.words import number
-from fem_reference.runs.scalar import FieldRun
+from fem_reference.runs.store import Run
 
 # What the report's figures show, in words: its pictures are not distributed with it. By the name of a case: figure and caption.
 FIGURES = {
@@ -44,18 +43,19 @@ class Difference(Record):
     measured: str
 
 
-def render(title: str, examples: tuple[Example, ...], differences: bool) -> str:
+def render(title: str, examples: tuple[Comparison, ...], differences: bool) -> str:
     """The whole page as text; with ``differences`` the table of where the report's text and listings part."""
     return template("field_page.html").render(
         title=title,
         examples=examples,
-        word=overall(cast(Word, example.word) for example in examples),
+        word=overall(example.word for example in examples),
         differences=read_differences() if differences else (),
         figures_of_report=FIGURES,
         apart=apart,
         bounds=bounds,
         seconds=seconds,
         pivot=pivot,
+        form=form,
         zip=zip,
         drawings=field_figures.drawings,
         convergence=field_figures.convergence,
@@ -69,17 +69,17 @@ def read_differences() -> tuple[Difference, ...]:
     return tuple(parse(Difference, row, f"{path}: difference[{i}]") for i, row in enumerate(table["difference"]))
 
 
-def apart(example: Example) -> str:
+def apart(example: Comparison) -> str:
     """In one sentence, how far the listing (else the first candidate) and the equation part at the vertices."""
     other, reference = field_figures.rival(example), example.reference
     if other is None:
         return "there is a reference alone, and nothing beside it."
     name = f"the {other.name}" if other.solver == "listing" else other.name
     for run, called in ((other, name), (reference, "the reference")):
-        if not np.isfinite(run.vertex_values).all():
+        if not np.isfinite(run.vertex_values[-1]).all():
             return f"{called} is not a number, so that they cannot be compared."
-    distance = float(np.abs(other.vertex_values - reference.vertex_values).max())
-    size = float(np.abs(reference.vertex_values).max())
+    distance = float(np.abs(other.vertex_values[-1] - reference.vertex_values[-1]).max())
+    size = float(np.abs(reference.vertex_values[-1]).max())
     if distance <= AGREE * size:
         return f"{name} and the equation agree; at the furthest vertex they part by {number(distance)}."
     (low, high), (least, greatest) = bounds(other), bounds(reference)
@@ -94,20 +94,26 @@ def apart(example: Example) -> str:
     )
 
 
-def bounds(run: FieldRun) -> tuple[float, float]:
+def bounds(run: Run) -> tuple[float, float]:
     """The least and the greatest value at a vertex, NaN where one is not a number."""
-    return float(run.vertex_values.min()), float(run.vertex_values.max())
+    return float(run.vertex_values[-1].min()), float(run.vertex_values[-1].max())
 
 
-def seconds(run: FieldRun) -> float | None:
+def seconds(run: Run) -> float | None:
     """What a run took, None where it does not say."""
-    cost = run.solution.outcome.cost
+    cost = run.outcome.cost
     parts = [value for key, value in cost.items() if key.startswith("seconds_")]
-    return cost.get("seconds", sum(parts) if parts else None)
+    return sum(parts) if parts else cost.get("seconds")
 
 
-def pivot(example: Example) -> dict[str, list[float | None]]:
-    """By measure, its value for every run, None where there is none of that run."""
-    found = {(measure.measure, measure.of): measure.value for measure in example.measures}
-    names = dict.fromkeys(measure.measure for measure in example.measures)
+def form(example: Comparison, run: Run) -> str:
+    """Which weak form was solved: what the run says, else that of the problem."""
+    return str(run.origin.get("form", example.setup.form))
+
+
+def pivot(example: Comparison) -> dict[str, list[float | None]]:
+    """By metric, its value for every run, None where there is none of that run."""
+    measured = {"reference": example.changes["reference"]} | example.deviations
+    found = {(one.metric, name): float(one.values[-1]) for name, measures in measured.items() for one in measures}
+    names = dict.fromkeys(metric for metric, _ in found)
     return {name: [found.get((name, run.name)) for run in example.runs] for name in names}

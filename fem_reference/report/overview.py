@@ -1,27 +1,28 @@
-"""The contents of a case and the results of scalar ones, in words and numbers: what ``show``, ``run`` and ``compare`` print."""
+"""The contents of a case and what came of it, in words and numbers: what ``show``, ``run`` and ``compare`` print."""
 
 import math
 from collections.abc import Iterable
+from functools import singledispatch
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import ErrorBar
-from fem_reference.assessment.judge import overall
-from fem_reference.assessment.scalar_example import Example, FieldMeasure, FieldVerdict
+from fem_reference.assessment.judge import Verdict
 from fem_reference.assessment.solver_table import Table
 from fem_reference.effects import Effect
 from fem_reference.foundations.mesh import Surface, enclosed_volume
 from fem_reference.foundations.motion import RigidMotion, Translation
 from fem_reference.geometry.sectors import attached_area, attached_shares
-from fem_reference.metrics import find
+from fem_reference.metrics import Measure, find
 from fem_reference.problems.muscle import AttachedVertices, RigidBody, Setup
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.report.words import exact
-from fem_reference.runs.scalar import FieldRun
 from fem_reference.runs.store import Run
-from fem_reference.scenes.muscle import Scene
-from fem_reference.scenes.scalar import FieldScene
+from fem_reference.scenes.case import Case, Expectation
+from fem_reference.scenes.muscle import MuscleCase
 
 # The statistics that are printed of a comparison; the page, JSON and CSV have them all.
 PRINTED = (
@@ -35,19 +36,41 @@ PRINTED = (
 )
 
 
-def scene_facts(scene: Scene, setup: Setup) -> dict[str, Any]:
+def case_facts(case: Case, setup: Any) -> dict[str, Any]:
     """Everything that a person asks of a case before solving it, as words and numbers by name."""
+    return {
+        "case": case.name,
+        "title": case.title,
+        "proves": case.proves,
+        **_made_of(setup, case),
+        "reference": " ".join([case.reference.solver, *(f"{k}={v}" for k, v in case.reference.settings.items())]),
+        "candidates": {candidate.name: candidate.solver for candidate in case.candidate},
+        "expects": [f"{_what(e)}: {e.truth} within {e.within} ({e.kind})" for e in case.expect],
+    }
+
+
+def _what(expected: Expectation) -> str:
+    if expected.statistic is None:
+        return f"{expected.of} {expected.metric}"
+    return f"{expected.of} {expected.metric} {expected.statistic} at frame {expected.frame}"
+
+
+@singledispatch
+def _made_of(setup: object, case: Case) -> dict[str, Any]:
+    """What is in a case, from its ``setup``."""
+    raise TypeError(f"{type(setup).__name__} is no setup of {case.name}")
+
+
+@_made_of.register
+def _(setup: Setup, case: MuscleCase) -> dict[str, Any]:
     surface = setup.surface
     return {
-        "case": scene.name,
-        "title": scene.title,
-        "proves": scene.proves,
         "muscle": {
             "triangles": len(surface.triangles),
             "volume_mm3": enclosed_volume(surface.points, surface.triangles),
-            "tet_size_mm": scene.muscle.tet_size,
-            "refinements": scene.muscle.refinements,
-            "mesher": scene.muscle.mesher,
+            "tet_size_mm": case.muscle.tet_size,
+            "refinements": case.muscle.refinements,
+            "mesher": case.muscle.mesher,
         },
         "bones": {bone.name: f"{_shape(bone)}, {_motion(bone.motion)}" for bone in setup.bones},
         "attachments": {
@@ -55,14 +78,22 @@ def scene_facts(scene: Scene, setup: Setup) -> dict[str, Any]:
             + ("exactly" if one.stiffness is None else f"by springs of {one.stiffness:g} MPa/mm")
             for one in setup.attached
         },
-        "effects": {effect.title: _parameters(effect) for effect in scene.effects},
-        "frames": f"{scene.frames.first} to {scene.frames.last}, every {scene.frames.every}",
-        "reference": " ".join([scene.reference.solver, *(f"{k}={v}" for k, v in scene.reference.settings.items())]),
-        "candidates": {candidate.name: candidate.solver for candidate in scene.candidate},
-        "expects": [
-            f"{e.of} {e.metric} {e.statistic} at frame {e.frame}: {e.truth} within {e.within} ({e.kind})"
-            for e in scene.expect
-        ],
+        "effects": {effect.title: _parameters(effect) for effect in case.effects},
+        "frames": f"{case.frames.first} to {case.frames.last}, every {case.frames.every}",
+    }
+
+
+@_made_of.register
+def _(setup: FieldProblem, case: Case) -> dict[str, Any]:
+    mesh, fixed = setup.mesh, int(np.isfinite(setup.fixed).sum())
+    return {
+        "domain": f"{len(mesh.cells)} cells, {len(mesh.points)} vertices, size {mesh.sizes.sum():.6g}",
+        "element": f"P{setup.order}, {len(setup.fixed)} nodes, {fixed} fixed",
+        "form": f"{setup.form}, mesh Peclet number up to {setup.peclet:.3g}",
+        "effects": {
+            title: {name: str(value) for name, value in effect.model_dump().items()}
+            for title, effect in case.acting.items()
+        },
     }
 
 
@@ -99,111 +130,50 @@ def _motion(motion: RigidMotion | None) -> str:
     return f"turns about ({x:g}, {y:g}, {z:g}) mm along {motion.axis}, rad at frame: {keys}"
 
 
-def field_scene_facts(scene: FieldScene, problem: FieldProblem) -> dict[str, Any]:
-    """Everything that a person asks of a scalar case before solving it."""
-    return {
-        "case": scene.name,
-        "title": scene.title,
-        "proves": scene.proves,
-        "domain": f"{len(problem.mesh.cells)} cells, {len(problem.mesh.points)} vertices, size {problem.mesh.sizes.sum():.6g}",
-        "element": f"P{problem.order}, {len(problem.fixed)} nodes, {_fixed(problem)} fixed",
-        "form": f"{'galerkin' if problem.tau is None else 'supg'}, mesh Peclet number up to {problem.peclet:.3g}",
-        "effects": {
-            type(effect).__name__: {name: str(value) for name, value in effect.model_dump().items()}
-            for effect in scene.effects
-        },
-        "reference": scene.reference.solver,
-        "candidates": {candidate.name: candidate.solver for candidate in scene.candidate},
-        "expects": [f"{e.of} {e.measure}: {e.truth:g} within {e.within:g} ({e.kind})" for e in scene.expect],
-    }
-
-
-def _fixed(problem: FieldProblem) -> int:
-    return sum(not math.isnan(value) for value in problem.fixed)
-
-
-def field_facts(
-    scene: FieldScene, runs: Iterable[FieldRun], measures: Iterable[FieldMeasure], verdicts: Iterable[FieldVerdict]
-) -> dict[str, Any]:
-    """What came of the runs of a scalar case, the first of them in front, as JSON has it."""
-    listed, judged = list(runs), list(verdicts)
-    first = listed[0]
-    return {
-        "case": scene.name,
-        "solver": first.solver,
-        "status": first.solution.outcome.status,
-        "message": first.solution.outcome.message,
-        "statuses": {run.name: run.solution.outcome.status for run in listed},
-        "verdict": overall(verdict.word for verdict in judged),  # type: ignore[misc]
-        "cost": {run.name: run.solution.outcome.cost for run in listed},
-        "measures": [
-            {
-                "candidate": entry.of,
-                "metric": entry.measure,
-                "value": entry.value if math.isfinite(entry.value) else None,
-            }
-            for entry in measures
-        ],
-        "verdicts": [
-            {"word": v.word, "of": v.expectation.of, "metric": v.expectation.measure, "truth": v.expectation.truth}
-            | {"within": v.expectation.within, "value": v.value if math.isfinite(v.value) else None}
-            for v in judged
-        ],
-        "runs": [str(run.folder) for run in listed],
-    }
-
-
-def field_text(facts: dict[str, Any]) -> str:
-    """The same for people."""
-    lines = [f"{facts['case']}: {facts['status']}, {facts['message']}"]
-    lines += [f"{row['candidate']} {row['metric']}: {_number(row['value'])}" for row in facts["measures"]]
-    lines += [
-        f"{v['word']}: {v['of']} {v['metric']} is {_number(v['value'])}, expected {v['truth']:.6g} within {v['within']:.3g}"
-        for v in facts["verdicts"]
-    ]
-    return "\n".join([*lines, f"verdict: {facts['verdict']}", *(f"stored in {folder}" for folder in facts["runs"])])
-
-
-def field_example_facts(example: Example) -> dict[str, Any]:
-    """What came of a whole example, its convergence included."""
-    ladders = [
-        {
-            "element": ladder.element,
-            "cells": ladder.cells,
-            "errors": [error if math.isfinite(error) else None for error in ladder.errors],
-            "against": ladder.against,
-        }
-        | {"order": ladder.order if math.isfinite(ladder.order) else None}
-        for ladder in example.ladders
-    ]
-    return field_facts(example.scene, example.runs, example.measures, example.verdicts) | {"convergence": ladders}
-
-
-def _number(value: float | None) -> str:
-    return "not a number" if value is None else f"{value:.6g}"
-
-
-def comparison_text(result: Comparison, page: Path) -> str:
-    """What came of a comparison, line by line: its runs, its worst numbers, its verdicts and its ``page``."""
+def comparison_text(result: Comparison, page: Path | None = None) -> str:
+    """What came of a comparison, line by line: its runs, its worst numbers, its verdicts and its ``page``, if it has one."""
     runs = [
         f"{run.name}: {run.outcome.status}, {run.outcome.message}" for run in (result.reference, *result.candidates)
     ]
-    judged = [
-        f"{verdict.word}: {verdict.expectation.of} {verdict.expectation.metric} {verdict.expectation.statistic} at frame "
-        f"{verdict.frame} is {verdict.value:.4g} {verdict.unit}, expected {verdict.truth:.4g} within {verdict.within:.4g}"
-        + ("" if verdict.error_bar is None else f", known to {verdict.error_bar:.2g}")
-        for verdict in result.verdicts
-    ]
+    judged = [_judged(verdict) for verdict in result.verdicts]
     asked = {verdict.expectation.of for verdict in result.verdicts}
-    unjudged = result.candidates and asked <= {"reference"}
+    unjudged = result.candidates and asked == {"reference"}
     verdict = f"verdict: {result.word}" + (
         ", of the reference; candidates are measured, not judged" if unjudged else ""
     )
-    return "\n".join([*runs, *_known(result), *_worst(result), *judged, verdict, f"page: {page}"])
+    written = [] if page is None else [f"page: {page}"]
+    return "\n".join([*runs, *_known(result), *_worst(result), *judged, verdict, *written])
+
+
+def _judged(verdict: Verdict) -> str:
+    """A verdict as a line; of a number without a unit all digits that people read."""
+    expected = verdict.expectation
+    if verdict.unit == "1":
+        truth = f"expected {verdict.truth:.6g} within {verdict.within:.3g}"
+        return f"{verdict.word}: {expected.of} {expected.metric} is {_number(verdict.value)}, {truth}"
+    return (
+        f"{verdict.word}: {expected.of} {expected.metric} {expected.statistic} at frame "
+        f"{verdict.frame} is {verdict.value:.4g} {verdict.unit}, expected {verdict.truth:.4g} within {verdict.within:.4g}"
+        + ("" if verdict.error_bar is None else f", known to {verdict.error_bar:.2g}")
+    )
+
+
+def _measured(name: str, measures: Iterable[Measure]) -> list[str]:
+    """A line for each number of a field."""
+    return [f"{name} {one.metric}: {_number(value)}" for one in measures for value in one.values]
+
+
+def _number(value: float) -> str:
+    return f"{value:.6g}" if math.isfinite(value) else "not a number"
 
 
 def _worst(result: Comparison) -> list[str]:
-    """A line a candidate: how far it is off where it is worst, in the statistics of the page's first table."""
+    """A line a candidate: how far it is off where it is worst, in the statistics of the page's first table; of fields, which have
+    a single number each, all of them.
+    """
+    if "field" in result.reference.carries:
+        measured = {"reference": result.changes["reference"]} | result.deviations
+        return [line for name, measures in measured.items() for line in _measured(name, measures)]
     lines = []
     for name, measures in result.deviations.items():
         text = [
@@ -237,23 +207,10 @@ def _bar(result: Comparison, bar: ErrorBar) -> str:
     return f"\N{PLUS-MINUS SIGN} {bar.values[bar.worst]:.2g} {bar.unit} at {at}"
 
 
-def run_facts(scene: Scene, run: Run) -> dict[str, Any]:
-    """What came of a run that nothing was compared with."""
-    return {
-        "case": scene.name,
-        "solver": run.solver,
-        "status": run.outcome.status,
-        "message": run.outcome.message,
-        "verdict": "not judged",
-        "cost": {run.name: run.outcome.cost},
-        "measures": [],
-        "folder": str(run.folder),
-    }
-
-
-def run_text(run: Run) -> str:
-    """The same in words."""
-    return f"{run.name}: {run.outcome.status}, {run.outcome.message}\nstored in {run.folder}"
+def run_text(run: Run, measures: Iterable[Measure], verdicts: Iterable[Verdict]) -> str:
+    """What came of a run that nothing was compared with, line by line."""
+    printed = [f"{run.name}: {run.outcome.status}, {run.outcome.message}", *_measured(run.name, measures)]
+    return "\n".join([*printed, *map(_judged, verdicts), f"stored in {run.folder}"])
 
 
 def ranking_text(table: Table) -> str:

@@ -26,7 +26,7 @@ from fem_reference.report.words import listed, ratio, words
 from fem_reference.runs.cost import seconds_per_frame
 from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
-from fem_reference.scenes.muscle import Scene
+from fem_reference.scenes.case import Case
 
 # The columns of the first table: metric, statistic, the words above a group and above the column, unit.
 COLUMNS = (
@@ -206,10 +206,12 @@ def _flat(table: Any, key: str = "") -> list[tuple[str, Any]]:
     return [(key, table if isinstance(table, str | float | int | None) else json.dumps(table, default=str))]
 
 
-def _changes(scene: Scene) -> list[tuple[str, Any, Any]]:
+def _changes(scene: Case) -> list[tuple[str, Any, Any]]:
     """Where the scene differs from its file: key, value in the file, value here."""
+    if not scene.place.endswith(".toml"):  # made without a file
+        return []
     try:
-        in_file = dict(_flat(_table(casefile.read_muscle(scene.place))))
+        in_file = dict(_flat(_table(casefile.read(scene.place))))
     except InputError as error:
         return [("the scene file", "not readable any more", str(error))]
     here = dict(_flat(_table(scene)))
@@ -218,7 +220,7 @@ def _changes(scene: Scene) -> list[tuple[str, Any, Any]]:
     ]
 
 
-def _table(scene: Scene) -> dict[str, Any]:
+def _table(scene: Case) -> dict[str, Any]:
     """The scene as nested tables, entries of a list by their number."""
     listed_effects = {"effect": [effect.model_dump(mode="json") for effect in scene.effects]}
     return dict(_numbered(scene.model_dump(mode="json", exclude={"folder", "effect"}) | listed_effects))
@@ -232,6 +234,6 @@ def _numbered(value: Any) -> Any:
     return value
 
 
-def _scene_text(scene: Scene) -> str:
+def _scene_text(scene: Case) -> str:
     path = Path(scene.place)
     return path.read_text(encoding="utf-8") if path.is_file() else ""

@@ -8,10 +8,12 @@ from typing import Any
 
 from fem_reference.assessment import ranking
 from fem_reference.assessment.comparison import Comparison
+from fem_reference.assessment.convergence import Ladder
 from fem_reference.assessment.error_bars import ErrorBar
-from fem_reference.assessment.judge import Verdict
+from fem_reference.assessment.judge import Verdict, overall
 from fem_reference.metrics import Measure
 from fem_reference.runs.store import Run
+from fem_reference.scenes.case import Case
 
 COLUMNS = ("candidate", "metric", "statistic", "frame", "value", "unit")
 
@@ -24,20 +26,36 @@ def summary(comparison: Comparison) -> dict[str, Any]:
     well the reference is known and ``rankings`` whom that separates, empty without any.
     """
     reference = comparison.reference
-    deviations = [row for run in comparison.candidates for row in _rows(run, comparison.deviations[run.name])]
-    from_rest = {run.name: _rows(run, comparison.changes[run.name]) for run in runs(comparison)}
-    return {
+    deviations = [row for run in comparison.candidates for row in rows(run, comparison.deviations[run.name])]
+    from_rest = {run.name: rows(run, comparison.changes[run.name]) for run in runs(comparison)}
+    facts = {
         "case": comparison.scene.name,
         "solver": reference.solver,
         "status": reference.outcome.status,
         "message": reference.outcome.message,
         "verdict": comparison.word,
         "cost": {run.name: {key: finite(value) for key, value in run.outcome.cost.items()} for run in runs(comparison)},
-        "measures": from_rest[reference.name] + _rows(reference, inversion(reference)) + deviations,
+        "measures": from_rest[reference.name] + rows(reference, inversion(reference)) + deviations,
         "from_rest": [row for rows in from_rest.values() for row in rows],
         "verdicts": [_verdict(verdict) for verdict in comparison.verdicts],
         "error_bars": [row for bar in known(comparison) for row in _bar_rows(comparison, bar)],
         "rankings": ranking.facts(comparison.rankings),
+    }
+    return facts | ({"convergence": [_ladder(ladder) for ladder in comparison.ladders]} if comparison.ladders else {})
+
+
+def of_run(case: Case, run: Run, measures: tuple[Measure, ...], verdicts: tuple[Verdict, ...]) -> dict[str, Any]:
+    """What came of a ``run`` that nothing was compared with, in the words of :func:`summary`."""
+    return {
+        "case": case.name,
+        "solver": run.solver,
+        "status": run.outcome.status,
+        "message": run.outcome.message,
+        "verdict": overall(verdict.word for verdict in verdicts),
+        "cost": {run.name: run.outcome.cost},
+        "measures": rows(run, measures),
+        "verdicts": [_verdict(verdict) for verdict in verdicts],
+        "folder": str(run.folder),
     }
 
 
@@ -52,7 +70,7 @@ def as_csv(rows: Iterable[dict[str, Any]]) -> str:
 
 def runs(comparison: Comparison) -> tuple[Run, ...]:
     """The reference and its candidates."""
-    return (comparison.reference, *comparison.candidates)
+    return comparison.runs
 
 
 def finite(value: float) -> float | None:
@@ -75,12 +93,18 @@ def inversion(run: Run) -> tuple[Measure, ...]:
     return tuple(Measure("inversion", name, "1", run.scalars[name]) for name in names)
 
 
-def _rows(run: Run, measures: Iterable[Measure]) -> list[dict[str, Any]]:
+def rows(run: Run, measures: Iterable[Measure]) -> list[dict[str, Any]]:
+    """One row a statistic and frame, with the keys ``COLUMNS``."""
     return [
         dict(zip(COLUMNS, (run.name, one.metric, one.statistic, number, finite(value), one.unit), strict=True))
         for one in measures
         for number, value in zip(run.numbers, one.values, strict=True)
     ]
+
+
+def _ladder(ladder: Ladder) -> dict[str, Any]:
+    errors = [finite(error) for error in ladder.errors]
+    return vars(ladder) | {"errors": errors, "order": finite(ladder.order)}
 
 
 def _bar_rows(comparison: Comparison, bar: ErrorBar) -> list[dict[str, Any]]:

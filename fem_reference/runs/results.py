@@ -20,8 +20,8 @@ from fem_reference.geometry.embedding import Locator
 from fem_reference.problems.body import reference_nodes
 from fem_reference.runs import states, store
 from fem_reference.runs.states import NodalState
-from fem_reference.scenes.casefile import read_muscle
-from fem_reference.scenes.muscle import Scene
+from fem_reference.scenes.case import Case
+from fem_reference.scenes.casefile import muscle, read_muscle
 
 NAMES = (
     "displacement",
@@ -153,7 +153,7 @@ class Results:
         return points
 
 
-def of_run(folder: Path | str, case: str | Path | Scene) -> Results:
+def of_run(folder: Path | str, case: str | Path | Case) -> Results:
     """The results of the run in ``folder``, which is one of ``case``: a name, a folder or a scene.
 
     InputError where there is no run with states, or it is of another scene (also where keys were changed after reading the case:
@@ -162,7 +162,7 @@ def of_run(folder: Path | str, case: str | Path | Scene) -> Results:
     folder = Path(folder)
     run = store.load(folder)
     mesh, fibre = states.read_rest(folder)
-    scene = case if isinstance(case, Scene) else read_muscle(case)
+    scene = read_muscle(case) if isinstance(case, str | Path) else muscle(case)
     if run.origin.get("scene") != scene.key:
         raise InputError(folder, f"a run of another scene than {scene.place}", "the scene that was solved")
     return Results(mesh, scene.effects, states.Stored(folder, run.numbers), fibre)

@@ -61,12 +61,12 @@ def write_rest(folder: Path, mesh: TetMesh, fibre: Floats | None) -> None:
 
     """
     directions = np.zeros((0, 3)) if fibre is None else fibre
-    _write(folder / FOLDER / "rest.npz", {"points": mesh.points, "tets": mesh.tets, "fibre": directions})
+    write_arrays(folder / FOLDER / "rest.npz", {"points": mesh.points, "tets": mesh.tets, "fibre": directions})
 
 
 def write(folder: Path, frame: int, state: NodalState) -> None:
     """Write the ``state`` at a ``frame`` number of the run in ``folder``."""
-    _write(_place(folder, frame), state.arrays)
+    write_arrays(_place(folder, frame), state.arrays)
 
 
 def read_rest(folder: Path) -> tuple[TetMesh, Floats | None]:
@@ -74,7 +74,7 @@ def read_rest(folder: Path) -> tuple[TetMesh, Floats | None]:
     place = folder / FOLDER / "rest.npz"
     if not place.is_file():
         raise InputError(folder, "a run without states", "one of the reference, solved with store_state = true")
-    arrays = _read(place, ("points", "tets", "fibre"))
+    arrays = read_arrays(place, ("points", "tets", "fibre"))
     return TetMesh(arrays["points"], arrays["tets"]), arrays["fibre"] if len(arrays["fibre"]) else None
 
 
@@ -89,7 +89,7 @@ class Stored(Mapping[float, NodalState]):
         if frame not in self.frames:
             raise KeyError(frame)
         if self.last is None or self.last[0] != frame:
-            self.last = (frame, NodalState.of(_read(_place(self.folder, int(frame)), _ARRAYS)))
+            self.last = (frame, NodalState.of(read_arrays(_place(self.folder, int(frame)), _ARRAYS)))
         return self.last[1]
 
     def __iter__(self) -> Iterator[float]:
@@ -103,15 +103,17 @@ def _place(folder: Path, frame: int) -> Path:
     return folder / FOLDER / f"frame_{frame:04d}.npz"
 
 
-def _write(path: Path, arrays: dict[str, Any]) -> None:
+def write_arrays(path: Path, arrays: dict[str, Any]) -> None:
+    """Write arrays by name into an .npz file."""
     path.parent.mkdir(exist_ok=True)
     with whole(path) as part:
         np.savez(part, allow_pickle=False, **arrays)
 
 
-def _read(path: Path, names: tuple[str, ...]) -> dict[str, Any]:
+def read_arrays(path: Path, names: tuple[str, ...] = ()) -> dict[str, Any]:
+    """The arrays of an .npz file by name: those of ``names``, by default all; InputError where it is damaged."""
     try:
         with path.open("rb") as file, np.load(file) as arrays:
-            return {name: arrays[name] for name in names}
+            return {name: arrays[name] for name in names or arrays.files}
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise InputError(path, repr(error), f"the arrays {', '.join(names)} of a stored state") from error

@@ -1,11 +1,12 @@
 """Run and the run store: what a solver produced, one folder a run, written as it goes.
 
-    <store>/<case>/<solver>-<key>/run.json        status, cost, origin, numbers per frame
-                                 /surface.pvd     the user's surface over the frames, for ParaView; surface/frame_0010.vtp
-                                 /rest/           surface.vtp and fibres.vtp at rest, of a solver that moves no surface
-                                 /fibres.pvd      fibre polylines, where the solver has an interior
-                                 /tets.pvd        tetrahedra, where the solver has them
-                                 /state/          the unknowns of the tetrahedra, where they were asked for (``states``)
+    <store>/<solver>-<key>/run.json        status, cost, origin, numbers per frame
+                          /surface.pvd     the user's surface over the frames, for ParaView; surface/frame_0010.vtp
+                          /rest/           surface.vtp and fibres.vtp at rest, of a solver that moves no surface
+                          /fibres.pvd      fibre polylines, where the solver has an interior
+                          /tets.pvd        tetrahedra, where the solver has them
+                          /field.pvd       a scalar field on its mesh, where that is what is solved (``fields``)
+                          /state/          the unknowns of the tetrahedra, where they were asked for (``states``)
 
 A file appears whole or not at all; ``run.json`` is written after the frame files that it names. A run whose status is
 ``running`` was cut off; it is not read as a result.
@@ -26,8 +27,11 @@ import numpy as np
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.markup import fact_table
 from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh
+from fem_reference.geometry.field_mesh import FieldMesh
 from fem_reference.io import files
-from fem_reference.runs import states
+from fem_reference.runs import fields, states
+from fem_reference.runs.fields import NodalField
+from fem_reference.scenes.case import Part
 
 log = logging.getLogger(__name__)
 
@@ -39,18 +43,19 @@ QUIET = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """One requested frame: positions [mm] of the surface (n, 3), None of a solver of lines alone, and where the solver has them
+    """One requested frame: positions [mm] of the surface (n, 3), None of a solver that moves none, and where the solver has them
     of the fibre points (m, 3) and tet points (k, 3); ``scalars`` by name; ``note`` is what progress says of it; ``state`` the
-    unknowns of the tets, where they were asked for.
+    unknowns of the tets, where they were asked for; ``field``, of a scalar problem.
     """
 
     number: int
-    surface: Floats | None
+    surface: Floats | None = None
     fibres: Floats | None = None
     tets: Floats | None = None
     scalars: dict[str, float] = field(default_factory=dict)
     note: str = ""
     state: states.NodalState | None = None
+    field: NodalField | None = None
 
 
 Sink = Callable[[Frame], None]
@@ -65,27 +70,56 @@ class Outcome:
     cost: dict[str, float] = field(default_factory=dict)
 
 
+# The surface of a run that moves none.
+NO_SURFACE = Surface(np.zeros((0, 3)), np.zeros((0, 3), np.int64))
+
+
 @dataclass(frozen=True, eq=False)
 class Run:
-    """Frames that somebody's solver produced for a scene.
+    """Frames that somebody's solver produced for a case.
 
     ``numbers`` (f,), ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (its rest state), ``fibre_positions``
     (f, m, 3) [mm] of the points of ``fibres`` or None for a surface-only solver, ``scalars`` by name (f,). A solver of lines
-    alone moves no surface: ``has_surface`` is False, and every entry of ``positions`` NaN.
+    alone moves no surface: ``has_surface`` is False, and every entry of ``positions`` NaN. A scalar run has a ``mesh`` in their
+    place, and ``fields`` by name (f, ...) at its nodes, as :class:`NodalField` has them.
     """
 
     name: str
     solver: str
     outcome: Outcome
     numbers: tuple[int, ...]
-    surface: Surface
-    positions: Floats
+    surface: Surface = NO_SURFACE
+    positions: Floats = field(default_factory=lambda: np.zeros((0, 0, 3)))
     fibres: Polylines | None = None
     fibre_positions: Floats | None = None
     scalars: dict[str, Floats] = field(default_factory=dict)
     origin: dict[str, Any] = field(default_factory=dict)
     folder: Path | None = None
     has_surface: bool = True
+    mesh: FieldMesh | None = None
+    fields: dict[str, Floats] = field(default_factory=dict)
+
+    @property
+    def carries(self) -> frozenset[Part]:
+        """What can be measured of it."""
+        if self.mesh is not None:
+            return frozenset({"field"})
+        return frozenset({"surface", "lines"}) if self.has_surface else frozenset({"lines"})
+
+    @property
+    def points(self) -> Floats:
+        """The vertices (n, d) that a field is on, else those of the surface at rest (n, 3) [mm]."""
+        return self.surface.points if self.mesh is None else self.mesh.points
+
+    @property
+    def values(self) -> Floats:
+        """The scalar field at all nodes (f, N); KeyError of a run that has none."""
+        return self.fields[fields.VALUES]
+
+    @property
+    def vertex_values(self) -> Floats:
+        """The scalar field at the vertices (f, n)."""
+        return self.values[:, : len(self.points)]
 
     def _repr_html_(self) -> str:
         """What notebooks show."""
@@ -98,7 +132,7 @@ class Run:
             "solver": self.solver,
             "status": f"{self.outcome.status}: {self.outcome.message}",
             "frames": f"{len(self.numbers)}, from {self.numbers[0]} to {self.numbers[-1]}",
-            "vertices": len(self.surface.points),
+            "vertices": len(self.points),
             "cost": ", ".join(f"{name} {value:.4g}" for name, value in cost.items()) or "not known",
             "stored in": self.folder or "nowhere",
         }
@@ -112,9 +146,9 @@ class Writer:
         self,
         folder: Path,
         identity: dict[str, Any],
-        surface: Surface,
-        fibres: Polylines | None,
-        mesh: TetMesh | None,
+        surface: Surface = NO_SURFACE,
+        fibres: Polylines | None = None,
+        mesh: TetMesh | None = None,
         directions: Floats | None = None,
     ) -> None:
         """``identity``: ``name``, ``solver``, ``origin`` and ``frames`` (the numbers wanted), as they go into run.json;
@@ -138,7 +172,7 @@ class Writer:
         parts: dict[str, Callable[[Path], None]] = {}
         if (surface := frame.surface) is not None:
             parts["surface"] = lambda path: files.write_surface(path, self.surface, surface)
-        elif not self.frames:
+        elif frame.field is None and not self.frames:
             self._write_rest()
         if self.fibres is not None and (fibres := frame.fibres) is not None:
             lines = self.fibres
@@ -147,10 +181,12 @@ class Writer:
             mesh = self.mesh
             parts["tets"] = lambda path: files.write_tets(path, mesh, tets)
         stored = ["state"] if self._write_unknowns(frame) else []
+        if (solved := frame.field) is not None:
+            parts[fields.FOLDER] = lambda path: fields.write(path, solved)
         self.state["numbers"].append(frame.number)
         self.state["parts"] = sorted([*parts, *stored])
         for part, write in parts.items():
-            suffix = ".vtu" if part == "tets" else ".vtp"
+            suffix = ".vtu" if part in ("tets", fields.FOLDER) else ".vtp"
             (self.folder / part).mkdir(exist_ok=True)
             write(self.folder / part / f"frame_{frame.number:04d}{suffix}")
             names = [(number, f"{part}/frame_{number:04d}{suffix}") for number in self.state["numbers"]]
@@ -160,8 +196,9 @@ class Writer:
         self._write_state()
         self._log_progress(frame)
 
-    def close(self, outcome: Outcome) -> None:
-        """Store how it ended."""
+    def close(self, outcome: Outcome, **origin: Any) -> None:
+        """Store how it ended, and what more is known of its ``origin`` now."""
+        self.state["origin"] |= origin
         cost = {"seconds": time.perf_counter() - self.begin} | outcome.cost
         self.state |= {"status": outcome.status, "message": outcome.message, "cost": cost}
         self._write_state()
@@ -213,6 +250,16 @@ def load(folder: Path) -> Run:
         raise InputError(place, repr(error), "the run.json of a stored run") from error
     if not numbers:
         raise InputError(place, "a run without frames", "at least the rest frame")
+    whose = {"name": name, "solver": solver, "outcome": outcome, "numbers": numbers, "scalars": scalars}
+    whose |= {"origin": origin, "folder": folder}
+    if fields.FOLDER in parts:
+        mesh, arrays = fields.read(folder, numbers)
+        return Run(**whose, has_surface=False, mesh=mesh, fields=arrays)
+    return Run(**whose, **_moved(folder, numbers, parts))
+
+
+def _moved(folder: Path, numbers: tuple[int, ...], parts: list[str]) -> dict[str, Any]:
+    """The surface and the fibres of a run in ``folder``, at rest and moved, as :class:`Run` has them."""
     names, has_surface = [f"frame_{number:04d}.vtp" for number in numbers], "surface" in parts
     if has_surface:
         surfaces = [files.read_surface(folder / "surface" / file, 1.0) for file in names]
@@ -220,25 +267,12 @@ def load(folder: Path) -> Run:
     else:
         surface = files.read_surface(folder / "rest" / "surface.vtp", 1.0)
         positions = np.full((len(numbers), *surface.points.shape), np.nan)
-    fibres, fibre_positions = None, None
+    found: dict[str, Any] = {"surface": surface, "positions": positions, "has_surface": has_surface}
     if "fibres" in parts:
         lines = [files.read_moved_polylines(folder / "fibres" / file, 1.0) for file in names]
         fibres = lines[0] if has_surface else files.read_polylines(folder / "rest" / "fibres.vtp", 1.0)
-        fibre_positions = np.stack([line.points for line in lines])
-    return Run(
-        name=name,
-        solver=solver,
-        outcome=outcome,
-        numbers=numbers,
-        surface=surface,
-        positions=positions,
-        fibres=fibres,
-        fibre_positions=fibre_positions,
-        scalars=scalars,
-        origin=origin,
-        folder=folder,
-        has_surface=has_surface,
-    )
+        found |= {"fibres": fibres, "fibre_positions": np.stack([line.points for line in lines])}
+    return found
 
 
 def status(folder: Path) -> str:

@@ -1,4 +1,4 @@
-"""case.toml -> Scene: strict reading. An unknown, missing or wrong key is an InputError that names file and key."""
+"""case.toml -> Case: strict reading. An unknown, missing or wrong key is an InputError that names file and key."""
 
 import re
 import tomllib
@@ -14,9 +14,10 @@ from fem_reference.effects import names as effect_names
 from fem_reference.effects.contact import Contact, among
 from fem_reference.effects.damping import Damping
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.records import Record, join, parse
-from fem_reference.scenes.muscle import HOME, NegativeControl, Scene, SceneFile
-from fem_reference.scenes.scalar import FieldScene, FieldSceneFile
+from fem_reference.foundations.records import Record, join, keys, parse
+from fem_reference.scenes.case import HOME, Case, NegativeControl
+from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.scenes.scalar import ScalarCase
 
 # What a load acts on, where it is no attachment: the surface that is not attached to bone.
 FREE = "free"
@@ -27,11 +28,9 @@ def cases() -> list[str]:
     return sorted(path.parent.name for path in (HOME / "cases").glob("*/case.toml"))
 
 
-def read(
-    case: str | Path, *, with_negative_control: bool = False, changes: dict[str, Any] | None = None
-) -> Scene | FieldScene:
-    """The scene of a shipped case (by name), a folder with a ``case.toml``, or a scene file: with a ``domain`` that of a scalar
-    field, else that of a muscle.
+def read(case: str | Path, *, with_negative_control: bool = False, changes: dict[str, Any] | None = None) -> Case:
+    """A shipped case (by name), that of a folder with a ``case.toml``, or that of a scene file: with a ``domain`` of a scalar
+    field, else of a muscle.
 
     ``changes`` maps keys such as ``"frames.last"`` or ``"effect[1].bulk"`` to other values; ``with_negative_control`` applies the
     case's negative control. That the negative control can be applied is checked too, except after changes of other keys: they may
@@ -47,7 +46,8 @@ def read(
     if with_negative_control:
         return _with_negative_control(table, path)
     scene = _scene(table, path)
-    if not changes or any(key.startswith("negative_control") for key in changes):
+    given = "negative_control" in table
+    if given and (not changes or any(key.startswith("negative_control") for key in changes)):
         _check_negative_control(scene, _with_negative_control(table, path))
     return scene
 
@@ -89,15 +89,19 @@ def setting(text: str) -> tuple[str, Any]:
         return key, value
 
 
-def read_muscle(case: str | Path, changes: dict[str, Any] | None = None) -> Scene:
-    """The scene of a case that has a muscle, with ``changes`` of its keys."""
-    scene = read(case, changes=changes)
-    if not isinstance(scene, Scene):
-        raise InputError(scene.place, "the scene of a scalar field", "the scene of a muscle")
-    return scene
+def read_muscle(case: str | Path, changes: dict[str, Any] | None = None) -> MuscleCase:
+    """The case of a muscle, with ``changes`` of its keys."""
+    return muscle(read(case, changes=changes))
 
 
-def _with_negative_control(table: dict[str, Any], path: Path) -> Scene | FieldScene:
+def muscle(case: Case, place: str | None = None) -> MuscleCase:
+    """The ``case`` itself, where it is one of a muscle; else InputError at ``place``, by default the file of the case."""
+    if not isinstance(case, MuscleCase):
+        raise InputError(place or case.place, f'"{case.name}", a scalar case', "the case of a muscle")
+    return case
+
+
+def _with_negative_control(table: dict[str, Any], path: Path) -> Case:
     """The scene with its negative control applied; ``table`` stays as it is."""
     place = str(path)
     control = parse(NegativeControl, table.get("negative_control"), join(place, "negative_control"))
@@ -115,47 +119,42 @@ def _with_negative_control(table: dict[str, Any], path: Path) -> Scene | FieldSc
         ) from error
 
 
-def _check_negative_control(scene: Scene | FieldScene, changed: Scene | FieldScene) -> None:
-    if changed.model_copy(update={"negative_control": scene.negative_control}) == scene:
-        raise InputError(
-            join(scene.place, "negative_control.value"),
-            _value_text(scene.negative_control),
-            f"a value that changes {scene.negative_control.key}",
-        )
+def _check_negative_control(scene: Case, changed: Case) -> None:
+    control = scene.negative_control
+    if control is not None and changed.model_copy(update={"negative_control": control}) == scene:
+        place = join(scene.place, "negative_control.value")
+        raise InputError(place, _value_text(control), f"a value that changes {control.key}")
 
 
 def _value_text(control: NegativeControl) -> str:
     return f'"{control.value}"' if isinstance(control.value, str) else repr(control.value)
 
 
-def _scene(table: dict[str, Any], path: Path) -> Scene | FieldScene:
-    place = str(path)
-    scalar = "domain" in table
-    kind: type[Record] = FieldEffect if scalar else Effect
+def _scene(table: dict[str, Any], path: Path) -> Case:
+    return made(table, {"name": path.parent.name, "folder": path.parent, "place": str(path)})
+
+
+def made(table: dict[str, Any], whose: dict[str, Any]) -> Case:
+    """The case with the keys of ``table`` and the ``name``, ``folder`` and ``place`` of ``whose``."""
+    place = str(whose["place"])
+    record, kind = (ScalarCase, FieldEffect) if "domain" in table else (MuscleCase, Effect)
+    for key in whose:
+        if key in table:
+            raise InputError(join(place, key), "an unknown key", f"one of {', '.join(keys(record))}")
     effects = table.get("effect", [])
-    if isinstance(effects, list):
-        read_effects = tuple(_effect(entry, f"{place}: effect[{i}]", kind) for i, entry in enumerate(effects))
+    if isinstance(effects, list | tuple):
+        read_effects = tuple(_effect(entry, join(place, f"effect[{i}]"), kind) for i, entry in enumerate(effects))
         table = table | {"effect": read_effects}
-    inside: Record
-    if scalar:
-        inside = parse(FieldSceneFile, {"candidate": (), "boundary": ()} | table, place)
-    else:
-        inside = parse(SceneFile, {"candidate": (), "attachment": ()} | table, place)
-    if isinstance(effects, list):
-        _check_effects([entry["name"] for entry in effects], read_effects, place)
-    if scalar:
-        field_scene = FieldScene(name=path.parent.name, folder=path.parent, **dict(inside))
-        _check_used(
-            [*_candidate_names(field_scene)],
-            [(f"expect[{i}].of", e.of) for i, e in enumerate(field_scene.expect)],
-            place,
-        )
-        return field_scene
-    scene = Scene(name=path.parent.name, folder=path.parent, **dict(inside))
-    _check_names(scene)
-    _check_rest(scene)
-    _check_time(scene)
-    return scene
+    case: Case = parse(record, table | whose, place)
+    _check_effects([entry["name"] for entry in effects], case.effects, place)
+    reference, *others = _candidate_names(case)
+    expected = [(f"expect[{i}].of", entry.of) for i, entry in enumerate(case.expect)]
+    _check_used([reference, "candidates", *others], expected, place)
+    if isinstance(case, MuscleCase):
+        _check_names(case)
+        _check_rest(case)
+        _check_time(case)
+    return case
 
 
 def _check_effects(names: list[str], effects: tuple[Record, ...], place: str) -> None:
@@ -176,14 +175,12 @@ def _effect(table: Any, place: str, kind: type[Record]) -> Record:
     return parse(find_effect(table["name"]), {key: value for key, value in table.items() if key != "name"}, place)
 
 
-def _check_names(scene: Scene) -> None:
+def _check_names(scene: MuscleCase) -> None:
     """Names are used once and refer to something."""
     bones = [bone.name for bone in scene.bone]
     attachments = [attachment.name for attachment in scene.attachment]
     _check_once(bones, join(scene.place, "bone"))
     _check_once([*attachments, FREE], join(scene.place, "attachment"))
-    reference, *others = _candidate_names(scene)
-    candidates = [reference, "candidates", *others]
     traced = scene.fibres.traced
     ends = [(f"fibres.traced.{end}", getattr(traced, end)) for end in ("start", "end") if traced]
     _check_used(bones, [(f"attachment[{i}].bone", entry.bone) for i, entry in enumerate(scene.attachment)], scene.place)
@@ -198,10 +195,9 @@ def _check_names(scene: Scene) -> None:
     _check_forces(scene)
     loads = [(f"effect[{i}].on", effect.on) for i, effect in enumerate(scene.effects) if isinstance(effect, Load)]
     _check_used([*attachments, FREE], loads, scene.place)
-    _check_used(candidates, [(f"expect[{i}].of", entry.of) for i, entry in enumerate(scene.expect)], scene.place)
 
 
-def _check_forces(scene: Scene) -> None:
+def _check_forces(scene: MuscleCase) -> None:
     """Forces are reported by the name of the bone, and something keeps the muscle from drifting."""
     bones = [bone.name for bone in scene.bone]
     contact = among(scene.effects) is not None
@@ -214,7 +210,7 @@ def _check_forces(scene: Scene) -> None:
         raise InputError(join(scene.place, "attachment"), "none", want)
 
 
-def _candidate_names(scene: Scene | FieldScene) -> list[str]:
+def _candidate_names(scene: Case) -> list[str]:
     """What runs are called: the reference and each candidate, which have names of their own."""
     names = ["reference", *(candidate.name for candidate in scene.candidate)]
     _check_once([*names, "candidates"], join(scene.place, "candidate"))
@@ -234,7 +230,7 @@ def _check_used(known: list[str], uses: list[tuple[str, str]], place: str) -> No
             raise InputError(join(place, key), f'"{name}"', want)
 
 
-def _check_rest(scene: Scene) -> None:
+def _check_rest(scene: MuscleCase) -> None:
     """At the first frame every bone is where its surface is, and nothing acts that comes and goes: the muscle rests."""
     for i, effect in enumerate(scene.effects):
         if isinstance(effect, Ramped) and effect.amount(scene.frames.first) != 0:
@@ -248,7 +244,7 @@ def _check_rest(scene: Scene) -> None:
             raise InputError(join(scene.place, f"bone[{i}].motion"), f"a bone {what} at the first frame", want)
 
 
-def _check_time(scene: Scene) -> None:
+def _check_time(scene: MuscleCase) -> None:
     """Where time matters to an effect, the scene says how fast it passes."""
     for i, effect in enumerate(scene.effects):
         if "interval" in effect.needs and scene.frames.interval is None:

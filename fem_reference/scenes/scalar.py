@@ -1,15 +1,14 @@
 """A scalar case as frozen records: where a field lives, which effects act on it, its boundary conditions, and what is expected."""
 
 from itertools import pairwise
-from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from fem_reference.effects import FieldEffect
 from fem_reference.foundations.formula import Formula
 from fem_reference.foundations.records import Record
-from fem_reference.scenes.muscle import Candidate, NegativeControl, SolverChoice, locate
+from fem_reference.scenes.case import Case, Standard
 
 
 class Interval(Record):
@@ -102,49 +101,44 @@ class Element(Record):
     form: Literal["auto", "galerkin", "supg"]
 
 
-class FieldExpectation(Record):
-    """A number that a measure of this case must have; ``of`` is ``"reference"`` or a candidate."""
+class ScalarCase(Case):
+    """The case of a scalar field; ``exact`` is its solution where that is known."""
 
-    of: str
-    measure: str
-    truth: float
-    within: float = Field(ge=0)
-    kind: Literal["closed form", "manufactured", "published", "property", "reference run", "pinned"]
-    because: str
-
-
-class FieldSceneFile(Record):
-    """The contents of the file of a scalar scene."""
-
-    title: str
-    proves: str
     domain: Domain
-    effect: tuple[Any, ...] = Field(min_length=1)
-    boundary: tuple[Boundary, ...]
+    boundary: tuple[Boundary, ...] = ()
     element: Element
     exact: Formula | None = None
-    reference: SolverChoice
-    candidate: tuple[Candidate, ...]
-    expect: tuple[FieldExpectation, ...] = Field(min_length=1)
-    negative_control: NegativeControl
 
-
-class FieldScene(FieldSceneFile):
-    """A scalar case, read and checked: the contents of its file, and the name and place of its folder."""
-
-    name: str
-    folder: Path
-
-    @property
-    def place(self) -> str:
-        """The scene file, for messages."""
-        return str(self.folder / "case.toml")
+    task = "solve_field"
+    carries = frozenset({"field"})
+    determined_by = frozenset({"domain", "boundary", "element"})
+    naming_files = frozenset({"points", "triangles", "file", "bounds"})
 
     @property
     def effects(self) -> tuple[FieldEffect, ...]:
         """The effects, in the order of the file."""
         return self.effect
 
-    def file(self, text: str, key: str) -> Path:
-        """The file that ``key`` names; see :func:`fem_reference.scenes.muscle.locate`."""
-        return locate(self.folder, text, key)
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """The one frame that a steady field has."""
+        return (0,)
+
+    def standards(self, of: str) -> frozenset[Standard]:
+        """What a run is measured against, ``of`` a candidate or the ``"reference"``: a field has no rest state."""
+        found: set[Standard] = {"itself"}
+        if self.exact is not None:
+            found.add("exact")
+        if of != "reference":
+            found.add("reference")
+        return frozenset(found)
+
+    @property
+    def facts(self) -> dict[str, str]:
+        """What the case is made of, in words, by name."""
+        (kind,) = (name for name, given in self.domain if given is not None)
+        return {
+            "domain": kind,
+            "element": f"Lagrange of order {self.element.order}, {self.element.form}",
+            "exact solution": self.exact or "not known",
+        }

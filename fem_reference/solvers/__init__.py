@@ -11,7 +11,7 @@ from typing import Any, Literal, overload
 from fem_reference.effects import Effect
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record, join, parse
-from fem_reference.scenes.muscle import SolverChoice
+from fem_reference.scenes.case import SolverChoice
 from fem_reference.solvers.common.protocol import BodySolver, FieldSolver, MuscleSolver, Solver, Task, trades
 
 __all__ = ["check", "find", "names", "offers", "require", "settings", "takes_effects", "trades"]
@@ -57,9 +57,9 @@ def find(name: str, place: str, task: Task = "solve") -> Solver[Any]:
     raise InputError(join(place, "solver"), got, f"one of {', '.join(names(task))}")
 
 
-def require(name: str, settings: Record, place: str) -> None:
+def require(name: str, settings: Record, place: str, task: Task = "solve") -> None:
     """MissingSoftware where the solver ``name`` needs what is not installed."""
-    find(name, place).require(settings)
+    find(name, place, task).require(settings)
 
 
 def takes_effects(name: str) -> bool:
@@ -67,9 +67,10 @@ def takes_effects(name: str) -> bool:
     return any(isinstance(offer, MuscleSolver) and offer.check_effects is not None for offer in offers(name))
 
 
-def check(name: str, settings: Record, effects: tuple[Effect, ...], place: str) -> None:
+def check(name: str, settings: Record, effects: tuple[Effect, ...], place: str, task: Task = "solve") -> None:
     """InputError below ``place`` where ``settings`` do not suit the ``effects``."""
-    suits = find(name, place).check_effects
+    offer = find(name, place, task)
+    suits = offer.check_effects if isinstance(offer, MuscleSolver) else None
     if suits is not None:
         suits(settings, effects, place)
 

@@ -19,7 +19,7 @@ from fem_reference.foundations.units import LengthUnit, length_unit
 from fem_reference.io import files
 from fem_reference.problems.muscle import Setup
 from fem_reference.runs.store import Frame, Outcome, Sink
-from fem_reference.scenes.muscle import Candidate
+from fem_reference.scenes.case import Candidate
 from fem_reference.solvers.common.protocol import MuscleSolver
 
 log = logging.getLogger(__name__)

@@ -18,7 +18,7 @@ from pathlib import Path
 from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.runs import store as runs
 from fem_reference.runs.store import Run
-from fem_reference.scenes.muscle import Scene
+from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies.execution import Bench
 from fem_reference.studies.ladders import Trial
 
@@ -77,10 +77,10 @@ def _cached_bench(key: str, store: Path, case: str) -> "_Kept":  # noqa: ARG001 
 class _Kept:
     """A bench that is made when it is first needed, so that runs on one scene share its tetrahedra."""
 
-    bench: Bench | None = None
+    bench: Bench[MuscleCase] | None = None
 
 
-def _bench(scene: Scene, store: Path) -> Bench:
+def _bench(scene: MuscleCase, store: Path) -> Bench[MuscleCase]:
     kept = _cached_bench(scene.key, store, str(scene.folder))
     if kept.bench is None:
         kept.bench = Bench(scene, store, ranks=1)

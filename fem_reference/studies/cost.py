@@ -21,7 +21,7 @@ from fem_reference.metrics import MeasurementContext, at_rest, measure
 from fem_reference.runs.cost import seconds_per_frame
 from fem_reference.runs.key import versions
 from fem_reference.runs.store import Run
-from fem_reference.scenes.muscle import Scene
+from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import refinement
 from fem_reference.studies.campaign import Made, Workers, carry_out
 from fem_reference.studies.execution import Bench, complete
@@ -39,7 +39,7 @@ _LADDERS = {"reference": reference_trials, "candidates": candidate_trials}
 _CLAIMING = 4
 
 
-def study(scenes: Iterable[Scene], store: Path, workers: Workers, parts: Sequence[Part] = PARTS) -> Study:
+def study(scenes: Iterable[MuscleCase], store: Path, workers: Workers, parts: Sequence[Part] = PARTS) -> Study:
     """Study each of ``scenes``, or ``parts`` of it, with runs in ``store``: solved where that was not done before."""
     cases, missing = list[CaseStudy](), dict[str, str]()
     for scene in scenes:
@@ -58,7 +58,7 @@ def alone(found: Study, case: CaseStudy) -> Study:
     return Study((case,), {}, found.origin)
 
 
-def _of(scene: Scene, store: Path, workers: Workers, parts: Sequence[Part]) -> CaseStudy:
+def _of(scene: MuscleCase, store: Path, workers: Workers, parts: Sequence[Part]) -> CaseStudy:
     bench = Bench(scene, store)
     log.info("%s: the truth", scene.name)
     truth = bench.obtain("reference", scene.reference, "reference")
@@ -92,7 +92,7 @@ def _known(bars: ErrorBars | None) -> dict[str, float]:
     return {name: value for name, value in worst.items() if math.isfinite(value)}
 
 
-def _point(scene: Scene, one: Made, truth: Run, context: MeasurementContext) -> Point:
+def _point(scene: MuscleCase, one: Made, truth: Run, context: MeasurementContext) -> Point:
     trial, run = one.trial, one.run
     choice = {"solver": trial.choice.solver, **trial.choice.settings}
     if trial.changed:

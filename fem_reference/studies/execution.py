@@ -1,4 +1,4 @@
-"""A scene and a choice of solver -> a run: from the store where it was solved before, else solved now and stored."""
+"""A case and a choice of solver -> a run: from the store where it was solved before, else solved now and stored."""
 
 import logging
 import os
@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cache
+from functools import cache, singledispatch
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +15,16 @@ import numpy as np
 from filelock import FileLock, Timeout
 
 from fem_reference import __version__, solvers
-from fem_reference.foundations.records import Record
+from fem_reference.foundations.records import Record, join
 from fem_reference.foundations.usage import forget_peak_memory, peak_memory
-from fem_reference.problems import muscle
-from fem_reference.problems.muscle import Problem, Setup
+from fem_reference.problems import of_case
+from fem_reference.problems.muscle import Problem
+from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs import store
+from fem_reference.runs.fields import VALUES, NodalField
 from fem_reference.runs.key import code_hash, key, versions
 from fem_reference.runs.store import Frame, Run
-from fem_reference.scenes.muscle import Scene, SolverChoice
+from fem_reference.scenes.case import Case, SolverChoice
 from fem_reference.solvers import recorded
 
 log = logging.getLogger(__name__)
@@ -35,23 +37,23 @@ _MACHINE_ONLY = {
 }  # settings that change the time and not the answer
 
 
-class Bench:
-    """A scene with what is made from it once and only when needed: its setup, its problem, and where its runs are stored."""
+class Bench[C: Case]:
+    """A case with what is made from it once and only when needed: its setup, its problem, and where its runs are stored."""
 
-    def __init__(self, scene: Scene, store: Path, ranks: int | None = None) -> None:
+    def __init__(self, scene: C, store: Path, ranks: int | None = None) -> None:
         self.scene, self.store, self.ranks = scene, store, ranks
-        self.setup: Callable[[], Setup] = cache(lambda: muscle.setup(scene))
-        self.problem: Callable[[], Problem] = cache(lambda: _build(scene, self.setup()))
+        self.setup: Callable[[], Any] = cache(lambda: of_case.setup(scene))
+        self.problem: Callable[[], Any] = cache(lambda: of_case.problem(scene, self.setup()))
 
     def settings(self, choice: SolverChoice, place: str) -> Record:
         """The settings of ``choice``, checked; a folder among them is found as files of the scene are."""
         if isinstance(folder := choice.settings.get("folder"), str):
             choice = choice.model_copy(update={"folder": str(self.scene.file(folder, f"{place}.folder"))})
-        if self.ranks is not None and choice.solver == "fenicsx":
-            choice = choice.model_copy(update={"ranks": self.ranks})
-        where = f"{self.scene.place}: {place}"
-        settings = solvers.settings(choice, where)
-        solvers.check(choice.solver, settings, self.scene.effects, where)
+        where, task = join(self.scene.place, place), self.scene.task
+        settings = solvers.settings(choice, where, task)
+        if self.ranks is not None and choice.solver == "fenicsx" and "ranks" in type(settings).model_fields:
+            settings = solvers.settings(choice.model_copy(update={"ranks": self.ranks}), where, task)
+        solvers.check(choice.solver, settings, self.scene.effects, where, task)
         return settings
 
     def obtain(self, name: str, choice: SolverChoice, place: str) -> Run:
@@ -61,7 +63,7 @@ class Bench:
         settings, folder = self.settings(choice, place), self.folder(choice, place)
         if (stored := _stored(folder, name)) is not None:
             return stored
-        solvers.require(choice.solver, settings, place)
+        solvers.require(choice.solver, settings, place, self.scene.task)
         self.problem()  # what is wrong with the input shows before anything is written
         with _alone(folder):
             return _stored(folder, name) or self._solve(name, choice.solver, settings, folder)
@@ -73,16 +75,8 @@ class Bench:
     def _solve(self, name: str, solver: str, settings: Record, folder: Path) -> Run:
         built = self.problem()
         origin = self.origin(solver, settings) | {"mesh": built.mesh_facts}
-        identity = {"name": name, "solver": solver, "origin": origin, "frames": built.frames}
-        writer = store.Writer(folder, identity, built.surface, built.fibres, built.mesh, built.directions)
-        forget_peak_memory()
-        began = time.process_time()
-        outcome = solvers.find(solver, self.scene.place).solve(built, settings, writer.add)
-        used = {"seconds_processor": time.process_time() - began, "peak_memory_mb": peak_memory()}
-        outcome = replace(outcome, cost=used | outcome.cost)  # a solver with processes of its own says what those used
-        if not writer.frames:  # it failed before its first frame, which is rest
-            writer.add(Frame(built.frames[0], built.surface.points, built.fibres.points))
-        writer.close(outcome)
+        identity = {"name": name, "solver": solver, "origin": origin, "frames": self.scene.numbers}
+        _solved(built, solvers.find(solver, self.scene.place, self.scene.task), settings, folder, identity)
         return store.load(folder)
 
     def read(self, name: str, choice: SolverChoice, place: str) -> Run:
@@ -104,18 +98,47 @@ class Bench:
 
     def origin(self, solver: str, settings: Record) -> dict[str, Any]:
         """Where a run comes from, for people and for doubt."""
-        acting = self.scene.effects if solvers.takes_effects(solver) else ()
+        acting = self.scene.acting if self.scene.task != "solve" or solvers.takes_effects(solver) else {}
         return {
             "case": self.scene.name,
             "scene": self.scene.key,
             "solver": solver,
             "settings": settings.model_dump(mode="json"),
-            "effects": {effect.title: effect.model_dump(mode="json") for effect in acting} or "none",
+            "effects": {title: effect.model_dump(mode="json") for title, effect in acting.items()} or "none",
             "fem_reference": __version__,
             "code": code_hash(solver),
             "versions": versions(),
             "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
         }
+
+
+@singledispatch
+def _solved(built: object, solver: Any, settings: Record, folder: Path, identity: dict[str, Any]) -> None:  # noqa: ARG001
+    """Solve what was ``built`` of a case, and write the run into ``folder`` as it goes."""
+    raise TypeError(f"{type(built).__name__} is no problem of a case")
+
+
+@_solved.register
+def _(built: Problem, solver: Any, settings: Record, folder: Path, identity: dict[str, Any]) -> None:
+    writer = store.Writer(folder, identity, built.surface, built.fibres, built.mesh, built.directions)
+    forget_peak_memory()
+    began = time.process_time()
+    outcome = solver.solve(built, settings, writer.add)
+    used = {"seconds_processor": time.process_time() - began, "peak_memory_mb": peak_memory()}
+    outcome = replace(outcome, cost=used | outcome.cost)  # a solver with processes of its own says what those used
+    if not writer.frames:  # it failed before its first frame, which is rest
+        writer.add(Frame(built.frames[0], built.surface.points, built.fibres.points))
+    writer.close(outcome)
+
+
+@_solved.register
+def _(built: FieldProblem, solver: Any, settings: Record, folder: Path, identity: dict[str, Any]) -> None:
+    writer = store.Writer(folder, identity)
+    solution = solver.solve_field(built, settings)
+    components = {} if solution.components is None else {"components": solution.components}
+    (number,) = identity["frames"]
+    writer.add(Frame(number, field=NodalField(built.mesh, {VALUES: solution.values} | components)))
+    writer.close(solution.outcome, form=solution.form or built.form)
 
 
 @contextmanager
@@ -132,15 +155,6 @@ def _alone(folder: Path) -> Iterator[None]:
         yield
     finally:
         lock.release()
-
-
-def _build(scene: Scene, setup: Setup) -> Problem:
-    size = scene.muscle.tet_size / 2**scene.muscle.refinements
-    log.info("%s: filling the muscle with tetrahedra of %g mm", scene.name, size)
-    built = muscle.build(scene, setup)
-    facts = built.mesh_facts
-    log.info("%s: %d tetrahedra, quality at least %.2f", scene.name, facts["tets"], facts["quality_min"])
-    return built
 
 
 def _stored(folder: Path, name: str) -> Run | None:
@@ -175,4 +189,5 @@ def complete(run: Run, numbers: tuple[int, ...]) -> Run:
         positions=pick(run.positions),
         fibre_positions=pick(run.fibre_positions),
         scalars={name: pick(values) for name, values in run.scalars.items()},
+        fields={name: pick(values) for name, values in run.fields.items()},
     )

@@ -8,10 +8,10 @@ from fem_reference.effects.incompressible import Incompressible
 from fem_reference.effects.neo_hooke import NeoHooke
 from fem_reference.foundations.motion import apply
 from fem_reference.problems.muscle import Setup
-from fem_reference.scenes.muscle import Scene
+from fem_reference.scenes.muscle import MuscleCase
 
 
-def features(scene: Scene, setup: Setup) -> dict[str, float]:
+def features(scene: MuscleCase, setup: Setup) -> dict[str, float]:
     """``size`` [mm], the diagonal of the muscle's box; ``triangles``; ``motion`` [mm], the greatest displacement of an
     attached vertex over the frames; ``contact``, how many bones may press; ``bulk_to_shear`` and ``fibres_to_shear`` of the
     material, 0 where it has none; ``tet_size`` [mm] and ``refinements`` of the reference.

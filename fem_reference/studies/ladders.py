@@ -5,10 +5,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fem_reference import solvers
-from fem_reference.assessment.solver_table import families
+from fem_reference.assessment.solver_table import solver_kinds
 from fem_reference.effects.contact import among
 from fem_reference.problems.body import ELEMENTS
-from fem_reference.scenes.muscle import Scene, SolverChoice
+from fem_reference.scenes.case import SolverChoice
+from fem_reference.scenes.muscle import MuscleCase
 
 # Sizes of tetrahedra, in those of the case, at each number of refinements up to its own.
 _SIZES = (2.0, 1.6, 1.25, 1.0)
@@ -26,7 +27,7 @@ class Trial:
     scene's keys that were ``changed``, as scene files write them.
     """
 
-    scene: Scene
+    scene: MuscleCase
     choice: SolverChoice
     name: str
     knob: str = ""
@@ -39,7 +40,7 @@ class Trial:
         return f"{self.choice.solver}, {self.knob} = {self.value}" if self.knob else f"{self.name}, as it is"
 
 
-def reference_trials(scene: Scene) -> Iterator[Trial]:
+def reference_trials(scene: MuscleCase) -> Iterator[Trial]:
     """The reference of a scene on other tetrahedra, and on coarse ones with each other cause of error larger and smaller."""
     yield Trial(scene, scene.reference, "reference")
     size, refinements = scene.muscle.tet_size, scene.muscle.refinements
@@ -91,7 +92,7 @@ def _contact_trials(base: Trial) -> Iterator[Trial]:
             )
 
 
-def _on(scene: Scene, size: float, refinements: int, knob: str = "tetrahedra", value: str = "") -> Trial:
+def _on(scene: MuscleCase, size: float, refinements: int, knob: str = "tetrahedra", value: str = "") -> Trial:
     muscle = scene.muscle.model_copy(update={"tet_size": size, "refinements": refinements})
     changed = {"muscle.tet_size": f"{size:.6g} mm", "muscle.refinements": refinements}
     return Trial(scene.model_copy(update={"muscle": muscle}), scene.reference, "reference", knob, value, changed)
@@ -111,18 +112,18 @@ def _changed(base: Trial, update: Mapping[str, Any], knob: str, value: str, key:
     )
 
 
-def candidate_trials(scene: Scene) -> Iterator[Trial]:
+def candidate_trials(scene: MuscleCase) -> Iterator[Trial]:
     """The candidates of a scene, and those that Table 5.1 has on every scene: as they are, and with each setting varied that their
     solver says trades accuracy for time.
     """
     known = list[dict[str, Any]]()
-    for candidate in (*scene.candidate, *(one for row in families() for one in row.candidate)):
+    for candidate in (*scene.candidate, *(one for row in solver_kinds() for one in row.candidate)):
         settings = {"solver": candidate.solver} | candidate.settings
         if candidate.solver == _RECORDED or settings in known:
             continue
         known.append(settings)
         yield Trial(scene, candidate, candidate.name)
-        for key, values in solvers.trades(candidate.solver, candidate.settings).items():
+        for key, values in solvers.trades(solvers.find(candidate.solver, candidate.name).settings).items():
             for value in values:
                 choice = candidate.model_copy(update={key: value})
                 yield Trial(scene, choice, candidate.name, key, str(value), {})

@@ -20,7 +20,7 @@ from fem_reference.foundations.records import Record
 from fem_reference.metrics import MeasurementContext
 from fem_reference.runs.store import Run
 from fem_reference.scenes.bones import Bone
-from fem_reference.scenes.muscle import Scene
+from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx
 from fem_reference.studies.execution import Bench, complete
 
@@ -48,7 +48,7 @@ class Variation:
     changes: dict[str, Any]
 
 
-def variations(scene: Scene, settings: Record, *, pressed: bool = True) -> tuple[Variation, ...]:
+def variations(scene: MuscleCase, settings: Record, *, pressed: bool = True) -> tuple[Variation, ...]:
     """What is varied apart from tetrahedra: of contact its stiffness and smoothing, and how well the distances to surfaces of bones
     are known and how far they are rounded, unless no bone ``pressed``; load steps, where the reference's ``settings`` have them,
     with drag or viscosity only: else a state does not depend on them.
@@ -64,14 +64,14 @@ def variations(scene: Scene, settings: Record, *, pressed: bool = True) -> tuple
     return tuple(found)
 
 
-def _finer_steps(scene: Scene, settings: Any) -> dict[str, Any]:
+def _finer_steps(scene: MuscleCase, settings: Any) -> dict[str, Any]:
     """At most half the load steps: no step goes beyond a frame, so that ``frames.every`` bounds it as well."""
     largest = min(scene.frames.every, settings.largest_step or math.inf) / 2
     steps = {"first_step": settings.first_step / 2, "largest_step": largest}
     return {"reference": scene.reference.model_copy(update=steps)}
 
 
-def _scaled(scene: Scene, key: str, factor: float) -> tuple[Effect, ...]:
+def _scaled(scene: MuscleCase, key: str, factor: float) -> tuple[Effect, ...]:
     """The effects of a scene, with this key of contact times ``factor``."""
     return tuple(
         effect.model_copy(update={key: factor * getattr(effect, key)}) if isinstance(effect, Contact) else effect
@@ -79,7 +79,7 @@ def _scaled(scene: Scene, key: str, factor: float) -> tuple[Effect, ...]:
     )
 
 
-def _closer(scene: Scene) -> tuple[Bone, ...]:
+def _closer(scene: MuscleCase) -> tuple[Bone, ...]:
     """The bones of a scene, the distances to their surfaces known twice as well and half as round; closed forms are exact."""
     halved = ("distance_error", "distance_rounding")
     return tuple(
@@ -88,7 +88,7 @@ def _closer(scene: Scene) -> tuple[Bone, ...]:
     )
 
 
-def obtain(bench: Bench, reference: Run, *, model: bool = True) -> ErrorBars | None:
+def obtain(bench: Bench[MuscleCase], reference: Run, *, model: bool = True) -> ErrorBars | None:
     """The error bars of the ``reference`` of a bench: from runs in the store where they are, else solved now; stored beside it.
     With ``model``, also what exact attachments would change. None for a run that did not converge, and for one without an interior.
     """
@@ -106,16 +106,16 @@ def obtain(bench: Bench, reference: Run, *, model: bool = True) -> ErrorBars | N
     return bars
 
 
-def offered(bench: Bench, reference: Run) -> ErrorBars | None:
+def offered(bench: Bench[MuscleCase], reference: Run) -> ErrorBars | None:
     """The error bars where nobody asked for them: those that are stored, or new ones where they cost less than a fifth of the
-    reference; else None.
+    reference; else None, as of what did not converge or has no interior.
     """
     found = stored(reference)
     if found is not None:
         return found
-    _, (fine, coarse) = _coarser(bench.scene)
-    if reference.outcome.status != "converged":
+    if reference.outcome.status != "converged" or reference.fibres is None:
         return None
+    _, (fine, coarse) = _coarser(bench.scene)
     count = 1 + len(_needed(bench, reference))
     if count * (fine / coarse) ** 3 > CHEAP:
         return None
@@ -133,7 +133,7 @@ def stored(reference: Run) -> ErrorBars | None:
     return bars if bars is None or bars.numbers == reference.numbers else None
 
 
-def _needed(bench: Bench, reference: Run) -> tuple[Variation, ...]:
+def _needed(bench: Bench[MuscleCase], reference: Run) -> tuple[Variation, ...]:
     """What has to be varied."""
     settings = bench.settings(bench.scene.reference, "reference")
     return variations(bench.scene, settings, pressed=_pressed(reference))
@@ -145,7 +145,7 @@ def _pressed(reference: Run) -> bool:
     return area is None or bool(np.nanmax(area) > 0)
 
 
-def finer(bench: Bench, reference: Run, ratio: float) -> Scene:
+def finer(bench: Bench[MuscleCase], reference: Run, ratio: float) -> MuscleCase:
     """The scene of a bench on tetrahedra of ``ratio`` times the size, with every other cause of error halved that its bars have."""
     scene, settings = bench.scene, bench.settings(bench.scene.reference, "reference")
     scene = scene.model_copy(
@@ -156,7 +156,7 @@ def finer(bench: Bench, reference: Run, ratio: float) -> Scene:
     return scene
 
 
-def _pair(bench: Bench, reference: Run, model: bool) -> Pair:
+def _pair(bench: Bench[MuscleCase], reference: Run, model: bool) -> Pair:
     coarser, sizes = _coarser(bench.scene)
     orders = NESTED if bench.scene.muscle.refinements else UNRELATED
     varied = _needed(bench, reference)
@@ -189,7 +189,7 @@ def _pair(bench: Bench, reference: Run, model: bool) -> Pair:
     return Pair(reference, coarse, sizes, orders, halved, runs.get(_EXACT))
 
 
-def _coarser(scene: Scene) -> tuple[Scene, tuple[float, float]]:
+def _coarser(scene: MuscleCase) -> tuple[MuscleCase, tuple[float, float]]:
     """The scene with larger tetrahedra, and the sizes [mm] of its own and of these."""
     size, refinements = scene.muscle.tet_size, scene.muscle.refinements
     if refinements:
@@ -201,7 +201,7 @@ def _coarser(scene: Scene) -> tuple[Scene, tuple[float, float]]:
     return scene.model_copy(update={"muscle": muscle}), sizes
 
 
-def _solved(bench: Bench, scene: Scene, name: str, reference: Run) -> Run:
+def _solved(bench: Bench[MuscleCase], scene: MuscleCase, name: str, reference: Run) -> Run:
     """The reference's run of a changed scene, over the frames of ``reference``."""
     other = Bench(scene, bench.store, bench.ranks)
     try:

@@ -13,10 +13,10 @@ from fem_reference.geometry.resampling import resampled
 from fem_reference.io import files
 from fem_reference.problems.muscle import Setup
 from fem_reference.runs.store import Run
-from fem_reference.scenes.muscle import Attachment, Scene, VertexList
+from fem_reference.scenes.muscle import Attachment, MuscleCase, VertexList
 
 
-def resample(scene: Scene, setup: Setup, power: int, folder: Path) -> Scene:
+def resample(scene: MuscleCase, setup: Setup, power: int, folder: Path) -> MuscleCase:
     """The scene on a surface of ``4**power`` times as many triangles; its files go into ``folder``, named by what they contain.
 
     A vertex is attached where the nearest of the original surface is.

@@ -11,7 +11,8 @@ from fem_reference.metrics import Measure, MeasurementContext, measure
 from fem_reference.runs.cost import seconds_per_frame
 from fem_reference.runs.key import versions
 from fem_reference.runs.store import Run
-from fem_reference.scenes.muscle import Candidate, Scene
+from fem_reference.scenes.case import Candidate
+from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import refinement
 from fem_reference.studies.execution import Bench, complete
 
@@ -33,7 +34,7 @@ REFERENCE = "FEM"
 FOREIGN = "Yours"
 
 
-def stand(scenes: Iterable[Scene], store: Path, foreign: dict[str, list[Candidate]]) -> Table:
+def stand(scenes: Iterable[MuscleCase], store: Path, foreign: dict[str, list[Candidate]]) -> Table:
     """The table over ``scenes``, with runs in ``store``; ``foreign``: by case, what somebody else's solvers made of it, which is
     read before anything is solved.
     """
@@ -60,7 +61,7 @@ def stand(scenes: Iterable[Scene], store: Path, foreign: dict[str, list[Candidat
     return Table(rows, tuple(scenarios), tuple(results), missing, versions(), machines)
 
 
-def chosen(scene: Scene, row: SolverKind) -> list[tuple[Candidate, str]]:
+def chosen(scene: MuscleCase, row: SolverKind) -> list[tuple[Candidate, str]]:
     """The solvers measured for a kind on a scene, and the place that says so."""
     own = [
         (candidate, f"candidate[{i}]")
@@ -70,9 +71,11 @@ def chosen(scene: Scene, row: SolverKind) -> list[tuple[Candidate, str]]:
     return own + [(candidate, f"{row.name} of Table 5.1") for candidate in row.candidate]
 
 
-def _on(bench: Bench, rows: Iterable[SolverKind], foreign: list[Run]) -> tuple[Scenario, list[SolverResult]]:
+def _on(
+    bench: Bench[MuscleCase], rows: Iterable[SolverKind], foreign: list[Run]
+) -> tuple[Scenario, list[SolverResult]]:
     """How everybody stands on the scene of a bench."""
-    scene, numbers = bench.scene, bench.scene.frames.numbers
+    scene, numbers = bench.scene, bench.scene.numbers
     reference = complete(bench.obtain("reference", scene.reference, "reference"), numbers)
     bars = refinement.stored(reference)
     assert reference.fibres is not None  # a reference has an interior
@@ -88,7 +91,7 @@ def _on(bench: Bench, rows: Iterable[SolverKind], foreign: list[Run]) -> tuple[S
     return Scenario(scene.name, scene.title, triangles, context.travel, reference.outcome), found
 
 
-def _result(scene: Scene, kind: str, run: Run, measures: tuple[Measure, ...]) -> SolverResult:
+def _result(scene: MuscleCase, kind: str, run: Run, measures: tuple[Measure, ...]) -> SolverResult:
     return SolverResult(
         kind,
         run.name,

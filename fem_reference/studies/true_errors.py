@@ -8,7 +8,7 @@ from pathlib import Path
 from fem_reference.assessment.claims import CLAIMED, FINER, Claim, Claims, claimed
 from fem_reference.foundations.errors import InputError
 from fem_reference.metrics import MeasurementContext, at_rest, measure
-from fem_reference.scenes.muscle import Scene
+from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import refinement
 from fem_reference.studies.execution import Bench, complete
 
@@ -24,7 +24,7 @@ CASES = (
 )
 
 
-def stake(scenes: Iterable[Scene], store: Path) -> Claims:
+def stake(scenes: Iterable[MuscleCase], store: Path) -> Claims:
     """The claims of the references of ``scenes``, with runs in ``store``: solved where that was not done before."""
     claims, sizes, missing = list[Claim](), dict[str, tuple[float, float]](), dict[str, str]()
     for scene in scenes:
@@ -43,7 +43,7 @@ def stake(scenes: Iterable[Scene], store: Path) -> Claims:
     return Claims(tuple(claims), sizes, missing)
 
 
-def _of(scene: Scene, store: Path) -> list[Claim]:
+def _of(scene: MuscleCase, store: Path) -> list[Claim]:
     bench = Bench(scene, store)
     reference = bench.obtain("reference", scene.reference, "reference")
     bars = refinement.stored(reference) or refinement.obtain(bench, reference)

@@ -7,24 +7,24 @@ from pathlib import Path
 from typing import Any
 
 from fem_reference import export, report
-from fem_reference.assessment import comparison
+from fem_reference.assessment import judge
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.problems.body import Body
 from fem_reference.runs.solved import Solved
 from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
-from fem_reference.scenes.muscle import Scene, SolverChoice
+from fem_reference.scenes.case import Case, SolverChoice
 from fem_reference.solvers import fenicsx, recorded
-from fem_reference.studies import refinement
-from fem_reference.studies.execution import Bench, complete
+from fem_reference.studies import judging, refinement
+from fem_reference.studies.execution import Bench
 
 Progress = Callable[[str], object]
 STORE = Path("reports/runs")
 
 
-def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Scene:
-    """Read the case of a muscle.
+def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Case:
+    """Read a case.
 
     Parameters
     ----------
@@ -39,11 +39,16 @@ def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Sce
         Where a key is missing, unknown or wrong; it names file, key, what was got and what is wanted.
 
     """
-    return casefile.read_muscle(case, changes=dict(changes or {}))
+    return casefile.read(case, changes=dict(changes or {}))
 
 
 def solve(
-    case: Scene, solver: str | None = None, *, store: Path = STORE, progress: Progress | None = None, **settings: Any
+    case: Case,
+    solver: str | None = None,
+    *,
+    store: Path = STORE,
+    progress: Progress | None = None,
+    **settings: Any,
 ) -> Run:
     """Solve a case, or take up what was solved before: a run is stored by all that determines it.
 
@@ -76,7 +81,7 @@ def solve(
         return Bench(case, store).obtain(name, choice, f'solver "{choice.solver}"')
 
 
-def read_run(folder: str | Path, case: Scene, *, unit: str | None = None) -> Run:
+def read_run(folder: str | Path, case: Case, *, unit: str | None = None) -> Run:
     """Read frames that another program wrote, and check them against the case.
 
     Parameters
@@ -104,7 +109,7 @@ def read_run(folder: str | Path, case: Scene, *, unit: str | None = None) -> Run
 
 
 def error_bars(
-    case: Scene, reference: Run, *, store: Path = STORE, progress: Progress | None = None
+    case: Case, reference: Run, *, store: Path = STORE, progress: Progress | None = None
 ) -> ErrorBars | None:
     """Estimate how far each statistic of a reference may be from the truth, from runs on larger tetrahedra and with finer contact.
 
@@ -126,12 +131,12 @@ def error_bars(
 
     """
     with _reported(progress):
-        bench = Bench(case, store)
+        bench = Bench(casefile.muscle(case), store)
         return refinement.stored(reference) or refinement.obtain(bench, reference)
 
 
 def compare(
-    case: Scene, reference: Run, candidates: Sequence[Run] = (), *, error_bars: ErrorBars | None = None
+    case: Case, reference: Run, candidates: Sequence[Run] = (), *, error_bars: ErrorBars | None = None
 ) -> Comparison:
     """Measure candidates against the reference of a case, and judge what the case expects.
 
@@ -152,12 +157,11 @@ def compare(
         ``comparison["pbd", "surface_deviation", "rms"]`` is a measure: ``values`` (f,), ``unit``, ``worst`` frame.
 
     """
-    numbers = case.frames.numbers
-    runs = tuple(complete(run, numbers) for run in candidates)
-    return comparison.compare(case, Bench(case, STORE).setup(), complete(reference, numbers), runs, error_bars)
+    judge.check(case)
+    return judging.compare(Bench(case, STORE), reference, candidates, error_bars)
 
 
-def export_case(case: Scene, folder: str | Path, form: export.Format = "open") -> list[str]:
+def export_case(case: Case, folder: str | Path, form: export.Format = "open") -> list[str]:
     """Write all that another program needs to solve a case.
 
     Parameters
@@ -180,7 +184,8 @@ def export_case(case: Scene, folder: str | Path, form: export.Format = "open") -
         Where ``folder`` is not empty, or FEBio has not the same effects.
 
     """
-    return export.export(case, Bench(case, STORE).problem, Path(folder), form)
+    muscle = casefile.muscle(case)
+    return export.export(muscle, Bench(muscle, STORE).problem, Path(folder), form)
 
 
 def write_report(comparison: Comparison, folder: str | Path) -> Path:

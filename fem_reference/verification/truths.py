@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
-from fem_reference.scenes.muscle import HOME
+from fem_reference.scenes.case import HOME
 
 FOLDER = HOME / "validation"
 

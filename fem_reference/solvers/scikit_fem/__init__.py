@@ -5,9 +5,9 @@
 
 from fem_reference.solvers.common.protocol import BodySolver, FieldSolver
 from fem_reference.solvers.scikit_fem.body import BodySettings, solve_body
-from fem_reference.solvers.scikit_fem.field import FieldSettings, assemble, errors, solve_field, space
+from fem_reference.solvers.scikit_fem.field import FieldSettings, assemble, solve_field, space
 
-__all__ = ["SOLVES", "BodySettings", "FieldSettings", "assemble", "errors", "solve_body", "solve_field", "space"]
+__all__ = ["SOLVES", "BodySettings", "FieldSettings", "assemble", "solve_body", "solve_field", "space"]
 
 SOLVES = (
     FieldSolver(settings=FieldSettings, solve_field=solve_field, example={}),

@@ -132,16 +132,6 @@ def _failed(count: int, why: str) -> Solution:
     return Solution(np.full(count, np.nan), Outcome("diverged", why))
 
 
-def errors(problem: FieldProblem, values: Floats, exact: str) -> float:
-    """The L2 norm of ``values`` (N,) minus the formula ``exact`` over the domain."""
-    basis, laid = space(problem)
-    inside = np.empty(len(values))
-    inside[_order(problem, basis)] = values
-    place = _place(problem, basis, laid)
-    wanted = at(exact, np.stack([np.ravel(entry) for entry in place.position], axis=1)).reshape(basis.dx.shape)
-    return float(np.sqrt(np.sum((np.asarray(basis.interpolate(inside)) - wanted) ** 2 * basis.dx)))
-
-
 def _place(problem: FieldProblem, basis: Any, laid: Flat) -> Place:
     position = np.einsum("mda,amq->dmq", laid.frames, np.asarray(basis.global_coordinates()))
     position = position + laid.origins.T[:, :, None]

@@ -19,7 +19,8 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record
 from fem_reference.report.tables import finite
 from fem_reference.runs.store import Frame
-from fem_reference.scenes.muscle import Candidate, Scene
+from fem_reference.scenes.case import Candidate
+from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies.execution import Bench
 from fem_reference.studies.table_5_1 import chosen
 
@@ -64,13 +65,13 @@ class Machine:
     multiplied: float
 
 
-def check(scene: Scene) -> None:
+def check(scene: MuscleCase) -> None:
     """InputError unless a scene is long enough to be timed."""
     if scene.frames.last - scene.frames.first <= WARM_UP:
         raise InputError(f"{scene.place}: frames.last", scene.frames.last, f"more than {WARM_UP} frame numbers")
 
 
-def measure(benches: Iterable[Bench]) -> tuple[list[Timing], Machine]:
+def measure(benches: Iterable[Bench[MuscleCase]]) -> tuple[list[Timing], Machine]:
     """Every candidate of Table 5.1 that iterates on every scene of ``benches``, each repeat with a look at the machine; one that
     fails has times that are not numbers.
     """
@@ -91,18 +92,18 @@ def measure(benches: Iterable[Bench]) -> tuple[list[Timing], Machine]:
     return timings, Machine(*(max(getattr(one, key) for one in machines) for key in ("copied", "multiplied")))
 
 
-def _candidates(bench: Bench) -> list[tuple[Candidate, str]]:
+def _candidates(bench: Bench[MuscleCase]) -> list[tuple[Candidate, str]]:
     """Who iterates from frame number to frame number: what was recorded does not, nor do lines of action."""
     found = [entry for row in solver_kinds() for entry in chosen(bench.scene, row)]
     return [entry for entry in found if entry[0].solver not in ("recorded", "line_of_action")]
 
 
-def _task(bench: Bench, candidate: Candidate, place: str) -> Callable[[int], str]:
+def _task(bench: Bench[MuscleCase], candidate: Candidate, place: str) -> Callable[[int], str]:
     """The solver's work as a function of how many iterations; it returns how it ended."""
     return partial(_solve, bench, candidate.solver, bench.settings(candidate, place))
 
 
-def _solve(bench: Bench, solver: str, settings: Record, iterations: int) -> str:
+def _solve(bench: Bench[MuscleCase], solver: str, settings: Record, iterations: int) -> str:
     built = bench.problem()
     first = built.frames[0]
 
@@ -114,7 +115,7 @@ def _solve(bench: Bench, solver: str, settings: Record, iterations: int) -> str:
     return str(ended.status)
 
 
-def _per_iteration(task: Callable[[int], str], bench: Bench) -> float:
+def _per_iteration(task: Callable[[int], str], bench: Bench[MuscleCase]) -> float:
     """CPU time [s] for an iteration; not a number where the solver failed, or took too little to be speed."""
     frames = bench.scene.frames
     count = min(ITERATIONS, frames.last - frames.first)

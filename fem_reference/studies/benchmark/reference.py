@@ -21,7 +21,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.subprocesses import command
 from fem_reference.scenes import casefile
-from fem_reference.scenes.muscle import DATA_SETTING
+from fem_reference.scenes.case import DATA_SETTING
 from fem_reference.solvers import fenicsx
 from fem_reference.studies.benchmark.checkout import ROOT, Commit, checked_out
 from fem_reference.studies.execution import Bench

@@ -1,10 +1,11 @@
-"""The verb ``verify``; it returns its output."""
+"""The verb ``verify``: problems whose answers are known."""
 
+import argparse
 import time
 
-from fem_reference import __version__
+from fem_reference import __version__, report
 from fem_reference.assessment.catalogue import Result
-from fem_reference.cli.scalar import Printed
+from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
 from fem_reference.report.verify_page import Verification, facts
 from fem_reference.runs.key import versions
 from fem_reference.verification import runner
@@ -12,7 +13,29 @@ from fem_reference.verification import runner
 _HEADS = ("entry", "value", "truth", "unit", "error", "within", "order", "seconds", "verdict")
 
 
-def verify(names: list[str], with_negative_control: list[str]) -> Verification:
+HELP = "measure problems whose answers are known and write the page"
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of the verb."""
+    known = "an entry, a family or a shell pattern of them (default: all)"
+    parser.add_argument("names", metavar="NAME", nargs="*", help=known)
+    control = "measure this entry with its one thing wrong, named or not: it must fail; may be repeated"
+    parser.add_argument("--negative-control", action="append", default=[], metavar="NAME", help=control)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Measure problems whose answers are known."""
+    measured = _verify(options.names, options.negative_control)
+    # Measurements are printed even if the page fails.
+    write_output(facts(measured), "\n".join([*_lines(measured.results), measured.summary]), options)
+    part = options.names or options.negative_control
+    name = "verify_part" if part else "verify"  # a part does not replace the whole
+    print(f"page: {report.write_verification(measured, out(options), name)}")
+    return {"failed": SOLVER_FAILED, "fail": VERDICT_FAIL}.get(measured.word, DONE)
+
+
+def _verify(names: list[str], with_negative_control: list[str]) -> Verification:
     """The results of the entries meant by ``names`` and ``with_negative_control`` (all where both are empty)."""
     from fem_reference.verification.lab import lab  # loads the solvers
 
@@ -24,12 +47,6 @@ def verify(names: list[str], with_negative_control: list[str]) -> Verification:
     results = runner.run(wanted, lab, wrong)
     made_with = {"fem_reference": __version__, **versions()}
     return Verification(results, time.perf_counter() - begin, made_with)
-
-
-def printed(verification: Verification) -> Printed:
-    """The output of a verification."""
-    text = [*_lines(verification.results), verification.summary]
-    return Printed(facts(verification), "\n".join(text), verification.word)
 
 
 def _lines(results: tuple[Result, ...]) -> list[str]:

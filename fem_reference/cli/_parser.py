@@ -1,0 +1,72 @@
+"""The command line as a parser: a verb for every module of this folder whose name begins with a letter.
+
+A verb has ``HELP``, ``add_options(parser)``, and ``run(options)``, which prints and returns the exit status.
+"""
+
+import argparse
+import importlib
+import pkgutil
+from pathlib import Path
+from typing import Protocol, cast
+
+from fem_reference import __version__
+
+RANKS = "MPI processes of the reference (default: 1, or 2 for large bodies where cores are free)"
+UNIT = "unit of length of the frames in DIR (default: that of its candidate.toml, else mm)"
+
+
+class Verb(Protocol):
+    """What the module of a verb has."""
+
+    HELP: str
+
+    def add_options(self, parser: argparse.ArgumentParser, /) -> None:
+        """Add the options that the verb has beside ``--out``, ``--json`` and ``--quiet``."""
+
+    def run(self, options: argparse.Namespace, /) -> int:
+        """Do it; returns the exit status."""
+
+
+def verbs() -> dict[str, Verb]:
+    """Every verb there is by name."""
+    package = __package__ or ""
+    folder = [str(Path(__file__).parent)]
+    names = sorted(module.name for module in pkgutil.iter_modules(folder) if not module.name.startswith("_"))
+    return {name: cast(Verb, importlib.import_module(f"{package}.{name}")) for name in names}
+
+
+def parser() -> argparse.ArgumentParser:
+    """The parser of the whole command line; ``verb`` of its options is what carries it out."""
+    whole = argparse.ArgumentParser(
+        prog="fem-reference", description="Finite element reference and validation for muscle deformation."
+    )
+    whole.add_argument("--version", action="version", version=f"fem-reference {__version__}")
+    kinds = whole.add_subparsers(metavar="VERB", required=True)
+    for name, verb in verbs().items():
+        sub = kinds.add_parser(name, help=verb.HELP, description=verb.HELP)
+        sub.set_defaults(verb=verb.run, ranks=None, error_bar=False, writes=True)
+        verb.add_options(sub)
+        sub.add_argument("--out", type=Path, metavar="DIR", help="where pages and stored runs go (default: reports)")
+        sub.add_argument("--json", type=Path, metavar="FILE", help="write what is printed as JSON")
+        sub.add_argument("--quiet", action="store_true", help="show no progress")
+    return whole
+
+
+def add_case(parser: argparse.ArgumentParser) -> None:
+    """The case that a verb is about, and changes of it."""
+    parser.add_argument("case", metavar="CASE", help="a shipped case (see list), a case folder or a case.toml")
+    change = "change a key of the case, such as muscle.tet_size='8 mm'; may be repeated"
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help=change)
+
+
+def add_error_bar(parser: argparse.ArgumentParser) -> None:
+    """Whether error bars are made where they take long."""
+    known = (
+        "how well the reference is known: solve it on larger tetrahedra too, and with stiffer contact where bones press"
+    )
+    parser.add_argument("--error-bar", action="store_true", help=known)
+
+
+def add_ranks(parser: argparse.ArgumentParser) -> None:
+    """On how many processes the reference is solved."""
+    parser.add_argument("--ranks", type=int, metavar="N", help=RANKS)

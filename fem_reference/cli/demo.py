@@ -1,0 +1,22 @@
+"""The verb ``demo``: the main job."""
+
+import argparse
+
+from fem_reference.cli._choosing import own_candidates
+from fem_reference.cli._judging import judge
+from fem_reference.cli._parser import add_ranks
+from fem_reference.scenes import casefile
+
+MAIN_JOB = "hip_flexion"
+HELP = f"the main job: the case {MAIN_JOB}, its reference against its candidates"
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of the verb."""
+    add_ranks(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Solve the main job and all its candidates."""
+    scene = casefile.read(MAIN_JOB)
+    return judge(scene, options, own_candidates(scene))

@@ -1,0 +1,123 @@
+"""The verb ``page``: a page over several cases."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from fem_reference import report
+from fem_reference.assessment.claims import Cover
+from fem_reference.assessment.comparison import Comparison
+from fem_reference.cli._choosing import check_names, checked_bench, own_candidates
+from fem_reference.cli._parser import UNIT
+from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
+from fem_reference.foundations.errors import InputError
+from fem_reference.report.claims_page import facts as claims_facts
+from fem_reference.report.overview import comparison_text, ranking_text
+from fem_reference.report.ranking_page import facts as ranking_facts
+from fem_reference.scenes import casefile
+from fem_reference.scenes.case import Candidate
+from fem_reference.solvers import recorded
+from fem_reference.studies import judging, table_5_1, true_errors
+from fem_reference.studies.execution import Bench
+
+HELP = "write a page over several cases"
+TABLE = "table-5-1"
+CLAIMS = "error-bars"
+PAGES = {
+    "octave-examples": (
+        "The report's Octave examples",
+        ("rod", "rod_advection", "plate_square", "plate_spiral", "surface_figure"),
+    )
+}
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of the verb."""
+    names = sorted([*PAGES, TABLE, CLAIMS])
+    parser.add_argument("name", metavar="NAME", choices=names, help=f"one of {', '.join(names)}")
+    some = f"for {TABLE} and {CLAIMS}: this case, not all of them; may be repeated"
+    parser.add_argument("--case", action="append", default=[], metavar="CASE", help=some)
+    foreign = f"for {TABLE}: frames that your solver made of a case; may be repeated"
+    parser.add_argument("--candidate", action="append", default=[], metavar="CASE=DIR", help=foreign)
+    parser.add_argument("--unit", help=UNIT)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write a page over several cases."""
+    if options.name == TABLE:
+        return _table(options)
+    if options.name == CLAIMS and not (options.candidate or options.unit):
+        return _claims(options)
+    if options.case or options.candidate or options.unit:
+        given = "--candidate or --unit" if options.name == CLAIMS else "--case, --candidate or --unit"
+        raise InputError("page", f"{given} for {options.name}", f"them for {TABLE} only")
+    return _examples(options)
+
+
+def _examples(options: argparse.Namespace) -> int:
+    """Cases with all their candidates, one after the other."""
+    title, names = PAGES[options.name]
+    cases, path = [casefile.read(name) for name in names], out(options) / f"{options.name}.html"
+    benches = [checked_bench(case, options, own_candidates(case)) for case in cases]
+    results = tuple(_compared(bench) for bench in benches)
+    report.write_examples(title, results, path, differences=True)
+    facts = {"page": str(path), "cases": [report.summary(result) for result in results]}
+    texts = [f"{result.scene.title}:\n{comparison_text(result)}" for result in results]
+    write_output(facts, "\n\n".join([*texts, f"page: {path}"]), options)
+    if any(run.outcome.status != "converged" for result in results for run in result.runs):
+        return SOLVER_FAILED
+    return VERDICT_FAIL if any(result.word == "fail" for result in results) else DONE
+
+
+def _compared(bench: Bench[Any]) -> Comparison:
+    """The reference of a case and all its candidates."""
+    case = bench.scene
+    reference = bench.obtain("reference", case.reference, "reference")
+    others = [bench.obtain(entry.name, entry, place) for entry, place in own_candidates(case)]
+    return judging.compare(bench, reference, others)
+
+
+def _table(options: argparse.Namespace) -> int:
+    """The families of the report's table, measured."""
+    scenes = {scene.name: scene for scene in map(casefile.read_muscle, options.case or table_5_1.SCENARIOS)}
+    foreign = _foreign(options, list(scenes))
+    for name in scenes if options.case else foreign:
+        Bench(scenes[name], out(options)).setup()  # only what nobody asked for by name may be missing
+    table = table_5_1.stand(scenes.values(), out(options) / "runs", foreign)
+    path = report.write_ranking(table, out(options), TABLE)
+    write_output(ranking_facts(table), f"{ranking_text(table)}\npage: {path}", options)
+    return DONE if all(one.reference.status == "converged" for one in table.scenarios) else SOLVER_FAILED
+
+
+def _claims(options: argparse.Namespace) -> int:
+    """Error bars beside errors."""
+    scenes = [casefile.read_muscle(case) for case in options.case or true_errors.CASES]
+    found = true_errors.stake(scenes, out(options) / "runs")
+    path = report.write_claims(found, out(options), CLAIMS)
+    whole = Cover.of(found.claims)
+    holding = f"{100 * whole.share:.1f} % hold the difference from a finer solution, median ratio {whole.median:.2f}"
+    printed = [f"{whole.count} error bars: {holding}"]
+    printed += [f"left out: {case}: {why}" for case, why in found.missing.items()]
+    write_output(claims_facts(found), "\n".join([*printed, f"page: {path}"]), options)
+    return SOLVER_FAILED if found.missing else DONE
+
+
+def _foreign(options: argparse.Namespace, cases: list[str]) -> dict[str, list[Candidate]]:
+    """By the name of a case, what somebody else's solvers made of it."""
+    found = dict[str, list[Candidate]]()
+    for text in options.candidate:
+        case, equals, folder = text.partition("=")
+        if not equals:
+            raise InputError("--candidate", f'"{text}"', "CASE=DIR, a case and a folder of frames of it")
+        name = casefile.read_muscle(case).name
+        if name not in cases:
+            raise InputError("--candidate", f'"{case}"', f"one of {', '.join(cases)}")
+        found.setdefault(name, []).append(_recorded(folder, options.unit))
+        check_names([candidate.name for candidate in found[name]])
+    return found
+
+
+def _recorded(text: str, unit: str | None) -> Candidate:
+    if not text:
+        raise InputError("--candidate", '""', "a folder of frames")
+    return recorded.choice(Path(text), unit, "--candidate")

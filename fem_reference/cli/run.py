@@ -1,0 +1,50 @@
+"""The verb ``run``: a case by its reference, or by another solver."""
+
+import argparse
+
+from fem_reference.assessment.comparison import alone
+from fem_reference.assessment.judge import check
+from fem_reference.cli._choosing import refuse_error_bar, scene_of
+from fem_reference.cli._judging import judge
+from fem_reference.cli._parser import add_case, add_error_bar, add_ranks
+from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
+from fem_reference.foundations.errors import InputError
+from fem_reference.report.overview import run_text
+from fem_reference.report.tables import of_run
+from fem_reference.scenes.case import Case, SolverChoice
+from fem_reference.studies.execution import Bench
+
+HELP = "solve a case and judge what it expects of the reference"
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of the verb."""
+    add_case(parser)
+    parser.add_argument("--solver", metavar="NAME", help="another solver than the case's own reference")
+    add_error_bar(parser)
+    add_ranks(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Solve a case, and judge what it expects of the reference; of another solver's run what needs no reference."""
+    scene = scene_of(options)
+    if options.solver is None or options.solver == scene.reference.solver:
+        return judge(scene, options, [])
+    refuse_error_bar(scene, options)
+    if options.error_bar:
+        raise InputError("--error-bar", "another solver", "the reference of a muscle")
+    check(scene)
+    bench = Bench(scene, out(options) / "runs", options.ranks)
+    solved = bench.obtain(*_chosen(scene, options.solver), f"--solver {options.solver}")
+    measures, verdicts = alone(scene, bench.setup(), solved)
+    write_output(of_run(scene, solved, measures, verdicts), run_text(solved, measures, verdicts), options)
+    if solved.outcome.status != "converged":
+        return SOLVER_FAILED
+    return VERDICT_FAIL if any(verdict.word == "fail" for verdict in verdicts) else DONE
+
+
+def _chosen(scene: Case, solver: str) -> tuple[str, SolverChoice]:
+    """The name of the run and how the case chooses ``solver``: as a candidate by its solver or name, else no settings."""
+    named = [entry for entry in scene.candidate if entry.solver == solver]
+    named += [entry for entry in scene.candidate if entry.name == solver]
+    return (named[0].name, named[0]) if named else (solver, SolverChoice(solver=solver))

@@ -1,0 +1,17 @@
+"""How far a field is from the reference's at the vertices, as a share of the reference's greatest value."""
+
+import numpy as np
+
+from fem_reference.metrics import FieldContext, Measure, at_vertices
+from fem_reference.runs.store import Run
+
+UNITS = {"max": "1"}
+OF, AGAINST = "field", "reference"
+
+
+def measure(run: Run, reference: Run, _context: FieldContext) -> tuple[Measure, ...]:
+    """``max``, the greatest distance at a vertex over the reference's greatest magnitude; the distance itself where that is 0."""
+    size = np.abs(reference.vertex_values).max(axis=1)
+    apart = np.abs(run.vertex_values - reference.vertex_values)
+    values = apart.max(axis=1) / np.where(size > 0, size, 1.0)
+    return (Measure("difference", "max", "1", values, at_vertices(run, apart.argmax(axis=1))),)

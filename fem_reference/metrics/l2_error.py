@@ -1,0 +1,22 @@
+"""The L2 norm of the error of a field over its domain, where the exact solution is known."""
+
+from functools import partial
+
+import numpy as np
+
+from fem_reference.geometry.lagrange import l2_distance
+from fem_reference.metrics import FieldContext, Measure
+from fem_reference.problems.scalar import at
+from fem_reference.runs.store import Run
+
+UNITS = {"norm": "1"}
+OF, AGAINST = "field", "exact"
+
+
+def measure(run: Run, _reference: Run, context: FieldContext) -> tuple[Measure, ...]:
+    """``norm``, the root of the integral of the squared error; nothing where no exact solution is known."""
+    if context.exact is None or run.mesh is None:
+        return ()
+    exact = partial(at, context.exact)
+    norms = np.array([l2_distance(run.mesh, values, exact) for values in run.values])
+    return (Measure("l2_error", "norm", "1", norms, ("",) * len(norms)),)

@@ -1,0 +1,19 @@
+"""How far a field is from the exact solution at the vertices, where that is known."""
+
+import numpy as np
+
+from fem_reference.metrics import FieldContext, Measure, at_vertices
+from fem_reference.problems.scalar import at
+from fem_reference.runs.store import Run
+
+UNITS = {"max": "1"}
+OF, AGAINST = "field", "exact"
+
+
+def measure(run: Run, _reference: Run, context: FieldContext) -> tuple[Measure, ...]:
+    """``max``, the greatest magnitude of the error over the vertices; nothing where no exact solution is known."""
+    if context.exact is None:
+        return ()
+    errors = np.abs(run.vertex_values - at(context.exact, run.points))
+    where = at_vertices(run, errors.argmax(axis=1))
+    return (Measure("nodal_error", "max", "1", errors.max(axis=1), where),)

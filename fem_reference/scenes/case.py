@@ -1,0 +1,180 @@
+"""The keys and behaviour that every case has, whatever is solved in it: muscles and scalar fields add keys of their own.
+
+``Case.key`` names a case by what determines its solution, the content of its files included.
+"""
+
+import hashlib
+import json
+import os
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any, ClassVar, Literal
+
+from pydantic import ConfigDict, Field
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.markup import fact_table
+from fem_reference.foundations.records import Record, join
+
+DATA_SETTING = "FEM_REFERENCE_DATA"
+DELAUNAY = "delaunay"  # where a file of triangles may stand: no file
+
+
+# What a run is measured against: the reference (of itself, its rest state), the exact solution, or nothing else.
+Standard = Literal["reference", "exact", "itself"]
+# What a run has that can be measured.
+Part = Literal["surface", "lines", "field"]
+
+
+def home(package: Path) -> Path:
+    """Where cases/ and meshes/ are: inside an installed package, beside it in a checkout."""
+    return package if (package / "cases").is_dir() else package.parent
+
+
+HOME = home(Path(__file__).resolve().parent.parent)
+
+
+class SolverChoice(Record):
+    """A solver by name with its own settings, which the solver checks."""
+
+    model_config = ConfigDict(frozen=True, extra="allow")
+    solver: str
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Every key but those that choose the solver."""
+        return dict(self.model_extra or {})
+
+
+class Candidate(SolverChoice):
+    """A run to compare with the reference."""
+
+    name: str = Field(pattern=r"^[\w.-]+$")
+
+
+class Expectation(Record):
+    """A number that a measure of this case must have.
+
+    ``of`` is ``"reference"``, a candidate, or ``"candidates"`` for each that is compared; ``statistic`` may be left out where the
+    metric has one only; ``frame`` a number or ``"any"``; ``truth`` and ``within`` text with a unit, or numbers where the metric
+    has none.
+    """
+
+    of: str
+    metric: str
+    statistic: str | None = None
+    frame: int | Literal["any"] = "any"
+    truth: str | float
+    within: str | float
+    kind: Literal["closed form", "manufactured", "published", "property", "reference run", "pinned"]
+    because: str
+
+
+class NegativeControl(Record):
+    """One change of this case that must turn its verdict to fail: the ``key`` to change and its ``value``."""
+
+    key: str
+    value: str | int | float
+    because: str
+
+
+class Case(Record):
+    """A case, read and checked: the keys of its file, and the ``name`` and ``folder`` that it has; ``place`` names its file in
+    messages.
+    """
+
+    title: str
+    proves: str
+    effect: tuple[Any, ...] = Field(min_length=1)
+    reference: SolverChoice
+    candidate: tuple[Candidate, ...] = ()
+    expect: tuple[Expectation, ...] = ()
+    negative_control: NegativeControl | None = None
+    name: str = Field(exclude=True)
+    folder: Path = Field(exclude=True)
+    place: str = Field(default="case", exclude=True)
+
+    # What a solver of it is asked for, what its runs have, the keys that determine its solution, and those of them that name files.
+    task: ClassVar[Literal["solve", "solve_field"]]
+    carries: ClassVar[frozenset[Part]]
+    determined_by: ClassVar[frozenset[str]]
+    naming_files: ClassVar[frozenset[str]]
+
+    @property
+    def effects(self) -> tuple[Any, ...]:
+        """The effects, in the order of the file."""
+        return self.effect
+
+    @property
+    def acting(self) -> dict[str, Any]:
+        """The effects by what each is called beside the others."""
+        return {type(effect).__name__: effect for effect in self.effects}
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """The frame numbers wanted."""
+        raise NotImplementedError(f"{type(self).__name__} has no frames")
+
+    def standards(self, of: str) -> frozenset[Standard]:  # noqa: ARG002
+        """What a run is measured against, ``of`` a candidate or the ``"reference"``."""
+        return frozenset({"reference", "itself"})
+
+    @property
+    def facts(self) -> dict[str, str]:
+        """What the case is made of, in words, by name."""
+        raise NotImplementedError(f"{type(self).__name__} has no facts")
+
+    def _repr_html_(self) -> str:
+        """What notebooks show."""
+        facts = self.facts | {
+            "effects": ", ".join(self.acting),
+            "reference": self.reference.solver,
+            "candidates": ", ".join(candidate.name for candidate in self.candidate) or "none",
+        }
+        return fact_table(f"{self.name}: {self.title}", facts)
+
+    def file(self, text: str, key: str) -> Path:
+        """The file that a ``key`` names: below the data folder (``data:``), below meshes (``mesh:``), or relative to the folder of
+        the case.
+        """
+        place = join(self.place, key)
+        if text.startswith("data:"):
+            root = os.environ.get(DATA_SETTING)
+            if not root:
+                raise InputError(
+                    place, f'"{text}" while {DATA_SETTING} is not set', f"the setting {DATA_SETTING}=FOLDER"
+                )
+            path = Path(root) / text.removeprefix("data:")
+        elif text.startswith("mesh:"):
+            path = HOME / "meshes" / text.removeprefix("mesh:")
+        else:
+            path = self.folder / text
+        if not path.exists():
+            raise InputError(place, f'"{text}", which is not at {path}', "a file that exists")
+        return path
+
+    @property
+    def key(self) -> str:
+        """A hash over everything that determines the solution: the keys of ``determined_by``, the effects, and the content of
+        the files that they name.
+        """
+        tables = self.model_dump(mode="json", include=set(self.determined_by))
+        tables["effect"] = [[type(effect).__name__, effect.model_dump(mode="json")] for effect in self.effects]
+        digest = hashlib.sha256(json.dumps(tables, sort_keys=True).encode())
+        for key, text in _files(tables, self.naming_files):
+            digest.update(self.file(text, key).read_bytes())
+        return digest.hexdigest()
+
+
+def _files(tables: Any, names: Collection[str], key: str = "") -> list[tuple[str, str]]:
+    """Every (key, text) below ``tables`` that names a file."""
+    if isinstance(tables, dict):
+        found = [(f"{key}.{name}".lstrip("."), value) for name, value in tables.items() if name in names]
+        below = [(f"{key}.{name}".lstrip("."), value) for name, value in tables.items()]
+    else:
+        found, below = (
+            [],
+            [(f"{key}[{i}]", value) for i, value in enumerate(tables)] if isinstance(tables, list) else [],
+        )
+    named = [(where, text) for where, text in found if isinstance(text, str) and text != DELAUNAY]
+    return named + [entry for where, value in below for entry in _files(value, names, where)]
