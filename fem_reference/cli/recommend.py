@@ -6,6 +6,7 @@ from pathlib import Path
 from fem_reference.assessment.cost_study import CaseStudy, load
 from fem_reference.assessment.judge import in_unit
 from fem_reference.assessment.recommendation import Expected, Recommendation, recommend
+from fem_reference.cli._choosing import scene_of
 from fem_reference.cli._parser import add_case
 from fem_reference.cli._printing import DONE, VERDICT_FAIL, out, write_output
 from fem_reference.cli.study import PAGE
