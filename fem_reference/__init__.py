@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from fem_reference.runs.store import Run
     from fem_reference.scenes.case import Case
     from fem_reference.scenes.casefile import cases
+    from fem_reference.scenes.made import make_case
     from fem_reference.studies.workflow import (
         compare,
         error_bars,
@@ -54,6 +55,7 @@ __all__ = [
     "error_bars",
     "export_case",
     "load_case",
+    "make_case",
     "make_effect",
     "read_run",
     "solve",
@@ -75,6 +77,7 @@ _PLACES = {
     "Run": ("fem_reference.runs.store", "Run"),
     "box": ("fem_reference.problems.shapes", "box"),
     "cases": ("fem_reference.scenes.casefile", "cases"),
+    "make_case": ("fem_reference.scenes.made", "make_case"),
     "make_effect": ("fem_reference.effects", "make"),
 }
 

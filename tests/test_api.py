@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 import small
 
 import fem_reference as fr
+from fem_reference.foundations.mesh import Polylines
 from fem_reference.foundations.subprocesses import command, environment
 from fem_reference.solvers.fenicsx import processes
 
@@ -42,6 +44,99 @@ def test_a_case_goes_from_its_file_to_a_page(tmp_path) -> None:
     assert np.abs(mine.positions - reference.positions).max() == 0
     with pytest.raises(fr.InputError, match="a reference that carries the fibres"):
         fr.compare(case, mine, [reference])
+
+
+def in_python() -> dict[str, object]:
+    """The small case as Python tables, numbers in place of text with units."""
+    turn = {"axis": [1.0, 0.0, 0.0], "centre": (5.0, 5.0, 30.0)}
+    angles = [{"frame": frame, "angle": angle} for frame, angle in ((0, 0.0), (10, 0.4), (20, 0.0))]
+    return {
+        "title": "A bar",
+        "proves": "that no file is needed",
+        "muscle": {"surface": "bar.vtp", "unit": "mm", "tet_size": 6.0},
+        "bone": [
+            {"name": "floor", "surface": "floor.vtp", "unit": "mm"},
+            {"name": "lid", "surface": "lid.vtp", "unit": "mm", "motion": turn | {"keyframes": angles}},
+        ],
+        "attachment": [
+            {"name": "origin", "bone": "floor", "within": 1.5},
+            {"name": "insertion", "bone": "lid", "within": 1.5},
+        ],
+        "effect": [fr.make_effect("neo_hooke", mu=0.01), {"name": "incompressible", "bulk": 10.0}],
+        "fibres": {"traced": {"count": 4, "start": "origin", "end": "insertion"}},
+        "frames": {"first": 0, "last": 20, "every": 10},
+        "reference": {"solver": "fenicsx", "first_step": 5},
+    }
+
+
+def test_a_case_made_in_python_is_that_of_the_file(tmp_path) -> None:
+    read = fr.load_case(small.write(tmp_path / "bar"), {"frames.every": 10})
+    case = fr.make_case(in_python(), tmp_path / "bar", name="bar")
+    assert case.key == read.key
+    assert (case.expect, case.negative_control, case.candidate) == ((), None, ())
+    assert "A bar" in case._repr_html_()
+    run = fr.solve(case, "pbd", store=tmp_path / "runs", **read.candidate[0].settings)
+    assert run.outcome.status == "converged"
+    assert fr.solve(read, "pbd", store=tmp_path / "runs").folder == run.folder
+    reference = replace(run, name="reference", fibres=small_fibres(), fibre_positions=np.zeros((3, 2, 3)))
+    result = fr.compare(case, reference, [run])
+    assert result["pbd", "surface_deviation", "max"].values.tolist() == [0, 0, 0]
+    assert result.word == "not judged"
+
+
+def small_fibres() -> Polylines:
+    return Polylines(np.array([[5.0, 5, 1], [5, 5, 39]]), np.array([0, 2]))
+
+
+def test_what_is_wrong_with_a_case_made_in_python_is_named(tmp_path) -> None:
+    small.write(tmp_path / "bar")
+    table = in_python()
+    for key, value, message in (
+        ("effect", [{"name": "neo_hooke", "mu": "1 mm"}], r'case\.effect\[0\]\.mu: got "1 mm", want a pressure'),
+        ("colour", "red", r"case\.colour: got an unknown key, want one of attachment"),
+        ("name", "bar", r"case\.name: got an unknown key"),
+        ("frames", {"first": 0, "last": 20, "every": 0}, r"case\.frames\.every: got 0"),
+    ):
+        with pytest.raises(fr.InputError, match=message):
+            fr.make_case(table | {key: value}, tmp_path / "bar")
+    lost = fr.make_case(table, tmp_path)
+    with pytest.raises(fr.InputError, match=r'case\.muscle\.surface: got "bar.vtp", which is not at'):
+        lost.key  # noqa: B018
+
+
+def test_a_scalar_case_goes_the_same_way(tmp_path) -> None:
+    # -psi'' = 2 with psi = 0 at both ends is x (1 - x); linear elements are exact at their nodes.
+    table = {
+        "title": "A rod",
+        "proves": "that it is short",
+        "domain": {"interval": {"start": 0.0, "end": 1.0, "count": 11}},
+        "effect": [{"name": "diffusion", "coefficient": 1.0}, {"name": "source", "strength": 2, "where": "everywhere"}],
+        "boundary": [{"on": "left", "value": 0}, {"on": "right", "value": 0}],
+        "element": {"order": 1, "form": "galerkin"},
+        "exact": "x*(1 - x)",
+        "reference": {"solver": "scikit_fem"},
+        "expect": [
+            {"of": "candidates", "metric": "nodal_error", "truth": 0.0, "within": 1e-12}
+            | {"kind": "closed form", "because": "elements of order 1 are exact at nodes"}
+        ],
+    }
+    case = fr.make_case(table, name="rod")
+    assert "exact solution" in case._repr_html_()
+    reference = fr.solve(case, store=tmp_path / "runs")
+    again = fr.solve(case, store=tmp_path / "runs")
+    assert again.folder == reference.folder
+    assert np.array_equal(again.vertex_values, reference.vertex_values)
+    assert reference.vertex_values[0, 5] == pytest.approx(0.25, rel=1e-13)
+    result = fr.compare(case, reference, [replace(again, name="again")])
+    assert result.word == "pass"
+    assert result["again", "maximum", "value"].values == pytest.approx([0.25])
+    assert result["again", "difference", "max"].values.tolist() == [0]
+    # The error of the interpolant of a parabola on intervals h: h^2 sqrt(1 / 30).
+    assert result["reference", "l2_error", "norm"].values == pytest.approx([0.01 / np.sqrt(30)], rel=1e-9)
+    assert "<svg " in fr.write_report(result, tmp_path / "page").read_text()
+    for call in (lambda: fr.error_bars(case, reference), lambda: fr.export_case(case, tmp_path / "export")):
+        with pytest.raises(fr.InputError, match='case: got "rod", a scalar case, want the case of a muscle'):
+            call()
 
 
 @pytest.mark.skipif(not processes.installed(), reason="FEniCSx is not installed")

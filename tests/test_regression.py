@@ -27,8 +27,7 @@ REST = shapes.sphere(2, 30.0).moved_to(np.round(shapes.sphere(2, 30.0).points, 2
 FIBRE = Polylines(np.array([[0.0, 0, -15], [0, 0, 15]]), np.array([0, 2]))
 NUMBERS = (0, 10, 20)
 SETUP = Setup(REST, (), (), NUMBERS, None)
-FRAMES = SimpleNamespace(numbers=NUMBERS)
-SCENE = SimpleNamespace(name="ball", key="0123456789abcdef0123", place="case.toml", frames=FRAMES)
+SCENE = SimpleNamespace(name="ball", key="0123456789abcdef0123", place="case.toml", numbers=NUMBERS)
 BAR = 0.5
 
 
@@ -236,7 +235,7 @@ def test_limits_of_a_new_baseline() -> None:
 
 
 def test_every_unit_has_its_digits() -> None:
-    assert set(metrics.units().values()) <= set(baseline.PLACES)
+    assert set(metrics.units({"surface", "lines"}).values()) <= set(baseline.PLACES)
 
 
 def test_a_sample_spreads() -> None:
@@ -333,7 +332,7 @@ def test_other_frames_are_reported(path) -> None:
 
 
 def test_another_scene_wants_an_update(path, tmp_path) -> None:
-    other = SimpleNamespace(name="ball", key="another", place="case.toml", frames=FRAMES)
+    other = SimpleNamespace(name="ball", key="another", place="case.toml", numbers=NUMBERS)
     with pytest.raises(InputError, match=r"scene: got 0123456789abcdef\.\.\., while case.toml is another"):
         baseline.read(path, other, "mine")
     baseline.check(path, other, "mine")

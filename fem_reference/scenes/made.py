@@ -1,0 +1,75 @@
+"""A case made in Python, without a file."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from fem_reference.effects import find, names
+from fem_reference.foundations.records import Record
+from fem_reference.foundations.units import unit_of, written
+from fem_reference.scenes.case import Case
+from fem_reference.scenes.casefile import made
+from fem_reference.scenes.muscle import MuscleCase
+
+
+def make_case(table: Mapping[str, Any], folder: str | Path = ".", name: str = "case") -> Case:
+    """Make a case from the keys that a ``case.toml`` has, without a file.
+
+    Parameters
+    ----------
+    table
+        Keys and tables as in a scene file (``cases/hip_flexion/case.toml`` explains each), with a ``domain`` of a scalar field,
+        else of a muscle. Where files have text with a unit, numbers in mm, N, MPa, s, rad and tonne do as well. Effects may be
+        those of :func:`fem_reference.make_effect`. ``candidate``, ``expect`` and ``negative_control`` may be left out.
+    folder
+        What files are named relative to.
+    name
+        What pages call the case.
+
+    Raises
+    ------
+    InputError
+        Where a key is missing, unknown or wrong; it names the key, what was got and what is wanted.
+
+    """
+    given = dict(table)
+    if "domain" not in given:
+        given = _with_units(MuscleCase, given)
+    if isinstance(effects := given.get("effect"), list | tuple):
+        given["effect"] = [_effect(entry) for entry in effects]
+    return made(given, {"name": name, "folder": Path(folder).resolve(), "place": "case"})
+
+
+def _effect(entry: Any) -> Any:
+    """An effect as the table that a file has."""
+    if isinstance(entry, Record):
+        values = {key: value for key, value in entry.model_dump().items() if value is not None}
+        entry = {"name": type(entry).__module__.rpartition(".")[2]} | values
+    if isinstance(entry, Mapping) and entry.get("name") in names(Record):
+        return _with_units(find(str(entry["name"])), dict(entry))
+    return entry
+
+
+def _with_units(annotation: Any, value: Any, unit: str = "") -> Any:
+    """``value`` with every number as text with its unit, where a field of the records in ``annotation`` wants that."""
+    if isinstance(value, Mapping):
+        records = [kind for kind in _kinds(annotation) if isinstance(kind, type) and issubclass(kind, Record)]
+        fields = {name: field for record in records for name, field in record.model_fields.items()}
+        return {
+            key: _with_units(fields[key].annotation, one, _unit(fields[key])) if key in fields else one
+            for key, one in value.items()
+        }
+    if isinstance(value, list | tuple) and not unit:
+        return [_with_units(annotation, one) for one in value]
+    return value if value is None else written(value, unit)
+
+
+def _unit(field: Any) -> str:
+    """The unit of a field, which stands with its type, or with one of several."""
+    inside = (unit_of(getattr(kind, "__metadata__", ())) for kind in _kinds(field.annotation))
+    return unit_of(field.metadata) or next((unit for unit in inside if unit), "")
+
+
+def _kinds(annotation: Any) -> list[Any]:
+    """A type and all that it is made of."""
+    return [annotation, *(kind for part in getattr(annotation, "__args__", ()) for kind in _kinds(part))]
