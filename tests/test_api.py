@@ -44,6 +44,7 @@ def test_a_case_goes_from_its_file_to_a_page(tmp_path) -> None:
         fr.compare(case, mine, [reference])
 
 
+@pytest.mark.usefixtures("without_pictures")
 @pytest.mark.skipif(not processes.installed(), reason="FEniCSx is not installed")
 def test_a_reference_is_compared_exported_and_written(tmp_path) -> None:
     case = fr.load_case(small.write(tmp_path / "bar"), {"frames.every": 10})

@@ -6,6 +6,7 @@ import pytest
 
 from fem_reference import cli
 from fem_reference.cli import scalar
+from fem_reference.report import page
 from fem_reference.scenes import casefile
 
 pytestmark = pytest.mark.slow
@@ -84,7 +85,9 @@ def test_the_page_of_the_octave_examples(tmp_path) -> None:
 
 
 def run(scene, folder, monkeypatch):
+    """Status and JSON of a scene, without its page: that of the main job is looked at."""
     monkeypatch.setattr(casefile, "read", lambda _, **__: scene)
+    monkeypatch.setattr(page, "render", lambda _: "")
     target = folder / "facts.json"
     status = cli.main(["run", scene.name, "--out", str(folder), "--json", str(target), "--quiet"])
     return status, json.loads(target.read_text())

@@ -17,7 +17,8 @@ from fem_reference.io import files
 from fem_reference.runs import store
 from fem_reference.scenes import casefile
 
-pytestmark = pytest.mark.slow
+# Pictures are drawn once, for the page of the job that all tests share.
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_pictures")]
 
 
 class Job:
@@ -57,6 +58,7 @@ def test_ends_well_and_leaves_a_page(job) -> None:
     assert job.status == cli.DONE
     page = (job.out / "bar" / "report.html").read_text()
     assert "pbd" in page
+    assert "data:image/webp" in page
     assert (job.out / "bar" / "measures.csv").exists()
     assert (job.out / "bar" / "measures.json").exists()
 
