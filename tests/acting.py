@@ -8,9 +8,10 @@ from scipy.spatial.transform import Rotation
 from fem_reference import effects
 from fem_reference.effects import Effect, Energy, Interaction, Load, Ramped, State
 from fem_reference.foundations.records import parse
+from fem_reference.foundations.units import unit_of
 
 RAMP = [{"frame": 0, "amount": 0.0}, {"frame": 10, "amount": 1.0}, {"frame": 30, "amount": 0.5}]
-PARAMETERS: dict[str, dict[str, Any]] = {
+_EXAMPLES: dict[str, dict[str, Any]] = {
     "neo_hooke": {"mu": "10 kPa"},
     "mooney_rivlin": {"c1": "10 kPa", "c2": "4 kPa"},
     "incompressible": {"bulk": "10 MPa"},
@@ -29,6 +30,16 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     "damping": {"coefficient": "2 Pa s/mm^2"},
     "viscosity": {"eta": "300 kPa s"},
 }
+
+
+def _example(name: str) -> dict[str, Any]:
+    """The parameters of an effect of which nobody has given an example: 3 of the unit of each, 1.3 where it has none."""
+    known = {"ramp": RAMP, "on": "top"}
+    units = {key: unit_of(field.metadata) for key, field in effects.find(name).model_fields.items()}
+    return {key: known.get(key, f"3 {unit}" if unit else 1.3) for key, unit in units.items()}
+
+
+PARAMETERS = {name: _EXAMPLES.get(name) or _example(name) for name in effects.names()}
 OTHER: dict[str, Any] = {
     "p1": 0.06,
     "p2": 6.0,
@@ -62,7 +73,7 @@ KINDS = {
 # What acts by an expression at a point of the body; an interaction does not.
 EXPRESSED = [name for name in PARAMETERS if not issubclass(effects.find(name), Interaction)]
 ENERGIES = [name for name in PARAMETERS if issubclass(effects.find(name), Energy)]
-ELASTIC = [name for name in ENERGIES if name not in ("gravity", "damping", "viscosity")]
+ELASTIC = [name for name in ENERGIES if effects.find(name).stored and name != "gravity"]
 RAMPED = [name for name in PARAMETERS if issubclass(effects.find(name), Ramped)]
 SLACK = ["fibre_passive", "fibre_passive_febio", "holzapfel_ogden"]
 

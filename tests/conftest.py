@@ -2,11 +2,15 @@
 
 import importlib.util
 import os
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 collect_ignore = ["foreign_solver.py"]  # a program: it runs where it is imported
+# Of these files each test takes long and shares nothing with the next; the tests of any other share its fixtures.
+SINGLE = ("test_cases.py", "test_verification_entries.py")
 
 
 def pytest_configure() -> None:
@@ -15,6 +19,63 @@ def pytest_configure() -> None:
     if worker is not None:
         cores = sorted(os.sched_getaffinity(0))
         os.sched_setaffinity(0, {cores[int(worker.removeprefix("gw")) % len(cores)]})
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Where processes share the tests, those that take long come first, so that none is left to one process at the end."""
+    if hasattr(config, "workerinput"):
+        items.sort(key=lambda item: (item.path.name not in SINGLE, item.get_closest_marker("slow") is None))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Processes that share the tests take whole files, or single tests of ``SINGLE``, in the order of the collection."""
+    from xdist.scheduler import LoadScopeScheduling
+
+    class ByFile(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            file = nodeid.split("::")[0]
+            return nodeid if file.endswith(SINGLE) else file
+
+    config.option.loadscopereorder = False
+    return ByFile(config, log)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _one_process_of_fenicsx() -> Iterator[None]:
+    """What is solved on one rank is solved in one process, started when the first test needs it: as error bars are."""
+    from fem_reference.solvers import fenicsx
+
+    with fenicsx.shared():
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _each_mesh_is_made_once() -> Iterator[None]:
+    """Muscles with the same surface, attachments and size have one mesh; the mesher itself is tested where it is imported."""
+    from fem_reference.foundations.mesh import fingerprint
+    from fem_reference.problems import muscle
+
+    made: dict[str, Any] = {}
+    mesher = muscle.tetrahedralise
+
+    def tetrahedralise(surface: Any, size: float, shares: dict[str, Any]) -> Any:
+        key = repr((list(shares), size, fingerprint(surface.points, surface.triangles, *shares.values())))
+        if key not in made:
+            made[key] = mesher(surface, size, shares)
+        return made[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(muscle, "tetrahedralise", tetrahedralise)
+        yield
+
+
+@pytest.fixture
+def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages are written as where nothing can draw."""
+    from fem_reference.report import gallery
+
+    monkeypatch.setattr(gallery, "_command", lambda _job, _folder: ["/nowhere/python"])
 
 
 @pytest.fixture(scope="session")

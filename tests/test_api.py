@@ -139,6 +139,7 @@ def test_a_scalar_case_goes_the_same_way(tmp_path) -> None:
             call()
 
 
+@pytest.mark.usefixtures("without_pictures")
 @pytest.mark.skipif(not processes.installed(), reason="FEniCSx is not installed")
 def test_a_reference_is_compared_exported_and_written(tmp_path) -> None:
     case = fr.load_case(small.write(tmp_path / "bar"), {"frames.every": 10})

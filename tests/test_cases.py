@@ -5,6 +5,8 @@ import json
 import pytest
 
 from fem_reference import cli
+from fem_reference.geometry import skins
+from fem_reference.report import page
 from fem_reference.scenes import casefile
 
 pytestmark = pytest.mark.slow
@@ -27,7 +29,7 @@ FIELDS = {
 # The report's muscles and its box, each with tetrahedra coarse enough for a test.
 MUSCLES = {
     "adductor_brevis": "5 mm",
-    "box_squeeze_report": "20 mm",
+    "box_squeeze_report": "33 mm",
     "gluteus_maximus_anatomical": "14 mm",
     "gluteus_medius": "9 mm",
     "gluteus_medius_anatomical": "9 mm",
@@ -86,6 +88,12 @@ def test_the_page_of_the_octave_examples(tmp_path) -> None:
     assert page.count("<h2") >= len(FIELDS) + 1
 
 
+@pytest.fixture
+def without_page(monkeypatch) -> None:
+    """Numbers alone are written: the page of the main job is looked at."""
+    monkeypatch.setattr(page, "render", lambda _: "")
+
+
 def run(scene, folder, monkeypatch, *more: str):
     monkeypatch.setattr(casefile, "read", lambda _, **__: scene)
     target = folder / "facts.json"
@@ -102,6 +110,7 @@ def test_every_case_is_run_here() -> None:
     assert casefile.cases() == sorted(["box_squeeze", "gluteus_maximus", "hip_flexion", UNSOLVED, *FIELDS, *MUSCLES])
 
 
+@pytest.mark.usefixtures("without_page")
 def test_hip_flexion_with_negative_control_fails(tmp_path, monkeypatch) -> None:
     status, facts = run(
         casefile.read("hip_flexion", changes=FEW | COARSE, with_negative_control=True), tmp_path, monkeypatch
@@ -124,6 +133,7 @@ def test_main_job(tmp_path) -> None:
     assert page.count("data:image/webp") >= 4, "the pictures are missing"
 
 
+@pytest.mark.usefixtures("without_page")
 def test_gluteus_maximus_against_the_recorded_output(data, tmp_path) -> None:
     target, recorded = tmp_path / "facts.json", data / "candidates" / "report_pbd_gluteus_maximus"
     status = cli.main(
@@ -165,29 +175,38 @@ def test_gluteus_maximus_with_a_truncated_frame(data, tmp_path, capsys) -> None:
     assert not (tmp_path / "out").exists()
 
 
+@pytest.fixture
+def coarse_contact(name, monkeypatch) -> None:
+    """A quarter of the points at which the box is in contact: its triangles are not cut."""
+    if name == "box_squeeze_report":
+        monkeypatch.setattr(skins, "_ACROSS", 20)
+
+
 def coarse(name: str) -> dict[str, object]:
-    """Tetrahedra of a case, or load steps of the viscous box, that are coarse enough for a test."""
-    other = {"reference.largest_step": 8.0} if name == "box_squeeze_report" else COARSE
+    """Tetrahedra of a case, or load steps of the viscous box, that are coarse enough for a test; the box is not watched at rest."""
+    other = {"reference.largest_step": 5.0, "frames.last": 200} if name == "box_squeeze_report" else COARSE
     return {"muscle.tet_size": MUSCLES.get(name, "14 mm")} | other
 
 
+@pytest.mark.usefixtures("without_page", "coarse_contact")
 @pytest.mark.parametrize("name", MUSCLES)
 def test_muscles_of_the_report(data, name, tmp_path, monkeypatch) -> None:
     assert data.is_dir()
     scene = casefile.read(name, changes=FEW | coarse(name))
     status, facts = run(scene, tmp_path, monkeypatch)
     assert (status, facts["verdict"], facts["status"]) == (cli.DONE, "pass", "converged")
-    assert scene.frames.numbers == (0, 100, 200, 300)
+    assert scene.frames.numbers == (0, 100, 200, 300)[: 3 if name == "box_squeeze_report" else 4]
 
 
 # Those attached anatomically have the effects, and the negative control, of those attached as in the report.
+@pytest.mark.usefixtures("without_page", "coarse_contact")
 @pytest.mark.parametrize("name", ["adductor_brevis", "box_squeeze_report", "gluteus_maximus", "gluteus_medius"])
 def test_muscles_of_the_report_with_negative_control_fails(data, name, tmp_path, monkeypatch) -> None:
     assert data.is_dir()
     last = 110 if name == "gluteus_maximus" else 100  # where it expects something of a recorded candidate
     changes = {"frames.last": last, "frames.every": last, "expect[1].frame": last}
     status, facts = run(
-        casefile.read(name, changes=changes | coarse(name), with_negative_control=True), tmp_path, monkeypatch
+        casefile.read(name, changes=coarse(name) | changes, with_negative_control=True), tmp_path, monkeypatch
     )
     assert status == cli.VERDICT_FAIL
     expected = "penetration" if name == "adductor_brevis" else "volume"
@@ -198,6 +217,7 @@ def test_muscles_of_the_report_with_negative_control_fails(data, name, tmp_path,
     assert failed - others == {expected}
 
 
+@pytest.mark.usefixtures("without_page")
 def test_the_box_with_negative_control_fails(tmp_path, monkeypatch) -> None:
     status, facts = run(casefile.read("box_squeeze", changes=FEW, with_negative_control=True), tmp_path, monkeypatch)
     assert status == cli.VERDICT_FAIL
@@ -206,10 +226,11 @@ def test_the_box_with_negative_control_fails(tmp_path, monkeypatch) -> None:
     assert volume[300] == pytest.approx(0, abs=1e-6)
 
 
+@pytest.mark.usefixtures("without_page")
 def test_the_unsolved_case_says_where_and_why_and_keeps_what_it_reached(data, tmp_path, monkeypatch) -> None:
     assert data.is_dir()
     changes = {"frames.last": 100, "frames.every": 20, "expect[1].frame": 100, "muscle.tet_size": "6 mm"} | COARSE
-    changes["reference"] = {"solver": "fenicsx", "smallest_step": 2.0}  # to have it over with
+    changes["reference"] = {"solver": "fenicsx", "smallest_step": 5.0}  # to have it over with
     status, facts = run(casefile.read(UNSOLVED, changes=changes), tmp_path, monkeypatch)
     assert status == cli.SOLVER_FAILED
     assert facts["status"] in ("diverged", "inverted")

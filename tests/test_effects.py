@@ -45,8 +45,7 @@ HERE = Place((0.3, 0.7), vars(np), 0.25)
 PSI, TEST = FieldState(1.1, (0.2, -0.4), 3.0), FieldState(0.6, (0.9, 0.5))
 
 
-def test_every_effect_is_under_test() -> None:
-    assert sorted(PARAMETERS) == effects.names()
+def test_every_field_effect_is_under_test() -> None:
     assert sorted(FIELD_PARAMETERS) == effects.names(FieldEffect)
 
 

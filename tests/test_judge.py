@@ -93,6 +93,16 @@ def test_units_of_tolerances_are_those_of_the_measure() -> None:
         checked(statistic="deviation_volume", truth="0 ml")
 
 
+@pytest.mark.parametrize(
+    ("unit", "truth", "value"),
+    [("mm", "1 cm", 10.0), ("%", "0.02", 2.0), ("mm3", "1 cm^3", 1000.0), ("deg", "0.5 rad", 90 / math.pi)],
+)
+def test_a_truth_is_taken_into_the_unit_of_its_measure(unit, truth, value) -> None:
+    found = judged([value] * 3, unit=unit, truth=truth, within=truth)
+    assert (found.truth, found.within) == pytest.approx((value, value), rel=1e-12)
+    assert judged([2.01 * value] * 3, unit=unit, truth=truth, within=truth).word == "fail"
+
+
 def test_a_tolerance_below_zero_is_refused() -> None:
     with pytest.raises(InputError, match=r'expect\[0\].within: got "-0.5 %", want a tolerance of at least zero'):
         checked(within="-0.5 %")

@@ -17,7 +17,8 @@ from fem_reference.io import files
 from fem_reference.runs import store
 from fem_reference.scenes import casefile
 
-pytestmark = pytest.mark.slow
+# Pictures are drawn once, for the page of the job that all tests share.
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_pictures")]
 
 
 class Job:
@@ -57,6 +58,7 @@ def test_ends_well_and_leaves_a_page(job) -> None:
     assert job.status == cli.DONE
     page = (job.out / "bar" / "report.html").read_text()
     assert "pbd" in page
+    assert "data:image/webp" in page
     assert (job.out / "bar" / "measures.csv").exists()
     assert (job.out / "bar" / "measures.json").exists()
 
@@ -96,6 +98,8 @@ def test_stored_runs_are_judged_without_fenicsx_and_meshers(job) -> None:
         "for name in ('dolfinx', 'dolfinx_solver', 'ufl', 'basix', 'petsc4py', 'mpi4py', 'gmsh', 'pytetwild'):\n"
         "    sys.modules[name] = None\n"
         "from fem_reference import cli\n"
+        "from fem_reference.report import gallery\n"
+        "gallery._command = lambda _job, _folder: ['/nowhere/python']\n"
         f"sys.exit(cli.main(['compare', {str(job.case)!r}, '--out', {str(job.out)!r}, '--quiet']))"
     )
     done = subprocess.run([sys.executable, "-c", block], capture_output=True, text=True, check=False)

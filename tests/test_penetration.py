@@ -128,6 +128,19 @@ def test_what_is_attached_is_exempt_and_its_neighbours_in_triangles() -> None:
     )  # two rings of triangles of 3 mm, on a cap of 10.5 mm, are exempt too
 
 
+def test_a_triangle_with_one_vertex_that_is_not_free_does_not_count() -> None:
+    # A plate of 60 x 60 x 10 mm, 1 mm deep in the floor: the lower face is two triangles, and one corner is of one of them alone.
+    low = np.flatnonzero(PLATE.points[:, 2] == 0)
+    below = PLATE.triangles[np.isin(PLATE.triangles, low).all(axis=1)]
+    corner = next(vertex for vertex in low if (below == vertex).any(axis=1).sum() == 1)
+    free = np.ones(len(PLATE.points), bool)
+    free[corner] = False
+    whole, half = (taken(run_of(PLATE.points, rest=PLATE), floor(1.0), free=those)[1] for those in (None, free))
+    assert_allclose(whole.values, 60 * 60 * 1.0, rtol=0.03)
+    # The sides count only within 1 mm of the edges.
+    assert_allclose(half.values, 60 * 60 * 1.0 / 2, rtol=0.05)
+
+
 def test_of_the_run_alone_whatever_it_is_compared_with() -> None:
     pressed = run_of(BALL.points - [0, 0, 2.0], BALL.points - [0, 0, 4.0])
     rest = Setup(BALL, (floor(LOW),), (), (0, 1), None)

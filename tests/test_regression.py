@@ -111,6 +111,20 @@ def test_a_frame_that_deviates_as_much_as_before_but_elsewhere_fails(path) -> No
     assert asked(check, "within", "surface_deviation.rms").word == "pass"
 
 
+def test_one_sampled_vertex_that_moves_shows_in_full(path) -> None:
+    now = current(known=bars())
+    vertex = baseline.read(path, SCENE, "mine").positions.vertices[1]
+    positions = np.array(now.candidate.positions)
+    positions[1, vertex] += [0, 0.6, -0.8]
+    moved = asked(
+        checked(path, replace(now, candidate=replace(now.candidate, positions=positions))),
+        "unchanged",
+        "positions.moved",
+    )
+    assert (moved.word, moved.frame) == ("fail", 10)
+    assert moved.current == pytest.approx(1, abs=baseline.POSITION_ROUNDING)
+
+
 def test_a_vertex_that_moves_between_the_sampled_ones_shows_in_the_statistics(path) -> None:
     now = current(known=bars())
     sampled = baseline.read(path, SCENE, "mine").positions.vertices

@@ -112,6 +112,20 @@ def test_means_over_cells_are_those_of_a_homogeneous_state(element, fem_lab) -> 
     assert solved.outcome.message.endswith(" mm, below 0.5")
 
 
+def test_a_mean_over_a_cell_weighs_by_volume(session) -> None:
+    """A frustum of 2 x 2 mm below, 1 x 1 mm above and 1 mm height, whose top is widened until it is a box: V/V0 is 4 to 7/3."""
+    mesh = shapes.box((1, 1, 1), (2.0, 2.0, 1.0), "hexahedron")
+    slanted = np.array(mesh.points)
+    slanted[mesh.points[:, 2] == 1, :2] = 1 + (mesh.points[mesh.points[:, 2] == 1, :2] - 1) / 2
+    widened = Affine(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 0.0)), (-1.0, -1.0, 0.0))
+    fixed = Prescribed("z0", "z0", (0, 1, 2), Rest()), Prescribed("z1", "z1", (0, 1, 2), widened)
+    flesh = (effect("neo_hooke", mu="10 kPa"), resistance("Q1/P0", 1.0))
+    solved = session.solve(
+        Body(replace(mesh, points=slanted), flesh, fixed, (0.0, 1.0)), BodySettings(element="Q1/P0", first_step=0.25)
+    )
+    assert solved.last.scalars["min_cell_volume_ratio"] == pytest.approx(12 / 7, abs=1e-9)
+
+
 @pytest.mark.parametrize("frames", [1, 9])
 def test_a_squeeze_to_collapse_is_no_result(frames, fem_lab) -> None:
     """In one frame or in many: no state of it is kept, and the law that ended is named."""
