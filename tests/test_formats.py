@@ -166,11 +166,11 @@ LIST_PLY = (
     ("name", "text", "got"),
     [
         ("quad.vtk", polydata(QUAD), "a polygon of 4 corners"),
-        ("strip.vtk", polydata(QUAD, "TRIANGLE_STRIPS"), "vtkPolyData that is not made of triangles"),
+        ("strip.vtk", polydata(QUAD, "TRIANGLE_STRIPS"), "PolyData that is not made of triangles"),
         (
             "grid.vtk",
             "# vtk DataFile Version 3.0\n\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 2\n",
-            "vtkStructuredPoints",
+            "ImageData",
         ),
         ("quad.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n", "a polygon of 4 corners"),
         ("quad.off", "OFF 4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n", "a polygon of 4 corners"),

@@ -21,8 +21,6 @@ from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, Tet
 from fem_reference.io import formats
 from fem_reference.io.formats import Soup, only_triangles, read_obj, read_off, read_ply, read_stl
 
-_TRIANGLE, _TETRA = 5, 10  # VTK's numbers of cell types
-
 
 def read_surface(path: Path, unit: float) -> Surface:
     """The triangles of a file whose coordinates are in units of ``unit`` mm; ``place`` is the path.
@@ -101,33 +99,26 @@ def read_rows(path: Path) -> list[list[str]]:
 
 def write_surface(path: Path, surface: Surface, positions: Floats) -> None:
     """VTP of the surface with its points at ``positions`` (n, 3) [mm] and point data ``displacement`` [mm], float64."""
-    from vtkmodules.vtkCommonDataModel import vtkPolyData
-    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
+    import pyvista
 
-    data = vtkPolyData()
-    offsets = 3 * np.arange(len(surface.triangles) + 1)
-    data.SetPolys(_vtk_cells(offsets, surface.triangles.ravel()))
-    _vtk_write(path, vtkXMLPolyDataWriter(), data, surface.points, positions)
+    data = pyvista.PolyData.from_regular_faces(np.array(positions, np.float64), surface.triangles, deep=True)
+    _save(path, data, positions - surface.points)
 
 
 def write_polylines(path: Path, polylines: Polylines, positions: Floats) -> None:
     """VTP of the lines with their points at ``positions`` (n, 3) [mm] and point data ``displacement`` [mm], float64."""
-    from vtkmodules.vtkCommonDataModel import vtkPolyData
-    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
+    import pyvista
 
-    data = vtkPolyData()
-    data.SetLines(_vtk_cells(polylines.offsets, np.arange(len(polylines.points))))
-    _vtk_write(path, vtkXMLPolyDataWriter(), data, polylines.points, positions)
+    cells = pyvista.CellArray.from_arrays(polylines.offsets, np.arange(len(polylines.points)), deep=True)
+    _save(path, pyvista.PolyData(np.array(positions, np.float64), lines=cells), positions - polylines.points)
 
 
 def write_tets(path: Path, mesh: TetMesh, positions: Floats) -> None:
     """VTU of the tets with their points at ``positions`` (n, 3) [mm] and point data ``displacement`` [mm], float64."""
-    from vtkmodules.vtkCommonDataModel import vtkUnstructuredGrid
-    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+    import pyvista
 
-    data = vtkUnstructuredGrid()
-    data.SetCells(_TETRA, _vtk_cells(4 * np.arange(len(mesh.tets) + 1), mesh.tets.ravel()))
-    _vtk_write(path, vtkXMLUnstructuredGridWriter(), data, mesh.points, positions)
+    data = pyvista.UnstructuredGrid({pyvista.CellType.TETRA: mesh.tets}, np.array(positions, np.float64))
+    _save(path, data, positions - mesh.points)
 
 
 def write_field(
@@ -207,96 +198,80 @@ def _meshio_steps(path: Path) -> list[tuple[float, Floats, Ints]]:
 
 def _read_vtk(path: Path) -> Soup:
     """Polygons of VTK polydata, or the cells of an unstructured grid (points and lines of polydata passed over)."""
-    from vtkmodules.util.numpy_support import vtk_to_numpy
+    import pyvista
 
     data = _vtk_data(path)
-    if data.IsA("vtkUnstructuredGrid"):
-        cells, types = data.GetCells(), {data.GetCellType(cell) for cell in range(data.GetNumberOfCells())}
-        if other := types - {_TRIANGLE}:
+    if data.n_cells == 0:
+        return np.empty((0, 3)), np.empty((0, 3))
+    if isinstance(data, pyvista.UnstructuredGrid):
+        cells = data.GetCells()
+        if other := set(data.celltypes.tolist()) - {pyvista.CellType.TRIANGLE}:
             raise ValueError(f"cells of VTK type {', '.join(map(str, sorted(other)))}")
-    elif data.IsA("vtkPolyData") and data.GetNumberOfStrips() == 0:
+    elif isinstance(data, pyvista.PolyData) and data.n_strips == 0:
         cells = data.GetPolys()
     else:
-        raise ValueError(f"{data.GetClassName()} that is not made of triangles")
-    if cells is None or cells.GetNumberOfCells() == 0:
-        return np.empty((0, 3)), np.empty((0, 3))
-    only_triangles(set(np.diff(vtk_to_numpy(cells.GetOffsetsArray())).tolist()))
-    return vtk_to_numpy(data.GetPoints().GetData()), vtk_to_numpy(cells.GetConnectivityArray()).reshape(-1, 3)
+        raise ValueError(f"{type(data).__name__} that is not made of triangles")
+    offsets, corners = _vtk_cells(cells)
+    only_triangles(set(np.diff(offsets).tolist()))
+    return data.points, corners.reshape(-1, 3)
 
 
 def _vtk_lines(path: Path) -> tuple[Floats, list[list[int]]]:
     """Points (n, 3) of the file, and the points of each line; ValueError where one is not usable."""
-    from vtkmodules.util.numpy_support import vtk_to_numpy
+    import pyvista
 
     data = _vtk_data(path)
-    if not data.IsA("vtkPolyData") or data.GetNumberOfLines() == 0:
+    if not isinstance(data, pyvista.PolyData) or data.n_lines == 0:
         raise ValueError("no lines")
-    lines = data.GetLines()
-    offsets = vtk_to_numpy(lines.GetOffsetsArray())
-    cells = [cell.tolist() for cell in np.split(vtk_to_numpy(lines.GetConnectivityArray()), offsets[1:-1])]
-    points = np.asarray(vtk_to_numpy(data.GetPoints().GetData()), np.float64)
+    offsets, connectivity = _vtk_cells(data.GetLines())
+    cells = [cell.tolist() for cell in np.split(connectivity, offsets[1:-1])]
+    points = np.asarray(data.points, np.float64)
     formats.check_lines(points, cells)
     return points, formats.joined(cells)
 
 
+def _vtk_cells(cells: Any) -> tuple[Ints, Ints]:
+    """Where each of VTK's cells begins in the list of their points, and that list."""
+    import pyvista
+
+    return pyvista.convert_array(cells.GetOffsetsArray()), pyvista.convert_array(cells.GetConnectivityArray())
+
+
 def _vtk_data(path: Path) -> Any:
     """The data set of a VTK file; ValueError with VTK's own words where it complains."""
-    from vtkmodules.vtkIOLegacy import vtkDataSetReader
-    from vtkmodules.vtkIOXML import vtkXMLPolyDataReader, vtkXMLUnstructuredGridReader
+    import pyvista
 
-    readers = {".vtk": vtkDataSetReader, ".vtp": vtkXMLPolyDataReader, ".vtu": vtkXMLUnstructuredGridReader}
-    reader: Any = readers[path.suffix.lower()]()
-    reader.SetFileName(str(path))
-    with _vtk_messages() as messages:
-        reader.Update()
-    printed = messages.GetOutput()
-    if "error" in printed.lower():
-        words = re.sub(r"^.*: In .*\n|^vtk\w+ \(0x\w+\): | for file: .*", "", printed, flags=re.MULTILINE)
-        raise ValueError(words.split("\n")[0])
-    return reader.GetOutput()
+    with _vtk_errors() as errors:
+        reader = pyvista.get_reader(path)
+        reader.reader.Update()  # the reader's own read() only logs errors and warns of them
+    if errors:
+        raise ValueError(re.sub(r"^.*: In .*\n| for file: .*", "", errors[0]).splitlines()[0])
+    return pyvista.wrap(reader.reader.GetOutputDataObject(0))
 
 
 @contextmanager
-def _vtk_messages() -> Iterator[Any]:
-    """What VTK has to say meanwhile, instead of on stderr."""
-    from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutputWindow
+def _vtk_errors() -> Iterator[list[str]]:
+    """What VTK complains of meanwhile, known at the end of it, instead of on stderr; some errors it calls warnings."""
+    import pyvista
 
-    window, before = vtkStringOutputWindow(), vtkOutputWindow.GetInstance()
-    verbosity = vtkLogger.GetCurrentVerbosityCutoff()
-    vtkOutputWindow.SetInstance(window)
-    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
-    try:
-        yield window
-    finally:
-        vtkOutputWindow.SetInstance(before)
-        vtkLogger.SetStderrVerbosity(verbosity)
+    found: list[str] = []
+    with pyvista.vtk_verbosity("off"), pyvista.VtkErrorCatcher(send_to_logging=False) as caught:
+        yield found
+    found += [event.alert for event in caught.events if "error" in str(event).lower()]
 
 
-def _vtk_cells(offsets: Ints, connectivity: Ints) -> Any:
-    from vtkmodules.util.numpy_support import numpy_to_vtkIdTypeArray
-    from vtkmodules.vtkCommonDataModel import vtkCellArray
+def _save(path: Path, data: Any, displacement: Floats) -> None:
+    """Write ``data`` with its ``displacement`` (n, 3) [mm]; OSError where that fails."""
+    import pyvista
 
-    cells = vtkCellArray()
-    cells.SetData(*(numpy_to_vtkIdTypeArray(np.array(ids, np.int64), deep=True) for ids in (offsets, connectivity)))
-    return cells
-
-
-def _vtk_write(path: Path, writer: Any, data: Any, rest: Floats, positions: Floats) -> None:
-    """Give ``data`` its points and their displacement from ``rest``, and write it."""
-    from vtkmodules.util.numpy_support import numpy_to_vtk
-    from vtkmodules.vtkCommonCore import vtkPoints
-
-    points = vtkPoints()
-    points.SetData(numpy_to_vtk(np.array(positions, np.float64), deep=True))
-    data.SetPoints(points)
-    displacement = numpy_to_vtk(positions - rest, deep=True)
-    displacement.SetName("displacement")
-    data.GetPointData().SetVectors(displacement)
-    writer.SetInputData(data)
-    with whole(path) as part, _vtk_messages() as messages:
-        writer.SetFileName(str(part))
-        if not writer.Write() or writer.GetErrorCode():
-            raise OSError(f"{path}: {messages.GetOutput()}")
+    data.point_data.set_vectors(displacement, "displacement")
+    kind = pyvista.XMLPolyDataWriter if path.suffix == ".vtp" else pyvista.XMLUnstructuredGridWriter
+    with whole(path) as part, _vtk_errors():
+        writer = kind(part, data)
+        writer.writer.SetDataModeToAppended()  # in the other modes a displacement that is not finite cannot be read again
+        writer.write()
+        if code := writer.writer.GetErrorCode():
+            raise OSError(f"{path}: VTK could not write it (its error {code})")
 
 
 _READERS: dict[str, Callable[[Path], Soup]] = {
