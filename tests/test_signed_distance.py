@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import shapes
 from numpy.testing import assert_allclose
+from scipy.interpolate import NdBSpline
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Surface
@@ -98,6 +99,20 @@ def test_gradient_and_curvature_are_the_slopes_of_the_distance(ball: Grid) -> No
     # Round-off of a distance of 5 mm over the step is 1e-10; the third derivative jumps between cells: 1e-5 of about 1 / mm2.
     assert_allclose(slopes, found.gradient, atol=1e-8)
     assert_allclose(bends, found.curvature, atol=1e-5)
+
+
+def test_the_spline_is_scipys(ball: Grid) -> None:
+    points = _shell(7, 7.0, 13.0, 500)
+    at, order = (points - ball.origin) / ball.spacing, np.eye(3, dtype=int)
+    # Counted in cells, B-spline i has its middle at i and its knots up to two cells away.
+    knots = tuple(np.arange(-2.0, count + 2) for count in ball.coefficients.shape)
+    spline, found = NdBSpline(knots, ball.coefficients, 3), ball.sample(points)
+    slopes = np.stack([spline(at, nu=one) for one in order], axis=1)
+    bends = np.stack([np.stack([spline(at, nu=one + other) for one in order], axis=1) for other in order], axis=2)
+    # Round-off of sums of 64 terms of up to 15 mm.
+    assert_allclose(found.distance, spline(at), atol=1e-13)
+    assert_allclose(found.gradient, slopes / ball.spacing, atol=1e-13)
+    assert_allclose(found.curvature, bends / ball.spacing**2, atol=1e-12)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
