@@ -12,7 +12,6 @@ from pathlib import Path
 
 import igl
 import numpy as np
-from scipy.interpolate import NdBSpline
 from scipy.ndimage import gaussian_filter, spline_filter, zoom
 
 from fem_reference.foundations.mesh import (
@@ -40,6 +39,8 @@ _STRIDE = 4
 # Random points around the surface at which the error is looked for, and points in one call of libigl.
 _PROBES = 30_000
 _CHUNK = 1_000_000
+# Coefficients by power 0 to 3 (columns) of the four cubic B-splines that reach into a cell (rows).
+_SPLINES = np.array([[1, -3, 3, -1], [4, 0, -6, 3], [1, 3, 3, -3], [0, 0, 0, 1]]) / 6
 
 logger = logging.getLogger(__name__)
 
@@ -82,20 +83,35 @@ class Grid:
         found.distance[~np.isfinite(points).all(axis=1)] = np.nan
         at = (points - self.origin) / self.spacing
         inside = np.flatnonzero(((at >= 1) & (at <= np.array(self.coefficients.shape) - 2)).all(axis=1))
-        at, order = at[inside], np.eye(3, dtype=np.int64)
-        found.distance[inside] = self._spline(at)
-        for i in range(3):
-            found.gradient[inside, i] = self._spline(at, nu=order[i]) / self.spacing
-            for j in range(i + 1):
-                bend = self._spline(at, nu=order[i] + order[j]) / self.spacing**2
-                found.curvature[inside, i, j] = found.curvature[inside, j, i] = bend
+        for chunk in np.array_split(inside, 1 + len(inside) // 10_000):
+            for whole, part in zip(found, self._interpolate(at[chunk]), strict=True):
+                whole[chunk] = part
         return found
 
-    @cached_property
-    def _spline(self) -> NdBSpline:
-        """At places (n, 3) counted in cells from the origin: B-spline i has its middle at i, and its knots up to two cells away."""
-        knots = tuple(np.arange(-2.0, count + 2) for count in self.coefficients.shape)
-        return NdBSpline(knots, self.coefficients, 3)
+    def _interpolate(self, at: Floats) -> Sampled:
+        """At places (n, 3) inside the grid, counted in cells from its origin."""
+        shape = self.coefficients.shape
+        cell = np.minimum(at.astype(np.int64), np.array(shape) - 3)
+        x, y, z = (_weights(at[:, axis] - cell[:, axis]) for axis in range(3))
+        first = np.ravel_multi_index(tuple(cell.T - 1), shape)
+        reach = np.ravel_multi_index(tuple(np.indices((4, 4, 4)).reshape(3, -1)), shape)
+        around = self.coefficients.ravel()[first[:, None] + reach].reshape(-1, 4, 4, 4)
+        values = x @ (y[:, None] @ (around @ z.transpose(0, 2, 1)[:, None])).reshape(-1, 4, 9)
+        values = values.reshape(-1, 3, 3, 3)  # by the order of the derivative along x, y and z
+        curvature = np.empty((len(at), 3, 3))
+        for i, j in np.ndindex(3, 3):
+            curvature[:, i, j] = values[:, *(np.eye(3, dtype=int)[i] + np.eye(3, dtype=int)[j])]
+        gradient = np.stack([values[:, 1, 0, 0], values[:, 0, 1, 0], values[:, 0, 0, 1]], axis=1)
+        return Sampled(values[:, 0, 0, 0], gradient / self.spacing, curvature / self.spacing**2)
+
+
+def _weights(within: Floats) -> Floats:
+    """Value and two derivatives of the four B-splines of a cell at ``within`` (n,), from 0 to 1 across it: (n, 3, 4)."""
+    one, none = np.ones_like(within), np.zeros_like(within)
+    powers = np.stack([one, within, within**2, within**3], axis=1)
+    slopes = np.stack([none, one, 2 * within, 3 * within**2], axis=1)
+    bends = np.stack([none, none, 2 * one, 6 * within], axis=1)
+    return np.stack([powers, slopes, bends], axis=1) @ _SPLINES.T
 
 
 def build(surface: Surface, spacing: float, margin: float, rounding: float = 0.0) -> Grid:
