@@ -5,15 +5,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import t as student
 
 from fem_reference.foundations.mesh import Floats
+
+# How sure an extrapolation is.
+CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
 class Growth:
-    """``cost`` of a ``solver`` over ``sizes`` (k,), unknowns or triangles: ``values`` (k,), about ``size^exponent``.
-
-    ``uncertainty``: the standard error of the exponent; ``offset`` and ``scatter`` of the fit in logarithms, for ``at``.
+    """``cost`` of a ``solver`` over ``sizes`` (k,), unknowns, triangles or tets as ``counted`` says: ``values`` (k,), about
+    ``size^exponent``. ``uncertainty``: the standard error of the exponent.
     """
 
     solver: str
@@ -22,15 +25,20 @@ class Growth:
     values: tuple[float, ...]
     exponent: float
     uncertainty: float
+    counted: str = "unknowns"
 
     def at(self, size: float) -> tuple[float, float, float]:
-        """The cost expected at a ``size``, and its least and greatest value with the exponent off by twice its uncertainty, from
-        the greatest size that was measured on.
+        """The cost expected at a ``size``, and its least and greatest value: the interval in which another measurement there would
+        be found with ``CONFIDENCE``, if the power holds that far.
         """
-        logs, values = np.log(np.array(self.sizes)), np.log(np.array(self.values))
-        middle = float(values.mean() + self.exponent * (math.log(size) - logs.mean()))
-        reach = 2 * self.uncertainty * abs(math.log(size) - float(logs.mean()))
-        return math.exp(middle), math.exp(middle - reach), math.exp(middle + reach)
+        x, y = np.log(np.array(self.sizes)), np.log(np.array(self.values))
+        away = math.log(size) - float(x.mean())
+        middle = float(y.mean()) + self.exponent * away
+        rest = y - y.mean() - self.exponent * (x - x.mean())
+        scatter = float(rest @ rest) / (len(x) - 2)
+        spread = math.sqrt(scatter * (1 + 1 / len(x)) + (self.uncertainty * away) ** 2)
+        reach = float(student.ppf((1 + CONFIDENCE) / 2, len(x) - 2)) * spread
+        return _exp(middle), _exp(middle - reach), _exp(middle + reach)
 
     @property
     def decades(self) -> float:
@@ -38,19 +46,22 @@ class Growth:
         return math.log10(max(self.sizes) / min(self.sizes))
 
 
-def growth(solver: str, cost: str, sizes: Sequence[float], values: Sequence[float]) -> Growth | None:
-    """A line through costs over sizes in logarithms, by least squares; None for fewer than three that are above zero.
+def growth(
+    solver: str, cost: str, sizes: Sequence[float], values: Sequence[float], counted: str = "unknowns"
+) -> Growth | None:
+    """A line through costs over sizes in logarithms, by least squares; None for fewer than three sizes whose costs are above zero.
 
     >>> found = growth("pbd", "seconds", (10, 100, 1000), (1, 10, 100))
     >>> round(found.exponent, 6), round(found.uncertainty, 6)
     (1.0, 0.0)
     """
     known = [(size, value) for size, value in zip(sizes, values, strict=True) if value > 0 and math.isfinite(value)]
-    if len(known) < 3 or len({size for size, _ in known}) < 3:
+    if len({size for size, _ in known}) < 3:
         return None
     x, y = np.log(np.array(known)).T
     exponent, error = _slope(x, y)
-    return Growth(solver, cost, tuple(size for size, _ in known), tuple(value for _, value in known), exponent, error)
+    kept_sizes, kept_values = (tuple(map(float, column)) for column in zip(*known, strict=True))
+    return Growth(solver, cost, kept_sizes, kept_values, exponent, error, counted)
 
 
 def _slope(x: Floats, y: Floats) -> tuple[float, float]:
@@ -59,3 +70,8 @@ def _slope(x: Floats, y: Floats) -> tuple[float, float]:
     slope = float(centred @ y / (centred @ centred))
     rest = y - y.mean() - slope * centred
     return slope, float(np.sqrt(rest @ rest / (len(x) - 2) / (centred @ centred)))
+
+
+def _exp(x: float) -> float:
+    """The exponential, infinite where it is beyond all numbers."""
+    return math.exp(x) if x < 700 else math.inf

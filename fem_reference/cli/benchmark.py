@@ -1,4 +1,4 @@
-"""The verb ``benchmark``: how fast the candidates are, or the reference."""
+"""The verb ``benchmark``: how fast the candidates are, or the reference, alone or against its peers."""
 
 import argparse
 import os
@@ -7,7 +7,7 @@ from fem_reference.cli._printing import DONE, SOLVER_FAILED, out, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import DATA_SETTING
-from fem_reference.studies.benchmark import candidates, checkout, reference, reference_table
+from fem_reference.studies.benchmark import against_peers, candidates, checkout, peer_table, reference, reference_table
 from fem_reference.studies.execution import Bench
 
 TIMED, TIMED_WITH_DATA = ("hip_flexion", "box_squeeze"), ("gluteus_maximus", "box_squeeze_report")
@@ -29,8 +29,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--reference", action="store_true", help=timed)
     commit = "with --reference: in turn with that of an earlier commit of this repository, and compare"
     parser.add_argument("--against", metavar="COMMIT", help=commit)
+    others = "time the reference in turn with FElupe and SfePy instead, as far as they are installed"
+    parser.add_argument("--peers", action="store_true", help=others)
     often = (
-        f"with --reference: how often (default: {reference.REPEATS}, of a muscle {reference.REPEATS_OF_MUSCLE}; "
+        f"with --reference or --peers: how often (default: {reference.REPEATS}, of a muscle {reference.REPEATS_OF_MUSCLE}; "
         "the first time, what is compiled is made beforehand)"
     )
     parser.add_argument("--repeats", type=int, metavar="N", help=often)
@@ -40,6 +42,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Time the solvers of Table 5.1, or the reference."""
+    if options.peers:
+        return _time_against_peers(options)
     if options.reference:
         return _time_reference(options)
     for name in ("against", "repeats", "ranks"):
@@ -62,3 +66,13 @@ def _time_reference(options: argparse.Namespace) -> int:
     facts = reference_table.facts(timings, against, left_out)
     write_output(facts, reference_table.text(timings, against, left_out), options)
     return DONE if all(timing.converged for timing in timings) else SOLVER_FAILED
+
+
+def _time_against_peers(options: argparse.Namespace) -> int:
+    refused = ("cases", "reference", "against", "ranks")
+    for name in refused:
+        if getattr(options, name):
+            raise InputError("--peers", f"{name} too", f"nothing of {', '.join(refused)} with it")
+    found = against_peers.measure(repeats=options.repeats)
+    write_output(peer_table.facts(found), peer_table.text(found), options)
+    return DONE if all(one.converged(name) for one in found for name in one.taken) else SOLVER_FAILED

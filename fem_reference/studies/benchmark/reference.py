@@ -219,12 +219,12 @@ def _take(request: dict[str, Any], root: Path, *, warm: bool) -> tuple[Taken, Fl
         order, facts, positions = folder / "order.json", folder / "facts.json", folder / "positions.npz"
         wanted = {"root": str(root), "request": request, "warm": warm, "facts": str(facts), "positions": str(positions)}
         order.write_text(json.dumps(wanted), encoding="utf-8")
-        _run(command(str(_PROGRAM), str(order)), root)
+        run_alone(command(str(_PROGRAM), str(order)), root)
         with np.load(positions) as arrays:
             return Taken(**json.loads(facts.read_text(encoding="utf-8"))), arrays["positions"]
 
 
-def _run(command_line: list[str], root: Path) -> None:
+def run_alone(command_line: list[str], root: Path) -> None:
     """Run it with the package below ``root`` before any other; it has ended after this, whatever happens."""
     theirs = [str(Path(path).absolute()) for path in os.environ.get("PYTHONPATH", "").split(os.pathsep) if path]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(root), *theirs]), "OMP_NUM_THREADS": "1"}

@@ -1,0 +1,81 @@
+"""The problem that the reference and its peers solve: a fusiform muscle with fibres, nearly incompressible, bent and stretched."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fem_reference.effects import make
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.problems.body import Body, Cells, Prescribed
+from fem_reference.problems.paths import Rest
+from fem_reference.studies.benchmark import timing
+
+# Its upper end turns by ANGLE [rad] and its middle line becomes longer by STRETCH, in so many FRAMES: each is one load step.
+ANGLE, STRETCH, FRAMES = np.pi / 3, 0.1, 12
+# What ends Newton's iteration everywhere: the Euclidean norm of the nodal forces [N] that are out of balance.
+RESIDUAL = 1e-8
+# Degree of the polynomials that are integrated exactly on a cell: 8 points in a hexahedron, 4 in a tetrahedron.
+QUADRATURE = {"Q1/P0": 3, "P2/P0": 2, "P2/P1": 2}
+
+
+@dataclass(frozen=True)
+class Bend:
+    """The middle line, straight along z from the origin, becomes an arc in the plane of x and z, and longer; sections across it
+    stay what they are.
+    """
+
+    def __call__(self, points: Floats, frame: float) -> Floats:
+        """The displacement (n, 3) [mm] of rest points (n, 3)."""
+        share = frame / FRAMES
+        if share == 0:
+            return np.zeros_like(points)
+        x, y, z = points.T
+        radius = (1 + STRETCH * share) * timing.LENGTH / (ANGLE * share)
+        angle = ANGLE * share * z / timing.LENGTH
+        arms = radius - x
+        return np.stack([radius - arms * np.cos(angle), y, arms * np.sin(angle)], axis=1) - points
+
+
+@dataclass(frozen=True, eq=False)
+class Muscle:
+    """The problem in an ``element``: its ``body``, and of that what a peer needs as arrays and numbers."""
+
+    element: str
+    body: Body
+
+    @property
+    def mesh(self) -> Cells:
+        """Straight cells."""
+        return self.body.mesh
+
+    @property
+    def fibres(self) -> Floats:
+        """Unit vectors (m, 3) along the fibres in the cells."""
+        assert self.body.fibre is not None
+        cells = np.arange(len(self.mesh.cells))
+        return self.body.fibre(cells, self.mesh.points[self.mesh.cells].mean(axis=1))
+
+    @property
+    def law(self) -> dict[str, float]:
+        """The parameters of the effects by name [MPa]."""
+        return {name: float(value) for effect in self.body.effects for name, value, _ in effect.parameters}
+
+    def fixed(self, points: Floats) -> tuple[Ints, Ints]:
+        """Which of ``points`` (n, 3), nodes at rest, are on the lower and on the upper end."""
+        z = points[:, 2]
+        return np.flatnonzero(np.isclose(z, 0, atol=1e-9)), np.flatnonzero(np.isclose(z, timing.LENGTH, atol=1e-9))
+
+
+def muscle(element: str, rings: int, slices: int, frames: int = FRAMES) -> Muscle:
+    """The fusiform body of ``timing`` with other motion, its first ``frames`` load steps."""
+    body = timing.fusiform(element, rings, slices)
+    ends = (
+        Prescribed("bottom", "bottom", (0, 1, 2), Rest()),
+        Prescribed("top", "top", (0, 1, 2), Bend()),
+    )
+    return Muscle(element, replace(body, prescribed=ends, frames=tuple(map(float, range(frames + 1)))))
+
+
+def acting() -> str:
+    """What acts, for people."""
+    return ", ".join(make(name, **parameters).title for name, parameters in timing.EFFECTS.items())

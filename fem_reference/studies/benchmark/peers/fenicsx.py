@@ -1,0 +1,36 @@
+"""The reference of this project: FEniCSx, as it is used elsewhere."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from fem_reference.solvers import fenicsx
+from fem_reference.studies.benchmark.peer_problem import QUADRATURE, RESIDUAL, Muscle
+from fem_reference.studies.benchmark.peers import Solve, Solved
+
+PACKAGES = ("dolfinx-solver-real",)
+TUNED = (
+    "as it comes: factorisations lagged and in single precision, Newton's method inexact; it also checks det F and counts "
+    "the negative modes of each state"
+)
+OMITTED: dict[str, str] = {}
+
+
+@contextmanager
+def opened() -> Iterator[Solve]:
+    """A process that has FEniCSx imported."""
+    with fenicsx.session() as own:
+
+        def solve(muscle: Muscle) -> Solved:
+            settings = fenicsx.BodySettings(
+                element=muscle.element,
+                first_step=1.0,
+                residual=RESIDUAL,
+                quadrature_degree=QUADRATURE[muscle.element],
+            )
+            found = own.solve(muscle.body, settings)
+            cost, outcome = found.outcome.cost, found.outcome
+            points = found.states[-1].points if found.states else muscle.mesh.points
+            iterations, unknowns = (int(cost.get(name, 0)) for name in ("newton_iterations", "unknowns"))
+            return Solved(outcome.status == "converged", outcome.message, iterations, unknowns, points)
+
+        yield solve
