@@ -242,4 +242,4 @@ def _index(bodies: tuple[RigidBody, ...], name: str, key: str) -> int:
     return names.index(name)
 
 
-SOLVES = (MuscleSolver(settings=Settings, solve=solve, example={}),)
+SOLVES = (MuscleSolver(settings=Settings, solve=solve, moves="lines", example={}),)

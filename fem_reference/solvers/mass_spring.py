@@ -283,4 +283,4 @@ def _compile(settings: Settings) -> float:
 
 
 _EXAMPLE = {"stiffness": "1 N/mm", "density": "1060 kg/m3", "frame_time": "20 ms", "damping": "eq. 5.5"}
-SOLVES = (MuscleSolver(settings=Settings, solve=solve, example=_EXAMPLE),)
+SOLVES = (MuscleSolver(settings=Settings, solve=solve, moves="tetrahedra", example=_EXAMPLE),)

@@ -274,4 +274,4 @@ def _check_at_rest(place: str, number: int, positions: Floats, rest: Surface) ->
         log.warning("%s: %s, which goes into what is measured", place, got)
 
 
-SOLVES = (MuscleSolver(settings=Settings, solve=solve, example={"folder": "frames", "unit": "mm"}),)
+SOLVES = (MuscleSolver(settings=Settings, solve=solve, moves="nothing", example={"folder": "frames", "unit": "mm"}),)

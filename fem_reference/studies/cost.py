@@ -26,7 +26,8 @@ from fem_reference.studies import refinement
 from fem_reference.studies.campaign import Made, Workers, carry_out
 from fem_reference.studies.execution import Bench, complete
 from fem_reference.studies.features import features
-from fem_reference.studies.ladders import Trial, candidate_trials, reference_trials
+from fem_reference.studies.ladders import TETRAHEDRA, Trial, candidate_trials, reference_trials
+from fem_reference.studies.resampled_scenes import carried, resample
 
 log = logging.getLogger(__name__)
 
@@ -34,7 +35,9 @@ log = logging.getLogger(__name__)
 METRICS = ("volume", "fibre_length", "surface_deviation", "penetration")
 Part = Literal["reference", "candidates"]
 PARTS: tuple[Part, ...] = get_args(Part)
-_LADDERS = {"reference": reference_trials, "candidates": candidate_trials}
+# Solvers of surfaces are also tried on 4 to these powers as many triangles, whose files are kept beside the runs.
+_POWERS = (-1, 1)
+SURFACES = "surfaces"
 # Error bars of so many of the reference's coarser members are set beside their errors: the finest of those that are cheap.
 _CLAIMING = 4
 
@@ -66,7 +69,14 @@ def _of(scene: MuscleCase, store: Path, workers: Workers, parts: Sequence[Part])
         raise InputError(scene.place, f"a reference that {truth.outcome.status}", "one that reaches all frames")
     bars = refinement.stored(truth) or refinement.obtain(bench, truth, model=False)
     context = MeasurementContext.of(truth, truth.fibres, bench.setup().bones, bench.setup().free)
-    trials = [trial for part in parts for trial in _LADDERS[part](scene)]
+    trials = list[Trial]()
+    if "reference" in parts:
+        trials += reference_trials(scene)
+    if "candidates" in parts:
+        others = [
+            (f"{4.0**power:g} times", resample(scene, bench.setup(), power, store / SURFACES)) for power in _POWERS
+        ]
+        trials += candidate_trials(scene, dict(others))
     made = carry_out(trials, store, workers)
     points = tuple(_point(scene, one, truth, context) for one in made)
     size = scene.muscle.tet_size / 2**scene.muscle.refinements
@@ -119,7 +129,7 @@ def errors(run: Run, truth: Run, context: MeasurementContext) -> dict[str, float
     """
     if run.outcome.status != "converged" or run.folder == truth.folder:
         return {}
-    whole = complete(run, truth.numbers)
+    whole = carried(complete(run, truth.numbers), truth.surface)
     found = {
         f"{one.metric}.{one.statistic}": float(np.abs(one.values).max()) for one in _measures(whole, truth, context)
     }
@@ -143,7 +153,12 @@ def _claims(made: Sequence[Made], truth: Run, context: MeasurementContext, store
     """The error bars of the reference on coarser tetrahedra, beside its difference from the truth."""
     found = list[Claim]()
     members = [
-        one for one in made if one.trial.knob == "tetrahedra" and one.run and one.run.outcome.status == "converged"
+        one
+        for one in made
+        if one.trial.name == "reference"
+        and one.trial.knob == TETRAHEDRA
+        and one.run
+        and one.run.outcome.status == "converged"
     ]
     for one in members[-_CLAIMING:]:
         assert one.run is not None

@@ -14,6 +14,7 @@ from fem_reference.runs.solved import Solved
 from fem_reference.runs.store import Outcome, Sink
 
 Task = Literal["solve", "solve_field", "solve_body"]
+Moves = Literal["surface", "tetrahedra", "lines", "nothing"]
 
 
 class SolveMuscle[S: Record](Protocol):
@@ -70,12 +71,15 @@ class Solver[S: Record]:
 
 @dataclass(frozen=True, kw_only=True)
 class MuscleSolver[S: Record](Solver[S]):
-    """A solver of muscles; ``check_effects`` of one that simulates the effects of a scene, None of one that does not."""
+    """A solver of muscles; ``moves``: what carries its unknowns, whose mesh its accuracy and cost depend on;
+    ``check_effects`` of one that simulates the effects of a scene, None of one that does not.
+    """
 
     task = "solve"
     solves = "muscles"
 
     solve: SolveMuscle[S]
+    moves: Moves = "surface"
     check_effects: CheckEffects[S] | None = None
 
 

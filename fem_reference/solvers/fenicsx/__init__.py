@@ -193,6 +193,7 @@ SOLVES = (
     MuscleSolver(
         settings=Settings,
         solve=solve,
+        moves="tetrahedra",
         example={"ranks": 1},
         require=require,
         check_effects=check_effects,

@@ -33,7 +33,7 @@ class BodySettings(Record):
     largest_step: Annotated[float | None, Trade((8.0, 4.0, 2.0, 1.0))] = Field(default=None, gt=0)
     newton_iterations: int = Field(default=14, gt=0)
     residual: Annotated[float, Trade((1e-4, 1e-6, 1e-8))] = Field(default=1e-8, gt=0)
-    quadrature_degree: int | None = Field(default=None, gt=0)
+    quadrature_degree: Annotated[int | None, Trade((2, 3, 4, 6))] = Field(default=None, gt=0)
     linear_solver: Literal["direct", "lagged", "multigrid"] | None = None
     precision: Literal["single", "double"] | None = None
     reuse: bool = True
