@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 collect_ignore = ["foreign_solver.py"]  # a program: it runs where it is imported
-# Of these files each test takes long and shares nothing with the next; the tests of any other share its fixtures.
+# Of these files each test takes long, and only those of one parameter, a case or an entry, have something in common; the tests of
+# any other file share its fixtures.
 SINGLE = ("test_cases.py", "test_verification_entries.py")
 
 
@@ -29,13 +30,15 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """Processes that share the tests take whole files, or single tests of ``SINGLE``, in the order of the collection."""
+    """Processes that share the tests take whole files, of ``SINGLE`` what has one parameter, in the order of the collection."""
     from xdist.scheduler import LoadScopeScheduling
 
     class ByFile(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
-            file = nodeid.split("::")[0]
-            return nodeid if file.endswith(SINGLE) else file
+            file, _, test = nodeid.partition("::")
+            if not file.endswith(SINGLE):
+                return file
+            return file + (test[test.find("[") :] if "[" in test else test)
 
     config.option.loadscopereorder = False
     return ByFile(config, log)
