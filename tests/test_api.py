@@ -104,7 +104,7 @@ def test_what_is_wrong_with_a_case_made_in_python_is_named(tmp_path) -> None:
         lost.key  # noqa: B018
 
 
-def test_a_scalar_case_goes_the_same_way(tmp_path) -> None:
+def test_a_scalar_case_uses_the_same_calls(tmp_path) -> None:
     # -psi'' = 2 with psi = 0 at both ends is x (1 - x); linear elements are exact at their nodes.
     table = {
         "title": "A rod",

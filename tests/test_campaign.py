@@ -20,6 +20,7 @@ from fem_reference.studies.campaign import Workers, carry_out
 from fem_reference.studies.ladders import Trial
 
 pytestmark = pytest.mark.slow
+ONLY = ("pbd",)
 PBD = {"sub_iterations": 3, "solver_iterations": 2, "damping": 0.05, "stretch": 1.0, "volume": 1.0, "bending": 0.5}
 
 
@@ -75,12 +76,12 @@ def errors_of(study: cost.Study) -> dict[str, dict[str, float]]:
 
 def test_a_point_is_the_same_alone_with_workers_and_after_a_kill(tmp_path) -> None:
     folder = small.write(tmp_path / "bar")
-    alone = cost.study([scene_in(tmp_path)], tmp_path / "alone" / "runs", Workers(), ("candidates",))
+    alone = cost.study([scene_in(tmp_path)], tmp_path / "alone" / "runs", Workers(), ONLY)
     assert len(errors_of(alone)) > 5
-    together = cost.study([scene_in(tmp_path)], tmp_path / "two" / "runs", Workers(2), ("candidates",))
+    together = cost.study([scene_in(tmp_path)], tmp_path / "two" / "runs", Workers(2), ONLY)
     assert errors_of(together) == errors_of(alone)
     line = command(
-        "-m", "fem_reference", "study", str(folder), "--only", "candidates", "--out", str(tmp_path / "cut"), "--quiet"
+        "-m", "fem_reference", "study", str(folder), "--solver", "pbd", "--out", str(tmp_path / "cut"), "--quiet"
     )
     with subprocess.Popen(line, start_new_session=True) as cut_off:
         while not list((tmp_path / "cut" / "runs").glob("pbd-*/run.json")):
@@ -90,8 +91,17 @@ def test_a_point_is_the_same_alone_with_workers_and_after_a_kill(tmp_path) -> No
     assert not (tmp_path / "cut" / "bar" / "study.json").exists()
     subprocess.run(line, check=True, stdout=sys.stderr)
     points = json.loads((tmp_path / "cut" / "bar" / "study.json").read_text())["points"]
-    resumed = {
-        f"{point['name']} {point['label']}" if "label" in point else point["name"]: point["errors"] for point in points
-    }
-    assert list(resumed.values())[-1] == list(errors_of(alone).values())[-1]
     assert [point["errors"] for point in points] == [point.errors for point in alone.points]
+
+
+def test_the_workers_of_a_dask_scheduler_make_the_same_runs(tmp_path) -> None:
+    distributed = pytest.importorskip("distributed", reason="Dask is not installed: the extra cluster has it")
+    scene = scene_in(tmp_path)
+    trials = [Trial(scene, SolverChoice(solver="pbd", **(PBD | {"sub_iterations": count})), "pbd") for count in (1, 2)]
+    own = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": None, "silence_logs": 50}
+    with distributed.LocalCluster(**own) as cluster:
+        made = carry_out(trials, tmp_path / "runs", Workers(1, cluster.scheduler_address))
+    alone = carry_out(trials, tmp_path / "alone", Workers())
+    for one, other in zip(made, alone, strict=True):
+        assert one.run.folder.parent == tmp_path / "runs"
+        assert abs(one.run.positions - other.run.positions).max() == 0

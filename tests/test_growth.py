@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fem_reference.assessment.growth import Growth, growth
-from fem_reference.assessment.solver_table import families
+from fem_reference.assessment.solver_table import solver_kinds
 from fem_reference.foundations.mesh import check_closed, enclosed_volume, tet_volumes
 from fem_reference.studies import growth as study
 
@@ -79,7 +79,9 @@ def test_the_spindle_has_tets_and_ends() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("candidate", [each for row in families() for each in row.candidate], ids=lambda one: one.name)
+@pytest.mark.parametrize(
+    "candidate", [each for row in solver_kinds() for each in row.candidate], ids=lambda one: one.name
+)
 def test_candidates_of_the_table_are_measured(candidate) -> None:
     said: list[str] = []
     found = study.of_candidate(candidate, said.append, most=3)

@@ -14,7 +14,7 @@ FORMAT = 1
 
 @dataclass(frozen=True, eq=False)
 class CaseStudy:
-    """The points of a case; ``units`` of errors by ``metric.statistic``, and ``bars``, how well the truth is known, by the same;
+    """The points of a case; ``units`` of errors by ``metric.statistic``, and ``bars``, the error bars of the truth, by the same;
     ``truth``: in words what that is; ``claims``: error bars of coarser members beside their errors; ``triangles``,
     ``travel`` [mm], the greatest displacement of the truth; ``features``, what the case is like as far as its scene says
     (:mod:`studies.features`).

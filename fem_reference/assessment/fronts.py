@@ -55,7 +55,7 @@ class Point:
 
     @property
     def label(self) -> str:
-        """What tells it from the other points of its solver."""
+        """What distinguishes it from the other points of its solver."""
         name = "" if self.name in (self.solver, "reference") else f"{self.name}, "
         return f"{name}{self.knob} = {self.value}" if self.knob else f"{self.name}, as it is"
 

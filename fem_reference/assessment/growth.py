@@ -29,7 +29,7 @@ class Growth:
 
     def at(self, size: float) -> tuple[float, float, float]:
         """The cost expected at a ``size``, and its least and greatest value: the interval in which another measurement there would
-        be found with ``CONFIDENCE``, if the power holds that far.
+        be found with ``CONFIDENCE``, if the power is the same that far.
         """
         x, y = np.log(np.array(self.sizes)), np.log(np.array(self.values))
         away = math.log(size) - float(x.mean())

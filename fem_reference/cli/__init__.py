@@ -24,7 +24,7 @@ __all__ = ["BAD_INPUT", "DONE", "INTERRUPTED", "SOLVER_FAILED", "TERMINATED", "V
 
 def entry() -> None:
     """The installed command."""
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))  # so that what is under way is cleaned up
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))  # so that what is running is cleaned up
     sys.exit(main(sys.argv[1:]))
 
 

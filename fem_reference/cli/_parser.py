@@ -61,9 +61,7 @@ def add_case(parser: argparse.ArgumentParser) -> None:
 
 def add_error_bar(parser: argparse.ArgumentParser) -> None:
     """Whether error bars are made where they take long."""
-    known = (
-        "how well the reference is known: solve it on larger tetrahedra too, and with stiffer contact where bones press"
-    )
+    known = "error bars of the reference: solve it on larger tetrahedra too, and with stiffer contact where bones press"
     parser.add_argument("--error-bar", action="store_true", help=known)
 
 

@@ -1,7 +1,7 @@
 """The verb ``check``: a candidate against its own past and against the reference, for the pipeline of whoever writes it.
 
 Where nothing can be said the exit status is 0: what the reference lacks is no fault of the change that is checked, and should
-not hold it up; the text, the Markdown and the JUnit file (as skipped) say so.
+not fail it; the text, the Markdown and the JUnit file (as skipped) say so.
 """
 
 import argparse

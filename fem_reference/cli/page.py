@@ -78,7 +78,7 @@ def _compared(bench: Bench[Any]) -> Comparison:
 
 
 def _table(options: argparse.Namespace) -> int:
-    """The families of the report's table, measured."""
+    """The kinds of solvers in the report's table, measured."""
     scenes = {scene.name: scene for scene in map(casefile.read_muscle, options.case or table_5_1.SCENARIOS)}
     foreign = _foreign(options, list(scenes))
     for name in scenes if options.case else foreign:
@@ -95,8 +95,8 @@ def _claims(options: argparse.Namespace) -> int:
     found = true_errors.stake(scenes, out(options) / "runs")
     path = report.write_claims(found, out(options), CLAIMS)
     whole = Cover.of(found.claims)
-    holding = f"{100 * whole.share:.1f} % hold the difference from a finer solution, median ratio {whole.median:.2f}"
-    printed = [f"{whole.count} error bars: {holding}"]
+    covered = f"{100 * whole.share:.1f} % cover the difference from a finer solution, median ratio {whole.median:.2f}"
+    printed = [f"{whole.count} error bars: {covered}"]
     printed += [f"left out: {case}: {why}" for case, why in found.missing.items()]
     write_output(claims_facts(found), "\n".join([*printed, f"page: {path}"]), options)
     return SOLVER_FAILED if found.missing else DONE

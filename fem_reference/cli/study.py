@@ -2,7 +2,7 @@
 
 import argparse
 
-from fem_reference import report
+from fem_reference import report, solvers
 from fem_reference.assessment.cost_study import facts
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, out, write_output
 from fem_reference.foundations.errors import InputError
@@ -27,8 +27,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "address of a Dask scheduler (such as dask-jobqueue starts) whose workers make the runs; they see --out too"
     )
     parser.add_argument("--scheduler", metavar="ADDRESS", help=cluster)
-    only = "the ladders of the reference only, or those of the candidates (default: both)"
-    parser.add_argument("--only", choices=cost.PARTS, help=only)
+    only = "only this solver; may be repeated (default: the reference and every candidate)"
+    parser.add_argument(
+        "--solver", action="append", default=[], choices=solvers.names("solve"), metavar="NAME", help=only
+    )
 
 
 def run(options: argparse.Namespace) -> int:
@@ -36,8 +38,8 @@ def run(options: argparse.Namespace) -> int:
     if options.workers < 1:
         raise InputError("--workers", options.workers, "1 or more")
     scenes = [casefile.read_muscle(case) for case in options.cases]
-    workers, parts = Workers(options.workers, options.scheduler), [options.only] if options.only else cost.PARTS
-    found = cost.study(scenes, out(options) / "runs", workers, parts)
+    workers = Workers(options.workers, options.scheduler)
+    found = cost.study(scenes, out(options) / "runs", workers, options.solver)
     for case in found.cases:
         path = report.write_study(cost.alone(found, case), out(options) / case.case, PAGE)
     if len(found.cases) != 1:

@@ -18,7 +18,7 @@ HELP = "measure problems whose answers are known and write the page"
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
-    known = "an entry, a family or a shell pattern of them (default: all)"
+    known = "an entry, a group or a shell pattern of them (default: all)"
     parser.add_argument("names", metavar="NAME", nargs="*", help=known)
     control = "measure this entry with its one thing wrong, named or not: it must fail; may be repeated"
     parser.add_argument("--negative-control", action="append", default=[], metavar="NAME", help=control)

@@ -124,7 +124,7 @@ class Rod(Record):
 
 class Bone(Record):
     """A rigid body: exactly one of a ``surface`` in a file, its coordinates in ``unit``, and the closed forms; without ``motion``
-    it rests. ``distance_error``: how well the distance to a surface shall be known, root mean square beside it, before
+    it rests. ``distance_error``: the error allowed in the distance to a surface, root mean square beside it, before
     ``distance_rounding`` takes its Gaussian mean, of this standard deviation: on flat triangles nothing slides smoothly.
     """
 

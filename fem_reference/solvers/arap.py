@@ -173,7 +173,7 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
 
 
 class Alternation:
-    """A surface on its way from frame number to frame number, whose free vertices ``relax`` as the attached ones have moved."""
+    """A surface going from frame number to frame number, whose free vertices ``relax`` as the attached ones have moved."""
 
     advice = "a slower motion may help"
 

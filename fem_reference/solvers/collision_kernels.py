@@ -1,7 +1,7 @@
 """Bones that keep vertices out of them, as constraints ``C = distance - allowed >= 0`` of vertices. Report section 6.1.1.
 
 A bone's distance is asked only for the vertices that it may have come near to: a distance grows and falls no faster than the
-way gone, so that a vertex which has gone less far, seen from the bone, than it was away is still outside. Vertices alone are
+displacement, so that a vertex which has gone less far, seen from the bone, than it was away is still outside. Vertices alone are
 asked, at the places they reach and not on their path there: a sharp edge gets between them, and what goes through a thin bone
 in one step comes out on its other side. The distance to a bone of triangles is kept on a grid along the axes at rest: with the
 whole scene turned, ``pbd`` puts the vertices of the case hip_flexion elsewhere by up to 1.2 mm, 0.1 mm on average.

@@ -95,7 +95,7 @@ def _coefficient(settings: Settings, mass: float) -> float:
 def report_damping(mass: float, stiffness: float) -> float:
     """Eq. 5.5, c = 2 sqrt(2 m (2 + 4 / k_a)), as a coefficient [N s/mm] of a ``mass`` [tonne] and a ``stiffness`` [N/mm].
 
-    It adds a number to one over a stiffness and holds in one system of units only, which the report does not name. Read in SI
+    It adds a number to one over a stiffness and is valid in one system of units only, which the report does not name. Read in SI
     (kg, N/m, N s/m), as here, it is the critical damping 2 sqrt(m k) of a mass on a spring of k = 4 + 8 / k_a: of k_a itself
     where that is 2 + sqrt(12) = 5.46 N/m, and of 4 N/m where k_a is large.
     """
@@ -202,7 +202,7 @@ def _obstacles(problem: Problem, fixed: Ints, gap: float) -> list[Obstacle]:
 
 
 class Motion:
-    """The masses of a ``model`` on their way from frame number to frame number, each in as many ``steps`` of the same length."""
+    """The masses of a ``model`` going from frame number to frame number, each in as many ``steps`` of the same length."""
 
     def __init__(self, model: Model, settings: Settings, wanted: float, seconds_compile: float) -> None:
         """``wanted``: how many steps, rounded up, in a frame number."""

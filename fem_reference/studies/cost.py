@@ -4,10 +4,9 @@ import logging
 import math
 import os
 import platform
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal, get_args
 
 import numpy as np
 
@@ -33,8 +32,6 @@ log = logging.getLogger(__name__)
 
 # What is measured on every point.
 METRICS = ("volume", "fibre_length", "surface_deviation", "penetration")
-Part = Literal["reference", "candidates"]
-PARTS: tuple[Part, ...] = get_args(Part)
 # Solvers of surfaces are also tried on 4 to these powers as many triangles, whose files are kept beside the runs.
 _POWERS = (-1, 1)
 SURFACES = "surfaces"
@@ -42,12 +39,14 @@ SURFACES = "surfaces"
 _CLAIMING = 4
 
 
-def study(scenes: Iterable[MuscleCase], store: Path, workers: Workers, parts: Sequence[Part] = PARTS) -> Study:
-    """Study each of ``scenes``, or ``parts`` of it, with runs in ``store``: solved where that was not done before."""
+def study(scenes: Iterable[MuscleCase], store: Path, workers: Workers, only: Collection[str] = ()) -> Study:
+    """Study each of ``scenes`` with runs in ``store``, solved where that was not done before; ``only`` solvers of these
+    names, where there are any.
+    """
     cases, missing = list[CaseStudy](), dict[str, str]()
     for scene in scenes:
         try:
-            cases.append(_of(scene, store, workers, parts))
+            cases.append(_of(scene, store, workers, only))
         except InputError as error:
             log.info("%s is left out: %s", scene.name, error)
             missing[scene.name] = str(error)
@@ -61,7 +60,7 @@ def alone(found: Study, case: CaseStudy) -> Study:
     return Study((case,), {}, found.origin)
 
 
-def _of(scene: MuscleCase, store: Path, workers: Workers, parts: Sequence[Part]) -> CaseStudy:
+def _of(scene: MuscleCase, store: Path, workers: Workers, only: Collection[str]) -> CaseStudy:
     bench = Bench(scene, store)
     log.info("%s: the truth", scene.name)
     truth = bench.obtain("reference", scene.reference, "reference")
@@ -70,13 +69,13 @@ def _of(scene: MuscleCase, store: Path, workers: Workers, parts: Sequence[Part])
     bars = refinement.stored(truth) or refinement.obtain(bench, truth, model=False)
     context = MeasurementContext.of(truth, truth.fibres, bench.setup().bones, bench.setup().free)
     trials = list[Trial]()
-    if "reference" in parts:
+    if not only or scene.reference.solver in only:
         trials += reference_trials(scene)
-    if "candidates" in parts:
+    if not only or set(only) - {scene.reference.solver}:
         others = [
             (f"{4.0**power:g} times", resample(scene, bench.setup(), power, store / SURFACES)) for power in _POWERS
         ]
-        trials += candidate_trials(scene, dict(others))
+        trials += [one for one in candidate_trials(scene, dict(others)) if not only or one.choice.solver in only]
     made = carry_out(trials, store, workers)
     points = tuple(_point(scene, one, truth, context) for one in made)
     size = scene.muscle.tet_size / 2**scene.muscle.refinements
@@ -95,7 +94,7 @@ def _of(scene: MuscleCase, store: Path, workers: Workers, parts: Sequence[Part])
 
 
 def _known(bars: ErrorBars | None) -> dict[str, float]:
-    """How well each statistic of a deviation is known, at worst over the frames."""
+    """The error bar of each statistic of a deviation, the greatest over the frames."""
     if bars is None:
         return {}
     worst = {f"{bar.metric}.{bar.statistic}": float(bar.values[bar.worst]) for bar in bars.of_deviations}
