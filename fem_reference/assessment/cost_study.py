@@ -7,6 +7,7 @@ from typing import Any
 
 from fem_reference.assessment.claims import Claim
 from fem_reference.assessment.fronts import Point
+from fem_reference.assessment.growth import Growth
 from fem_reference.foundations.errors import InputError
 
 FORMAT = 1
@@ -34,11 +35,14 @@ class CaseStudy:
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """Studies of cases; ``missing``: by case, why it was left out; ``origin``: with what and on what it was measured."""
+    """Studies of cases; ``missing``: by case, why it was left out; ``origin``: with what and on what it was measured; ``growth`` of
+    costs with size, where that was measured too.
+    """
 
     cases: tuple[CaseStudy, ...]
     missing: dict[str, str] = field(default_factory=dict)
     origin: dict[str, str] = field(default_factory=dict)
+    growth: tuple[Growth, ...] = ()
 
     @property
     def points(self) -> tuple[Point, ...]:

@@ -1,6 +1,8 @@
 """The verb ``study``: what accuracy costs in time on cases."""
 
 import argparse
+import logging
+from dataclasses import replace
 
 from fem_reference import report, solvers
 from fem_reference.assessment.cost_study import facts
@@ -8,8 +10,10 @@ from fem_reference.cli._printing import DONE, SOLVER_FAILED, out, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import study_page
 from fem_reference.scenes import casefile
-from fem_reference.studies import cost
+from fem_reference.studies import cost, growth
 from fem_reference.studies.campaign import Workers
+
+log = logging.getLogger(__name__)
 
 PAGE = "study"
 HELP = "what accuracy costs in time: reference and candidates over ladders of settings, and the page"
@@ -31,6 +35,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--solver", action="append", default=[], choices=solvers.names("solve"), metavar="NAME", help=only
     )
+    grown = "measure too how costs grow with the size of the problem, on bodies of our own making (about 5 minutes)"
+    parser.add_argument("--growth", action="store_true", help=grown)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -40,6 +46,8 @@ def run(options: argparse.Namespace) -> int:
     scenes = [casefile.read_muscle(case) for case in options.cases]
     workers = Workers(options.workers, options.scheduler)
     found = cost.study(scenes, out(options) / "runs", workers, options.solver)
+    if options.growth:
+        found = replace(found, growth=growth.measure(log.info))
     for case in found.cases:
         path = report.write_study(cost.alone(found, case), out(options) / case.case, PAGE)
     if len(found.cases) != 1:

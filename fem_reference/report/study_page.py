@@ -35,6 +35,7 @@ TIME = "seconds_per_frame"
 # What the fronts, the sentences and the tables are about, and what tables are matched by.
 SHOWN = ("surface_deviation.rms", "fibre_length.rms_percent", "volume.deviation")
 MAIN = SHOWN[0]
+LARGE = 1e7  # the size that growth is extrapolated to
 MATCHED = (TIME, "peak_memory_mb", "unknowns")
 _COLOURS = ("#222222", *PALETTE, "#7f7f7f", "#8c564b", "#17becf")
 
@@ -56,6 +57,8 @@ def render(study: Study) -> str:
         data=json.dumps(_data(study)).replace("</", "<\\/"),
         cover=lambda case: Cover.of(case.claims),
         claims=lambda case: [claims_drawing(case.claims, metric, case.case) for metric in CLAIMED_UNITS],
+        large=LARGE,
+        growth_drawing=_growth(study) if study.growth else None,
         transfers=transfers(study.points, MAIN) if len(study.cases) > 1 else (),
     )
 
@@ -138,6 +141,26 @@ def _front(case: CaseStudy, error: str) -> Curve:
         text = io.StringIO()
         figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
     return Curve(title, inline(text.getvalue(), f"front-{case.case}-{error.replace('.', '-')}", title))
+
+
+def _growth(study: Study) -> Curve:
+    """Times over sizes, the whole of the reference and an iteration of each candidate."""
+    title = "Time of a load step of the reference and of an iteration of candidates"
+    with mpl.rc_context(LOOK):
+        figure = Figure(figsize=(6.4, 4.2), layout="constrained")
+        FigureCanvasSVG(figure)
+        axes = figure.add_subplot()
+        shown = [one for one in study.growth if one.cost in ("total", "iteration")]
+        for i, one in enumerate(shown):
+            label = f"{one.solver}, {one.counted}: {one.exponent:.2f}"
+            axes.plot(one.sizes, one.values, ".-", color=_COLOURS[i % len(_COLOURS)], linewidth=1.2, label=label)
+        axes.set(xscale="log", yscale="log")
+        axes.set_xlabel("size")
+        axes.set_ylabel("s")
+        figure.legend(loc="outside lower center", ncols=3, fontsize="small")
+        text = io.StringIO()
+        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
+    return Curve(title, inline(text.getvalue(), "growth", title))
 
 
 def _draw(axes: Any, points: Sequence[Point], error: str, solver: str, colour: str) -> None:

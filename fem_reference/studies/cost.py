@@ -57,7 +57,7 @@ def study(scenes: Iterable[MuscleCase], store: Path, workers: Workers, only: Col
 
 def alone(found: Study, case: CaseStudy) -> Study:
     """The part of a study that is about one of its cases."""
-    return Study((case,), {}, found.origin)
+    return replace(found, cases=(case,), missing={})
 
 
 def _of(scene: MuscleCase, store: Path, workers: Workers, only: Collection[str]) -> CaseStudy:
