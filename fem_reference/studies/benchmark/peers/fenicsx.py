@@ -30,7 +30,7 @@ def opened() -> Iterator[Solve]:
             found = own.solve(muscle.body, settings)
             cost, outcome = found.outcome.cost, found.outcome
             points = found.states[-1].points if found.states else muscle.mesh.points
-            counts = (int(cost.get(name, 0)) for name in ("newton_iterations", "unknowns"))
-            return Solved(outcome.status == "converged", outcome.message, *counts, points)
+            iterations, unknowns = (int(cost.get(name, 0)) for name in ("newton_iterations", "unknowns"))
+            return Solved(outcome.status == "converged", outcome.message, iterations, unknowns, points)
 
         yield solve
