@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -78,6 +79,8 @@ def test_a_point_is_the_same_alone_with_workers_and_after_a_kill(tmp_path) -> No
     folder = small.write(tmp_path / "bar")
     alone = cost.study([scene_in(tmp_path)], tmp_path / "alone" / "runs", Workers(), ONLY)
     assert len(errors_of(alone)) > 5
+    for other in ("two", "cut"):  # the truth is the same for all
+        shutil.copytree(tmp_path / "alone" / "runs", tmp_path / other / "runs", ignore=shutil.ignore_patterns("pbd-*"))
     together = cost.study([scene_in(tmp_path)], tmp_path / "two" / "runs", Workers(2), ONLY)
     assert errors_of(together) == errors_of(alone)
     line = command(

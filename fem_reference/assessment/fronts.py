@@ -89,10 +89,13 @@ class Price:
     count: int
 
 
-def price(points: Iterable[Point], solver: str, error: str, cost: str) -> Price | None:
-    """The price of a ``solver``: a line through its front in logarithms, by least squares; None where nothing is known of it."""
+def price(points: Iterable[Point], solver: str, error: str, cost: str, known: float = 0.0) -> Price | None:
+    """The price of a ``solver``: a line through its front in logarithms, by least squares; None where nothing is known of it. An
+    error below ``known``, the truth's own bar, counts as that.
+    """
     front = pareto((point for point in points if point.solver == solver), error, cost)
-    pairs = [pair for point in front if (pair := point.at(error, cost))]
+    pairs = [(max(pair[0], known), pair[1]) for point in front if (pair := point.at(error, cost))]
+    pairs = [pair for i, pair in enumerate(pairs) if i == 0 or pair[0] < pairs[i - 1][0]]
     if not pairs:
         return None
     errors, costs = np.array(pairs).T

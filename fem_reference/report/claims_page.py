@@ -9,7 +9,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from fem_reference.assessment.claims import CLAIMED, FINER, LEAST, Claim, Claims, Cover
-from fem_reference.report.curves import LOOK, PALETTE, Curve, inline
+from fem_reference.report.curves import LOOK, PALETTE, Curve, inline, logarithmic
 from fem_reference.report.tables import finite
 from fem_reference.report.templates import template
 from fem_reference.report.words import words
@@ -70,7 +70,8 @@ def drawing(claims: Sequence[Claim], metric: str, name: str) -> Curve:
             axes.plot([one.error for one in some], [one.bar for one in some], ".", color=colour, label=case, alpha=0.7)
         axes.plot(ends, ends, color="#555555", linewidth=1)
         axes.plot(ends, [3 * end for end in ends], color="#bbbbbb", linewidth=1, linestyle="--")
-        axes.set(xscale="log", yscale="log", xlim=ends, ylim=ends)
+        logarithmic(axes)
+        axes.set(xlim=ends, ylim=ends)
         axes.set_xlabel(f"difference from the finer solution, {UNITS[metric]}")
         axes.set_ylabel(f"error bar, {UNITS[metric]}")
         axes.legend(fontsize="small")

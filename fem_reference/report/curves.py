@@ -11,14 +11,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, NullFormatter
 
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import Of
 from fem_reference.foundations.mesh import Floats
 from fem_reference.metrics import Measure, find
 from fem_reference.report.tables import inversion, runs
-from fem_reference.report.words import words
+from fem_reference.report.words import number, words
 
 REFERENCE = "#222222"
 # Okabe and Ito's palette for all kinds of colour vision, without its black and yellow.
@@ -184,6 +184,14 @@ def _legend(figure: Figure, axes: Axes) -> None:
     lengths = [len(label) + 7 for label in labels]
     columns = len(labels) if sum(lengths) < 75 else max(1, 75 // max(lengths))
     figure.legend(handles, labels, loc="outside upper left", ncols=columns, handlelength=2.2, columnspacing=1.2)
+
+
+def logarithmic(axes: Axes) -> None:
+    """Both axes in powers of ten, their numbers as people read them and not as formulas."""
+    axes.set(xscale="log", yscale="log")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(lambda value, _: number(value))
+        axis.set_minor_formatter(NullFormatter())
 
 
 def inline(svg: str, name: str, title: str) -> str:

@@ -26,7 +26,7 @@ from fem_reference.assessment.fronts import (
 from fem_reference.assessment.transfer import transfers
 from fem_reference.report.claims_page import UNITS as CLAIMED_UNITS
 from fem_reference.report.claims_page import drawing as claims_drawing
-from fem_reference.report.curves import BAND, LOOK, PALETTE, Curve, inline
+from fem_reference.report.curves import BAND, LOOK, PALETTE, Curve, inline, logarithmic
 from fem_reference.report.templates import template
 from fem_reference.report.words import listed, number, words
 
@@ -75,7 +75,11 @@ def title_of(name: str) -> str:
 def sentences(case: CaseStudy, error: str = MAIN) -> list[str]:
     """What a case says about the price of accuracy."""
     unit = case.units[error]
-    prices = {solver: found for solver in solvers(case.points) if (found := price(case.points, solver, error, TIME))}
+    prices = {
+        solver: found
+        for solver in solvers(case.points)
+        if (found := price(case.points, solver, error, TIME, case.bars.get(error, 0.0)))
+    }
     said = [_sentence(one, unit) for one in prices.values()]
     others = {solver: one.best for solver, one in prices.items() if solver != REFERENCE}
     if REFERENCE in prices and others:
@@ -134,7 +138,7 @@ def _front(case: CaseStudy, error: str) -> Curve:
             )
         if (bar := case.bars.get(error, 0.0)) > 0:
             axes.axhspan(axes.get_ylim()[0], bar, color=BAND, linewidth=0, label="error bar of the truth")
-        axes.set(xscale="log", yscale="log")
+        logarithmic(axes)
         axes.set_xlabel("time of a frame, s")
         axes.set_ylabel(f"{title_of(error)}, {case.units[error]}")
         figure.legend(loc="outside lower center", ncols=3, fontsize="small")
@@ -154,7 +158,7 @@ def _growth(study: Study) -> Curve:
         for i, one in enumerate(shown):
             label = f"{one.solver}, {one.counted}: {one.exponent:.2f}"
             axes.plot(one.sizes, one.values, ".-", color=_COLOURS[i % len(_COLOURS)], linewidth=1.2, label=label)
-        axes.set(xscale="log", yscale="log")
+        logarithmic(axes)
         axes.set_xlabel("size")
         axes.set_ylabel("s")
         figure.legend(loc="outside lower center", ncols=3, fontsize="small")

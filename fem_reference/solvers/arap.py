@@ -182,7 +182,8 @@ class Alternation:
     ) -> None:
         self.setup, self.system, self.relax = setup, system, relax
         self.relaxed = Relaxed(np.array(setup.surface.points), 0, True)
-        self.cost = cost | {"local_global_steps": 0, "frames_off_tolerance": 0}
+        free = len(setup.surface.points) - len(np.unique(setup.attached_vertices))
+        self.cost = cost | {"unknowns": 3.0 * free, "local_global_steps": 0, "frames_off_tolerance": 0}
 
     def move(self, number: int) -> None:
         """Carry the attached vertices there, and relax."""

@@ -148,7 +148,9 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
             points, displacement = advance(points, displacement, constraints, settings, obstacles)
         return points, displacement
 
-    return follow(MovingSurface(setup, iterate, cost), setup.frames, sink)
+    sweep = len(constraints.edges) + len(constraints.hinges) + 1
+    projections = sweep * settings.solver_iterations * settings.sub_iterations
+    return follow(MovingSurface(setup, iterate, cost, projections), setup.frames, sink)
 
 
 def _constraints(setup: Setup, settings: Settings) -> Constraints:

@@ -202,7 +202,8 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
             points, velocity = reached, (reached - points) * (1 / STEP)
         return points, velocity
 
-    return follow(MovingSurface(setup, iterate, cost), setup.frames, sink)
+    projections = (len(constraints.edges) + len(constraints.hinges) + 1) * settings.sub_iterations
+    return follow(MovingSurface(setup, iterate, cost, projections), setup.frames, sink)
 
 
 def project(points: Floats, at: Constraints, bending: float) -> None:

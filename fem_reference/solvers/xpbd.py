@@ -215,7 +215,9 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
             points, velocities = advance(points, velocities, constraints, step, contacts)
         return points, velocities
 
-    outcome = follow(MovingSurface(setup, iterate, cost), setup.frames, sink)
+    sweep = len(constraints.edges) + len(constraints.hinges) + (settings.volume is not None)
+    projections = sweep * settings.sweeps * settings.sub_steps
+    outcome = follow(MovingSurface(setup, iterate, cost, projections), setup.frames, sink)
     return replace(outcome, message=outcome.message + other_clock(setup, settings.frame_time))
 
 

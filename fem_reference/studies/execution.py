@@ -124,7 +124,8 @@ def _(built: Problem, solver: Any, settings: Record, folder: Path, identity: dic
     forget_peak_memory()
     began = time.process_time()
     outcome = solver.solve(built, settings, writer.add)
-    used = {"seconds_processor": time.process_time() - began, "peak_memory_mb": peak_memory()}
+    processor = time.process_time() - began - outcome.cost.get("seconds_compile", 0.0)
+    used = {"seconds_processor": max(processor, 0.0), "peak_memory_mb": peak_memory()}
     outcome = replace(outcome, cost=used | outcome.cost)  # a solver with processes of its own says what those used
     if not writer.frames:  # it failed before its first frame, which is rest
         writer.add(Frame(built.frames[0], built.surface.points, built.fibres.points))

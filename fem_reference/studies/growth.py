@@ -5,10 +5,12 @@ against triangles, those of tetrahedra against these. Times of candidates are pr
 its outcome has them. Memory is what a run takes beyond what the process had before.
 """
 
+import ctypes
 import gc
 import math
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -113,7 +115,7 @@ def of_candidate(candidate: Candidate, progress: Progress, most: int | None = No
 def _costs(solver: str, settings: Record, setup: Setup) -> dict[str, float]:
     """Processor time of an iteration [s], and the memory [MB] that a run takes."""
     _spent(solver, settings, setup, 1)  # what is compiled is loaded
-    gc.collect()
+    _give_back()
     forget_peak_memory()
     before = peak_memory()
     _spent(solver, settings, setup, 1)
@@ -123,6 +125,13 @@ def _costs(solver: str, settings: Record, setup: Setup) -> dict[str, float]:
         once, more = (_spent(solver, settings, setup, count) for count in (1, 1 + ITERATIONS))
         times.append((more - once) / ITERATIONS)
     return {"iteration": min(times), "memory": memory}
+
+
+def _give_back() -> None:
+    """Give memory that is free back to the system, which else would serve again and not be seen; the C library of Linux can."""
+    gc.collect()
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _spent(solver: str, settings: Record, setup: Setup, iterations: int) -> float:

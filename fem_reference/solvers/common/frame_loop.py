@@ -83,11 +83,14 @@ def _begun(model: Model) -> dict[str, float]:
 
 @dataclass(eq=False)
 class MovingSurface:
-    """A muscle that is its surface of particles, taken along by ``iterate``: a model of the loop."""
+    """A muscle that is its surface of particles, taken along by ``iterate``, which projects so many constraints (``projections``,
+    those of contact not counted): a model of the loop.
+    """
 
     setup: Setup
     iterate: Iterate
     cost: dict[str, float]
+    projections: int = 0
     advice: str = "a slower motion, more steps or a lower stiffness may help"
     points: Floats = field(init=False)
     kept: Floats = field(init=False)
@@ -95,10 +98,13 @@ class MovingSurface:
     def __post_init__(self) -> None:
         self.points = np.array(self.setup.surface.points)
         self.kept = np.zeros(self.points.shape)
+        free = len(self.points) - len(np.unique(self.setup.attached_vertices))
+        self.cost |= {"unknowns": 3.0 * free, "projections": 0.0}
 
     def move(self, number: int) -> None:
         """Iterate once."""
         self.points, self.kept = self.iterate(self.points, self.kept, number)
+        self.cost["projections"] += self.projections
 
     def trouble(self) -> Trouble | None:
         """What is wrong with the surface; None if nothing is."""

@@ -19,12 +19,12 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.subprocesses import command
 from fem_reference.studies.benchmark import peer_problem, peers
 from fem_reference.studies.benchmark.checkout import ROOT
-from fem_reference.studies.benchmark.reference import Ratio, difference, ratio, run_alone
+from fem_reference.studies.benchmark.reference import FUSIFORM, Ratio, difference, ratio, run_alone
 
 log = logging.getLogger(__name__)
 
-# Element, rings and slices of the bodies.
-BODIES = (("Q1/P0", 3, 20), ("P2/P0", 2, 10))
+# Element, rings and slices of the bodies, as large as those that the reference is timed on alone.
+BODIES = tuple(FUSIFORM[name] for name in ("fusiform_Q1/P0", "fusiform_P2/P0"))
 REPEATS = 3
 _PROGRAM = Path(__file__).with_name("peer_program.py")
 

@@ -76,6 +76,15 @@ def muscle(element: str, rings: int, slices: int, frames: int = FRAMES) -> Muscl
     return Muscle(element, replace(body, prescribed=ends, frames=tuple(map(float, range(frames + 1)))))
 
 
+def tension(law: dict[str, float], stretch: Floats) -> tuple[Floats, Floats]:
+    """``l dW/dl`` [MPa] of ``fibre_passive_febio`` and its slope in the stretch l."""
+    c3, c4, c5, end = (law[name] for name in ("c3", "c4", "c5", "linear_from"))
+    growing = np.exp(c4 * (np.clip(stretch, 1, end) - 1))
+    beyond = np.maximum(stretch - end, 0)
+    slope = np.where(stretch > end, c5, np.where(stretch > 1, c3 * c4 * growing, 0))
+    return c3 * (growing - 1) + c5 * beyond, slope
+
+
 def acting() -> str:
     """What acts, for people."""
     return ", ".join(make(name, **parameters).title for name, parameters in timing.EFFECTS.items())

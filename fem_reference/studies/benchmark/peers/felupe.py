@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats
-from fem_reference.studies.benchmark.peer_problem import RESIDUAL, Muscle
+from fem_reference.studies.benchmark.peer_problem import RESIDUAL, Muscle, tension
 from fem_reference.studies.benchmark.peers import Solve, Solved
 
 PACKAGES = ("felupe", "pypardiso")
@@ -38,36 +38,29 @@ def _solve(felupe: Any, pypardiso: Any, muscle: Muscle) -> Solved:
     shape = (3, region.quadrature.npoints, region.mesh.ncells)
     fibres = np.ascontiguousarray(np.broadcast_to(muscle.fibres.T[:, None, :], shape))
     body = felupe.SolidBodyNearlyIncompressible(law, field, bulk=muscle.law["bulk"], statevars=fibres)
-    ends = np.concatenate(muscle.fixed(points))
-    fixed = (3 * ends[:, None] + np.arange(3)).ravel()
+    ends = muscle.fixed(points)
+    fixed = (3 * np.concatenate(ends)[:, None] + np.arange(3)).ravel()
     free = np.setdiff1d(np.arange(points.size), fixed)
     linear, iterations = _linear(pypardiso), 0
     for frame in muscle.body.frames[1:]:
-        parts = [entry.path(points, frame) * _there(points, entry.on, muscle) for entry in muscle.body.prescribed]
-        displaced = np.sum(parts, axis=0)
+        paths = zip(muscle.body.prescribed, ends, strict=True)
+        displaced = np.concatenate([entry.path(points[nodes], frame) for entry, nodes in paths])
         try:
             found = felupe.newtonraphson(
                 items=[body],
                 x0=field,
                 dof0=fixed,
                 dof1=free,
-                ext0=displaced.ravel()[fixed],
+                ext0=displaced.ravel(),
                 solver=linear,
                 check=_check,
                 verbose=0,
             )
         except felupe.tools.NewtonConvergenceError as error:
-            return Solved(False, f"frame {frame:g}: {error}".strip(), iterations, len(free), points)
+            return Solved(False, f"frame {frame:g}: {error}".strip(), iterations, len(free), muscle.mesh.points)
         field, iterations = found.x, iterations + found.iterations
     corners = slice(len(muscle.mesh.points))
     return Solved(True, "", iterations, len(free), (points + field[0].values)[corners])
-
-
-def _there(points: Floats, on: Any, muscle: Muscle) -> Floats:
-    """1 at the nodes on an end, 0 elsewhere, (n, 1)."""
-    found = np.zeros((len(points), 1))
-    found[muscle.fixed(points)[("bottom", "top").index(on)]] = 1
-    return found
 
 
 def _field(felupe: Any, muscle: Muscle) -> Any:
@@ -156,12 +149,3 @@ def _law(felupe: Any) -> Any:
             return [tangent]
 
     return Law
-
-
-def tension(law: dict[str, float], stretch: Floats) -> tuple[Floats, Floats]:
-    """``l dW/dl`` [MPa] of ``fibre_passive_febio`` and its slope in the stretch l."""
-    c3, c4, c5, end = (law[name] for name in ("c3", "c4", "c5", "linear_from"))
-    growing = np.exp(c4 * (np.clip(stretch, 1, end) - 1))
-    beyond = np.maximum(stretch - end, 0)
-    slope = np.where(stretch > end, c5, np.where(stretch > 1, c3 * c4 * growing, 0))
-    return c3 * (growing - 1) + c5 * beyond, slope
