@@ -114,3 +114,17 @@ def test_a_file_that_is_no_study_is_refused_by_name(tmp_path, text) -> None:
     path.write_text(text)
     with pytest.raises(InputError, match=r"study\.json"):
         load(path)
+
+
+def test_tetrahedra_are_recommended_in_the_size_of_the_case_itself() -> None:
+    # Twice as large as a studied case has them, which is 10 mm; the new case has 6 mm.
+    def with_tets(one: CaseStudy) -> CaseStudy:
+        coarse = {"solver": "fenicsx", "scene": {"muscle.tet_size": "20 mm", "muscle.refinements": 0}}
+        errors, costs = {RMS: 0.1}, {TIME: 1.0}
+        fem = Point(one.case, "fenicsx", "reference", "tetrahedra", "20 mm", coarse, "converged", "", errors, costs)
+        return CaseStudy(**(vars(one) | {"points": (*one.points, fem)}))
+
+    fine = features(60) | {"tet_size": 6.0, "refinements": 2.0}
+    found = recommend(fine, "new", [with_tets(one) for one in STUDIES], RMS, {"error": 1.0})
+    assert found.best is not None
+    assert found.best.point.choice["scene"] == {"muscle.tet_size": "12 mm", "muscle.refinements": 1}

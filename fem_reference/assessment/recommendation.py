@@ -4,7 +4,7 @@ like it.
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,8 +16,9 @@ TIME = "seconds_per_frame"
 _ALIKE = 3
 # Of what is expected from other cases, this share is met on each case that was left out when the margin was found.
 _MET = 0.95
-# How many times as many triangles take so many times as long is the same for all: linear, as sweeps over constraints are.
+# By which features cases are alike, and the keys of a scene that say its tetrahedra.
 _COMPARED = ("motion_to_size", "contact", "bulk_to_shear", "fibres_to_shear")
+_TETS = ("muscle.tet_size", "muscle.refinements")
 
 
 @dataclass(frozen=True)
@@ -106,7 +107,10 @@ def _expected(
         error = max(one.error * scale(features, study.features, metric) for study, one in found)
         time = max(one.time * features["triangles"] / study.features["triangles"] for study, one in found)
         yield Expected(
-            found[0][1].point, margins.error * error, margins.time * time, tuple(study.case for study in chosen)
+            _translated(found[0][1].point, chosen[0], features),
+            margins.error * error,
+            margins.time * time,
+            tuple(study.case for study in chosen),
         )
 
 
@@ -117,10 +121,12 @@ def scale(features: Mapping[str, float], other: Mapping[str, float], metric: str
 
 def _key(point: Point, study: CaseStudy) -> str:
     """What makes a setting the same on two cases; tetrahedra count by their size in that of the case's own reference."""
-    scene = {name: value for name, value in point.choice.get("scene", {}).items() if not name.startswith("muscle.")}
-    if scene:
+    scene = point.choice.get("scene", {})
+    if set(scene) - {*_TETS, "triangles"}:
         return f"{study.case}: {point.label}"  # of that scene's own values, on no other case
-    if "scene" in point.choice:
+    if "triangles" in scene:
+        return f"{point.solver}: {scene['triangles']} as many triangles, {_settings(point)}"
+    if scene:
         factor, fewer = tetrahedra(point, study)
         return f"{point.solver}: tetrahedra {factor:.3g}, {fewer:g} refinements fewer, {_settings(point)}"
     return f"{point.solver}: {_settings(point)}"
@@ -133,6 +139,16 @@ def tetrahedra(point: Point, study: CaseStudy) -> tuple[float, float]:
     scene = point.choice["scene"]
     size = float(str(scene["muscle.tet_size"]).removesuffix(" mm"))
     return size / study.features["tet_size"], study.features["refinements"] - scene["muscle.refinements"]
+
+
+def _translated(point: Point, study: CaseStudy, features: Mapping[str, float]) -> Point:
+    """A point of a studied case as it is on another: tetrahedra in the size of that case's own."""
+    scene = dict(point.choice.get("scene", {}))
+    if not set(_TETS) <= set(scene):
+        return point
+    factor, fewer = tetrahedra(point, study)
+    own = (f"{factor * features['tet_size']:.6g} mm", max(0, round(features["refinements"] - fewer)))
+    return replace(point, choice=point.choice | {"scene": scene | dict(zip(_TETS, own, strict=True))})
 
 
 def _settings(point: Point) -> str:

@@ -71,7 +71,7 @@ def candidate_trials(scene: MuscleCase, surfaces: Mapping[str, MuscleCase]) -> I
             yield from _sizes(whole)
         elif offer.moves == "surface":
             for text, other in surfaces.items():
-                yield Trial(other, candidate, candidate.name, TRIANGLES, text, {"muscle.surface": text})
+                yield Trial(other, candidate, candidate.name, TRIANGLES, text, {TRIANGLES: text})
 
 
 def _sizes(whole: Trial) -> Iterator[Trial]:
