@@ -66,6 +66,7 @@
     const unit = study.costs[cost][1];
     svg.append(element("text", { x: (LEFT + W - RIGHT) / 2, y: H - 10, "text-anchor": "middle", "font-size": 13, fill: "currentColor" }, words(cost) + (unit ? `, ${unit}` : "")));
     svg.append(element("text", { transform: `translate(16 ${(TOP + H - BOTTOM) / 2}) rotate(-90)`, "text-anchor": "middle", "font-size": 13, fill: "currentColor" }, `${words(error)}, ${found.units[error]}`));
+    let shown = 0;
     [...new Set(found.points.map(point => point.solver))].forEach((solver, i) => {
       const own = points.filter(point => point.solver === solver), colour = study.colours[i % study.colours.length];
       if (!own.length) return;
@@ -78,8 +79,8 @@
         svg.append(dot);
         if (point.default) svg.append(element("circle", { ...at, r: 8, fill: "none", stroke: colour }));
       }
-      svg.append(element("circle", { cx: W - RIGHT + 18, cy: TOP + 12 + 20 * i, r: 4, fill: colour }));
-      svg.append(element("text", { x: W - RIGHT + 28, y: TOP + 16 + 20 * i, "font-size": 13, fill: "currentColor" }, solver));
+      svg.append(element("circle", { cx: W - RIGHT + 18, cy: TOP + 12 + 20 * shown, r: 4, fill: colour }));
+      svg.append(element("text", { x: W - RIGHT + 28, y: TOP + 16 + 20 * shown++, "font-size": 13, fill: "currentColor" }, solver));
     });
   }
 
