@@ -16,7 +16,7 @@ def test_only_what_was_left_half_done_long_ago_goes(tmp_path, monkeypatch) -> No
     handlers = {}
     monkeypatch.setattr(compiling.signal, "signal", handlers.__setitem__)
     long_ago = time.time() - 2 * compiling.PATIENCE
-    for name in ("done.c", "done.c.cached", "left.c", "unfinished.c"):
+    for name in ("done.c", "done.c.cached", "left.c", "unfinished.c", "source_went.c.cached"):
         (tmp_path / name).write_text("")
     for name in ("done.c", "left.c"):
         os.utime(tmp_path / name, (long_ago, long_ago))

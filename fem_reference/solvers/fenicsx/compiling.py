@@ -91,6 +91,11 @@ def prepare() -> None:
         done = source.with_suffix(".c.cached").exists()
         if not done and time.time() - source.stat().st_mtime > PATIENCE:
             source.unlink(missing_ok=True)
+    for ready in folder.glob("*.c.cached") if folder.is_dir() else ():
+        if not ready.with_suffix(
+            ""
+        ).exists():  # of a compilation that took longer than that: it would stop the next one
+            ready.unlink(missing_ok=True)
 
 
 def _stop(_number: int, _frame: FrameType | None) -> None:
