@@ -11,11 +11,13 @@ import pytest
 import shapes
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Surface, enclosed_volume
+from fem_reference.foundations.mesh import Polylines, Surface, enclosed_volume
 from fem_reference.io import files
+from fem_reference.io import formats as io_formats
+from fem_reference.io.formats import formats
 
 BALL = shapes.sphere(2, 30.0)  # 162 vertices that float32 cannot hold, 320 triangles
-UNREADABLE = "want a triangle surface, whole, as .ply .obj .stl .off .msh .vtk .vtp .vtu"
+UNREADABLE = f"want a triangle surface, whole, as {' '.join(files.surface_suffixes())}"
 
 # Every format and kind of it, written by meshio, and how far its coordinates may be from ours [mm]: nothing where it
 # holds float64 or all its digits, and half a unit in the last place of float32 at 30 mm (1e-6) for binary STL.
@@ -52,6 +54,65 @@ def polydata(surface: Surface, kind: str = "POLYGONS") -> str:
     m, corners = surface.triangles.shape
     head = f"# vtk DataFile Version 3.0\nball\nASCII\nDATASET POLYDATA\nPOINTS {len(surface.points)} double\n"
     return f"{head}{points}\n{kind} {m} {m * (corners + 1)}\n{rows}\n"
+
+
+@pytest.mark.parametrize("suffix", formats())
+def test_a_surface_comes_back_as_it_was_written(suffix: str, tmp_path: Path) -> None:
+    """The contract of formats, met by every file of io/formats: points to the bit, in their order where triangles share them."""
+    path, moved = tmp_path / f"ball{suffix}", BALL.points + 1 / 3
+    files.write_surface(path, BALL, moved)
+    assert [one.name for one in tmp_path.iterdir()] == [path.name]
+    back = files.read_surface(path, 10.0)
+    assert np.array_equal(back.points[back.triangles], 10.0 * moved[BALL.triangles])
+    assert files.shares_points(back.place) == np.array_equal(back.triangles, BALL.triangles)
+
+
+# Where a file does not state its size, only a cut before its triangles shows anyhow.
+CUTS = [
+    (suffix, share)
+    for suffix, one in formats().items()
+    for share in (0.0, 0.01, 0.2, 0.4, 0.7, 0.97)
+    if one.states_size or share < 0.5
+]
+
+
+@pytest.mark.parametrize(("suffix", "share"), CUTS)
+def test_what_was_written_and_cut_off_is_refused(
+    suffix: str, share: float, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The contract of formats: nobody takes half a file for a whole one, and nobody prints."""
+    path = tmp_path / f"ball{suffix}"
+    files.write_surface(path, BALL, BALL.points)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(share * len(whole))])
+    with pytest.raises(InputError, match=rf"^{re.escape(str(path))}: got \S.*, {UNREADABLE}"):
+        files.read_surface(path, 1.0)
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("suffix", [suffix for suffix, one in formats().items() if suffix in one.lines])
+def test_lines_come_back_as_they_were_written(suffix: str, tmp_path: Path) -> None:
+    lines, path = Polylines(BALL.points[:13], np.array([0, 2, 7, 13])), tmp_path / f"lines{suffix}"
+    files.write_polylines(path, lines, lines.points / 3)
+    back = files.read_polylines(path, 1.0)
+    assert np.array_equal(back.points, lines.points / 3)
+    assert np.array_equal(back.offsets, lines.offsets)
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("", "unfinished: FORMAT is None, want a Format"),
+        ("from fem_reference.io.formats.off import FORMAT", r"\.off, which"),
+    ],
+)
+def test_a_file_that_is_no_format_is_named(text: str, problem: str, tmp_path: Path, monkeypatch) -> None:
+    (tmp_path / "unfinished.py").write_text(text)
+    monkeypatch.setattr(io_formats, "__path__", [*io_formats.__path__, str(tmp_path)])
+    monkeypatch.setitem(sys.modules, "fem_reference.io.formats.unfinished", None)  # so that it is gone afterwards
+    del sys.modules["fem_reference.io.formats.unfinished"]
+    with pytest.raises(TypeError, match=problem):
+        formats.__wrapped__()
 
 
 @pytest.mark.parametrize("name", [*WRITTEN, "polydata.vtp", "polydata.vtk"])

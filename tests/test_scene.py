@@ -439,7 +439,7 @@ def test_every_key_is_needed(bar: Path, line: str) -> None:
         (
             'title = "A bar"\n',
             "colour",
-            "attachment, bone, candidate, effect, expect, fibres, frames, muscle, negative_control, proves, reference, title",
+            "attachment, bone, candidate, effect, expect, fibres, frames, muscle, negative_control, proves, quick, reference, title, unsolved",
         ),
         ("[muscle]\n", "muscle.colour", "mesher, refinements, surface, tet_size, unit"),
         (
@@ -638,6 +638,7 @@ def test_shipped_case_reads_and_its_files_exist(case: str) -> None:
     assert scene.name == case
     assert scene.expect, "a shipped case shows that its numbers are right"
     assert scene.negative_control, "and that they could be wrong"
+    assert casefile.read(case, changes=scene.quick).quick == scene.quick
     changed = casefile.read(case, with_negative_control=True)
     assert len(scene.key) == 64
     assert (changed.key, changed.candidate) != (scene.key, scene.candidate)

@@ -12,7 +12,7 @@ import numpy as np
 
 from fem_reference import __version__
 from fem_reference.effects import Effect
-from fem_reference.foundations.mesh import Floats, Polylines, Surface
+from fem_reference.foundations.mesh import Floats, Polylines
 from fem_reference.geometry.embedding import embed
 from fem_reference.io import files
 from fem_reference.problems.muscle import Problem
@@ -29,9 +29,9 @@ CONVENTIONS = {
 def write(scene: MuscleCase, problem: Problem, folder: Path) -> None:
     """Every file of the export of a ``problem`` but those that explain it, into ``folder``."""
     (folder / "bones").mkdir()
-    write_ply(folder / "muscle.ply", problem.surface)
+    files.write_surface(folder / "muscle.ply", problem.surface, problem.surface.points)
     for bone, name in zip(problem.bones, bone_files(problem), strict=True):
-        write_ply(folder / name, bone.surface)
+        files.write_surface(folder / name, bone.surface, bone.surface.points)
     along = {} if problem.directions is None else {"fibre": problem.directions}
     for name in ("tets.vtu", "tets.msh"):
         files.write_field(folder / name, problem.mesh.points, problem.mesh.tets, {}, along)
@@ -115,17 +115,6 @@ def _effect(effect: Effect) -> dict[str, Any]:
     values = effect.model_dump(mode="json")
     parameters = {name: {"value": values[name], "unit": unit} for name, _, unit in effect.parameters}
     return {"name": effect_name(effect), "law": type(effect).__doc__, "parameters": parameters}
-
-
-def write_ply(path: Path, surface: Surface) -> None:
-    """The triangles as PLY in text, coordinates in full."""
-    head = (
-        "ply\nformat ascii 1.0\ncomment unit mm\n"
-        f"element vertex {len(surface.points)}\nproperty double x\nproperty double y\nproperty double z\n"
-        f"element face {len(surface.triangles)}\nproperty list uchar int vertex_indices\nend_header\n"
-    )
-    faces = "".join(f"3 {a} {b} {c}\n" for a, b, c in surface.triangles.tolist())
-    files.write_text(path, head + _rows(surface.points) + faces)
 
 
 def write_lines(path: Path, lines: Polylines) -> None:

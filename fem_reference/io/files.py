@@ -4,13 +4,10 @@ A reader keeps the points of its file as they are: their order, their number, an
 """
 
 import csv
-import io
 import os
-import re
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, redirect_stderr
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 from xml.sax.saxutils import quoteattr
 
@@ -18,8 +15,28 @@ import numpy as np
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh
-from fem_reference.io import formats
-from fem_reference.io.formats import Soup, only_triangles, read_obj, read_off, read_ply, read_stl
+from fem_reference.io import soup
+from fem_reference.io.formats import Format, formats, vtk
+from fem_reference.io.soup import Lines
+
+
+def surface_suffixes() -> tuple[str, ...]:
+    """The suffixes of the files that ``read_surface`` reads and ``write_surface`` writes."""
+    return tuple(formats())
+
+
+def shares_points(place: str) -> bool:
+    """Whether triangles read from ``place`` have points in common, in the order of the file; else each has three of its own."""
+    found = formats().get(Path(place).suffix.lower())
+    return found is None or found.shares_points
+
+
+def _format(path: Path, want: str, known: Collection[str]) -> Format:
+    """The format of a file by its suffix, one of ``known``; InputError that says what is wanted."""
+    suffix = path.suffix.lower()
+    if suffix not in known:
+        raise InputError(path, f'the suffix "{path.suffix}"', want)
+    return formats()[suffix]
 
 
 def read_surface(path: Path, unit: float) -> Surface:
@@ -28,11 +45,9 @@ def read_surface(path: Path, unit: float) -> Surface:
     An STL file has no shared points: its surface has three points a triangle. InputError where the file cannot be read
     whole or has other polygons than triangles.
     """
-    want = f"a triangle surface, whole, as {' '.join(SURFACE_SUFFIXES)}"
-    reader = _READERS.get(path.suffix.lower())
-    if reader is None:
-        raise InputError(path, f'the suffix "{path.suffix}"', want)
-    points, triangles = _attempt(lambda file: formats.arrays(reader(file)), path, want)
+    want = f"a triangle surface, whole, as {' '.join(formats())}"
+    read = _format(path, want, formats()).read
+    points, triangles = _attempt(lambda file: soup.arrays(read(file)), path, want)
     return Surface(points * unit, triangles, str(path))
 
 
@@ -41,24 +56,25 @@ def read_polylines(path: Path, unit: float) -> Polylines:
 
     InputError where it cannot be read whole, a point is not finite or a line has no length.
     """
-
-    def read(file: Path) -> tuple[Floats, list[list[int]]]:
-        points, lines = _vtk_lines(file)
-        formats.check_lengths(points, lines)
-        return points, lines
-
-    return _polylines(read, path, unit)
+    return _polylines(path, unit, soup.check_lengths)
 
 
 def read_moved_polylines(path: Path, unit: float) -> Polylines:
     """As ``read_polylines``, of what a solver made of the lines: points not finite and lines of no length as well."""
-    return _polylines(_vtk_lines, path, unit)
+    return _polylines(path, unit, lambda _points, _lines: None)
 
 
-def _polylines(read: Callable[[Path], tuple[Floats, list[list[int]]]], path: Path, unit: float) -> Polylines:
-    want = "polylines, whole, as .vtk or .vtp"
-    if path.suffix.lower() not in (".vtk", ".vtp"):
-        raise InputError(path, f'the suffix "{path.suffix}"', want)
+def _polylines(path: Path, unit: float, check: Callable[[Floats, list[list[int]]], None]) -> Polylines:
+    known = [suffix for suffix, one in formats().items() if suffix in one.lines]
+    want = f"polylines, whole, as {' or '.join(known)}"
+    reader = _format(path, want, known).read_lines
+
+    def read(file: Path) -> Lines:
+        assert reader is not None  # of a suffix in ``lines``
+        points, lines = reader(file)
+        check(points, lines)
+        return points, lines
+
     points, lines = _attempt(read, path, want)
     offsets = np.cumsum([0, *(len(line) for line in lines)])
     return Polylines(points[np.concatenate(lines)] * unit, offsets)
@@ -98,27 +114,36 @@ def read_rows(path: Path) -> list[list[str]]:
 
 
 def write_surface(path: Path, surface: Surface, positions: Floats) -> None:
-    """VTP of the surface with its points at ``positions`` (n, 3) [mm] and point data ``displacement`` [mm], float64."""
-    import pyvista
-
-    data = pyvista.PolyData.from_regular_faces(np.array(positions, np.float64), surface.triangles, deep=True)
-    _save(path, data, positions - surface.points)
+    """The surface with its points at ``positions`` (n, 3) [mm] in the format of the suffix; in VTK's with point data
+    ``displacement`` [mm], float64.
+    """
+    write = _format(path, f"one of {' '.join(formats())}", formats()).write
+    with _written(path) as part:
+        write(part, surface.moved_to(positions), positions - surface.points)
 
 
 def write_polylines(path: Path, polylines: Polylines, positions: Floats) -> None:
     """VTP of the lines with their points at ``positions`` (n, 3) [mm] and point data ``displacement`` [mm], float64."""
-    import pyvista
-
-    cells = pyvista.CellArray.from_arrays(polylines.offsets, np.arange(len(polylines.points)), deep=True)
-    _save(path, pyvista.PolyData(np.array(positions, np.float64), lines=cells), positions - polylines.points)
+    write = _format(path, "a .vtp file", [suffix for suffix, one in formats().items() if one.write_lines]).write_lines
+    assert write is not None
+    with _written(path) as part:
+        write(part, Polylines(positions, polylines.offsets), positions - polylines.points)
 
 
 def write_tets(path: Path, mesh: TetMesh, positions: Floats) -> None:
     """VTU of the tets with their points at ``positions`` (n, 3) [mm] and point data ``displacement`` [mm], float64."""
-    import pyvista
+    with _written(path) as part:
+        vtk.write_tets(part, TetMesh(positions, mesh.tets, mesh.facets), positions - mesh.points)
 
-    data = pyvista.UnstructuredGrid({pyvista.CellType.TETRA: mesh.tets}, np.array(positions, np.float64))
-    _save(path, data, positions - mesh.points)
+
+@contextmanager
+def _written(path: Path) -> Iterator[Path]:
+    """As ``whole``; what cannot be written is an OSError that names ``path``."""
+    with whole(path) as part:
+        try:
+            yield part
+        except OSError as error:
+            raise OSError(f"{path}: {error.strerror or error}") from error
 
 
 def write_field(
@@ -172,114 +197,10 @@ def _attempt[T](read: Callable[[Path], T], path: Path, want: str) -> T:
         raise InputError(path, str(error) or type(error).__name__, want) from error
 
 
-def _read_msh(path: Path) -> Soup:
-    import meshio
-
-    with redirect_stderr(io.StringIO()):  # meshio prints what it skips
-        return _meshio_triangles(meshio.gmsh.read(path))
-
-
-def _meshio_triangles(mesh: Any) -> Soup:
-    """Points and triangles of a meshio mesh (points and line cells passed over)."""
-    blocks = [block for block in mesh.cells if block.type not in ("vertex", "line")]
-    if other := {block.type for block in blocks} - {"triangle"}:
-        raise ValueError(f"cells of type {', '.join(sorted(other))}")
-    return mesh.points, np.concatenate([np.empty((0, 3), np.int64), *(block.data for block in blocks)])
-
-
 def _meshio_steps(path: Path) -> list[tuple[float, Floats, Ints]]:
     import meshio
 
     with meshio.xdmf.TimeSeriesReader(path) as series:
-        points, triangles = formats.arrays(_meshio_triangles(meshio.Mesh(*series.read_points_cells())))
+        points, triangles = soup.arrays(soup.of_meshio(meshio.Mesh(*series.read_points_cells())))
         steps = [series.read_data(step)[:2] for step in range(series.num_steps)]
-    return [(time, points + formats.displacement(data, points), triangles) for time, data in steps]
-
-
-def _read_vtk(path: Path) -> Soup:
-    """Polygons of VTK polydata, or the cells of an unstructured grid (points and lines of polydata passed over)."""
-    import pyvista
-
-    data = _vtk_data(path)
-    if data.n_cells == 0:
-        return np.empty((0, 3)), np.empty((0, 3))
-    if isinstance(data, pyvista.UnstructuredGrid):
-        cells = data.GetCells()
-        if other := set(data.celltypes.tolist()) - {pyvista.CellType.TRIANGLE}:
-            raise ValueError(f"cells of VTK type {', '.join(map(str, sorted(other)))}")
-    elif isinstance(data, pyvista.PolyData) and data.n_strips == 0:
-        cells = data.GetPolys()
-    else:
-        raise ValueError(f"{type(data).__name__} that is not made of triangles")
-    offsets, corners = _vtk_cells(cells)
-    only_triangles(set(np.diff(offsets).tolist()))
-    return data.points, corners.reshape(-1, 3)
-
-
-def _vtk_lines(path: Path) -> tuple[Floats, list[list[int]]]:
-    """Points (n, 3) of the file, and the points of each line; ValueError where one is not usable."""
-    import pyvista
-
-    data = _vtk_data(path)
-    if not isinstance(data, pyvista.PolyData) or data.n_lines == 0:
-        raise ValueError("no lines")
-    offsets, connectivity = _vtk_cells(data.GetLines())
-    cells = [cell.tolist() for cell in np.split(connectivity, offsets[1:-1])]
-    points = np.asarray(data.points, np.float64)
-    formats.check_lines(points, cells)
-    return points, formats.joined(cells)
-
-
-def _vtk_cells(cells: Any) -> tuple[Ints, Ints]:
-    """Where each of VTK's cells begins in the list of their points, and that list."""
-    import pyvista
-
-    return pyvista.convert_array(cells.GetOffsetsArray()), pyvista.convert_array(cells.GetConnectivityArray())
-
-
-def _vtk_data(path: Path) -> Any:
-    """The data set of a VTK file; ValueError with VTK's own words where it complains."""
-    import pyvista
-
-    with _vtk_errors() as errors:
-        reader = pyvista.get_reader(path)
-        reader.reader.Update()  # the reader's own read() only logs errors and warns of them
-    if errors:
-        raise ValueError(re.sub(r"^.*: In .*\n| for file: .*", "", errors[0]).splitlines()[0])
-    return pyvista.wrap(reader.reader.GetOutputDataObject(0))
-
-
-@contextmanager
-def _vtk_errors() -> Iterator[list[str]]:
-    """What VTK complains of meanwhile, known at the end of it, instead of on stderr; some errors it calls warnings."""
-    import pyvista
-
-    found: list[str] = []
-    with pyvista.vtk_verbosity("off"), pyvista.VtkErrorCatcher(send_to_logging=False) as caught:
-        yield found
-    found += [event.alert for event in caught.events if "error" in str(event).lower()]
-
-
-def _save(path: Path, data: Any, displacement: Floats) -> None:
-    """Write ``data`` with its ``displacement`` (n, 3) [mm]; OSError where that fails."""
-    import pyvista
-
-    data.point_data.set_vectors(displacement, "displacement")
-    kind = pyvista.XMLPolyDataWriter if path.suffix == ".vtp" else pyvista.XMLUnstructuredGridWriter
-    with whole(path) as part, _vtk_errors():
-        writer = kind(part, data)
-        writer.writer.SetDataModeToAppended()  # in the other modes a displacement that is not finite cannot be read again
-        writer.write()
-        if code := writer.writer.GetErrorCode():
-            raise OSError(f"{path}: VTK could not write it (its error {code})")
-
-
-_READERS: dict[str, Callable[[Path], Soup]] = {
-    ".ply": read_ply,
-    ".obj": read_obj,
-    ".stl": read_stl,
-    ".off": read_off,
-    ".msh": _read_msh,
-    **dict.fromkeys((".vtk", ".vtp", ".vtu"), _read_vtk),
-}
-SURFACE_SUFFIXES = tuple(_READERS)
+    return [(time, points + soup.displacement(data, points), triangles) for time, data in steps]

@@ -80,7 +80,8 @@ class NegativeControl(Record):
 
 class Case(Record):
     """A case, read and checked: the keys of its file, and the ``name`` and ``folder`` that it has; ``place`` names its file in
-    messages.
+    messages. ``quick`` are changes, by key, with which it is solved faster and less well, as tests do; ``unsolved`` says why the
+    reference ends before the last frame, where it does.
     """
 
     title: str
@@ -90,6 +91,8 @@ class Case(Record):
     candidate: tuple[Candidate, ...] = ()
     expect: tuple[Expectation, ...] = ()
     negative_control: NegativeControl | None = None
+    quick: dict[str, Any] = Field(default_factory=dict)
+    unsolved: str = ""
     name: str = Field(exclude=True)
     folder: Path = Field(exclude=True)
     place: str = Field(default="case", exclude=True)

@@ -191,7 +191,7 @@ def _by_number(source: Path, entries: Iterable[tuple[int | None, str, Path | Sur
 def _number_in(path: Path) -> int | None:
     """The last digits in the name of a mesh file."""
     digits = re.findall(r"\d+", path.stem)
-    return int(digits[-1]) if digits and path.suffix.lower() in files.SURFACE_SUFFIXES else None
+    return int(digits[-1]) if digits and path.suffix.lower() in files.surface_suffixes() else None
 
 
 def _number(time: float, interval: float | None) -> int | None:
@@ -213,7 +213,7 @@ def _positions(surface: Surface, rest: Surface) -> Floats:
     want = f"the vertices and triangles of {rest.place}"
     if len(surface.triangles) != len(rest.triangles):
         raise InputError(surface.place, f"{len(surface.triangles)} triangles instead of {len(rest.triangles)}", want)
-    if surface.place.lower().endswith(".stl"):
+    if not files.shares_points(surface.place):
         return _welded(surface, rest)
     if len(surface.points) != len(rest.points):
         raise InputError(surface.place, f"{len(surface.points)} vertices instead of {len(rest.points)}", want)

@@ -1,0 +1,33 @@
+"""Geomview OFF with numpy alone."""
+
+import re
+from pathlib import Path
+
+from fem_reference.foundations.mesh import Floats, Surface
+from fem_reference.io.formats import Format
+from fem_reference.io.soup import Soup, only_triangles, positions, rows
+
+
+def _read(path: Path) -> Soup:
+    """Geomview OFF: text, counts, positions, faces; colours are passed over."""
+    text = re.sub(r"#[^\n]*", "", path.read_text(encoding="utf-8"))
+    parts = re.match(r"\s*C?N?OFF\s+(\d+)\s+(\d+)\s+\d+\s+(.*)", text, re.DOTALL)
+    if parts is None:
+        raise ValueError("no OFF header")
+    vertices, faces = int(parts[1]), int(parts[2])
+    rows = [line.split() for line in parts[3].splitlines() if line.strip()]
+    if len(rows) != vertices + faces:
+        raise ValueError(f"{len(rows)} rows of {vertices} vertices and {faces} faces")
+    only_triangles({size for row in rows[vertices:] for size in (int(row[0]), len(row[1:4]))})
+    points = positions([[float(value) for value in row[:3]] for row in rows[:vertices]])
+    return points, [[int(value) for value in row[1:4]] for row in rows[vertices:]]
+
+
+def _write(path: Path, surface: Surface, displacement: Floats) -> None:  # noqa: ARG001 - it has no room for it
+    """OFF, coordinates in full."""
+    faces = (f"3 {a} {b} {c}" for a, b, c in surface.triangles.tolist())
+    head = ["OFF", f"{len(surface.points)} {len(surface.triangles)} 0"]
+    path.write_text("\n".join([*head, *rows(surface.points), *faces, ""]), encoding="utf-8")
+
+
+FORMAT = Format((".off",), _read, _write)

@@ -1,0 +1,36 @@
+"""STL with numpy alone."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from fem_reference.foundations.mesh import Floats, Surface
+from fem_reference.io.formats import Format
+from fem_reference.io.soup import Soup, rows
+
+_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+
+
+def _read(path: Path) -> Soup:
+    """STL, text or binary: three points a triangle, in the order of the file."""
+    data = path.read_bytes()
+    count = int.from_bytes(data[80:84], "little")
+    if len(data) >= 84 and len(data) == 84 + 50 * count:
+        points = np.frombuffer(data, _FACET, count, 84)["corners"].reshape(-1, 3)
+    elif re.match(rb"\s*solid\b.*\bendsolid\b[^\n]*\s*$", data, re.DOTALL):
+        lines = [line.split()[1:] for line in data.splitlines() if line.lstrip().startswith(b"vertex")]
+        points = np.array(lines).astype(np.float64)
+    else:
+        raise ValueError(f"{len(data)} bytes that are no complete STL file")
+    return points, np.arange(len(points)).reshape(-1, 3)
+
+
+def _write(path: Path, surface: Surface, displacement: Floats) -> None:  # noqa: ARG001 - it has no room for it
+    """STL as text, coordinates in full; without normals, which the order of the corners says too."""
+    around = ("facet normal 0 0 0\nouter loop\nvertex ", "\nvertex ", "\nendloop\nendfacet\n")
+    facets = (around[0] + around[1].join(rows(corners)) + around[2] for corners in surface.points[surface.triangles])
+    path.write_text(f"solid surface\n{''.join(facets)}endsolid surface\n", encoding="utf-8")
+
+
+FORMAT = Format((".stl",), _read, _write, shares_points=False)

@@ -1,0 +1,96 @@
+"""What points, triangles and lines of any format must be."""
+
+from collections import Counter
+from typing import Any
+
+import numpy as np
+
+from fem_reference.foundations.mesh import Floats, Ints
+
+Soup = tuple[Any, Any]
+Lines = tuple[Floats, list[list[int]]]
+
+
+def arrays(soup: Soup) -> tuple[Floats, Ints]:
+    """Points (n, 3) and triangles (m, 3) as arrays; ValueError or OverflowError where they are none."""
+    points, corners = (np.asarray(values) for values in soup)
+    if len(corners) == 0:
+        raise ValueError("no triangles")
+    if len(points) == 0:
+        raise ValueError("no vertices")
+    if points.shape != (len(points), 3):
+        raise ValueError(f"points of shape {points.shape}")
+    with np.errstate(invalid="ignore"):  # not a number becomes another one, and is found below
+        triangles = np.asarray(soup[1], np.int64)
+    if triangles.shape != (len(triangles), 3) or (triangles != corners).any():
+        raise ValueError(f"corners of shape {corners.shape} that are not three point numbers each")
+    return points.astype(np.float64), triangles
+
+
+def check_lines(points: Floats, lines: list[list[int]]) -> None:
+    """ValueError where a line is of fewer than two points, or of one that is not among ``points`` (n, 3)."""
+    for number, line in enumerate(lines):
+        if len(line) < 2:
+            raise ValueError(f"line {number} of {len(line)} points")
+        if min(line) < 0 or max(line) >= len(points):
+            raise ValueError(f"line {number} with a point that does not exist, of {len(points)}")
+
+
+def check_lengths(points: Floats, lines: list[list[int]]) -> None:
+    """ValueError where one of ``points`` (n, 3) is not finite or a line has no length."""
+    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if len(bad):
+        raise ValueError(f"a point that is not finite (point {bad[0]})")
+    for number, line in enumerate(lines):
+        if (points[line] == points[line[0]]).all():
+            raise ValueError(f"line {number} of zero length")
+
+
+def joined(cells: list[list[int]]) -> list[list[int]]:
+    """Lines of point numbers; a cell that begins where one other ends goes on from there."""
+    starts, ends = Counter(cell[0] for cell in cells), Counter(cell[-1] for cell in cells)
+    shared = {point for point in starts if starts[point] == ends[point] == 1}
+    after = {cell[0]: cell for cell in cells}
+    lines = []
+    for cell in (cell for cell in cells if cell[0] not in shared):
+        line = list(cell)
+        while line[-1] in shared:
+            line += after[line[-1]][1:]
+        lines.append(line)
+    if sum(len(line) - 1 for line in lines) != sum(len(cell) - 1 for cell in cells):
+        raise ValueError("lines that close to a ring")
+    return lines
+
+
+def only_triangles(corners: set[int]) -> None:
+    """ValueError where polygons have another number of corners than three."""
+    if other := corners - {3}:
+        raise ValueError(f"a polygon of {min(other)} corners")
+
+
+def positions(rows: list[list[float]]) -> Any:
+    """Points (n, 3) of as many ``rows``; ValueError where one has fewer coordinates."""
+    if any(len(row) != 3 for row in rows):
+        raise ValueError("a position of fewer than three coordinates")
+    return np.array(rows)
+
+
+def displacement(data: dict[str, Any], points: Floats) -> Any:
+    """The displacement among point ``data`` of a step; ValueError where there is none of the shape of ``points``."""
+    name = next((name for name in ("displacement", "u") if np.shape(data.get(name, 0)) == points.shape), None)
+    if name is None:
+        raise ValueError(f"point data {', '.join(data) or 'nothing'} in a step")
+    return data[name]
+
+
+def rows(points: Floats) -> list[str]:
+    """One text a point (n, 3), in as many digits as bring the same float back."""
+    return [f"{x!r} {y!r} {z!r}" for x, y, z in np.asarray(points).tolist()]
+
+
+def of_meshio(mesh: Any) -> Soup:
+    """Points and triangles of a meshio mesh (points and line cells passed over)."""
+    blocks = [block for block in mesh.cells if block.type not in ("vertex", "line")]
+    if other := {block.type for block in blocks} - {"triangle"}:
+        raise ValueError(f"cells of type {', '.join(sorted(other))}")
+    return mesh.points, np.concatenate([np.empty((0, 3), np.int64), *(block.data for block in blocks)])

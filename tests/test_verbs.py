@@ -1,0 +1,46 @@
+"""The contract of verbs, met by every file of cli/: its help names its options, and what it does not know ends with status 2."""
+
+import argparse
+
+import pytest
+
+from fem_reference import cli
+from fem_reference.cli._parser import parser, verbs
+
+VERBS = sorted(verbs())
+
+
+def options_of(name: str) -> argparse.ArgumentParser:
+    """The parser of the verb alone, with every option it has."""
+    (kinds,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
+    return kinds.choices[name]
+
+
+@pytest.mark.parametrize("name", VERBS)
+def test_a_verb_has_what_the_command_line_asks_for(name: str) -> None:
+    verb = verbs()[name]
+    assert verb.HELP.strip()
+    assert not verb.HELP.endswith(".")
+    assert callable(verb.run)
+    assert verb.__doc__.startswith(f"The verb ``{name}``: ")
+
+
+@pytest.mark.parametrize("name", VERBS)
+def test_help_explains_every_option_and_ends_well(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match=r"^0$"):
+        cli.main([name, "--help"])
+    printed = capsys.readouterr().out
+    for action in options_of(name)._actions:
+        assert all(word in printed for word in action.option_strings)
+        assert action.help, f"{action.dest} is not explained"
+
+
+@pytest.mark.parametrize("name", VERBS)
+def test_what_a_verb_does_not_know_ends_with_2(name: str, tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
+    given = []
+    for action in (action for action in options_of(name)._actions if action.required):
+        given += [*action.option_strings[:1], next(iter(action.choices or ["hip_flexion"]))]
+    with pytest.raises(SystemExit, match=r"^2$"):
+        cli.main([name, *given, "--out", str(tmp_path), "--no-such-option"])
+    assert "--no-such-option" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
