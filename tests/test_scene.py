@@ -439,8 +439,10 @@ def test_every_key_is_needed(bar: Path, line: str) -> None:
         (
             'title = "A bar"\n',
             "colour",
-            "attachment, bone, candidate, effect, expect, fibres, frames, muscle, negative_control, proves, "
-            "quick, reference, title, unsolved",
+            (
+                "attachment, bone, candidate, effect, expect, fibres, frames, muscle, negative_control, proves, "
+                "quick, reference, title, unsolved"
+            ),
         ),
         ("[muscle]\n", "muscle.colour", "mesher, refinements, surface, tet_size, unit"),
         (
