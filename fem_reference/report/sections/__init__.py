@@ -32,9 +32,10 @@ class Section:
 
 def sections() -> dict[str, Section]:
     """The sections there are by their names, from top to bottom; TypeError where a file has none."""
-    found = {}
+    found = dict[str, Section]()
     for name in (module.name for module in pkgutil.iter_modules(__path__)):
-        found[name] = vars(importlib.import_module(f"{__name__}.{name}")).get("SECTION")
-        if not isinstance(found[name], Section):
-            raise TypeError(f"report/sections/{name}: SECTION is {found[name]!r}, want a Section")
+        section = vars(importlib.import_module(f"{__name__}.{name}")).get("SECTION")
+        if not isinstance(section, Section):
+            raise TypeError(f"report/sections/{name}: SECTION is {section!r}, want a Section")
+        found[name] = section
     return dict(sorted(found.items(), key=lambda item: (item[1].order, item[0])))
