@@ -6,6 +6,7 @@ import json
 import re
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,7 +22,10 @@ from fem_reference.geometry.tessellation import tessellated
 from fem_reference.metrics import Measure, MeasurementContext
 from fem_reference.problems.muscle import RigidBody, Setup
 from fem_reference.report import gallery, page
+from fem_reference.report import sections as folder_of_sections
 from fem_reference.report.curves import curves
+from fem_reference.report.sections import sections
+from fem_reference.report.sections.reference import least
 from fem_reference.report.tables import COLUMNS
 from fem_reference.report.words import duration, number
 from fem_reference.runs.cost import seconds_per_frame
@@ -406,6 +410,63 @@ def test_curves_have_a_band_as_wide_as_the_error_bar(comparison):
     assert not any("error bar" in curve.svg for curve in bare)
 
 
+def lacking(comparison: Comparison) -> dict[str, Comparison]:
+    """The comparison, and what it is without each of the things that sections may need."""
+    whole = with_bars(comparison)
+    return {
+        "nothing": whole,
+        "candidates": alone(whole),
+        "verdicts": replace(whole, verdicts=()),
+        "rankings": replace(whole, error_bars=None),
+    }
+
+
+def own_heading(name: str, text: str) -> bool:
+    """Whether a page has a section, by its first heading as in its template."""
+    template = (Path(folder_of_sections.__file__).parent / f"{name}.html").read_text(encoding="utf-8")
+    heading = re.search(r"<section>\s*(<h[23][^>]*>[^<{]+</h[23]>)", template)
+    assert heading, f"{name}.html does not begin with <section> and a heading"
+    assert text.count(heading[1]) <= 1
+    return heading[1] in text
+
+
+@pytest.fixture(scope="module")
+def rendered() -> dict[str, str]:
+    """Pages that one test has rendered, for the others."""
+    return {}
+
+
+@pytest.mark.parametrize("name", sections())
+def test_a_section_is_shown_where_its_numbers_exist_and_absent_where_they_do_not(comparison, name, rendered):
+    """The contract of sections, met by every file of report/sections."""
+    section = sections()[name]
+    assert set(section.needs) <= lacking(comparison).keys(), "a new need: say above how a comparison lacks it"
+    for without, one in lacking(comparison).items():
+        text = rendered[without] = rendered.get(without) or page.render(one)
+        assert own_heading(name, text) == section.has_numbers(one), without
+        ids = re.findall(r'\bid="([^"]*)"', text)
+        assert len(ids) == len(set(ids))
+    assert section.has_numbers(with_bars(comparison))
+    assert not any(section.has_numbers(lacking(comparison)[need]) for need in section.needs)
+
+
+def test_sections_stand_in_their_order(comparison):
+    text = page.render(with_bars(comparison))
+    assert [text.count("<section>"), text.count("</section>")] == [len(sections())] * 2
+    orders = [section.order for section in sections().values()]
+    assert sorted(set(orders)) == orders
+
+
+@pytest.mark.parametrize("text", ["", "SECTION = len"])
+def test_a_file_that_is_no_section_is_named(text, tmp_path, monkeypatch):
+    (tmp_path / "unfinished.py").write_text(text)
+    monkeypatch.setattr(folder_of_sections, "__path__", [*folder_of_sections.__path__, str(tmp_path)])
+    monkeypatch.setitem(sys.modules, f"{folder_of_sections.__name__}.unfinished", None)  # so that it is gone afterwards
+    del sys.modules[f"{folder_of_sections.__name__}.unfinished"]
+    with pytest.raises(TypeError, match=r"report/sections/unfinished: SECTION is .*, want a Section"):
+        sections()
+
+
 def test_a_scene_that_differs_from_its_file_is_reported(comparison):
     damaged = replace(comparison, scene=casefile.read(comparison.scene.place, with_negative_control=True))
     assert "effect[0].mu" not in re.sub(r"<pre>.*</pre>", "", page.render(comparison), flags=re.DOTALL)
@@ -431,7 +492,7 @@ def test_a_reference_that_is_unstable_is_reported(comparison):
 
 
 def test_least_of_nothing_known_is_not_a_number():
-    assert np.isnan(page.least(Measure("inversion", "min_det_F", "1", np.array([NAN, NAN]))))
+    assert np.isnan(least(Measure("inversion", "min_det_F", "1", np.array([NAN, NAN]))))
 
 
 def test_effects_are_reported_with_their_units(comparison):

@@ -16,6 +16,19 @@ from fem_reference.scenes import casefile
 from fem_reference.scenes.case import DATA_SETTING, HOME, home
 from fem_reference.scenes.muscle import MuscleCase
 
+MUSCLE_KEYS = [
+    "attachment",
+    "bone",
+    "candidate",
+    "effect",
+    "expect",
+    "fibres",
+    "frames",
+    "muscle",
+    "negative_control",
+    "proves",
+]
+MUSCLE_KEYS += ["quick", "reference", "title", "unsolved"]
 SCENE = """
 title = "A bar"
 proves = "that scenes are read"
@@ -439,10 +452,7 @@ def test_every_key_is_needed(bar: Path, line: str) -> None:
         (
             'title = "A bar"\n',
             "colour",
-            (
-                "attachment, bone, candidate, effect, expect, fibres, frames, muscle, negative_control, proves, "
-                "quick, reference, title, unsolved"
-            ),
+            ", ".join(MUSCLE_KEYS),
         ),
         ("[muscle]\n", "muscle.colour", "mesher, refinements, surface, tet_size, unit"),
         (

@@ -1,0 +1,14 @@
+"""What measuring fibres in a surface alone gets wrong."""
+
+from typing import Any
+
+from fem_reference.assessment.comparison import Comparison
+from fem_reference.report.sections import Section
+
+
+def _facts(_: Comparison) -> dict[str, Any]:
+    """Nothing but the comparison itself."""
+    return {}
+
+
+SECTION = Section(85, _facts)

@@ -1,0 +1,62 @@
+"""Where every number comes from: effects, runs, the file of the scene."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from fem_reference.assessment.comparison import Comparison
+from fem_reference.foundations.errors import InputError
+from fem_reference.report.sections import Section
+from fem_reference.report.tables import runs
+from fem_reference.scenes import casefile
+from fem_reference.scenes.case import Case
+
+
+def _facts(comparison: Comparison) -> dict[str, Any]:
+    """Origins as one table each, and the scene."""
+    scene = comparison.scene
+    origins = [(run, _flat(run.origin)) for run in runs(comparison)]
+    return {"origins": origins, "changes": _changes(scene), "scene_text": _scene_text(scene)}
+
+
+def _flat(table: Any, key: str = "") -> list[tuple[str, Any]]:
+    """Every (key, value) below ``table``, keys joined by dots."""
+    if isinstance(table, dict):
+        return [entry for name, value in table.items() for entry in _flat(value, f"{key}.{name}".lstrip("."))]
+    return [(key, table if isinstance(table, str | float | int | None) else json.dumps(table, default=str))]
+
+
+def _changes(scene: Case) -> list[tuple[str, Any, Any]]:
+    """Where the scene differs from its file: key, value in the file, value here."""
+    if not scene.place.endswith(".toml"):  # made without a file
+        return []
+    try:
+        in_file = dict(_flat(_table(casefile.read(scene.place))))
+    except InputError as error:
+        return [("the scene file", "not readable any more", str(error))]
+    here = dict(_flat(_table(scene)))
+    return [
+        (key, in_file.get(key, ""), here.get(key, "")) for key in in_file | here if in_file.get(key) != here.get(key)
+    ]
+
+
+def _table(scene: Case) -> dict[str, Any]:
+    """The scene as nested tables, entries of a list by their number."""
+    listed_effects = {"effect": [effect.model_dump(mode="json") for effect in scene.effects]}
+    return dict(_numbered(scene.model_dump(mode="json", exclude={"folder", "effect"}) | listed_effects))
+
+
+def _numbered(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _numbered(inside) for key, inside in value.items()}
+    if isinstance(value, list):
+        return {f"[{i}]": _numbered(inside) for i, inside in enumerate(value)}
+    return value
+
+
+def _scene_text(scene: Case) -> str:
+    path = Path(scene.place)
+    return path.read_text(encoding="utf-8") if path.is_file() else ""
+
+
+SECTION = Section(90, _facts)

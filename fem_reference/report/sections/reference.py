@@ -1,0 +1,32 @@
+"""The reference against its own rest state, and what is to be known before trusting it."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from fem_reference.assessment.comparison import Comparison
+from fem_reference.metrics import Measure
+from fem_reference.report.sections import Section
+from fem_reference.report.tables import inversion
+from fem_reference.runs.store import Run
+
+
+def _facts(_: Comparison) -> dict[str, Any]:
+    """What its alarms are made of."""
+    return {"inversion": inversion, "least": least, "greatest": greatest}
+
+
+def greatest(run: Run, scalar: str) -> float:
+    """The greatest value of a scalar over the frames that have one, NaN without any."""
+    values = run.scalars[scalar]
+    return float(np.nanmax(values)) if np.isfinite(values).any() else float("nan")
+
+
+def least(measure: Measure) -> float:
+    """The smallest value of a measure over the frames where it is a number, NaN where it nowhere is."""
+    known = measure.values[np.isfinite(measure.values)]
+    return float(known.min()) if len(known) else math.nan
+
+
+SECTION = Section(30, _facts)
