@@ -172,3 +172,25 @@ def test_importing_the_package_does_nothing() -> None:
     code = "import sys, fem_reference; print(*(name for name in sys.modules if name.startswith('fem_reference.')))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == []
+
+
+def test_what_cannot_be_compared_is_refused_by_name(tmp_path) -> None:
+    case = fr.load_case(small.write(tmp_path / "bar"), {"frames.every": 10})
+    run = fr.solve(case, "pbd", store=str(tmp_path / "runs"))  # a store may be text
+    reference = replace(run, name="reference", fibres=small_fibres(), fibre_positions=np.zeros((3, 2, 3)))
+    with pytest.raises(fr.InputError, match='candidates: got the name "pbd" twice'):
+        fr.compare(case, reference, [run, run])
+    other = replace(run, positions=run.positions[:, :5])
+    with pytest.raises(fr.InputError, match=r'candidate "pbd": got 5 vertices, want the \d+ vertices of the reference'):
+        fr.compare(case, reference, [other])
+
+
+def test_a_body_with_a_path_or_setting_that_cannot_be_is_refused_before_it_is_solved() -> None:
+    block = fr.box((1, 1, 1), (10.0, 10.0, 10.0), "tetrahedron")
+    wrong = fr.Prescribed("top", "z1", (2,), lambda points, _: points[:, 0])
+    body = fr.Body(block, (fr.make_effect("neo_hooke", mu=0.01),), (wrong,), frames=(0.0, 1.0))
+    with pytest.raises(fr.InputError, match=r'prescribed "top": path: got displacements \(2,\) of points \(2, 3\)'):
+        fr.solve_body(body)
+    still = fr.Prescribed("top", "z1", (2,), lambda points, _: 0 * points)
+    with pytest.raises(fr.InputError, match=r"settings\.elemnt: got an unknown key, want one of element"):
+        fr.solve_body(replace(body, prescribed=(still,)), elemnt="P2")

@@ -25,7 +25,7 @@ COSTS: dict[str, tuple[str, str]] = {
     "peak_memory_mb": ("most memory", "MB"),
 }
 # A slope needs so many points, whose errors span so much.
-_LEAST_POINTS, _LEAST_SPAN = 3, 1.3
+_LEAST_POINTS, _LEAST_SPAN = 2, 1.3
 
 
 @dataclass(frozen=True)

@@ -102,9 +102,8 @@ def _text(found: Recommendation, case: str, metric: str, named: dict[str, str]) 
     if found.best is None:
         return f"none of {found.count} settings meets what is asked on {case} ({measured})"
     lines = [f"{found.best.point.solver}: {_settings(found.best)}"]
-    lines.append(
-        f"{title_of(metric)} at most {number(found.best.error)} {named[metric]}, {duration(found.best.time)} a frame, {measured}"
-    )
+    error = f"{title_of(metric)} at most {number(found.best.error)} {named[metric]} with the bar of the truth"
+    lines.append(f"{error}, {duration(found.best.time)} a frame, {measured}")
     if found.of != (case,):
         lines.append(
             f"margins in it: {number(found.margins.error)} times the error, {number(found.margins.time)} times the time"

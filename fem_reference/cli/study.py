@@ -24,6 +24,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "cases", metavar="CASE", nargs="+", help="a shipped case (see list), a case folder or a case.toml"
     )
+    change = "change a key of every case, such as muscle.tet_size='8 mm'; may be repeated"
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help=change)
     parser.add_argument(
         "--workers", type=int, default=1, metavar="N", help="how many runs are made at once (default: 1)"
     )
@@ -43,7 +45,8 @@ def run(options: argparse.Namespace) -> int:
     """Measure what accuracy costs on cases, and write the page; one on each case, and one on all where there are several."""
     if options.workers < 1:
         raise InputError("--workers", options.workers, "1 or more")
-    scenes = [casefile.read_muscle(case) for case in options.cases]
+    changes = dict(map(casefile.setting, options.set))
+    scenes = [casefile.read_muscle(case, changes) for case in options.cases]
     workers = Workers(options.workers, options.scheduler)
     found = cost.study(scenes, out(options) / "runs", workers, options.solver)
     if options.growth:

@@ -136,9 +136,10 @@ def _front(case: CaseStudy, error: str) -> Curve:
                 solver,
                 _COLOURS[i % len(_COLOURS)],
             )
-        if (bar := case.bars.get(error, 0.0)) > 0:
-            axes.axhspan(axes.get_ylim()[0], bar, color=BAND, linewidth=0, label="error bar of the truth")
         logarithmic(axes)
+        if (bar := case.bars.get(error, 0.0)) > 0:
+            axes.set_ylim(bottom=min(axes.get_ylim()[0], bar / 2))
+            axes.axhspan(axes.get_ylim()[0], bar, color=BAND, linewidth=0, label="error bar of the truth")
         axes.set_xlabel("time of a frame, s")
         axes.set_ylabel(f"{title_of(error)}, {case.units[error]}")
         figure.legend(loc="outside lower center", ncols=3, fontsize="small")

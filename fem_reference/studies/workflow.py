@@ -6,10 +6,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from fem_reference import export, report
 from fem_reference.assessment import judge
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import ErrorBars
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.records import parse
 from fem_reference.problems.body import Body
 from fem_reference.runs.solved import Solved
 from fem_reference.runs.store import Run
@@ -46,7 +50,7 @@ def solve(
     case: Case,
     solver: str | None = None,
     *,
-    store: Path = STORE,
+    store: str | Path = STORE,
     progress: Progress | None = None,
     **settings: Any,
 ) -> Run:
@@ -78,7 +82,7 @@ def solve(
         choice = own[0] if own else SolverChoice(solver=solver, **settings)
     name = "reference" if solver is None else solver
     with _reported(progress):
-        return Bench(case, store).obtain(name, choice, f'solver "{choice.solver}"')
+        return Bench(case, Path(store)).obtain(name, choice, f'solver "{choice.solver}"')
 
 
 def read_run(folder: str | Path, case: Case, *, unit: str | None = None) -> Run:
@@ -109,7 +113,7 @@ def read_run(folder: str | Path, case: Case, *, unit: str | None = None) -> Run:
 
 
 def error_bars(
-    case: Case, reference: Run, *, store: Path = STORE, progress: Progress | None = None
+    case: Case, reference: Run, *, store: str | Path = STORE, progress: Progress | None = None
 ) -> ErrorBars | None:
     """Estimate how far each statistic of a reference may be from the truth, from runs on larger tetrahedra and with finer contact.
 
@@ -131,7 +135,7 @@ def error_bars(
 
     """
     with _reported(progress):
-        bench = Bench(casefile.muscle(case), store)
+        bench = Bench(casefile.muscle(case), Path(store))
         return refinement.stored(reference) or refinement.obtain(bench, reference)
 
 
@@ -158,7 +162,19 @@ def compare(
 
     """
     judge.check(case)
+    _check_runs(reference, candidates)
     return judging.compare(Bench(case, STORE), reference, candidates, error_bars)
+
+
+def _check_runs(reference: Run, candidates: Sequence[Run]) -> None:
+    """InputError where runs cannot be compared: two of one name, or with other vertices than the reference."""
+    names = [run.name for run in (reference, *candidates)]
+    for run in candidates:
+        if names.count(run.name) > 1:
+            raise InputError("candidates", f'the name "{run.name}" twice', "runs of different names")
+        if run.positions.shape[1:] != reference.positions.shape[1:]:
+            got, want = (f"{one.positions.shape[1]} vertices" for one in (run, reference))
+            raise InputError(f'candidate "{run.name}"', got, f"the {want} of the reference: a run of the same case")
 
 
 def export_case(case: Case, folder: str | Path, form: export.Format = "open") -> list[str]:
@@ -213,8 +229,12 @@ def solve_body(body: Body, *, progress: Progress | None = None, **settings: Any)
         ``outcome``.
 
     """
+    for entry in body.prescribed:
+        if (shape := np.shape(entry.path(body.mesh.points[:2], body.frames[0]))) != (2, 3):
+            got = f"displacements {shape} of points (2, 3)"
+            raise InputError(f'prescribed "{entry.name}": path', got, "one (3,) for each point, as (n, 3)")
     with _reported(progress):
-        return fenicsx.solve_body(body, fenicsx.BodySettings(**settings))
+        return fenicsx.solve_body(body, parse(fenicsx.BodySettings, settings, "settings"))
 
 
 @contextmanager
