@@ -39,6 +39,10 @@ def _format(path: Path, want: str, known: Collection[str]) -> Format:
     return formats()[suffix]
 
 
+def _suffixes_of_lines() -> list[str]:
+    return [suffix for suffix, one in formats().items() if suffix in one.lines]
+
+
 def read_surface(path: Path, unit: float) -> Surface:
     """The triangles of a file whose coordinates are in units of ``unit`` mm; ``place`` is the path.
 
@@ -65,7 +69,7 @@ def read_moved_polylines(path: Path, unit: float) -> Polylines:
 
 
 def _polylines(path: Path, unit: float, check: Callable[[Floats, list[list[int]]], None]) -> Polylines:
-    known = [suffix for suffix, one in formats().items() if suffix in one.lines]
+    known = _suffixes_of_lines()
     want = f"polylines, whole, as {' or '.join(known)}"
     reader = _format(path, want, known).read_lines
 
@@ -123,9 +127,10 @@ def write_surface(path: Path, surface: Surface, positions: Floats) -> None:
 
 
 def write_polylines(path: Path, polylines: Polylines, positions: Floats) -> None:
-    """VTP of the lines with their points at ``positions`` (n, 3) [mm] and point data ``displacement`` [mm], float64."""
-    write = _format(path, "a .vtp file", [suffix for suffix, one in formats().items() if one.write_lines]).write_lines
-    assert write is not None
+    """VTP or VTK of the lines with their points at ``positions`` (n, 3) [mm] and point data ``displacement`` [mm], float64."""
+    known = _suffixes_of_lines()
+    write = _format(path, f"one of {' '.join(known)}", known).write_lines
+    assert write is not None  # of a suffix in ``lines``
     with _written(path) as part:
         write(part, Polylines(positions, polylines.offsets), positions - polylines.points)
 
