@@ -275,4 +275,4 @@ def test_the_verb(scene: MuscleCase, tmp_path: Path, capsys) -> None:
     assert cli.main(words) == cli.BAD_INPUT
     assert "which is not empty" in capsys.readouterr().err
     assert cli.main(["export", "rod", "--to", str(tmp_path / "rod")]) == cli.BAD_INPUT
-    assert "got the scene of a scalar field, want the scene of a muscle" in capsys.readouterr().err
+    assert 'got "rod", a scalar case, want the case of a muscle' in capsys.readouterr().err

@@ -1,6 +1,7 @@
 """A record says which key is unknown, missing or wrong, and cannot be changed."""
 
 import math
+import pickle
 from typing import Any, Literal
 
 import pytest
@@ -75,3 +76,9 @@ def test_records_are_frozen() -> None:
 
 def test_join_says_where_a_key_is() -> None:
     assert [join("a.toml", "b"), join("a.toml: b", "c"), join("a.toml", "")] == ["a.toml: b", "a.toml: b.c", "a.toml"]
+
+
+def test_bad_input_is_the_same_in_another_process() -> None:
+    error = InputError("case.toml: bone", None, "a bone")
+    again = pickle.loads(pickle.dumps(error))
+    assert (str(again), again.place, again.want) == (str(error), "case.toml: bone", "a bone")

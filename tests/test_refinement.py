@@ -186,7 +186,8 @@ def test_a_scene_that_cannot_be_coarser_is_named(case, monkeypatch) -> None:
 def test_it_is_of_the_reference_of_a_muscle(case, capsys, words) -> None:
     name = str(case) if "--solver" in words else "rod"
     assert cli.main([words[0], name, *words[1:], "--error-bar", "--out", str(case.parent / "out")]) == cli.BAD_INPUT
-    assert "--error-bar: got a scalar case or another solver, want the reference of a muscle" in capsys.readouterr().err
+    got, want = ("another solver", "the reference") if "--solver" in words else ('"rod", a scalar case', "the case")
+    assert f"--error-bar: got {got}, want {want} of a muscle" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("every", "largest"), [(10, None), (9, 4.0), (1, None)])

@@ -10,7 +10,11 @@ class InputError(Exception):
 
     def __init__(self, place: object, got: object, want: str) -> None:
         super().__init__(f"{place}: got {got}, want {want}")
-        self.got, self.want = got, want
+        self.place, self.got, self.want = place, got, want
+
+    def __reduce__(self) -> tuple[type["InputError"], tuple[object, object, str]]:
+        """So that it goes from one process to another."""
+        return type(self), (self.place, self.got, self.want)
 
 
 class MissingSoftware(Exception):  # noqa: N818 - it is a state of the machine, not a mistake of the caller
