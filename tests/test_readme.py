@@ -2,8 +2,10 @@
 
 import argparse
 import re
+import tomllib
 from pathlib import Path
 
+import fem_reference as fr
 from fem_reference import metrics, solvers
 from fem_reference.cli._parser import parser
 
@@ -27,6 +29,14 @@ def test_the_metrics() -> None:
 def test_the_verbs() -> None:
     (verbs,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
     assert sorted(set(listed("verb"))) == sorted(verbs.choices)
+
+
+def test_the_scene_is_complete() -> None:
+    scene = README[README.index("## Write a scene") :]
+    table = tomllib.loads(scene.split("```toml\n")[1].split("```")[0])
+    case = fr.make_case(table, name="my_muscle")
+    assert [bone.name for bone in case.bone] == ["femur", "pelvis"]
+    assert case.frames.numbers[-1] == 100
 
 
 def test_nothing_is_left_to_fill_in() -> None:
