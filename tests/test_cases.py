@@ -49,8 +49,9 @@ def whole(name: str, *, with_negative_control: bool, folder, monkeypatch) -> tup
 @pytest.mark.usefixtures("without_page")
 @pytest.mark.parametrize("name", FIELDS)
 def test_scalar_cases_meet_their_expectations_and_fail_with_their_negative_control(name, tmp_path, monkeypatch) -> None:
-    status, facts = whole(name, with_negative_control=False, folder=tmp_path / "right", monkeypatch=monkeypatch)
-    assert (status, facts["verdict"], facts["status"]) == (cli.DONE, "pass", "converged")
+    if name not in PAGES["octave-examples"][1]:  # the test of that page asks those
+        status, facts = whole(name, with_negative_control=False, folder=tmp_path / "right", monkeypatch=monkeypatch)
+        assert (status, facts["verdict"], facts["status"]) == (cli.DONE, "pass", "converged")
     status, facts = whole(name, with_negative_control=True, folder=tmp_path / "wrong", monkeypatch=monkeypatch)
     assert (status, facts["verdict"]) == (cli.VERDICT_FAIL, "fail")
     # What two solvers of the same equations differ by is rounding, whatever they are.
