@@ -164,7 +164,9 @@ def test_the_script_of_the_readme_stretches_a_block_in_25_lines(tmp_path) -> Non
     script.write_text(STRETCHED_BLOCK)
     done = subprocess.run(command(str(script)), env=environment(), capture_output=True, text=True, check=True)
     # Incompressible neo-Hooke: the nominal stress is mu (l - 1 / l^2); a bulk modulus of 10^4 mu leaves 1e-4 of it.
-    force = float(done.stdout.strip("[]\n ").split()[2])
+    status, numbers = done.stdout.split("[")
+    assert status.strip() == "converged"
+    force = float(numbers.strip("]\n ").split()[2])
     assert force == pytest.approx(0.01 * (1.2 - 1.2**-2) * 100, rel=3e-4)
 
 

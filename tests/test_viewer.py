@@ -17,6 +17,7 @@ from browser import PROGRAM, Browser
 
 from fem_reference.problems.muscle import RigidBody
 from fem_reference.report import page, viewer
+from fem_reference.report.sections import frames
 
 pytestmark = pytest.mark.slow
 
@@ -180,7 +181,7 @@ def browser(tmp_path_factory):
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
     """Without the curves, of which nothing here is."""
-    monkeypatch.setattr(page, "curves", lambda _: [])
+    monkeypatch.setattr(frames, "curves", lambda _: [])
 
 
 @pytest.fixture
