@@ -122,22 +122,23 @@ class Match:
 
 def at_same_cost(points: Sequence[Point], error: str, cost: str, at: float) -> Match:
     """Of each solver the point of the least ``error`` among those that cost at most ``at``."""
-    best = dict[str, Point]()
-    for point in points:
-        pair = point.at(error, cost)
-        if pair and pair[1] <= at and (point.solver not in best or pair[0] < best[point.solver].errors[error]):
-            best[point.solver] = point
-    return Match(cost, at, best)
+    known = [(pair[0], point) for point in points if (pair := point.at(error, cost)) and pair[1] <= at]
+    return Match(cost, at, _least(known))
 
 
 def at_same_error(points: Sequence[Point], error: str, cost: str, at: float) -> Match:
     """Of each solver the point that costs the least among those whose ``error`` is at most ``at``."""
-    best = dict[str, Point]()
-    for point in points:
-        pair = point.at(error, cost)
-        if pair and pair[0] <= at and (point.solver not in best or pair[1] < best[point.solver].costs[cost]):
-            best[point.solver] = point
-    return Match(error, at, best)
+    known = [(pair[1], point) for point in points if (pair := point.at(error, cost)) and pair[0] <= at]
+    return Match(error, at, _least(known))
+
+
+def _least(known: Iterable[tuple[float, Point]]) -> dict[str, Point]:
+    """Of each solver the point of the least value, the first where several have it."""
+    best = dict[str, tuple[float, Point]]()
+    for value, point in known:
+        if point.solver not in best or value < best[point.solver][0]:
+            best[point.solver] = value, point
+    return {solver: point for solver, (_, point) in best.items()}
 
 
 def levels(points: Iterable[Point], error: str, cost: str, *, of_error: bool, count: int = 5) -> tuple[float, ...]:

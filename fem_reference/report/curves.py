@@ -186,6 +186,17 @@ def _legend(figure: Figure, axes: Axes) -> None:
     figure.legend(handles, labels, loc="outside upper left", ncols=columns, handlelength=2.2, columnspacing=1.2)
 
 
+def drawn(name: str, title: str, size: tuple[float, float], draw: Callable[[Figure, Axes], None]) -> Curve:
+    """What ``draw`` draws, as SVG of a ``size`` in inches whose ids begin with ``name``."""
+    with mpl.rc_context(LOOK):
+        figure = Figure(figsize=size, layout="constrained")
+        FigureCanvasSVG(figure)
+        draw(figure, figure.add_subplot())
+        text = io.StringIO()
+        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
+    return Curve(title, inline(text.getvalue(), name, title))
+
+
 def logarithmic(axes: Axes) -> None:
     """Both axes in powers of ten, their numbers as people read them and not as formulas."""
     axes.set(xscale="log", yscale="log")

@@ -1,12 +1,10 @@
 """The page of a study: error against cost, who is best at the same cost or error, what half the error costs."""
 
-import io
 import json
 from collections.abc import Sequence
 from typing import Any
 
-import matplotlib as mpl
-from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fem_reference.assessment.claims import Cover
@@ -26,7 +24,7 @@ from fem_reference.assessment.fronts import (
 from fem_reference.assessment.transfer import transfers
 from fem_reference.report.claims_page import UNITS as CLAIMED_UNITS
 from fem_reference.report.claims_page import drawing as claims_drawing
-from fem_reference.report.curves import BAND, LOOK, PALETTE, Curve, inline, logarithmic
+from fem_reference.report.curves import BAND, PALETTE, Curve, drawn, logarithmic
 from fem_reference.report.templates import template
 from fem_reference.report.words import listed, number, words
 
@@ -124,10 +122,8 @@ def fronts(case: CaseStudy) -> list[Curve]:
 
 def _front(case: CaseStudy, error: str) -> Curve:
     title = title_of(error).capitalize()
-    with mpl.rc_context(LOOK):
-        figure = Figure(figsize=(4.9, 4.2), layout="constrained")
-        FigureCanvasSVG(figure)
-        axes = figure.add_subplot()
+
+    def draw(figure: Figure, axes: Axes) -> None:
         for i, solver in enumerate(solvers(case.points)):
             _draw(
                 axes,
@@ -143,18 +139,15 @@ def _front(case: CaseStudy, error: str) -> Curve:
         axes.set_xlabel("time of a frame, s")
         axes.set_ylabel(f"{title_of(error)}, {case.units[error]}")
         figure.legend(loc="outside lower center", ncols=3, fontsize="small")
-        text = io.StringIO()
-        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
-    return Curve(title, inline(text.getvalue(), f"front-{case.case}-{error.replace('.', '-')}", title))
+
+    return drawn(f"front-{case.case}-{error.replace('.', '-')}", title, (4.9, 4.2), draw)
 
 
 def _growth(study: Study) -> Curve:
     """Times over sizes, the whole of the reference and an iteration of each candidate."""
     title = "Time of a load step of the reference and of an iteration of candidates"
-    with mpl.rc_context(LOOK):
-        figure = Figure(figsize=(6.4, 4.2), layout="constrained")
-        FigureCanvasSVG(figure)
-        axes = figure.add_subplot()
+
+    def draw(figure: Figure, axes: Axes) -> None:
         shown = [one for one in study.growth if one.cost in ("total", "iteration")]
         for i, one in enumerate(shown):
             label = f"{one.solver}, {one.counted}: {one.exponent:.2f}"
@@ -163,9 +156,8 @@ def _growth(study: Study) -> Curve:
         axes.set_xlabel("size")
         axes.set_ylabel("s")
         figure.legend(loc="outside lower center", ncols=3, fontsize="small")
-        text = io.StringIO()
-        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
-    return Curve(title, inline(text.getvalue(), "growth", title))
+
+    return drawn("growth", title, (6.4, 4.2), draw)
 
 
 def _draw(axes: Any, points: Sequence[Point], error: str, solver: str, colour: str) -> None:
