@@ -1,15 +1,13 @@
 """The page ``error-bars``: error bars of references against their differences from finer solutions."""
 
-import io
 from collections.abc import Sequence
 from typing import Any
 
-import matplotlib as mpl
-from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fem_reference.assessment.claims import CLAIMED, FINER, LEAST, Claim, Claims, Cover
-from fem_reference.report.curves import LOOK, PALETTE, Curve, inline, logarithmic
+from fem_reference.report.curves import PALETTE, Curve, drawn, logarithmic
 from fem_reference.report.tables import finite
 from fem_reference.report.templates import template
 from fem_reference.report.words import words
@@ -57,10 +55,8 @@ def facts(claims: Claims) -> dict[str, Any]:
 def drawing(claims: Sequence[Claim], metric: str, name: str) -> Curve:
     """Bars against errors, a colour for each case; ``name`` makes its ids those of this drawing alone."""
     title = f"{words(metric).capitalize()}: claimed against true"
-    with mpl.rc_context(LOOK):
-        figure = Figure(figsize=(4.6, 4.0), layout="constrained")
-        FigureCanvasSVG(figure)
-        axes = figure.add_subplot()
+
+    def draw(_: Figure, axes: Axes) -> None:
         shown = [one for one in claims if one.metric == metric and one.error > LEAST and one.bar > 0]
         values = [value for one in shown for value in (one.bar, one.error)]
         ends = [0.5 * min(values, default=0.1), 2 * max(values, default=1.0)]
@@ -75,6 +71,5 @@ def drawing(claims: Sequence[Claim], metric: str, name: str) -> Curve:
         axes.set_xlabel(f"difference from the finer solution, {UNITS[metric]}")
         axes.set_ylabel(f"error bar, {UNITS[metric]}")
         axes.legend(fontsize="small")
-        text = io.StringIO()
-        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
-    return Curve(title, inline(text.getvalue(), f"{name}-{metric}", title))
+
+    return drawn(f"{name}-{metric}", title, (4.6, 4.0), draw)

@@ -162,19 +162,15 @@ def _line(axes: Axes, numbers: tuple[int, ...], measure: Measure, label: str, **
 
 
 def _drawing(name: str, title: str, unit: str, draw: Callable[[Axes], None]) -> Curve:
-    with mpl.rc_context(LOOK):
-        figure = Figure(figsize=(5.4, 3.1), layout="constrained")
-        FigureCanvasSVG(figure)
-        axes = figure.add_subplot()
+    def whole(figure: Figure, axes: Axes) -> None:
         draw(axes)
         axes.margins(x=0.02)
         axes.set_xlabel("frame")
         axes.set_ylabel(unit.replace("mm3", "mm³"))
         axes.xaxis.set_major_locator(MaxNLocator(nbins=8, integer=True, steps=[1, 2, 5, 10]))
         _legend(figure, axes)
-        text = io.StringIO()
-        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
-    return Curve(title, inline(text.getvalue(), name, title))
+
+    return drawn(name, title, (5.4, 3.1), whole)
 
 
 def _legend(figure: Figure, axes: Axes) -> None:
