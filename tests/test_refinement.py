@@ -94,9 +94,9 @@ def test_the_bar_covers_an_error_that_is_known(case, capsys, monkeypatch) -> Non
     surface = fine.surface
     areas = vertex_areas(surface.points, surface.triangles)
     furthest = metrics.rms(np.linalg.norm(surface.points, axis=1)[None], areas)[0]
-    # Of order 1 in tetrahedra 1.5 times as large: 1.25 / (1.5 - 1) of the difference. Twice the stiffness takes half of what
-    # contact gives away, twice that is all.
-    share = np.hypot(2.5 * (growth(tets[0]) - growth(tets[1])), CONTACT_GIVES)
+    # Of order 1 in tetrahedra 1.5 times as large: 1.25 / (1.5 - 1) of the difference, and as much more as 6 mm is above the radius
+    # of an end of 100 mm2. Twice the stiffness takes half of what contact gives away, twice that is all.
+    share = np.hypot(2.5 * 6 / np.sqrt(100 / np.pi) * (growth(tets[0]) - growth(tets[1])), CONTACT_GIVES)
     wanted = np.array([0, 5, 10, 15, 20]) * furthest * share
     assert rows(facts, "change", "surface_deviation", "rms") == pytest.approx(wanted, rel=1e-6)
     assert "error bars of the reference" in capsys.readouterr().out
@@ -104,6 +104,15 @@ def test_the_bar_covers_an_error_that_is_known(case, capsys, monkeypatch) -> Non
     assert "(9 mm instead of 6 mm)" in text
     assert "cause of error halved at a time (contact stiffness, contact smoothing and distances to bones)" in text
     assert ">error bar</text>" in text
+
+
+@pytest.mark.parametrize(("size", "more"), [(5.0, 1.0), (40.0, 4.0)])
+def test_tetrahedra_larger_than_the_radius_of_an_attachment_make_bars_longer(case, monkeypatch, size, more) -> None:
+    monkeypatch.setattr(refinement, "attached_area", lambda *_: np.pi * 10.0**2)  # [mm2]
+    scene = scene_of(case)
+    muscle = scene.muscle.model_copy(update={"tet_size": size})
+    bench = Bench(scene.model_copy(update={"muscle": muscle}), case.parent / "out" / "runs")
+    assert refinement._safety(bench) == pytest.approx(error_bars.SAFETY * more)
 
 
 def test_it_is_kept_with_its_run_until_the_metrics_change_or_the_file_is_damaged(case, monkeypatch, capsys) -> None:

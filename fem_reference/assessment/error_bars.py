@@ -110,7 +110,7 @@ class Pair:
     """Runs of the reference over the same frames: ``fine``, itself, and ``coarse`` on larger tetrahedra; by name the ``varied``
     ones, each as ``coarse`` with one cause of error halved; and one with ``exact`` attachments, where they are springs.
 
-    ``sizes`` [mm] are those of the tetrahedra, and the error is of the ``orders`` in them.
+    ``sizes`` [mm] are those of the tetrahedra, and the error is of the ``orders`` in them, with a ``safety``.
     """
 
     fine: Run
@@ -119,11 +119,12 @@ class Pair:
     orders: Orders
     varied: dict[str, Run]
     exact: Run | None = None
+    safety: float = SAFETY
 
     def share(self, of: Of, metric: str, statistic: str) -> float:
         """The error of the fine run over what the two differ by, with the safety of a grid convergence index."""
         order = self.orders.of(of, metric, statistic)
-        return float(SAFETY / ((self.sizes[1] / self.sizes[0]) ** order - 1))
+        return float(self.safety / ((self.sizes[1] / self.sizes[0]) ** order - 1))
 
 
 def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:

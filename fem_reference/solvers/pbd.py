@@ -203,4 +203,10 @@ def _compile(settings: Settings) -> float:
 
 
 _EXAMPLE = {"sub_iterations": 3, "solver_iterations": 2, "damping": 0.1, "stretch": 1.0, "volume": 1.0, "bending": 0.5}
-SOLVES = (MuscleSolver(settings=Settings, solve=solve, example=_EXAMPLE),)
+
+
+def _fibres(settings: Settings) -> bool:
+    return settings.anisotropy is not None
+
+
+SOLVES = (MuscleSolver(settings=Settings, solve=solve, example=_EXAMPLE, fibres=_fibres),)

@@ -237,4 +237,10 @@ def _compile(settings: Settings) -> float:
 
 
 _EXAMPLE = {"sub_iterations": 3, "damping": 0.01, "bending": 0.9, "voxels": 64, "anisotropy": 1.0}
-SOLVES = (MuscleSolver(settings=Settings, solve=solve, example=_EXAMPLE),)
+
+
+def _fibres(settings: Settings) -> bool:
+    return settings.anisotropy is not None
+
+
+SOLVES = (MuscleSolver(settings=Settings, solve=solve, example=_EXAMPLE, fibres=_fibres),)

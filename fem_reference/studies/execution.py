@@ -19,7 +19,7 @@ from fem_reference import __version__, solvers
 from fem_reference.foundations.records import Record, join
 from fem_reference.foundations.usage import forget_peak_memory, peak_memory
 from fem_reference.problems import of_case
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import Problem, Setup
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs import store
 from fem_reference.runs.fields import VALUES, NodalField
@@ -27,6 +27,7 @@ from fem_reference.runs.key import code_hash, key, versions
 from fem_reference.runs.store import Frame, Run
 from fem_reference.scenes.case import Case, SolverChoice
 from fem_reference.solvers import recorded
+from fem_reference.solvers.common.protocol import MuscleSolver
 
 log = logging.getLogger(__name__)
 
@@ -65,7 +66,7 @@ class Bench[C: Case]:
         if (stored := _stored(folder, name)) is not None:
             return stored
         solvers.require(choice.solver, settings, place, self.scene.task)
-        self.problem()  # what is wrong with the input shows before anything is written
+        self.made_for(choice.solver, settings)  # what is wrong with the input shows before anything is written
         with _alone(folder):
             return _stored(folder, name) or self._solve(name, choice.solver, settings, folder)
 
@@ -74,11 +75,21 @@ class Bench[C: Case]:
         return self.store / f"{choice.solver}-{self.key(choice.solver, self.settings(choice, place))}"
 
     def _solve(self, name: str, solver: str, settings: Record, folder: Path) -> Run:
-        built = self.problem()
-        origin = self.origin(solver, settings) | {"mesh": built.mesh_facts}
-        identity = {"name": name, "solver": solver, "origin": origin, "frames": self.scene.numbers}
-        _solved(built, solvers.find(solver, self.scene.place, self.scene.task), settings, folder, identity)
+        origin, numbers = self.origin(solver, settings), self.scene.numbers
+        identity = {"name": name, "solver": solver, "origin": origin, "frames": numbers}
+        _solved(
+            self.made_for(solver, settings),
+            solvers.find(solver, self.scene.place, self.scene.task),
+            settings,
+            folder,
+            identity,
+        )
         return store.load(folder)
+
+    def made_for(self, solver: str, settings: Record) -> Any:
+        """What the solver needs: the problem, or the setup of a muscle that it does not need filled."""
+        offer = solvers.find(solver, self.scene.place, self.scene.task)
+        return self.setup() if isinstance(offer, MuscleSolver) and not offer.fills(settings) else self.problem()
 
     def read(self, name: str, choice: SolverChoice, place: str) -> Run:
         """The run that somebody recorded, checked against the setup of the scene; it is read each time and not stored."""
@@ -121,7 +132,19 @@ def _solved(built: object, solver: Any, settings: Record, folder: Path, identity
 
 @_solved.register
 def _(built: Problem, solver: Any, settings: Record, folder: Path, identity: dict[str, Any]) -> None:
+    identity["origin"]["mesh"] = built.mesh_facts
     writer = store.Writer(folder, identity, built.surface, built.fibres, built.mesh, built.directions)
+    _write(writer, built, solver, settings, Frame(built.frames[0], built.surface.points, built.fibres.points))
+
+
+@_solved.register
+def _(built: Setup, solver: Any, settings: Record, folder: Path, identity: dict[str, Any]) -> None:
+    writer = store.Writer(folder, identity, built.surface)
+    _write(writer, built, solver, settings, Frame(built.frames[0], built.surface.points))
+
+
+def _write(writer: store.Writer, built: Setup, solver: Any, settings: Record, rest: Frame) -> None:
+    """The run of a muscle, with what it cost; of one that failed before its first frame that frame, which is ``rest``."""
     forget_peak_memory()
     began = time.process_time()
     outcome = solver.solve(built, settings, writer.add)
@@ -130,13 +153,14 @@ def _(built: Problem, solver: Any, settings: Record, folder: Path, identity: dic
         processor = min(processor, cost.get("seconds_setup", 0.0) + cost.get("seconds_solve", math.inf))
     used = {"seconds_processor": processor, "peak_memory_mb": peak_memory()}
     outcome = replace(outcome, cost=used | outcome.cost)  # a solver with processes of its own says what those used
-    if not writer.frames:  # it failed before its first frame, which is rest
-        writer.add(Frame(built.frames[0], built.surface.points, built.fibres.points))
+    if not writer.frames:
+        writer.add(rest)
     writer.close(outcome)
 
 
 @_solved.register
 def _(built: FieldProblem, solver: Any, settings: Record, folder: Path, identity: dict[str, Any]) -> None:
+    identity["origin"]["mesh"] = built.mesh_facts
     writer = store.Writer(folder, identity)
     solution = solver.solve_field(built, settings)
     components = {} if solution.components is None else {"components": solution.components}

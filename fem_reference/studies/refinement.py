@@ -12,11 +12,12 @@ import numpy as np
 
 from fem_reference import metrics, solvers
 from fem_reference.assessment import error_bars
-from fem_reference.assessment.error_bars import ErrorBars, Orders, Pair
+from fem_reference.assessment.error_bars import SAFETY, ErrorBars, Orders, Pair
 from fem_reference.effects import Effect
 from fem_reference.effects.contact import Contact, among
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record
+from fem_reference.geometry.sectors import attached_area, attached_shares
 from fem_reference.metrics import MeasurementContext
 from fem_reference.runs.store import Run
 from fem_reference.scenes.bones import Bone
@@ -186,7 +187,18 @@ def _pair(bench: Bench[MuscleCase], reference: Run, model: bool) -> Pair:
             "a size that coarser meshes differ from",
         )
     halved = {variation.name: run for variation, run in zip(varied, others, strict=False)}
-    return Pair(reference, coarse, sizes, orders, halved, runs.get(_EXACT))
+    return Pair(reference, coarse, sizes, orders, halved, runs.get(_EXACT), _safety(bench))
+
+
+def _safety(bench: Bench[MuscleCase]) -> float:
+    """That of a grid convergence index, and as much more as the tetrahedra, before they are refined, are larger than the radius of
+    the smallest attachment: nested tetrahedra share its polygon, and their difference does not show what is wrong with that.
+    """
+    rest, radii = bench.setup(), [math.inf]
+    for entry in rest.attached:
+        area = attached_area(rest.surface, attached_shares(rest.surface, entry.vertices))
+        radii.append(math.sqrt(area / math.pi))
+    return SAFETY * max(1.0, bench.scene.muscle.tet_size / min(radii))
 
 
 def _coarser(scene: MuscleCase) -> tuple[MuscleCase, tuple[float, float]]:

@@ -51,6 +51,11 @@ def _nothing(_: Record) -> None:
     """Nothing but what this package needs itself."""
 
 
+def _none(_: Record) -> bool:
+    """No fibres."""
+    return False
+
+
 @dataclass(frozen=True, kw_only=True)
 class Solver[S: Record]:
     """What a solver's file offers for one task.
@@ -72,7 +77,8 @@ class Solver[S: Record]:
 @dataclass(frozen=True, kw_only=True)
 class MuscleSolver[S: Record](Solver[S]):
     """A solver of muscles; ``moves``: what carries its unknowns, whose mesh its accuracy and cost depend on;
-    ``check_effects`` of one that simulates the effects of a scene, None of one that does not.
+    ``check_effects`` of one that simulates the effects of a scene, None of one that does not; ``fibres``: whether one of surfaces
+    needs the fibres under such settings: without them it is given a ``Setup``, as the muscle is not filled for it.
     """
 
     task = "solve"
@@ -81,6 +87,11 @@ class MuscleSolver[S: Record](Solver[S]):
     solve: SolveMuscle[S]
     moves: Moves = "surface"
     check_effects: CheckEffects[S] | None = None
+    fibres: Callable[[S], bool] = _none
+
+    def fills(self, settings: S) -> bool:
+        """Whether it needs the muscle filled with tetrahedra and fibres."""
+        return self.moves not in ("surface", "nothing") or self.fibres(settings)
 
 
 @dataclass(frozen=True, kw_only=True)
