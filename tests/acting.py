@@ -29,6 +29,7 @@ _EXAMPLES: dict[str, dict[str, Any]] = {
     "prestretch": {"stretch": 1.1, "ramp": RAMP},
     "damping": {"coefficient": "2 Pa s/mm^2"},
     "viscosity": {"eta": "300 kPa s"},
+    "inertia": {"density": "1060 kg/m3", "spectral_radius": 0.8},
 }
 
 
@@ -58,6 +59,7 @@ OTHER: dict[str, Any] = {
     "stretch": 1.2,
     "coefficient": "7 MPa s/mm^2",
     "eta": "7 MPa s",
+    "spectral_radius": 0.5,
     "ramp": [{"frame": 0, "amount": 0.2}],
     "on": "bottom",
 }  # of other parameters it is 7 MPa
@@ -85,7 +87,13 @@ BEFORE = ((1.2, 0.1, 0.0), (-0.2, 0.8, 0.3), (0.1, 0.0, 1.1))
 
 
 def state(F: np.ndarray, pressure: float = 0.3, fibre: np.ndarray = FIBRE, amount: float = 1.0) -> State:
-    moved = {"displacement": (0.3, -0.2, 0.5), "before": (0.2, 0.1, 0.5), "F_before": BEFORE, "rate": 4.0}
+    moved = {
+        "displacement": (0.3, -0.2, 0.5),
+        "before": (0.2, 0.1, 0.5),
+        "predicted": (0.1, 0.1, 0.4),
+        "F_before": BEFORE,
+        "rate": 4.0,
+    }
     return State(F=F, pressure=pressure, fibre=fibre, amount=amount, **moved)
 
 

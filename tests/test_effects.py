@@ -181,7 +181,7 @@ def test_expressions_take_symbols(name: str) -> None:
     symbolic = effect.model_copy(update={key: symbols(value) for key, value, _ in effect.parameters if key != "ramp"})
     for F in deformations():
         at = replace(state(F, amount=0.5), F=F.tolist(), fibre=FIBRE.tolist())
-        keys = ("F", "displacement", "pressure", "fibre", "amount", "before", "F_before", "rate")
+        keys = ("F", "displacement", "pressure", "fibre", "amount", "before", "predicted", "F_before", "rate")
         parts = {key: symbols(getattr(at, key)) for key in keys}
         found = outcome(symbolic, State(**parts, functions=SymbolFunctions()))
         got = np.vectorize(lambda entry: float(plain(entry)))(np.array(found, object))

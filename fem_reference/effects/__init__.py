@@ -70,8 +70,8 @@ class State:
     ``F``: the deformation gradient, ``F[i][k] = dx_i / dX_k``; ``displacement``: (3,) [mm]; ``pressure``: the mixed pressure
     unknown [MPa], None where no effect brings it; ``fibre``: the unit vector (3,) along the fibres at rest, None where there is
     none; ``amount``: how much of the effect acts (see :meth:`Effect.amount`); ``before``: the displacement (3,) [mm] that the load
-    step starts from, ``F_before`` its deformation gradient, and ``rate`` [1/s] one over the time that it takes, 0 where no time
-    passes.
+    step starts from, ``F_before`` its deformation gradient, ``predicted`` (3,) [mm] where velocities alone would lead it, and
+    ``rate`` [1/s] one over the time that it takes, 0 where no time passes.
     """
 
     F: Sequence[Sequence[Any]]
@@ -80,6 +80,7 @@ class State:
     fibre: Any = None
     amount: Any = 1.0
     before: Sequence[Any] = (0.0, 0.0, 0.0)
+    predicted: Sequence[Any] = (0.0, 0.0, 0.0)
     F_before: Sequence[Sequence[Any]] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     rate: Any = 0.0
     functions: Functions = field(default_factory=Numpy)
@@ -143,8 +144,8 @@ class RampPoint(Record):
 class Effect(Record):
     """A frozen record of parameters of what acts in a body.
 
-    ``unknowns``: names of the fields that it brings; ``needs``: what it asks of the rest state, ``"fibre"``, or of
-    the frames, ``"interval"``: the time from a frame number to the next.
+    ``unknowns``: names of the fields that it brings; ``needs``: what it asks of the rest state, ``"fibre"``, of the frames,
+    ``"interval"``: the time from a frame number to the next, or of a step, ``"momentum"``: velocities and where these lead.
     """
 
     unknowns: ClassVar[tuple[str, ...]] = ()
@@ -278,8 +279,7 @@ class FieldEffect(Record):
 
 def names(kind: type[Record] = Effect) -> list[str]:
     """The effects of a ``kind`` that there are, as scene files name them."""
-    found = sorted(module.name for module in pkgutil.iter_modules(__path__))
-    return [name for name in found if issubclass(find(name), kind)]
+    return sorted(name for _, name, _ in pkgutil.iter_modules(__path__) if issubclass(find(name), kind))
 
 
 def find(name: str) -> type[Record]:

@@ -205,8 +205,10 @@ def _check_forces(scene: MuscleCase) -> None:
         if contact and attachment.name in bones:
             place = join(scene.place, f"attachment[{i}].name")
             raise InputError(place, f'"{attachment.name}", which a bone in contact has too', "a name of its own")
-    if not scene.attachment and not any(isinstance(effect, Damping) for effect in scene.effects):
-        want = 'an attachment, soft as it may be, or the effect "damping": without either the muscle drifts'
+    if not scene.attachment and not any(
+        isinstance(effect, Damping) or "momentum" in effect.needs for effect in scene.effects
+    ):
+        want = 'an attachment, soft as it may be, or the effect "damping" or "inertia": without any the muscle drifts'
         raise InputError(join(scene.place, "attachment"), "none", want)
 
 

@@ -48,8 +48,9 @@ class AssembledBody:
         self.displacement = fem.Function(self.displacement_space)
         form = forms.Form(self.mesh, body, self.unknowns, settings, self.cells)
         self.amounts = form.amounts
-        self.clock = Clock(body, form.before, form.rate)
+        self.clock = Clock(body, form.step)
         self.volume_form, self.energy_form = compiling.form(form.volume), compiling.form(form.energy)
+        self.kinetic_form = compiling.form(form.kinetic) if form.kinetic else None
         self.rest_volume = self.integral(self.volume_form)
         self.conditions = [self._condition(entry, form) for entry in body.prescribed]
         self.determinants = Determinants(self.mesh, self.cells, form.determinant, form.rule[0], body.mesh.kind)
@@ -99,6 +100,8 @@ class AssembledBody:
         volume is collapsed.
         """
         before = np.array(self.unknowns.x.array)
+        if self.clock.begins():
+            self._begin(before)
         self.clock.start(frame, before)
         self._set(frame)
         self.recalled = None
@@ -107,7 +110,7 @@ class AssembledBody:
         through = self.contact.tunnelled(self.comm) if self.contact and failure is None else None
         lost = self.validity.collapsed() if failure is None and smallest.value > 0 else None
         if failure is None and smallest.value > 0 and through is None and lost is None:
-            self.clock.settle(frame)
+            self.clock.settle(frame, self.unknowns.x.array)
             if self.contact:
                 self.contact.settle()
             return Attempt(None, iterations)
@@ -120,6 +123,16 @@ class AssembledBody:
             return Attempt("collapsed", iterations, f"Newton's method converged, but {lost}")
         how = failure or f"converged, but det F fell to {smallest}"
         return Attempt("diverged" if smallest.value > 0 else "inverted", iterations, f"Newton's method {how}")
+
+    def _begin(self, before: Floats) -> None:
+        """Find with what acceleration the body leaves its rest at ``before``: by a step in which nothing moves."""
+        self.clock.instant(before)
+        self._set(self.clock.at)
+        self.newton.solve(self.clock.at)  # of a tangent that is all mass: what it cannot do, the first step will show
+        self.clock.begin(self.unknowns.x.array)
+        self.unknowns.x.array[:] = before
+        if self.contact:
+            self.contact.go_back()
 
     def recall(self, frame: float) -> bool:
         """Take up the state that was solved before under what acts at ``frame``, if there is one; its residual proves it."""
@@ -157,14 +170,19 @@ class AssembledBody:
             one.move_to(frame)
 
     def scalars(self) -> dict[str, float]:
-        """The smallest det F at quadrature points and vertices, V/V0, and the energy [N mm]."""
+        """The smallest det F at quadrature points and vertices, V/V0, and the energies [N mm]."""
         contact = self.contact.scalars(self.comm) if self.contact else {}
-        return contact | {
-            "min_det_F_quadrature": self.determinants.smallest("quadrature point").value,
-            "min_det_F_vertices": self.determinants.smallest("vertex").value,
-            "volume_ratio": self.integral(self.volume_form) / self.rest_volume,
-            "energy": self.integral(self.energy_form),
-        }
+        moving = {} if self.kinetic_form is None else {"kinetic_energy": self.integral(self.kinetic_form)}
+        return (
+            contact
+            | moving
+            | {
+                "min_det_F_quadrature": self.determinants.smallest("quadrature point").value,
+                "min_det_F_vertices": self.determinants.smallest("vertex").value,
+                "volume_ratio": self.integral(self.volume_form) / self.rest_volume,
+                "energy": self.integral(self.energy_form),
+            }
+        )
 
     def examine(self, frame: float) -> float | None:
         """In how many directions the energy falls from the present state, that of a ``frame`` which was reached; the state is kept

@@ -1,48 +1,107 @@
-"""The time that passes in load steps, for effects that feel velocities."""
+"""The time that passes in load steps, for effects that feel velocities, and the velocities of masses with inertia."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any, Protocol
 
 import numpy as np
-from dolfinx import fem
 
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.body import Body
+from fem_reference.solvers.fenicsx.forms import TimeStep
+
+# Of all frames, how long forces act in which nothing moves yet, to know the acceleration that they begin with.
+_INSTANT = 1e-7
+
+
+class Momentum(Protocol):
+    """An effect that asks for momentum: its method of steps in time."""
+
+    def predicted(self, u: Any, v: Any, a: Any, seconds: float) -> Any:
+        """The displacement that velocities alone would lead to."""
+
+    def advanced(self, u: Any, v: Any, a: Any, now: Any, seconds: float) -> tuple[Any, Any]:
+        """Velocity and acceleration after a step."""
+
+    def begun(self, u: Any, seconds: float) -> Any:
+        """The acceleration after an instant from rest."""
 
 
 class Clock:
-    """Sets ``rate`` [1/s] and the unknowns ``before`` of a load step; both stay as they are where nothing needs the time."""
+    """Sets the ``step`` of time of a form; nothing where there is none.
 
-    def __init__(self, body: Body, before: fem.Function | None, rate: fem.Constant) -> None:
-        self.before, self.rate, self.interval, self.at = before, rate, body.interval, body.frames[0]
+    With inertia a body is at rest up to its first frame that is wanted: ``resting`` until it has the acceleration with which it
+    leaves that, and velocities from then on.
+    """
+
+    def __init__(self, body: Body, step: TimeStep | None) -> None:
+        self.step, self.interval, self.at, self.first = step, body.interval, body.frames[0], body.first
         self.whole = body.frames[-1] - body.frames[0]
+        self.momentum: Momentum | None = next((one for one in body.effects if "momentum" in one.needs), None)  # type: ignore[assignment]
+        size = 0 if step is None or self.momentum is None else len(step.before.x.array)
+        self.velocity, self.acceleration = np.zeros(size), np.zeros(size)
+        self.resting = self.momentum is not None
 
     @property
     def matters(self) -> bool:
         """Whether anything feels how fast time passes."""
-        return self.before is not None
+        return self.step is not None
 
     def start(self, frame: float, unknowns: Floats) -> None:
         """A load step from the last settled frame, with its ``unknowns``, to ``frame``."""
-        if self.before is not None:
-            self.before.x.array[:] = unknowns
-            self.rate.value = self._rate(frame - self.at)
+        if self.step is not None:
+            self._set(unknowns, self._seconds(frame - self.at))
 
-    def settle(self, frame: float) -> None:
-        """The load step to ``frame`` is the last good one."""
+    def settle(self, frame: float, unknowns: Floats) -> None:
+        """The load step to ``frame``, which ends with ``unknowns``, is the last good one."""
+        if self.step is not None and self.momentum is not None and frame > self.first:
+            moved = (self.step.before.x.array, self.velocity, self.acceleration, unknowns)
+            self.velocity, self.acceleration = self.momentum.advanced(*moved, 1 / float(self.step.rate.value))
+            assert self.step.velocity is not None  # with momentum
+            self.step.velocity.x.array[:] = self.velocity
         self.at = frame
+
+    def begins(self) -> bool:
+        """Whether the next load step is the first in which a body with inertia moves; its acceleration has to be known."""
+        return self.resting and self.at >= self.first
+
+    def instant(self, unknowns: Floats) -> None:
+        """A load step so short that nothing moves, from rest at ``unknowns``."""
+        self._set(unknowns, self._seconds(_INSTANT * self.whole))
+
+    def begin(self, unknowns: Floats) -> None:
+        """The instant ended with ``unknowns``: velocities are 0, and accelerations known."""
+        assert self.step is not None  # there is momentum
+        assert self.momentum is not None
+        moved = unknowns - self.step.before.x.array
+        self.acceleration, self.resting = self.momentum.begun(moved, 1 / float(self.step.rate.value)), False
 
     @contextmanager
     def slow(self, unknowns: Floats) -> Iterator[None]:
         """Meanwhile a step would start from ``unknowns`` and take as long as all frames."""
-        if self.before is None:
+        if self.step is None:
             yield
             return
-        now, passed = float(self.rate.value), np.array(self.before.x.array)
-        self.before.x.array[:], self.rate.value = unknowns, self._rate(self.whole)
+        given = (self.step.before, self.step.predicted)
+        now, passed = float(self.step.rate.value), [None if one is None else np.array(one.x.array) for one in given]
+        for one in given:
+            if one is not None:
+                one.x.array[:] = unknowns
+        self.step.rate.value = 1 / self._seconds(self.whole)
         yield
-        self.before.x.array[:], self.rate.value = passed, now
+        self.step.rate.value = now
+        for one, values in zip(given, passed, strict=True):
+            if one is not None:
+                one.x.array[:] = values
 
-    def _rate(self, frames: float) -> float:
+    def _set(self, unknowns: Floats, seconds: float) -> None:
+        assert self.step is not None  # the caller asked
+        self.step.before.x.array[:], self.step.rate.value = unknowns, 1 / seconds
+        if self.momentum is not None and self.step.predicted is not None:
+            self.step.predicted.x.array[:] = self.momentum.predicted(
+                unknowns, self.velocity, self.acceleration, seconds
+            )
+
+    def _seconds(self, frames: float) -> float:
         assert self.interval is not None  # checked where an effect needs it
-        return 1 / (frames * self.interval)
+        return frames * self.interval

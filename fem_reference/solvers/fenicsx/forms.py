@@ -40,9 +40,9 @@ class Form:
     of the displacement. ``loads`` on the surface, a residual, 0 where there are none.
 
     ``energy`` that is stored and ``volume`` as integrals, det F as ``determinant``, the ``fibre_stretch`` that energies see (None
-    without fibres); to be set: ``amounts`` by effect, ``rate``
-    [1/s] of the load step and the unknowns ``before`` it (None where nothing depends on time); ``rule``: points (q, 3) and weights
-    (q,) of the quadrature, of ``degree``; ``regions``: by name, this rank's facets.
+    without fibres); to be set: ``amounts`` by effect, and the ``step`` of time (None where nothing depends on it), with
+    ``kinetic`` energy of its velocity (0 without inertia); ``rule``: points (q, 3) and weights (q,) of the quadrature, of
+    ``degree``; ``regions``: by name, this rank's facets.
     """
 
     def __init__(self, msh: mesh.Mesh, body: Body, unknowns: fem.Function, settings: BodySettings, cells: Ints) -> None:
@@ -54,17 +54,23 @@ class Form:
         self.amounts = [fem.Constant(msh, effect.amount(body.frames[0])) for effect in body.effects]
         effects = [_symbolic(effect, msh) for effect in body.effects]
         acting = list(zip(effects, self.amounts, strict=True))
-        timed = any("interval" in effect.needs for effect in effects)
-        self.before, self.rate = fem.Function(unknowns.function_space) if timed else None, fem.Constant(msh, 0.0)
-        state, variables = _state(unknowns, self._fibre(body, cells), self.before, self.rate)
+        self.step = _step(effects, unknowns.function_space)
+        state, variables = _state(unknowns, self._fibre(body, cells), self.step)
         self.determinant = state.J
         self.fibre_stretch = None if state.fibre is None else elastic_state(acting, state).fibre_stretch
         stored = [(effect, amount) for effect, amount in acting if not isinstance(effect, Energy) or effect.stored]
         self.volume, self.energy = state.J * self.dx, total_energy(stored, state) * self.dx
+        self.kinetic = self._kinetic(effects)
         self.kinds, first, second = _derivatives(total_energy(acting, state), variables)
         self.first = compiling.expression(ufl.as_vector(first), self.rule[0])
         self.second = compiling.expression(ufl.as_vector(first + second), self.rule[0])
         self.loads = self._loads(acting, state, unknowns)
+
+    def _kinetic(self, effects: list[Any]) -> Any:
+        if self.step is None or self.step.velocity is None:
+            return 0
+        velocity = _components(self.step.velocity)
+        return sum(effect.kinetic(velocity) for effect in effects if "momentum" in effect.needs) * self.dx
 
     def _loads(self, acting: list[tuple[Effect, Any]], state: State, unknowns: fem.Function) -> Any:
         test, loads = ufl.TestFunction(unknowns.function_space), 0
@@ -108,6 +114,26 @@ def _measures(msh: mesh.Mesh, regions: dict[str, Ints], rule: Rule, degree: int)
     )
 
 
+@dataclass(frozen=True, eq=False)
+class TimeStep:
+    """A load step that takes time: one over that, ``rate`` [1/s], the unknowns ``before`` it, and, where masses have inertia, those
+    ``predicted`` and the ``velocity``.
+    """
+
+    rate: fem.Constant
+    before: fem.Function
+    predicted: fem.Function | None = None
+    velocity: fem.Function | None = None
+
+
+def _step(effects: list[Effect], space: fem.FunctionSpace) -> TimeStep | None:
+    if not any("interval" in effect.needs for effect in effects):
+        return None
+    step = TimeStep(fem.Constant(space.mesh, 0.0), fem.Function(space))
+    moving = any("momentum" in effect.needs for effect in effects)
+    return replace(step, predicted=fem.Function(space), velocity=fem.Function(space)) if moving else step
+
+
 @dataclass(frozen=True)
 class _Variables:
     """What the energy at a point is differentiated by: ``F`` and ``displacement``, and the ``pressure`` where there is one."""
@@ -117,24 +143,29 @@ class _Variables:
     pressure: Any
 
 
-def _state(
-    unknowns: fem.Function, fibre: list[Any] | None, before: fem.Function | None, rate: fem.Constant
-) -> tuple[State, _Variables]:
+def _state(unknowns: fem.Function, fibre: list[Any] | None, step: TimeStep | None) -> tuple[State, _Variables]:
     displacement, *others = (ufl.variable(part) for part in ufl.split(unknowns))
     F = ufl.variable(ufl.Identity(3) + ufl.grad(ufl.split(unknowns)[0]))
-    passed = ufl.as_vector((0.0, 0.0, 0.0)) if before is None else ufl.split(before)[0]
-    F_before = F if before is None else ufl.Identity(3) + ufl.grad(passed)
+    timed: dict[str, Any] = {"F_before": _rows(F)}
+    if step is not None:
+        F_before = ufl.Identity(3) + ufl.grad(ufl.split(step.before)[0])
+        timed = {"before": _components(step.before), "F_before": _rows(F_before), "rate": step.rate}
+        if step.predicted is not None:
+            timed["predicted"] = _components(step.predicted)
     state = State(
         F=_rows(F),
         displacement=[displacement[i] for i in range(3)],
         pressure=others[0] if others else None,
         fibre=fibre,
-        before=[passed[i] for i in range(3)],
-        F_before=_rows(F_before),
-        rate=rate,
         functions=UflFunctions(),
+        **timed,
     )
     return state, _Variables(F, displacement, others[0] if others else None)
+
+
+def _components(unknowns: fem.Function) -> list[Any]:
+    """The displacement (3,) of ``unknowns``."""
+    return [ufl.split(unknowns)[0][i] for i in range(3)]
 
 
 def _rows(F: Any) -> list[list[Any]]:

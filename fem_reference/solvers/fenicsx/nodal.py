@@ -26,14 +26,14 @@ class Nodal:
         self.pressure = (
             _Values(pressures[0], corners if order else corners.mean(axis=0)[None], ()) if pressures else None
         )
-        self.before = None if clock.before is None else _Values(ufl.split(clock.before)[0], nodes, (3,))
+        self.before = None if clock.step is None else _Values(ufl.split(clock.step.before)[0], nodes, (3,))
 
     def state(self) -> NodalState:
         """The present state, the same on every rank."""
         displacement = self._gathered(self.displacement)
         pressure = np.zeros((len(displacement), 0)) if self.pressure is None else self._gathered(self.pressure)
         before = np.zeros((0, 0, 3)) if self.before is None else self._gathered(self.before)
-        rate = 0.0 if self.before is None else float(self.clock.rate.value)
+        rate = 0.0 if self.clock.step is None else float(self.clock.step.rate.value)
         return NodalState(displacement, pressure, before, rate)
 
     def _gathered(self, values: "_Values") -> Floats:

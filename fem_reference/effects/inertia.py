@@ -1,0 +1,58 @@
+"""Inertia: mass resists acceleration. Without it a scene is quasi-static and has neither velocities nor a mass matrix."""
+
+from typing import Any, ClassVar
+
+from pydantic import Field
+
+from fem_reference.effects import Energy, State
+from fem_reference.foundations.units import Density
+
+
+class Inertia(Energy):
+    """A force per rest volume of ``-density a``, a the acceleration, by an implicit method of second order.
+
+    Of the generalised-alpha family that is the method in which stresses are those at the end of a step (Wood, Bossak and
+    Zienkiewicz 1980, doi 10.1002/nme.1620151011; Chung and Hulbert 1993, doi 10.1115/1.2900803, with alpha_f = 0):
+    ``alpha = (r - 1) / (r + 1)``, ``gamma = 1/2 - alpha``, ``beta = (1 - alpha)^2 / 4``, of which r, ``spectral_radius``, is what a
+    step leaves of the shortest waves: 1 keeps them (the trapezoidal rule), 0 takes them away at once. Long waves keep their energy.
+    A step then ends where ``density (1 + r) rate^2 |u - predicted|^2`` and all other energies are least: a potential of the step,
+    which no material stores.
+
+    ``density``: at rest [tonne/mm^3]; ``spectral_radius``: from 0 to 1.
+    """
+
+    needs: ClassVar[tuple[str, ...]] = ("interval", "momentum")
+    stored: ClassVar[bool] = False
+
+    density: Density
+    spectral_radius: float = Field(default=0.9, ge=0, le=1)
+
+    def energy(self, state: State) -> Any:
+        """The potential of the step per rest volume [MPa]."""
+        square = sum((now - then) ** 2 for now, then in zip(state.displacement, state.predicted, strict=True))
+        return self.density * (1 + self.spectral_radius) * state.rate**2 * square
+
+    def kinetic(self, velocity: Any) -> Any:
+        """The kinetic energy per rest volume [MPa] at a ``velocity`` (3,) [mm/s]."""
+        return self.density / 2 * sum(component**2 for component in velocity)
+
+    def predicted(self, u: Any, v: Any, a: Any, seconds: float) -> Any:
+        """The displacement [mm] that a step of so many ``seconds`` goes to without forces, from ``u`` with velocity ``v`` and
+        acceleration ``a`` (arrays of one shape).
+        """
+        alpha, _, beta = self._rule()
+        return u + seconds * v + seconds**2 * (0.5 - beta - beta * alpha / (1 - alpha)) * a
+
+    def advanced(self, u: Any, v: Any, a: Any, now: Any, seconds: float) -> tuple[Any, Any]:
+        """Velocity and acceleration after a step of so many ``seconds`` from ``u`` to ``now``."""
+        _, gamma, beta = self._rule()
+        after = (now - u - seconds * v - seconds**2 * (0.5 - beta) * a) / (beta * seconds**2)
+        return v + seconds * ((1 - gamma) * a + gamma * after), after
+
+    def begun(self, u: Any, seconds: float) -> Any:
+        """The acceleration of what was at rest and is displaced by ``u`` after so few ``seconds`` that forces are the same."""
+        return 2 * (1 + self.spectral_radius) * u / seconds**2
+
+    def _rule(self) -> tuple[float, float, float]:
+        alpha = (self.spectral_radius - 1) / (self.spectral_radius + 1)
+        return alpha, 0.5 - alpha, (1 - alpha) ** 2 / 4
