@@ -10,6 +10,7 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh
 from fem_reference.io.formats import Format
+from fem_reference.io.formats._vtk_sizes import check_sizes
 from fem_reference.io.soup import Lines, Soup, check_lines, joined, only_triangles
 
 
@@ -58,6 +59,7 @@ def _data(path: Path) -> Any:
     """The data set of a VTK file; ValueError with VTK's own words where it complains."""
     import pyvista
 
+    check_sizes(path.read_bytes(), xml=path.suffix.lower() != ".vtk")
     with _errors() as errors:
         reader = pyvista.get_reader(path)
         reader.reader.Update()  # the reader's own read() only logs errors and warns of them
