@@ -118,7 +118,12 @@ def test_every_parameter_is_felt_and_has_its_unit(name: str) -> None:
         ("guccione", "bt", 0.0, "bt: got 0.0, want greater than 0"),
         ("guccione", "bfs", 0.0, "bfs: got 0.0, want greater than 0"),
         ("prestretch", "stretch", 0.0, "stretch: got 0.0, want greater than 0"),
-        ("prestretch", "ramp", [{"frame": 0, "amount": -5.0}], r"ramp\[0\].amount: got -5.0, want greater than or equal"),
+        (
+            "prestretch",
+            "ramp",
+            [{"frame": 0, "amount": -5.0}],
+            r"ramp\[0\].amount: got -5.0, want greater than or equal",
+        ),
         ("gravity", "ramp", [{"frame": 0, "amount": 1e300}], r"amount: got 1e\+300, want less than or equal to 1000"),
         ("mooney_rivlin", "c2", "-10 kPa", r"want c1 \+ c2 above zero"),
         ("pressure", "ramp", [], r"ramp: got \[\], want .* at least 1 item"),

@@ -99,7 +99,7 @@ def test_damage_is_named(tmp_path) -> None:
     with pytest.raises(InputError, match="format: got 99, want 1"):
         store.load(folder)
     (folder / "run.json").write_text(json.dumps(state | {"numbers": []}))
-    with pytest.raises(InputError, match="run.numbers: got \\[\\], want .* at least 1 item"):
+    with pytest.raises(InputError, match=r"run.numbers: got \[\], want .* at least 1 item"):
         store.load(folder)
 
 
