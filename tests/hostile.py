@@ -237,7 +237,7 @@ def _finite(text: str) -> None:
 def _make_surface(suffix: str, **settings: Any) -> Callable[[Path], None]:
     def make(folder: Path) -> None:
         if settings:
-            mesh = meshio.Mesh(BALL.points, [("triangle", BALL.triangles)], {"displacement": BALL.points})
+            mesh = meshio.Mesh(BALL.points, [("triangle", BALL.triangles)])
             mesh.write(folder / f"ball{suffix}", **settings)
         else:
             files.write_surface(folder / f"ball{suffix}", BALL, BALL.points)

@@ -97,7 +97,7 @@ class _Arrays:
         form = array.get("format", "ascii")
         dtype = np.dtype(self.order + kind)
         if form == "ascii":
-            return _numbers(array.text or "", dtype)
+            return _numbers(array.text or "", np.dtype(kind))
         if form == "appended":
             offset = int(array.attrib["offset"])
             if not 0 <= offset <= len(self.appended):
@@ -144,19 +144,53 @@ def _decoded(data: memoryview, count: int) -> bytes:
 
 def _unpacking(compressor: str) -> Callable[[bytes, int], bytes]:
     """How blocks become bytes, never more than are said to be in them."""
+    if compressor not in _UNPACKING:
+        raise ValueError(f"arrays compressed by {compressor[:40]}, none of {', '.join(_UNPACKING)}")
 
     def unpacked(packed: bytes, count: int) -> bytes:
-        if compressor == "vtkZLibDataCompressor":
-            found = zlib.decompressobj().decompress(packed, count + 1)
-        else:
-            found = lzma.LZMADecompressor(memlimit=_MOST).decompress(packed, count + 1)
+        found = _UNPACKING[compressor](packed, count + 1)
         if len(found) != count:
             raise ValueError(f"a block of {len(found)} bytes in place of {count}")
         return found
 
-    if compressor not in ("vtkZLibDataCompressor", "vtkLZMADataCompressor"):
-        raise ValueError(f"arrays compressed by {compressor}, while zlib, LZMA or none are read")
     return unpacked
+
+
+def _of_lz4(packed: bytes, most: int) -> bytes:
+    """A block of LZ4: runs of bytes as they are, each followed by a repetition of what was shortly before."""
+    found, at = bytearray(), 0
+
+    def extended(length: int) -> int:
+        nonlocal at
+        if length == 15:
+            while packed[at] == 255:
+                length, at = length + 255, at + 1
+            length, at = length + packed[at], at + 1
+        return length
+
+    while at < len(packed):
+        token = packed[at]
+        at += 1
+        plain = extended(token >> 4)
+        found += packed[at : at + plain]
+        at += plain
+        if at >= len(packed):
+            break
+        back = int.from_bytes(packed[at : at + 2], "little")
+        at += 2
+        count = extended(token & 15) + 4
+        if not 0 < back <= len(found) or len(found) + count > most:
+            raise ValueError("a damaged block of LZ4")
+        before = bytes(found[-back:])
+        found += (before * (count // back + 1))[:count]
+    return bytes(found)
+
+
+_UNPACKING: dict[str, Callable[[bytes, int], bytes]] = {
+    "vtkZLibDataCompressor": lambda packed, most: zlib.decompressobj().decompress(packed, most),
+    "vtkLZMADataCompressor": lambda packed, most: lzma.LZMADecompressor(memlimit=_MOST).decompress(packed, most),
+    "vtkLZ4DataCompressor": _of_lz4,
+}
 
 
 def _numbers(text: str, dtype: np.dtype[Any]) -> Any:
