@@ -63,7 +63,7 @@ def _scene_file(case: str | Path) -> Path:
 
 def _change(table: dict[str, Any], key: str, value: Any, place: str) -> None:
     parts = re.findall(r"[^.\[\]]+", key) or [""]
-    *parents, last = [int(part) if part.isdecimal() else part for part in parts]
+    *parents, last = [int(part) if part.isdecimal() and len(part) < 10 else part for part in parts]
     inside: Any = table
     try:
         for part in parents:
