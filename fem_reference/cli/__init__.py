@@ -49,13 +49,15 @@ def main(arguments: list[str]) -> int:
     except KeyboardInterrupt:
         print("fem-reference: interrupted; a run that was not finished is solved again next time", file=sys.stderr)
         return INTERRUPTED
-    except Exception as error:  # whatever it is, it is no verdict
+    except SystemExit:
+        raise
+    except BaseException as error:  # whatever it is, it is no verdict
         print(f"fem-reference: {_why_broken(error)}", file=sys.stderr)
         return BROKEN
     return status
 
 
-def _why_broken(error: Exception) -> str:
+def _why_broken(error: BaseException) -> str:
     """The sentence on an exception that nobody expected: what, where, and what to do."""
     if isinstance(error, MemoryError):
         return "there is not enough memory for this; nothing was judged. Smaller input, or larger tetrahedra, need less"

@@ -47,9 +47,9 @@ class Bench[C: Case]:
         self.problem: Callable[[], Any] = cache(lambda: of_case.problem(scene, self.setup()))
 
     def settings(self, choice: SolverChoice, place: str) -> Record:
-        """The settings of ``choice``, checked; a folder that the scene names is found as its files are."""
-        named = choice in (self.scene.reference, *self.scene.candidate)
-        if named and isinstance(folder := choice.settings.get("folder"), str):
+        """The settings of ``choice``, checked; a folder that the scene names is found as its files are, and only there."""
+        folder, named = choice.settings.get("folder"), choice in (self.scene.reference, *self.scene.candidate)
+        if isinstance(folder, str) and (named or not Path(folder).is_absolute()):
             choice = choice.model_copy(update={"folder": str(self.scene.file(folder, f"{place}.folder"))})
         where, task = join(self.scene.place, place), self.scene.task
         settings = solvers.settings(choice, where, task)

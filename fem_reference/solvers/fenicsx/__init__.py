@@ -185,7 +185,7 @@ def _frame(event: dict[str, Any]) -> Frame:
         note += f", unstable equilibrium (negative modes: {scalars['negative_modes']:.0f})"
     if scalars.get("outside_law", 0) > 0:
         note += f", a law outside its range in {scalars['outside_law']:.0f} cells"
-    with np.load(event["file"]) as arrays:
+    with np.load(event["file"], allow_pickle=False) as arrays:
         pulls = {
             name.replace("force ", "force_"): float(np.linalg.norm(arrays[name]))
             for name in arrays
