@@ -118,7 +118,13 @@ def test_every_parameter_is_felt_and_has_its_unit(name: str) -> None:
         ("guccione", "bt", 0.0, "bt: got 0.0, want greater than 0"),
         ("guccione", "bfs", 0.0, "bfs: got 0.0, want greater than 0"),
         ("prestretch", "stretch", 0.0, "stretch: got 0.0, want greater than 0"),
-        ("prestretch", "ramp", [{"frame": 0, "amount": -10.0}], r"want a ramp whose stretches 1 \+ amount"),
+        (
+            "prestretch",
+            "ramp",
+            [{"frame": 0, "amount": -5.0}],
+            r"ramp\[0\].amount: got -5.0, want greater than or equal",
+        ),
+        ("gravity", "ramp", [{"frame": 0, "amount": 1e300}], r"amount: got 1e\+300, want less than or equal to 1000"),
         ("mooney_rivlin", "c2", "-10 kPa", r"want c1 \+ c2 above zero"),
         ("pressure", "ramp", [], r"ramp: got \[\], want .* at least 1 item"),
         (
@@ -133,6 +139,11 @@ def test_every_parameter_is_felt_and_has_its_unit(name: str) -> None:
 def test_values_that_mean_nothing_are_refused(name: str, key: str, value: object, want: str) -> None:
     with pytest.raises(InputError, match=want):
         make(name, **{key: value})
+
+
+def test_a_prestretch_keeps_its_fibres_longer_than_nothing() -> None:
+    with pytest.raises(InputError, match=r"want a ramp whose stretches 1 \+ amount"):
+        make("prestretch", stretch=0.5, ramp=[{"frame": 0, "amount": 10.0}])
 
 
 @dataclass(frozen=True)

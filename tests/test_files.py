@@ -87,9 +87,9 @@ def test_segments_become_lines(tmp_path: Path, cells: tuple[list[int], ...], wan
     [
         ("ring.vtk", segments([0, 1], [1, 2], [2, 0]), "lines that close to a ring"),
         ("none.vtk", segments(), "no lines"),
-        ("cut.vtk", segments([0, 1], [1, 2])[:-6], "Error reading"),
-        ("beyond.vtk", segments([0, 1], [1, 9]), "line 1 with a point that does not exist, of 9"),
-        ("below.vtk", segments([0, 1], [-1, 2]), "line 1 with a point that does not exist, of 9"),
+        ("cut.vtk", segments([0, 1], [1, 2])[:-6], "3 numbers of 6"),
+        ("beyond.vtk", segments([0, 1], [1, 9]), "cell 1 with a point that does not exist, of 9"),
+        ("below.vtk", segments([0, 1], [-1, 2]), "cell 1 with a point that does not exist, of 9"),
         ("point.vtk", segments([0, 1], [3]), "line 1 of 1 points"),
         ("nan.vtk", segments([0, 1]).replace("5 0 0", "5 nan 0"), r"a point that is not finite \(point 5\)"),
         ("inf.vtk", segments([0, 1]).replace("1 0 0", "1 0 inf"), r"a point that is not finite \(point 1\)"),
@@ -113,7 +113,7 @@ def test_what_a_solver_made_of_lines_is_read(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"moved\.vtp: got a point that is not finite \(point 0\)"):
         files.read_polylines(path, 1.0)
     (tmp_path / "cells.vtk").write_text(segments([0, 9]))
-    with pytest.raises(InputError, match=r"cells\.vtk: got line 0 with a point that does not exist"):
+    with pytest.raises(InputError, match=r"cells\.vtk: got cell 0 with a point that does not exist"):
         files.read_moved_polylines(tmp_path / "cells.vtk", 1.0)
 
 

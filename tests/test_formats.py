@@ -231,7 +231,7 @@ LIST_PLY = (
         (
             "grid.vtk",
             "# vtk DataFile Version 3.0\n\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 2\n",
-            "ImageData",
+            "a VTK file of STRUCTURED_POINTS",
         ),
         ("quad.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n", "a polygon of 4 corners"),
         ("quad.off", "OFF 4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n", "a polygon of 4 corners"),
@@ -252,7 +252,7 @@ LIST_PLY = (
         ),
         ("nan.ply", f"{PLY_TEXT}element face 1\n{CORNERS}3 0 1 nan\n", r"corners of shape \(1, 3\) that are not three"),
         ("word.off", "a text\n", "no OFF header"),
-        ("word.vtp", "a text\n", "Error parsing XML"),
+        ("word.vtp", "a text\n", "syntax error"),
         ("word.step", "ISO-10303-21\n", 'the suffix ".step"'),
     ],
 )

@@ -101,7 +101,7 @@ because = "it is nearly incompressible"
 
 [negative_control]
 key = "effect[1].bulk"
-value = "10 kPa"
+value = "40 kPa"
 because = "it is compressible then"
 """
 # Solvers check their own settings.
@@ -267,7 +267,7 @@ WRONG = [
     ("bone[1].motion.axis", ["1", "0", "0"], 'bone[1].motion.axis[0]: got "1", want a valid number'),
     ("bone[1].motion.keyframes[1].frame", NAN, "bone[1].motion.keyframes[1].frame: got nan, want a finite number"),
     ("bone[1].motion.keyframes[1].frame", "10", 'bone[1].motion.keyframes[1].frame: got "10", want a valid number'),
-    ("muscle.tet_size", "1e-320 mm", 'muscle.tet_size: got "1e-320 mm", want more than zero'),
+    ("muscle.tet_size", "1e-320 mm", 'muscle.tet_size: got "1e-320 mm", want at least 1e-30 mm'),
     ("muscle.tet_size", "mm", 'muscle.tet_size: got "mm", want a length with its unit'),
     ("title", 3, "title: got 3, want a valid string"),
     ("bone[1].motion.centre", "1, 2 mm", 'bone[1].motion.centre: got "1, 2 mm", want three lengths with one unit'),
@@ -410,7 +410,7 @@ WRONG = [
     (
         "negative_control.key",
         "negative_control.because",
-        'negative_control.value: got "10 kPa", want a value that changes negative_control.because',
+        'negative_control.value: got "40 kPa", want a value that changes negative_control.because',
     ),
     (
         "negative_control.value",
@@ -519,7 +519,7 @@ def test_change_of_a_key_that_is_not_there(bar: Path, key: str) -> None:
 
 
 def test_negative_control_changes_one_key(bar: Path) -> None:
-    assert casefile.read(bar, with_negative_control=True) == casefile.read(bar, changes={"effect[1].bulk": "10 kPa"})
+    assert casefile.read(bar, with_negative_control=True) == casefile.read(bar, changes={"effect[1].bulk": "40 kPa"})
 
 
 def test_negative_control_that_is_missing(bar: Path) -> None:
@@ -533,7 +533,7 @@ def test_negative_control_is_tried_on_reading(bar: Path) -> None:
 
 
 def test_negative_control_may_be_a_number(bar: Path) -> None:
-    file = edited(bar, 'key = "effect[1].bulk"\nvalue = "10 kPa"', 'key = "frames.last"\nvalue = 15')
+    file = edited(bar, 'key = "effect[1].bulk"\nvalue = "40 kPa"', 'key = "frames.last"\nvalue = 15')
     assert casefile.read(file, with_negative_control=True).frames.last == 15
 
 

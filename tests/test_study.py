@@ -170,5 +170,5 @@ def test_a_damaged_file_is_named(tmp_path, what) -> None:
 
 def test_a_file_that_was_cut_off_is_named(tmp_path) -> None:
     (tmp_path / error_bars.FILE).write_text('{"format": 2, "of"')
-    with pytest.raises(InputError, match=r"error_bar.json: got JSONDecodeError"):
+    with pytest.raises(InputError, match=r"error_bar.json: got Expecting .*, want the error bar"):
         error_bars.load(tmp_path, OF)

@@ -15,7 +15,7 @@ from fem_reference.assessment.measured import CurrentMeasures, sample
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import Record, parse
-from fem_reference.io import files
+from fem_reference.io import files, texts
 from fem_reference.metrics import Measure
 from fem_reference.scenes.muscle import MuscleCase
 
@@ -115,12 +115,7 @@ def update(path: Path, current: CurrentMeasures) -> Baseline:
 
 def _read(path: Path) -> Baseline:
     place, want = f"{path}", "the baseline of a candidate (--update writes it)"
-    if not path.is_file():
-        raise InputError(place, "no file", want)
-    try:
-        table = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(place, str(error), want) from error
+    table = texts.read_json(path, want)
     if not isinstance(table, dict) or table.get("format") != FORMAT:
         got = table.get("format", "nothing") if isinstance(table, dict) else "no table"
         raise InputError(f"{place}: format", got, f"{FORMAT}, {want}")

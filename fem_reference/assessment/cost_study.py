@@ -1,14 +1,16 @@
 """What accuracy costs on cases: points of error and cost, as pages show them and files keep them."""
 
-import json
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
+
+from pydantic import TypeAdapter
 
 from fem_reference.assessment.claims import Claim
 from fem_reference.assessment.fronts import Point
 from fem_reference.assessment.growth import Growth
 from fem_reference.foundations.errors import InputError
+from fem_reference.io import texts
 
 FORMAT = 1
 
@@ -58,12 +60,10 @@ def facts(case: CaseStudy, origin: dict[str, str]) -> dict[str, Any]:
 def load(path: Path) -> CaseStudy:
     """The study of a case from the file that :func:`facts` went into; InputError where it is none."""
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        found = texts.read_json(path, "a study as the verb study writes it")
         if found.pop("format") != FORMAT:
             raise InputError(f"{path}: format", "another one", str(FORMAT))
         del found["origin"]
-        found["points"] = tuple(Point(**point) for point in found["points"])
-        found["claims"] = tuple(Claim(**claim) for claim in found["claims"])
-        return CaseStudy(**found)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        return TypeAdapter(CaseStudy).validate_python(found)
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(path, repr(error), "a study as the verb study writes it") from error

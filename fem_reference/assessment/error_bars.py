@@ -17,7 +17,7 @@ import numpy as np
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
-from fem_reference.io import files
+from fem_reference.io import files, texts
 from fem_reference.metrics import Measure, MeasurementContext, at_rest, find, measure, names, of_itself
 from fem_reference.runs.store import Run
 
@@ -245,14 +245,14 @@ def load(folder: Path, of: dict[str, str]) -> ErrorBars | None:
     if not place.exists():
         return None
     try:
-        table = json.loads(place.read_text(encoding="utf-8"))
+        table = texts.read_json(place, "the error bar of a stored run")
         if table["format"] != FORMAT or table["of"] != of:
             return None
         numbers = tuple(int(number) for number in table["numbers"])
         bars = tuple(_bar(row, len(numbers)) for row in table["bars"])
         fine, coarse = (float(size) for size in table["sizes_mm"])
         return ErrorBars(numbers, (fine, coarse), float(table["order"]), bars)
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
         raise InputError(place, repr(error), "the error bar of a stored run (--error-bar makes it anew)") from error
 
 

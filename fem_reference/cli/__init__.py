@@ -5,11 +5,13 @@ import logging
 import os
 import signal
 import sys
+import traceback
 from pathlib import Path
 
 from fem_reference.cli._parser import parser
 from fem_reference.cli._printing import (
     BAD_INPUT,
+    BROKEN,
     DONE,
     INTERRUPTED,
     SOLVER_FAILED,
@@ -19,7 +21,10 @@ from fem_reference.cli._printing import (
 )
 from fem_reference.foundations.errors import InputError, MissingSoftware
 
-__all__ = ["BAD_INPUT", "DONE", "INTERRUPTED", "SOLVER_FAILED", "TERMINATED", "VERDICT_FAIL", "entry", "main"]
+__all__ = ["BAD_INPUT", "BROKEN", "DONE", "INTERRUPTED", "SOLVER_FAILED", "TERMINATED", "VERDICT_FAIL", "entry", "main"]
+
+
+TRACEBACK_SETTING = "FEM_REFERENCE_TRACEBACK"
 
 
 def entry() -> None:
@@ -30,9 +35,9 @@ def entry() -> None:
 
 def main(arguments: list[str]) -> int:
     """Carry out a command line; returns the exit status."""
-    options = parser().parse_args(arguments)
-    _show_progress(on=not options.quiet)
     try:
+        options = parser().parse_args(arguments)
+        _show_progress(on=not options.quiet)
         _check_outputs(options)
         status: int = options.verb(options)
     except (InputError, OSError) as error:
@@ -44,7 +49,27 @@ def main(arguments: list[str]) -> int:
     except KeyboardInterrupt:
         print("fem-reference: interrupted; a run that was not finished is solved again next time", file=sys.stderr)
         return INTERRUPTED
+    except SystemExit:
+        raise
+    except BaseException as error:  # whatever it is, it is no verdict
+        print(f"fem-reference: {_why_broken(error)}", file=sys.stderr)
+        return BROKEN
     return status
+
+
+def _why_broken(error: BaseException) -> str:
+    """The sentence on an exception that nobody expected: what, where, and what to do."""
+    if isinstance(error, MemoryError):
+        return "there is not enough memory for this; nothing was judged. Smaller input, or larger tetrahedra, need less"
+    frames = traceback.extract_tb(error.__traceback__)
+    places = [f"{Path(frame.filename).name}:{frame.lineno}" for frame in frames[-3:]]
+    what = " ".join(f"{type(error).__name__}: {error}".split())[:300]
+    if os.environ.get(TRACEBACK_SETTING):
+        traceback.print_exception(error)
+    return (
+        f"a mistake of fem-reference itself, no verdict: {what} ({' < '.join(reversed(places))}). Please report it to whoever "
+        f"gave you fem-reference, with the command line; {TRACEBACK_SETTING}=1 shows all of it"
+    )
 
 
 def _check_outputs(options: argparse.Namespace) -> None:

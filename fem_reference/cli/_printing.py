@@ -5,9 +5,9 @@ import json
 from pathlib import Path
 from typing import Any
 
-from fem_reference.io import files
-
 DONE, VERDICT_FAIL, BAD_INPUT, SOLVER_FAILED = range(4)
+# Our own mistake, EX_SOFTWARE of sysexits.h. Python's own status for it is 1, which here is a verdict.
+BROKEN = 70
 INTERRUPTED, TERMINATED = 130, 143  # what shells report for them
 
 
@@ -33,5 +33,7 @@ def write_output(facts: dict[str, Any], text: str, options: argparse.Namespace) 
     """Print ``text``, and write ``facts`` as JSON where that is wanted."""
     print(text)
     if options.json is not None:
+        from fem_reference.io import files
+
         options.json.parent.mkdir(parents=True, exist_ok=True)
         files.write_text(options.json, json.dumps(facts, indent=1, allow_nan=False))

@@ -132,10 +132,10 @@ class State:
 
 
 class RampPoint(Record):
-    """How much of an effect acts at a frame number."""
+    """How much of an effect acts at a frame number: up to a thousand times what its parameters say."""
 
     frame: float
-    amount: float
+    amount: float = Field(ge=0, le=1000)
 
     def __str__(self) -> str:
         return f"{self.amount:g} at frame {self.frame:g}"

@@ -1,5 +1,8 @@
 """The two exceptions of this package: input that is not usable, and software that is not installed."""
 
+# Of what was got, a message shows this many characters.
+_SHOWN = 400
+
 
 class InputError(Exception):
     """What somebody gave is not what is wanted: names the place (file and key), what was got and what is wanted.
@@ -9,12 +12,20 @@ class InputError(Exception):
     """
 
     def __init__(self, place: object, got: object, want: str) -> None:
-        super().__init__(f"{place}: got {got}, want {want}")
+        super().__init__(f"{_shown(place)}: got {_shown(got)}, want {want}")
         self.place, self.got, self.want = place, got, want
 
     def __reduce__(self) -> tuple[type["InputError"], tuple[object, object, str]]:
         """So that it goes from one process to another."""
         return type(self), (self.place, self.got, self.want)
+
+
+def _shown(value: object) -> str:
+    """A value on one line that a terminal shows as it is: not too long, and without control characters."""
+    text = str(value)
+    if len(text) > _SHOWN:
+        text = f"{text[: _SHOWN // 2]} ... {text[-_SHOWN // 4 :]}"
+    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
 
 
 class MissingSoftware(Exception):  # noqa: N818 - it is a state of the machine, not a mistake of the caller

@@ -17,6 +17,8 @@ from fem_reference.foundations.errors import InputError
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+# The greatest coordinate [mm] of a surface: a thousand kilometres.
+FARTHEST = 1e9
 # Corners of the four triangles of a tet, each ordered so that its normal points out of a tet of positive volume.
 TET_FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 
@@ -110,7 +112,17 @@ def check_finite(surface: Surface) -> None:
     bad = np.flatnonzero(~np.isfinite(surface.points).all(axis=1))
     if len(bad):
         raise InputError(surface.place, f"a point that is not finite (vertex {bad[0]})", "finite coordinates")
-    if surface.triangles.min() < 0 or surface.triangles.max() >= len(surface.points):
+    if (farthest := np.abs(surface.points).max()) > FARTHEST:
+        vertex = np.abs(surface.points).max(axis=1).argmax()
+        raise InputError(
+            surface.place, f"a coordinate of {farthest:.3g} mm (vertex {vertex})", f"at most {FARTHEST:g} mm"
+        )
+    check_corners(surface)
+
+
+def check_corners(surface: Surface) -> None:
+    """InputError where a triangle names a point that is not there."""
+    if surface.triangles.min(initial=0) < 0 or surface.triangles.max(initial=-1) >= len(surface.points):
         raise InputError(
             surface.place, "a triangle with a vertex that does not exist", f"0 to {len(surface.points) - 1}"
         )

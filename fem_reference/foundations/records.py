@@ -1,8 +1,8 @@
 """Strict frozen records read from TOML: an unknown key, a missing key or a wrong value is one InputError that names it."""
 
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from fem_reference.foundations.errors import InputError
 
@@ -18,10 +18,25 @@ class Record(BaseModel):
     )
 
 
+def _check_name(name: str) -> str:
+    if not name.isprintable() or name != name.strip() or not 0 < len(name) <= _LONGEST_NAME:
+        raise ValueError(f"a name of 1 to {_LONGEST_NAME} letters, digits and signs, without blanks at its ends")
+    return name
+
+
+# What pages and messages call something.
+_LONGEST_NAME = 100
+Name = Annotated[str, AfterValidator(_check_name)]
+# A name that a file or folder can have too.
+FileName = Annotated[str, Field(pattern=r"^[\w-][\w.-]{0,99}$")]
+
+
 def parse[R: Record](record: type[R], table: object, place: str) -> R:
     """``table`` as a ``record``; ``place`` is what its keys are reported below, for example ``"case.toml: effect[0]"``."""
     try:
         return record.model_validate(_frozen(table))
+    except RecursionError as error:
+        raise InputError(place, "tables inside tables without end", "the keys of a file") from error
     except ValidationError as error:
         # An unknown key first: where a key is mistyped, it says more than that the right one is missing.
         first = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")

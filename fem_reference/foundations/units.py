@@ -5,7 +5,6 @@ The annotated types are what scene records are made of: a field of type ``Pressu
 
 import math
 import re
-import sys
 from collections.abc import Sequence
 from functools import cache, partial
 from typing import Annotated, Any
@@ -36,6 +35,14 @@ _INSIDE = {
 _WRITTEN = {"a fraction": ("", "%", "percent"), "a number": ("",)}
 # A number, then what may be a unit.
 _NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.ASCII)
+# What a unit may not have: an exponent that is no integer of one or two digits, or that has an exponent itself, as in mm^9^9^9.
+_NO_UNIT = re.compile(r"(?:\^|\*\*)(?!\s*[+-]?\d{1,2}(?![\w.])(?!\s*(?:\^|\*\*)))", re.ASCII)
+# The most characters of a quantity, and of three.
+_LONGEST = 100
+# The greatest magnitude of each kind, in its unit inside: a thousand kilometres, ten times the stiffness of diamond; of others, and
+# how much what is above zero must have, beyond all that exists and where digits are not lost.
+_GREATEST = {"a length": 1e9, "a pressure": 1e7, "an angle": 1e6, "a fraction": 1e6}
+_GREATEST_OF_OTHERS, _SMALLEST = 1e15, 1e-30
 # Where an exponent follows a unit without a sign for it, as in m3.
 _EXPONENT = re.compile(r"(?<=[A-Za-z])(?=[23](?!\w))")
 
@@ -56,7 +63,7 @@ def quantity(text: object, kind: str) -> float:
     wrong = ValueError(f"{kind}{' with its unit' if kind != 'a number' else ''}, such as {_EXAMPLE[kind]}")
     number, unit = _split(text)
     unit = _EXPONENT.sub("^", unit)
-    if not number or unit not in _WRITTEN.get(kind, (unit,)):
+    if not number or unit not in _WRITTEN.get(kind, (unit,)) or _NO_UNIT.search(unit):
         raise wrong
     try:
         read = _registry().Quantity(float(number), _registry().parse_units(unit))
@@ -66,12 +73,14 @@ def quantity(text: object, kind: str) -> float:
         raise wrong from error
     if not math.isfinite(value) or not same:  # to pint an angle has no dimension, its root unit distinguishes it
         raise wrong
+    if abs(value) > (most := _GREATEST.get(kind, _GREATEST_OF_OTHERS)):
+        raise ValueError(f"{kind} of at most {most:g} {_INSIDE[kind]}".rstrip())
     return value
 
 
 def _split(text: object) -> tuple[str, str]:
     """Number and unit as text; both empty where ``text`` does not begin with a number."""
-    match = _NUMBER_AND_UNIT.fullmatch(text) if isinstance(text, str) else None
+    match = _NUMBER_AND_UNIT.fullmatch(text) if isinstance(text, str) and len(text) <= _LONGEST else None
     return (match[1], match[2]) if match else ("", "")
 
 
@@ -106,7 +115,7 @@ def three(text: object, kind: str) -> tuple[float, float, float]:
     >>> three("146, 238, -431 mm", "a length"), three("0, 6.25, 0 kPa", "a pressure")
     ((146.0, 238.0, -431.0), (0.0, 0.00625, 0.0))
     """
-    parts = [_split(part) for part in text.split(",")] if isinstance(text, str) else []
+    parts = [_split(part) for part in text.split(",", 3)] if isinstance(text, str) else []
     shared = parts[-1][1] if parts else ""
     try:
         x, y, z = (quantity(f"{number} {shared}", kind) for number, unit in parts if unit in ("", shared))
@@ -126,8 +135,10 @@ def length_unit(text: object) -> float:
 def positive(text: object, kind: str) -> float:
     """A :func:`quantity` above zero."""
     value = quantity(text, kind)
-    if not value >= sys.float_info.min:  # below it numbers lose their digits
+    if not value > 0:
         raise ValueError("more than zero")
+    if not value >= _SMALLEST:
+        raise ValueError(f"at least {_SMALLEST:g} {_INSIDE[kind]}".rstrip())
     return value
 
 

@@ -3,9 +3,12 @@
 import igl
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats, Surface
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, Ints, Surface
 from fem_reference.geometry.distance import distances
 
+# The most triangles that a patch is laid on a bone in: those of some metres.
+_MOST_TRIANGLES = 2**20
 # Sides of the triangles of a patch that is laid on a bone are at most this long [mm].
 _SIDE = 2.0
 
@@ -17,9 +20,18 @@ def draped(patches: Surface, bone_surface: Surface) -> Surface:
     is thick there.
     """
     points, triangles = patches.points, patches.triangles
-    while np.linalg.norm(points[triangles] - points[np.roll(triangles, 1, axis=1)], axis=2).max() > _SIDE:
+    longest = _longest_side(points, triangles)
+    if len(triangles) * (longest / _SIDE) ** 2 > _MOST_TRIANGLES:
+        raise InputError(
+            patches.place, f"landmarks {longest:.4g} mm apart", "those around one attachment, in the unit stated"
+        )
+    while _longest_side(points, triangles) > _SIDE:
         points, triangles = igl.upsample(points, triangles)
     return Surface(distances(points, bone_surface).closest, triangles, patches.place)
+
+
+def _longest_side(points: Floats, triangles: Ints) -> float:
+    return float(np.linalg.norm(points[triangles] - points[np.roll(triangles, 1, axis=1)], axis=2).max())
 
 
 def fan(points: Floats) -> Surface:

@@ -194,7 +194,7 @@ def _run(mesher: str, surface: Surface, size: float) -> TetMesh:
             raise InputError(surface.place, got, "larger tetrahedra or a cleaner surface") from None
         if done.returncode != 0 or not result.exists():
             raise InputError(surface.place, f"a surface that {mesher} refuses ({_last_words(done)})", "a clean surface")
-        with np.load(result) as arrays:
+        with np.load(result, allow_pickle=False) as arrays:
             return TetMesh(arrays["points"], arrays["tets"], maker=_MAKERS[mesher])
 
 
@@ -281,7 +281,7 @@ def _tetwild(points: Floats, triangles: Ints, size: float) -> tuple[Floats, Ints
 
 
 def _work(job: Path, result: Path) -> None:
-    with np.load(job) as given:
+    with np.load(job, allow_pickle=False) as given:
         mesher = {"gmsh": _gmsh, "tetwild": _tetwild}[str(given["mesher"])]
         points, tets = mesher(given["points"], given["triangles"], float(given["size"]))
     np.savez(result, points=points, tets=tets)

@@ -8,16 +8,21 @@ import os
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from xml.etree import ElementTree
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh
-from fem_reference.io import soup
+from fem_reference.io import soup, xdmf
 from fem_reference.io.formats import Format, formats, vtk
+from fem_reference.io.references import beside, parsed_xml
 from fem_reference.io.soup import Lines
+from fem_reference.io.texts import check_size
+
+# The most bytes of a mesh, a table or an index: a million triangles, which no mesher and no solver of ours takes. What is read
+# of a text takes up to thirty times as much.
+MOST_BYTES = 2**26
 
 
 def surface_suffixes() -> tuple[str, ...]:
@@ -90,7 +95,7 @@ def read_xdmf(path: Path, unit: float) -> list[tuple[float, Surface]]:
     The points are moved by the point data ``displacement``, or ``u`` where that is its name.
     """
     want = "an XDMF time series of one triangle mesh with its displacement"
-    steps = _attempt(_meshio_steps, path, want)
+    steps = _attempt(xdmf.read, path, want)
     return [(time, Surface(points * unit, triangles, f"{path}: time {time:g}")) for time, points, triangles in steps]
 
 
@@ -99,8 +104,8 @@ def read_pvd(path: Path) -> list[tuple[float, Path]]:
     want = "a PVD index with a timestep and a file for each DataSet"
 
     def read(index: Path) -> list[tuple[float, Path]]:
-        entries = ElementTree.parse(index).getroot().iter("DataSet")
-        return [(float(entry.attrib["timestep"]), index.parent / entry.attrib["file"]) for entry in entries]
+        entries = parsed_xml(index).iter("DataSet")
+        return [(float(entry.attrib["timestep"]), beside(index, entry.attrib["file"])) for entry in entries]
 
     return _attempt(read, path, want)
 
@@ -196,16 +201,10 @@ def _attempt[T](read: Callable[[Path], T], path: Path, want: str) -> T:
     """What ``read`` makes of the file; whatever a reader raises over a damaged file becomes an InputError."""
     if not path.is_file():
         raise InputError(path, "no file", want)
+    check_size(path, MOST_BYTES, want)
     try:
         return read(path)
+    except MemoryError as error:
+        raise InputError(path, "more than there is memory for", want) from error
     except Exception as error:  # the readers of foreign packages raise whatever occurs to them
         raise InputError(path, str(error) or type(error).__name__, want) from error
-
-
-def _meshio_steps(path: Path) -> list[tuple[float, Floats, Ints]]:
-    import meshio
-
-    with meshio.xdmf.TimeSeriesReader(path) as series:
-        points, triangles = soup.arrays(soup.of_meshio(meshio.Mesh(*series.read_points_cells())))
-        steps = [series.read_data(step)[:2] for step in range(series.num_steps)]
-    return [(time, points + soup.displacement(data, points), triangles) for time, data in steps]

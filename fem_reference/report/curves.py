@@ -4,6 +4,7 @@ import io
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from html import escape
 from typing import Any
 
 import matplotlib as mpl
@@ -202,10 +203,11 @@ def logarithmic(axes: Axes) -> None:
 
 
 def inline(svg: str, name: str, title: str) -> str:
-    """The ``<svg>`` alone, as wide as its place, with ``name`` before every id."""
+    """The ``<svg>`` alone, as wide as its place, with ``name`` before every id, which has letters and digits only."""
+    name = re.sub(r"[^\w.-]", "_", name)
     svg = re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)
     svg = re.sub(r' xmlns(:\w+)?="[^"]*"', "", svg).replace("xlink:href", "href")
     svg = re.sub(r'(id="|href="#|url\(#)', rf"\g<1>{name}-", svg)
     box = re.search(r'viewBox="[^"]*"', svg)
     assert box is not None  # matplotlib writes one in every drawing
-    return f'<svg {box[0]} role="img" aria-label="{title}">{svg[svg.index(">") + 1 :]}'
+    return f'<svg {box[0]} role="img" aria-label="{escape(title)}">{svg[svg.index(">") + 1 :]}'

@@ -24,7 +24,7 @@ _MUSCLE, _BONE, _LINE = "#b4574e", "#dedbd4", (25, 25, 25)
 
 def main(job: Path, folder: Path) -> None:
     """Draw every view of every shot."""
-    with np.load(job) as stored:
+    with np.load(job, allow_pickle=False) as stored:
         arrays = dict(stored)
     bones = [_surface(arrays[f"bone_{i}_points"], arrays[f"bone_{i}_triangles"]) for i in range(arrays["bones"])]
     for shot in range(arrays["shots"]):

@@ -52,7 +52,7 @@ def render(study: Study) -> str:
         matched=matched,
         left_out=left_out,
         title_of=title_of,
-        data=json.dumps(_data(study)).replace("</", "<\\/"),
+        data=json.dumps(_data(study)).replace("<", "\\u003c"),
         cover=lambda case: Cover.of(case.claims),
         claims=lambda case: [claims_drawing(case.claims, metric, case.case) for metric in CLAIMED_UNITS],
         large=LARGE,

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -41,6 +42,32 @@ def read(folder: Path, numbers: tuple[int, ...]) -> tuple[FieldMesh, dict[str, F
         frames.append(read_arrays(path))
         if not {"points", "cells", VALUES} <= frames[-1].keys():
             raise InputError(path, ", ".join(frames[-1]), f"the arrays points, cells and {VALUES}")
+        _check(frames[-1], frames[0], path)
     names = [name for name in frames[0] if name not in ("points", "cells")]
     mesh = FieldMesh(frames[0]["points"], frames[0]["cells"], str(folder))
     return mesh, {name: np.stack([frame[name] for frame in frames]) for name in names}
+
+
+def _check(arrays: dict[str, Any], first: dict[str, Any], path: Path) -> None:
+    """InputError where the arrays of a frame are none of a field, or of another mesh than those of the ``first``."""
+    points, cells, values = arrays["points"], arrays["cells"], arrays[VALUES]
+    found = {name: (array.shape, array.dtype.kind) for name, array in arrays.items()}
+    usable = (
+        all(kind in "fiu" for _, kind in found.values())
+        and points.ndim == cells.ndim == 2
+        and points.shape[1] in (1, 2, 3)
+        and cells.shape[1] in (2, 3)
+        and cells.dtype.kind == "i"
+        and cells.size > 0
+        and cells.min() >= 0
+        and cells.max() < len(points)
+        and values.ndim == 1
+    )
+    if not usable or found != {name: (array.shape, array.dtype.kind) for name, array in first.items()}:
+        got = ", ".join(f"{name} {shape} of {kind}" for name, (shape, kind) in found.items())
+        raise InputError(
+            path, got, f"points (n, d), cells (m, 2 or 3) and {VALUES} of one mesh, as in the other frames"
+        )
+    nodes = {len(points), len(points) + len(FieldMesh(points, cells).edges)}
+    if len(values) not in nodes or any(len(array) < len(points) for name, array in arrays.items() if name != "cells"):
+        raise InputError(path, f"{len(values)} values", f"{' or '.join(map(str, sorted(nodes)))}, one a node")

@@ -8,7 +8,7 @@ import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from fem_reference.foundations.mesh import Floats, TetMesh
 from fem_reference.io.files import whole
 
 FOLDER = "state"
+# The most memory [bytes] that the arrays of a file may take: a state of a million tetrahedra.
+MOST_BYTES = 2**30
 _ARRAYS = ("displacement", "pressure", "before", "rate")
 
 
@@ -75,6 +77,13 @@ def read_rest(folder: Path) -> tuple[TetMesh, Floats | None]:
     if not place.is_file():
         raise InputError(folder, "a run without states", "one of the reference, solved with store_state = true")
     arrays = read_arrays(place, ("points", "tets", "fibre"))
+    points, tets, fibre = arrays["points"], arrays["tets"], arrays["fibre"]
+    fits = points.dtype.kind == fibre.dtype.kind == "f" and tets.dtype.kind == "i" and fibre.ndim == 2
+    fits = fits and points.ndim == tets.ndim == 2 and (points.shape[1], tets.shape[1], fibre.shape[1]) == (3, 4, 3)
+    fits = fits and tets.size > 0 and tets.min() >= 0 and tets.max() < len(points) and len(fibre) in (0, len(tets))
+    if not (fits and np.isfinite(points).all()):
+        got = f"arrays {points.shape}, {tets.shape} and {fibre.shape}"
+        raise InputError(place, got, "finite points (n, 3), tets (m, 4) of them and fibre (m or 0, 3)")
     return TetMesh(arrays["points"], arrays["tets"]), arrays["fibre"] if len(arrays["fibre"]) else None
 
 
@@ -89,7 +98,12 @@ class Stored(Mapping[float, NodalState]):
         if frame not in self.frames:
             raise KeyError(frame)
         if self.last is None or self.last[0] != frame:
-            self.last = (frame, NodalState.of(read_arrays(_place(self.folder, int(frame)), _ARRAYS)))
+            place = _place(self.folder, int(frame))
+            arrays = read_arrays(place, _ARRAYS)
+            try:
+                self.last = (frame, NodalState.of(arrays))
+            except (TypeError, ValueError) as error:
+                raise InputError(place, str(error), "the arrays of a state") from error
         return self.last[1]
 
     def __iter__(self) -> Iterator[float]:
@@ -110,10 +124,21 @@ def write_arrays(path: Path, arrays: dict[str, Any]) -> None:
         np.savez(part, allow_pickle=False, **arrays)
 
 
+def _check_size(file: BinaryIO) -> None:
+    """ValueError where arrays would take more than ``MOST_BYTES`` of memory."""
+    with zipfile.ZipFile(file) as members:
+        size = sum(member.file_size for member in members.infolist())
+    file.seek(0)
+    if size > MOST_BYTES:
+        raise ValueError(f"{size / 2**20:.0f} MB of arrays, more than {MOST_BYTES / 2**20:.0f}")
+
+
 def read_arrays(path: Path, names: tuple[str, ...] = ()) -> dict[str, Any]:
     """The arrays of an .npz file by name: those of ``names``, by default all; InputError where it is damaged."""
     try:
-        with path.open("rb") as file, np.load(file) as arrays:
-            return {name: arrays[name] for name in names or arrays.files}
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        with path.open("rb") as file:
+            _check_size(file)
+            with np.load(file, allow_pickle=False) as arrays:
+                return {name: arrays[name] for name in names or arrays.files}
+    except Exception as error:  # zipfile and numpy raise whatever occurs to them over a damaged file
         raise InputError(path, repr(error), f"the arrays {', '.join(names)} of a stored state") from error

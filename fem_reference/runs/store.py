@@ -17,26 +17,26 @@ import logging
 import math
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.markup import fact_table
-from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh
+from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh, check_corners
+from fem_reference.foundations.records import parse
 from fem_reference.geometry.field_mesh import FieldMesh
-from fem_reference.io import files
+from fem_reference.io import files, texts
 from fem_reference.runs import fields, states
+from fem_reference.runs.contents import FORMAT, Contents, Status
 from fem_reference.runs.fields import NodalField
 from fem_reference.scenes.case import Part
 
 log = logging.getLogger(__name__)
 
-Status = Literal["converged", "diverged", "inverted", "collapsed", "out of steps", "timed out", "crashed"]
-FORMAT = 1
 # Between the first and the last frame, progress is reported no more often than this [s].
 QUIET = 1.0
 
@@ -236,50 +236,52 @@ class Writer:
 def load(folder: Path) -> Run:
     """The run in ``folder``; InputError where there is none, it was cut off, or one of its files is damaged."""
     place = folder / "run.json"
-    try:
-        state = json.loads(place.read_text(encoding="utf-8"))
-        if state["format"] != FORMAT:
-            raise InputError(f"{place}: format", state["format"], str(FORMAT))
-        if state["status"] not in get_args(Status):
-            raise InputError(f"{place}: status", f'"{state["status"]}"', "a run that came to its end")
-        outcome = Outcome(state["status"], state["message"], state["cost"])
-        numbers = tuple(state["numbers"])
-        scalars = {name: np.asarray(values, float) for name, values in state["scalars"].items()}
-        name, solver, origin, parts = state["name"], state["solver"], state["origin"], state["parts"]
-    except (OSError, json.JSONDecodeError, KeyError, TypeError) as error:
-        raise InputError(place, repr(error), "the run.json of a stored run") from error
-    if not numbers:
-        raise InputError(place, "a run without frames", "at least the rest frame")
-    whose = {"name": name, "solver": solver, "outcome": outcome, "numbers": numbers, "scalars": scalars}
-    whose |= {"origin": origin, "folder": folder}
-    if fields.FOLDER in parts:
-        mesh, arrays = fields.read(folder, numbers)
+    state = texts.read_json(place, "the run.json of a stored run")
+    if isinstance(state, dict) and state.get("status") == "running":
+        raise InputError(f"{place}: status", '"running"', "a run that came to its end")
+    stored = parse(Contents, state, f"{place}: run")
+    whose: dict[str, Any] = {"name": stored.name, "solver": stored.solver, "numbers": stored.numbers, "folder": folder}
+    whose |= {"outcome": Outcome(stored.status, stored.message, stored.cost), "origin": state["origin"]}
+    whose |= {"scalars": {name: np.asarray(values, float) for name, values in stored.scalars.items()}}
+    if fields.FOLDER in stored.parts:
+        mesh, arrays = fields.read(folder, stored.numbers)
         return Run(**whose, has_surface=False, mesh=mesh, fields=arrays)
-    return Run(**whose, **_moved(folder, numbers, parts))
+    return Run(**whose, **_moved(folder, stored.numbers, stored.parts))
 
 
-def _moved(folder: Path, numbers: tuple[int, ...], parts: list[str]) -> dict[str, Any]:
+def _moved(folder: Path, numbers: tuple[int, ...], parts: Collection[str]) -> dict[str, Any]:
     """The surface and the fibres of a run in ``folder``, at rest and moved, as :class:`Run` has them."""
     names, has_surface = [f"frame_{number:04d}.vtp" for number in numbers], "surface" in parts
     if has_surface:
         surfaces = [files.read_surface(folder / "surface" / file, 1.0) for file in names]
-        surface, positions = surfaces[0], np.stack([moved.points for moved in surfaces])
+        surface = surfaces[0]
+        _check_same(folder / "surface", names, [moved.points for moved in surfaces], surface.points)
+        positions = np.stack([moved.points for moved in surfaces])
     else:
         surface = files.read_surface(folder / "rest" / "surface.vtp", 1.0)
         positions = np.full((len(numbers), *surface.points.shape), np.nan)
+    check_corners(surface)
     found: dict[str, Any] = {"surface": surface, "positions": positions, "has_surface": has_surface}
     if "fibres" in parts:
         lines = [files.read_moved_polylines(folder / "fibres" / file, 1.0) for file in names]
         fibres = lines[0] if has_surface else files.read_polylines(folder / "rest" / "fibres.vtp", 1.0)
+        _check_same(folder / "fibres", names, [line.points for line in lines], fibres.points)
         found |= {"fibres": fibres, "fibre_positions": np.stack([line.points for line in lines])}
     return found
+
+
+def _check_same(folder: Path, names: list[str], frames: list[Floats], rest: Floats) -> None:
+    """InputError where a frame has another number of points than the run has at rest."""
+    for name, points in zip(names, frames, strict=True):
+        if len(points) != len(rest):
+            raise InputError(folder / name, f"{len(points)} points", f"{len(rest)}, as the rest of the run has")
 
 
 def status(folder: Path) -> str:
     """What ``run.json`` in ``folder`` says of the run: a status, ``"running"`` where it was cut off, or ``"damaged"``."""
     try:
-        return str(json.loads((folder / "run.json").read_text(encoding="utf-8"))["status"])
-    except (OSError, ValueError, KeyError, TypeError):
+        return str(texts.read_json(folder / "run.json", "a run")["status"])
+    except (InputError, KeyError, TypeError):
         return "damaged"
 
 

@@ -8,9 +8,12 @@ from typing import Self
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from fem_reference.foundations.motion import Rotation, Translation
-from fem_reference.foundations.records import Record
+from fem_reference.foundations.records import Name, Record
 from fem_reference.foundations.units import Angle, Length, LengthUnit, Point, PositiveLength
 from fem_reference.geometry.rigid_bodies import CLOSED_FORMS
+
+# Below this [mm] neither the distance to a bone nor its rounding is resolved by any grid; far above a bone has no shape.
+_FINEST = 1e-3
 
 
 class Keyframe(Record):
@@ -128,7 +131,7 @@ class Bone(Record):
     ``distance_rounding`` takes its Gaussian mean, of this standard deviation: on flat triangles nothing slides smoothly.
     """
 
-    name: str
+    name: Name
     surface: str | None = None
     unit: LengthUnit | None = None
     half_space: HalfSpace | None = None
@@ -147,9 +150,11 @@ class Bone(Record):
             raise ValueError(f"exactly one of {_quoted(forms)}")
         if (self.surface is None) != (self.unit is None):
             raise ValueError('"unit" beside "surface" and only there')
-        for key in ("distance_error", "distance_rounding"):
+        for key, most in (("distance_error", 1.0), ("distance_rounding", 10.0)):
             if self.surface is None and key in self.model_fields_set:
                 raise ValueError(f'"{key}" beside "surface" only: a closed form has none')
+            if not _FINEST <= getattr(self, key) <= most:
+                raise ValueError(f'"{key}" from {_FINEST:g} to {most:g} mm')
         return self
 
 

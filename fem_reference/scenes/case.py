@@ -6,7 +6,7 @@
 import hashlib
 import json
 import os
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -14,9 +14,11 @@ from pydantic import ConfigDict, Field
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.markup import fact_table
-from fem_reference.foundations.records import Record, join
+from fem_reference.foundations.records import FileName, Name, Record, join
 
 DATA_SETTING = "FEM_REFERENCE_DATA"
+# Further folders, divided as those of PATH are, that files which a scene file names may be in.
+ALLOWED_SETTING = "FEM_REFERENCE_FILES"
 DELAUNAY = "delaunay"  # where a file of triangles may stand: no file
 
 
@@ -49,7 +51,7 @@ class SolverChoice(Record):
 class Candidate(SolverChoice):
     """A run to compare with the reference."""
 
-    name: str = Field(pattern=r"^[\w.-]+$")
+    name: FileName
 
 
 class Expectation(Record):
@@ -80,8 +82,8 @@ class NegativeControl(Record):
 
 class Case(Record):
     """A case, read and checked: the keys of its file, and the ``name`` and ``folder`` that it has; ``place`` names its file in
-    messages. ``quick`` are changes, by key, with which it is solved faster and less well, as tests do; ``unsolved`` says why the
-    reference ends before the last frame, where it does.
+    messages, ``from_file`` says that it has one. ``quick`` are changes, by key, with which it is solved faster and less well, as
+    tests do; ``unsolved`` says why the reference ends before the last frame, where it does.
     """
 
     title: str
@@ -93,9 +95,10 @@ class Case(Record):
     negative_control: NegativeControl | None = None
     quick: dict[str, Any] = Field(default_factory=dict)
     unsolved: str = ""
-    name: str = Field(exclude=True)
+    name: Name = Field(exclude=True)
     folder: Path = Field(exclude=True)
     place: str = Field(default="case", exclude=True)
+    from_file: bool = Field(default=False, exclude=True)
 
     # What a solver of it is asked for, what its runs have, the keys that determine its solution, and those of them that name files.
     task: ClassVar[Literal["solve", "solve_field"]]
@@ -152,9 +155,26 @@ class Case(Record):
             path = HOME / "meshes" / text.removeprefix("mesh:")
         else:
             path = self.folder / text
-        if not path.exists():
+        if not _exists(path):
             raise InputError(place, f'"{text}", which is not at {path}', "a file that exists")
+        self._check_allowed(path, place, text)
         return path
+
+    def _check_allowed(self, path: Path, place: str, text: str) -> None:
+        """InputError where a scene file names what is, links followed, in no folder that it may read. A case that a program made
+        may read whatever the program may.
+        """
+        if not self.from_file:
+            return
+        settings = (os.environ.get(name, "") for name in (DATA_SETTING, ALLOWED_SETTING))
+        folders = [
+            self.folder,
+            HOME / "meshes",
+            *(Path(one) for one in os.pathsep.join(settings).split(os.pathsep) if one),
+        ]
+        if not is_inside(path, folders):
+            want = f"a file in the folder of the scene, or {ALLOWED_SETTING}=FOLDER set to one that it may be in"
+            raise InputError(place, f'"{text}", which is at {path.resolve()}', want)
 
     @property
     def key(self) -> str:
@@ -167,6 +187,19 @@ class Case(Record):
         for key, text in _files(tables, self.naming_files):
             digest.update(self.file(text, key).read_bytes())
         return digest.hexdigest()
+
+
+def _exists(path: Path) -> bool:
+    """Whether there is such a file or folder; what is no path at all is none."""
+    try:
+        return path.exists()
+    except (OSError, ValueError):  # a name that is too long, or with a null character
+        return False
+
+
+def is_inside(path: Path, folders: Iterable[Path]) -> bool:
+    """Whether ``path``, links followed, is in one of the ``folders``."""
+    return any(path.resolve().is_relative_to(folder.resolve()) for folder in folders)
 
 
 def _files(tables: Any, names: Collection[str], key: str = "") -> list[tuple[str, str]]:

@@ -1,7 +1,7 @@
 """case.toml -> Case: strict reading. An unknown, missing or wrong key is an InputError that names file and key."""
 
 import re
-import tomllib
+from contextlib import suppress
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
@@ -13,8 +13,12 @@ from fem_reference.effects import find as find_effect
 from fem_reference.effects import names as effect_names
 from fem_reference.effects.contact import Contact, among
 from fem_reference.effects.damping import Damping
+from fem_reference.effects.incompressible import Incompressible
+from fem_reference.effects.incompressible_penalty import IncompressiblePenalty
+from fem_reference.effects.neo_hooke import NeoHooke
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record, join, keys, parse
+from fem_reference.io import texts
 from fem_reference.scenes.case import HOME, Case, NegativeControl
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.scenes.scalar import ScalarCase
@@ -37,10 +41,7 @@ def read(case: str | Path, *, with_negative_control: bool = False, changes: dict
     take away what it changes.
     """
     path = _scene_file(case)
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(path, str(error), "a TOML file") from error
+    table = texts.toml(path)
     for key, value in (changes or {}).items():
         _change(table, key, value, str(path))
     if with_negative_control:
@@ -54,14 +55,15 @@ def read(case: str | Path, *, with_negative_control: bool = False, changes: dict
 
 def _scene_file(case: str | Path) -> Path:
     for path in (HOME / "cases" / str(case) / "case.toml", Path(case) / "case.toml", Path(case)):
-        if path.is_file():
-            return path.resolve()
+        with suppress(OSError, ValueError):  # a name that is too long, or with a null character
+            if path.is_file():
+                return path.resolve()
     raise InputError("CASE", f'"{case}"', f"a scene file, a folder with a case.toml, or one of {', '.join(cases())}")
 
 
 def _change(table: dict[str, Any], key: str, value: Any, place: str) -> None:
     parts = re.findall(r"[^.\[\]]+", key) or [""]
-    *parents, last = [int(part) if part.isdecimal() else part for part in parts]
+    *parents, last = [int(part) if part.isdecimal() and len(part) < 10 else part for part in parts]
     inside: Any = table
     try:
         for part in parents:
@@ -84,8 +86,8 @@ def setting(text: str) -> tuple[str, Any]:
     if not equals or not key:
         raise InputError("--set", f'"{text}"', "KEY=VALUE, such as candidate[1].peclet=10")
     try:
-        return key, tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
+        return key, texts.parse_toml(f"value = {value}", "--set")["value"]
+    except InputError:
         return key, value
 
 
@@ -131,7 +133,7 @@ def _value_text(control: NegativeControl) -> str:
 
 
 def _scene(table: dict[str, Any], path: Path) -> Case:
-    return made(table, {"name": path.parent.name, "folder": path.parent, "place": str(path)})
+    return made(table, {"name": path.parent.name, "folder": path.parent, "place": str(path), "from_file": True})
 
 
 def made(table: dict[str, Any], whose: dict[str, Any]) -> Case:
@@ -147,6 +149,7 @@ def made(table: dict[str, Any], whose: dict[str, Any]) -> Case:
         table = table | {"effect": read_effects}
     case: Case = parse(record, table | whose, place)
     _check_effects([entry["name"] for entry in effects], case.effects, place)
+    _check_moduli(case.effects, place)
     reference, *others = _candidate_names(case)
     expected = [(f"expect[{i}].of", entry.of) for i, entry in enumerate(case.expect)]
     _check_used([reference, "candidates", *others], expected, place)
@@ -166,6 +169,15 @@ def _check_effects(names: list[str], effects: tuple[Record, ...], place: str) ->
         if (name, on) in acting[:i]:
             again = f'"{name}" on "{on}" a second time' if on else f'"{name}" a second time'
             raise InputError(join(place, f"effect[{i}].name"), again, "every effect once")
+
+
+def _check_moduli(effects: tuple[Record, ...], place: str) -> None:
+    """A bulk modulus below the shear modulus is of no tissue, and usually a slip of units."""
+    mu = max((effect.mu for effect in effects if isinstance(effect, NeoHooke)), default=0.0)
+    for i, effect in enumerate(effects):
+        if isinstance(effect, Incompressible | IncompressiblePenalty) and effect.bulk < mu:
+            want = f"at least the shear modulus of neo_hooke, {mu:g} MPa"
+            raise InputError(join(place, f"effect[{i}].bulk"), f"{effect.bulk:g} MPa", want)
 
 
 def _effect(table: Any, place: str, kind: type[Record]) -> Record:

@@ -5,7 +5,7 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from fem_reference.effects import Effect
-from fem_reference.foundations.records import Record
+from fem_reference.foundations.records import Name, Record
 from fem_reference.foundations.units import AreaStiffness, LengthUnit, PositiveLength, Time
 from fem_reference.scenes.bones import Bone
 from fem_reference.scenes.case import Case
@@ -48,7 +48,7 @@ class Attachment(Record):
     and how: by springs of a ``stiffness`` over its area, without it exactly.
     """
 
-    name: str
+    name: Name
     bone: str
     stiffness: AreaStiffness | None = None
     vertices: VertexList | None = None

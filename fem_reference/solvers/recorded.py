@@ -3,7 +3,6 @@
 import logging
 import math
 import re
-import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -14,9 +13,9 @@ from pydantic import Field, field_validator
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Surface, check_finite
-from fem_reference.foundations.records import Record, parse
+from fem_reference.foundations.records import FileName, Name, Record, parse
 from fem_reference.foundations.units import LengthUnit, length_unit
-from fem_reference.io import files
+from fem_reference.io import files, texts
 from fem_reference.problems.muscle import Setup
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.scenes.case import Candidate
@@ -57,8 +56,8 @@ class About(Record):
     so many threads.
     """
 
-    name: str | None = Field(default=None, pattern=r"^[\w.-]+$")
-    version: str | None = None
+    name: FileName | None = None
+    version: Name | None = None
     unit: str | None = None
     seconds_per_frame: float | None = Field(default=None, gt=0)
     threads: int | None = Field(default=None, gt=0)
@@ -75,11 +74,7 @@ def about(path: Path) -> About:
     file = _about_file(path)
     if not file.is_file():
         return About()
-    try:
-        table = tomllib.loads(file.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(file, str(error), "a TOML file") from error
-    return parse(About, table, str(file))
+    return parse(About, texts.toml(file), str(file))
 
 
 def choice(path: Path, unit: str | None = None, place: str = "folder") -> Candidate:
@@ -90,7 +85,8 @@ def choice(path: Path, unit: str | None = None, place: str = "folder") -> Candid
         raise InputError(place, f'"{path}"', "a folder of frames")
     folder = path.resolve()
     said = about(folder)
-    name = said.name or re.sub(r"[^\w.-]+", "_", folder.stem if folder.is_file() else folder.name) or "candidate"
+    plain = re.sub(r"[^\w.-]+", "_", folder.stem if folder.is_file() else folder.name)
+    name = said.name or plain.lstrip(".")[:100] or "candidate"
     table = {"name": name, "solver": "recorded", "folder": str(folder), "unit": unit or said.unit or "mm"}
     return parse(Candidate, table, place)
 

@@ -48,8 +48,9 @@ class Bench[C: Case]:
         self.problem: Callable[[], Any] = cache(lambda: of_case.problem(scene, self.setup()))
 
     def settings(self, choice: SolverChoice, place: str) -> Record:
-        """The settings of ``choice``, checked; a folder among them is found as files of the scene are."""
-        if isinstance(folder := choice.settings.get("folder"), str):
+        """The settings of ``choice``, checked; a folder that the scene names is found as its files are, and only there."""
+        folder, named = choice.settings.get("folder"), choice in (self.scene.reference, *self.scene.candidate)
+        if isinstance(folder, str) and (named or not Path(folder).is_absolute()):
             choice = choice.model_copy(update={"folder": str(self.scene.file(folder, f"{place}.folder"))})
         where, task = join(self.scene.place, place), self.scene.task
         settings = solvers.settings(choice, where, task)
@@ -190,7 +191,7 @@ def _stored(folder: Path, name: str) -> Run | None:
     run = store.finished(folder)
     if run is None:
         return None
-    now, then = versions(), run.origin["versions"]
+    now, then = versions(), run.origin.get("versions", {})
     other = [package for package in now if package in then and now[package] != then[package] and package != "python"]
     if other:
         log.info("%s: solved before, but with another %s; solving again", name, other[0])

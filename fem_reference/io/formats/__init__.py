@@ -40,7 +40,7 @@ class Format:
 def formats() -> dict[str, Format]:
     """Every format there is by the suffix of its files; TypeError where a file has none, or one that another has."""
     found: dict[str, Format] = {}
-    for name in sorted(module.name for module in pkgutil.iter_modules(__path__)):
+    for name in sorted(module.name for module in pkgutil.iter_modules(__path__) if not module.name.startswith("_")):
         one = vars(importlib.import_module(f"{__name__}.{name}")).get("FORMAT")
         if not isinstance(one, Format) or not one.suffixes:
             raise TypeError(f"io/formats/{name}: FORMAT is {one!r}, want a Format with a suffix")

@@ -1,6 +1,5 @@
-"""VTK's own formats, legacy and XML, by pyvista."""
+"""VTK's own formats, legacy and XML: read with numpy, written by pyvista."""
 
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -8,62 +7,43 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh
-from fem_reference.io.formats import Format
+from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh
+from fem_reference.io.formats import Format, _vtk_legacy, _vtk_xml
+from fem_reference.io.formats._vtk_cells import DataSet
 from fem_reference.io.soup import Lines, Soup, check_lines, joined, only_triangles
+
+_TRIANGLE = 5  # of VTK's cell types
 
 
 def _read(path: Path) -> Soup:
     """Polygons of VTK polydata, or the cells of an unstructured grid (points and lines of polydata passed over)."""
-    import pyvista
-
     data = _data(path)
-    if data.n_cells == 0:
+    if data.kind == "UnstructuredGrid" and (other := set(data.types.tolist()) - {_TRIANGLE}):
+        raise ValueError(f"cells of VTK type {', '.join(map(str, sorted(other)))}")
+    if "Strips" in data.cells and len(data.cells["Strips"].corners):
+        raise ValueError(f"{data.kind} that is not made of triangles")
+    cells = data.cells.get("Cells" if data.kind == "UnstructuredGrid" else "Polys")
+    if cells is None or len(cells.corners) == 0:
         return np.empty((0, 3)), np.empty((0, 3))
-    if isinstance(data, pyvista.UnstructuredGrid):
-        cells = data.GetCells()
-        if other := set(data.celltypes.tolist()) - {pyvista.CellType.TRIANGLE}:
-            raise ValueError(f"cells of VTK type {', '.join(map(str, sorted(other)))}")
-    elif isinstance(data, pyvista.PolyData) and data.n_strips == 0:
-        cells = data.GetPolys()
-    else:
-        raise ValueError(f"{type(data).__name__} that is not made of triangles")
-    offsets, corners = _cells(cells)
-    only_triangles(set(np.diff(offsets).tolist()))
-    return data.points, corners.reshape(-1, 3)
+    only_triangles(cells.sizes)
+    return data.points, cells.corners.reshape(-1, 3)
 
 
 def _read_lines(path: Path) -> Lines:
     """Points (n, 3) of the file, and the points of each line; ValueError where one is not usable."""
-    import pyvista
-
     data = _data(path)
-    if not isinstance(data, pyvista.PolyData) or data.n_lines == 0:
+    if data.kind != "PolyData" or "Lines" not in data.cells or len(data.cells["Lines"].corners) == 0:
         raise ValueError("no lines")
-    offsets, connectivity = _cells(data.GetLines())
-    cells = [cell.tolist() for cell in np.split(connectivity, offsets[1:-1])]
+    cells = [cell.tolist() for cell in np.split(data.cells["Lines"].corners, data.cells["Lines"].offsets[1:-1])]
     points = np.asarray(data.points, np.float64)
     check_lines(points, cells)
     return points, joined(cells)
 
 
-def _cells(cells: Any) -> tuple[Ints, Ints]:
-    """Where each of VTK's cells begins in the list of their points, and that list."""
-    import pyvista
-
-    return pyvista.convert_array(cells.GetOffsetsArray()), pyvista.convert_array(cells.GetConnectivityArray())
-
-
-def _data(path: Path) -> Any:
-    """The data set of a VTK file; ValueError with VTK's own words where it complains."""
-    import pyvista
-
-    with _errors() as errors:
-        reader = pyvista.get_reader(path)
-        reader.reader.Update()  # the reader's own read() only logs errors and warns of them
-    if errors:
-        raise ValueError(re.sub(r"^.*: In .*\n| for file: .*", "", errors[0]).splitlines()[0])
-    return pyvista.wrap(reader.reader.GetOutputDataObject(0))
+def _data(path: Path) -> DataSet:
+    """The data set of a VTK file."""
+    data = path.read_bytes()
+    return _vtk_legacy.read(data) if path.suffix.lower() == ".vtk" else _vtk_xml.read(data)
 
 
 @contextmanager

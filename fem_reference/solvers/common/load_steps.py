@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from fem_reference.runs.store import Status
+from fem_reference.runs.contents import Status
 
 EASY = 5  # Newton iterations up to which the next step may grow
 GROWTH = 1.5

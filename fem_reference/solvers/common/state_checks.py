@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface, enclosed_volume
-from fem_reference.runs.store import Status
+from fem_reference.runs.contents import Status
 
 # A body spread this many times as wide as at rest, or as its attached part, is lost.
 _WIDE = 10.0

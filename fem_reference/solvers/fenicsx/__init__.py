@@ -4,6 +4,7 @@ This side needs no FEniCSx: it runs ``worker`` in processes of its own (``mpiexe
 a file, and sinks frames as the worker reports them. A worker that dies is the status *crashed*, not an exception.
 """
 
+import os
 import pickle
 import shutil
 import sys
@@ -32,6 +33,9 @@ from fem_reference.solvers.fenicsx.jobs import Job, stored_state
 from fem_reference.solvers.fenicsx.processes import require_installed, running
 from fem_reference.solvers.fenicsx.session import present, session, shared, solve_body
 from fem_reference.solvers.fenicsx.settings import BodySettings, Settings
+
+# Ranks that any machine may be asked for; more only where there are as many cores.
+_MOST_RANKS = 8
 
 __all__ = [
     "SOLVES",
@@ -137,6 +141,8 @@ def _command(settings: Settings, job: Path) -> list[str]:
     ranks = settings.ranks or 1
     if ranks == 1:
         return worker
+    if ranks > (most := max(_MOST_RANKS, os.cpu_count() or 1)):
+        raise InputError("ranks", ranks, f"at most {most} on this machine")
     if mpiexec is None:
         raise MissingSoftware(f"{ranks} ranks need mpiexec, which is neither beside {sys.executable} nor on the PATH")
     return [mpiexec, "-n", str(ranks), *worker]
@@ -179,7 +185,7 @@ def _frame(event: dict[str, Any]) -> Frame:
         note += f", unstable equilibrium (negative modes: {scalars['negative_modes']:.0f})"
     if scalars.get("outside_law", 0) > 0:
         note += f", a law outside its range in {scalars['outside_law']:.0f} cells"
-    with np.load(event["file"]) as arrays:
+    with np.load(event["file"], allow_pickle=False) as arrays:
         pulls = {
             name.replace("force ", "force_"): float(np.linalg.norm(arrays[name]))
             for name in arrays

@@ -34,6 +34,6 @@ def _run(command_line: list[str], settings: FieldSettings, count: int) -> Soluti
     """What the worker that ``command_line`` starts makes of a problem with ``count`` nodes."""
     with running(command_line, settings.time_limit) as worker:
         for event in worker.events():
-            with np.load(event["file"]) as arrays:
+            with np.load(event["file"], allow_pickle=False) as arrays:
                 return Solution(arrays["values"], Outcome(event["status"], event["message"], event["cost"]))
         return Solution(np.full(count, np.nan), worker.ending("there are no values"))

@@ -69,7 +69,7 @@ def _followed(process: Process, job: Path, sink: Callable[[dict[str, Any]], None
 
 def _state(event: dict[str, Any]) -> Reached:
     path = Path(event["file"])
-    with np.load(path) as arrays:
+    with np.load(path, allow_pickle=False) as arrays:
         forces, moments = (
             {name.removeprefix(kind): arrays[name] for name in arrays if name.startswith(kind)}
             for kind in ("force ", "moment ")

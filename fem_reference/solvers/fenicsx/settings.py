@@ -46,4 +46,4 @@ class Settings(BodySettings):
     time, not the answer.
     """
 
-    ranks: int | None = Field(default=None, gt=0)
+    ranks: int | None = Field(default=None, gt=0, le=1024)

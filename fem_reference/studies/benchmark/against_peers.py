@@ -112,5 +112,5 @@ def _take(peer: str, body: tuple[str, int, int]) -> tuple[Taken, Floats]:
         wanted: dict[str, Any] = {"peer": peer, "body": body, "facts": str(facts), "positions": str(positions)}
         order.write_text(json.dumps(wanted), encoding="utf-8")
         run_alone(command(str(_PROGRAM), str(order)), ROOT)
-        with np.load(positions) as arrays:
+        with np.load(positions, allow_pickle=False) as arrays:
             return Taken(**json.loads(facts.read_text(encoding="utf-8"))), arrays["positions"]

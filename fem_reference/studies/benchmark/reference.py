@@ -220,7 +220,7 @@ def _take(request: dict[str, Any], root: Path, *, warm: bool) -> tuple[Taken, Fl
         wanted = {"root": str(root), "request": request, "warm": warm, "facts": str(facts), "positions": str(positions)}
         order.write_text(json.dumps(wanted), encoding="utf-8")
         run_alone(command(str(_PROGRAM), str(order)), root)
-        with np.load(positions) as arrays:
+        with np.load(positions, allow_pickle=False) as arrays:
             return Taken(**json.loads(facts.read_text(encoding="utf-8"))), arrays["positions"]
 
 

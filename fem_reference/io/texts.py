@@ -1,0 +1,92 @@
+"""TOML and JSON from files that anybody may have written: bounded in size and depth, so that reading them ends.
+
+What is read is refused where it is no such text, is too large, or is nested deeper than anything of ours.
+"""
+
+import json
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from fem_reference.foundations.errors import InputError
+
+# How large files may be [bytes]. A scene has some kB, a baseline 1.3 kB a frame; what is read takes up to thirty times as much.
+MOST_TOML = 2**21
+MOST_JSON = 2**25
+# How deep tables and lists may be nested; scenes go to 6.
+DEEPEST = 32
+# What in TOML is no key: strings of its four kinds, and comments.
+_NO_KEYS = re.compile(r'"""(?:\\.|[^\\])*?"""|\'\'\'.*?\'\'\'|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'|#[^\n]*', re.DOTALL)
+# A dotted key of so many parts takes the square of its length to read.
+_LONG_KEY = re.compile(rf"(?<![\w-])[\w-]++(?:[ \t]*+\.[ \t]*+[\w-]++){{{DEEPEST},}}")
+
+
+def toml(path: Path) -> dict[str, Any]:
+    """The table of a TOML file."""
+    want = "a TOML file"
+    return parse_toml(_text(path, MOST_TOML, want), path, want)
+
+
+def parse_toml(text: str, place: object, want: str = "TOML") -> dict[str, Any]:
+    """The table of a TOML text; InputError at ``place``."""
+    if (long := _LONG_KEY.search(_NO_KEYS.sub("_", text))) is not None:
+        raise InputError(place, f'the key "{long[0]}"', f"{want} with keys of at most {DEEPEST} parts")
+    try:
+        table = tomllib.loads(text)
+    except RecursionError as error:
+        raise _too_deep(place, want) from error
+    except ValueError as error:
+        raise InputError(place, str(error), want) from error
+    _check_depth(table, place, want)
+    return table
+
+
+def read_json(path: Path, want: str) -> Any:
+    """The value of a JSON file, ``want`` of messages; numbers that are not finite are none."""
+    text = _text(path, MOST_JSON, want)
+    try:
+        value = json.loads(text, parse_constant=_no_number)
+    except RecursionError as error:
+        raise _too_deep(path, want) from error
+    except ValueError as error:
+        raise InputError(path, str(error), want) from error
+    _check_depth(value, path, want)
+    return value
+
+
+def check_size(path: Path, most: int, want: str) -> None:
+    """InputError where a file has more than ``most`` bytes."""
+    if (size := path.stat().st_size) > most:
+        raise InputError(path, f"a file of {size / 2**20:.0f} MB", f"{want}, of at most {most / 2**20:.0f} MB")
+
+
+def _text(path: Path, most: int, want: str) -> str:
+    if not path.is_file():
+        raise InputError(path, "no file", want)
+    try:
+        check_size(path, most, want)
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(path, str(error), want) from error
+
+
+def _no_number(name: str) -> float:
+    raise ValueError(f"{name}, which is no JSON number")
+
+
+def _too_deep(place: object, want: str) -> InputError:
+    return InputError(place, f"tables or lists more than {DEEPEST} deep", want)
+
+
+def _check_depth(value: Any, place: object, want: str) -> None:
+    level = [value]
+    for _ in range(DEEPEST + 1):
+        level = [inside for one in level for inside in _inside(one) if isinstance(inside, dict | list)]
+        if not level:
+            return
+    raise _too_deep(place, want)
+
+
+def _inside(value: Any) -> Any:
+    return value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()

@@ -1,0 +1,61 @@
+"""Time series in XDMF, by meshio, with their numbers in the text or in HDF5 files beside it."""
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element
+
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.io import soup
+from fem_reference.io.references import beside, parsed_xml
+
+# The most numbers of one array: ten million points.
+_MOST = 3 * 10**7
+
+
+def read(path: Path) -> list[tuple[float, Floats, Ints]]:
+    """Time, points where they are then, and triangles of each step."""
+    import meshio
+
+    for item in parsed_xml(path).iter("DataItem"):
+        _check(item, path)
+    with meshio.xdmf.TimeSeriesReader(path) as series:
+        points, triangles = soup.arrays(soup.of_meshio(meshio.Mesh(*series.read_points_cells())))
+        steps = [series.read_data(step)[:2] for step in range(series.num_steps)]
+    return [(time, points + soup.displacement(data, points), triangles) for time, data in steps]
+
+
+def _check(item: Element, path: Path) -> None:
+    """ValueError where numbers are elsewhere than in the file at ``path`` or in HDF5 files beside it, or too many."""
+    if item.get("Format") == "XML":
+        return
+    if item.get("Format") != "HDF":
+        raise ValueError(f'numbers in the format "{item.get("Format")}"')
+    name, colon, place = (item.text or "").strip().partition(":")
+    if not colon or not place.startswith("/"):
+        raise ValueError(f'"{item.text}", which is no FILE:/PLACE')
+    import h5py
+
+    with h5py.File(beside(path, name), "r") as file:
+        _check_dataset(file, place)
+
+
+def _check_dataset(file: Any, place: str) -> None:
+    """ValueError where what is at ``place`` of an HDF5 file is not in the file itself, or too large."""
+    import h5py
+
+    names = ["", *place.strip("/").split("/")]
+    steps = ["/".join(names[: i + 1]) or "/" for i in range(len(names))]
+    for above, step in pairwise(steps):
+        if not isinstance(file[above].get(step.rpartition("/")[2], getlink=True), h5py.HardLink):
+            raise ValueError(f'"{step}", a link to elsewhere')
+    dataset = file[place]
+    if (
+        not isinstance(dataset, h5py.Dataset)
+        or dataset.external
+        or dataset.is_virtual
+        or dataset.dtype.kind not in "fiu"
+    ):
+        raise ValueError(f'"{place}", which is no array of numbers in this file')
+    if dataset.size > _MOST:
+        raise ValueError(f'{dataset.size} numbers at "{place}", more than {_MOST}')

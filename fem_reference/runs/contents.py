@@ -1,0 +1,49 @@
+"""What run.json holds, as a record: read strictly, so that a damaged one is refused and not half believed."""
+
+from itertools import pairwise
+from typing import Annotated, Literal, Self
+
+from pydantic import ConfigDict, Field, field_validator, model_validator
+
+from fem_reference.foundations.records import Name, Record
+from fem_reference.scenes.muscle import LAST_FRAME, MOST_FRAMES
+
+Status = Literal["converged", "diverged", "inverted", "collapsed", "out of steps", "timed out", "crashed"]
+FORMAT = 1
+
+
+class Origin(Record):
+    """Where a run comes from, as far as anything depends on it."""
+
+    model_config = ConfigDict(frozen=True, strict=True, extra="allow")
+    versions: dict[str, str] = Field(default_factory=dict)
+    mesh: dict[str, float | str] = Field(default_factory=dict)
+
+
+class Contents(Record):
+    """The contents of run.json of a run that came to its end."""
+
+    format: Literal[1]
+    name: Name
+    solver: str
+    status: Status
+    message: str
+    frames: tuple[int, ...]
+    numbers: tuple[Annotated[int, Field(ge=0, le=LAST_FRAME)], ...] = Field(min_length=1, max_length=MOST_FRAMES)
+    scalars: dict[str, tuple[float | None, ...]]
+    cost: dict[str, float]
+    origin: Origin
+    parts: tuple[str, ...]
+
+    @field_validator("numbers")
+    @classmethod
+    def _check_numbers(cls, numbers: tuple[int, ...]) -> tuple[int, ...]:
+        if any(late <= early for early, late in pairwise(numbers)):
+            raise ValueError("frame numbers that increase")
+        return numbers
+
+    @model_validator(mode="after")
+    def _check_scalars(self) -> Self:
+        if any(len(values) != len(self.numbers) for values in self.scalars.values()):
+            raise ValueError("as many values of each of the scalars as there are numbers of frames")
+        return self

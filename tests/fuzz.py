@@ -1,0 +1,150 @@
+"""Damaged input by the thousand: each is accepted or refused by a sentence, in ten seconds and two gigabytes, or this says which.
+
+``python tests/fuzz.py --inputs 10000 --seed 1``: exit status 0 where all went well; 1 where not, with the damaged files kept.
+"""
+
+import argparse
+import os
+import resource
+import select
+import shutil
+import signal
+import sys
+import tempfile
+import time
+import traceback
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import hostile
+from hypothesis import HealthCheck, Phase, given, seed, settings
+from hypothesis import strategies as st
+
+# Of one input: processor time [s], the time that passes on a machine that is shared, and memory [bytes].
+SECONDS, PATIENCE, MEMORY = 10, 120, 2 * 2**30
+
+
+@dataclass
+class Tried:
+    """What came of the inputs of a kind; ``failed``: why, and the folder in which the input is kept."""
+
+    count: Counter[str] = field(default_factory=Counter)
+    failed: list[str] = field(default_factory=list)
+    slowest: float = 0.0
+
+
+def limited(kind: hostile.Kind, folder: Path) -> str:
+    """What came of reading ``folder`` in a process with limits: accepted, refused, or why it failed."""
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        _read(kind, folder, writing)
+    os.close(writing)
+    ready, _, _ = select.select([reading], [], [], PATIENCE)
+    if not ready:
+        os.kill(child, signal.SIGKILL)
+    said = os.read(reading, 4000).decode(errors="replace") if ready else ""
+    os.close(reading)
+    _, status, used = os.wait4(child, 0)
+    seconds = used.ru_utime + used.ru_stime
+    if not ready or seconds > SECONDS:
+        return f"more than {SECONDS} s"
+    if os.WIFSIGNALED(status):
+        return f"ended by {signal.Signals(os.WTERMSIG(status)).name}"
+    return said or f"exit status {os.waitstatus_to_exitcode(status)}"
+
+
+def _read(kind: hostile.Kind, folder: Path, writing: int) -> None:
+    """In the process of an input: what it says goes into the pipe."""
+    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS + 2, SECONDS + 2))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+    resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + MEMORY,) * 2)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    try:
+        kind.read(folder)
+        said = "accepted"
+    except hostile.REFUSED as error:
+        text = str(error)
+        said = "refused" if ": got " in text and ", want " in text else f"a message without place: {text}"
+    except BaseException as error:
+        frames = traceback.extract_tb(error.__traceback__)[-3:]
+        places = " < ".join(f"{Path(frame.filename).name}:{frame.lineno}" for frame in reversed(frames))
+        said = f"{type(error).__name__}: {str(error)[:150]} ({places})"
+    if (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 > MEMORY:
+        said = "more than 2 GB"
+    os.write(writing, said.encode(errors="replace")[:4000])
+    os._exit(0)
+
+
+def fuzz(name: str, inputs: int, number: int, kept: Path) -> Tried:
+    """Try so many inputs of a kind; those that failed are kept below ``kept``."""
+    kind, tried = hostile.KINDS[name], Tried()
+    with tempfile.TemporaryDirectory(prefix="fuzz-") as place:
+        whole, folder = Path(place) / "whole", Path(place) / "work" / "ball"
+        whole.mkdir()
+        kind.make(whole)
+        said = limited(kind, _copied(whole, folder))
+        if said != "accepted":
+            tried.failed.append(f"{name}: undamaged: {said}")
+            return tried
+        targets = sorted(path.relative_to(whole) for path in whole.glob(kind.damaged) if path.is_file())
+        strategies = {target: hostile.damage((whole / target).read_bytes()) for target in targets}
+
+        @seed(number)
+        @settings(
+            max_examples=inputs,
+            deadline=None,
+            database=None,
+            phases=[Phase.generate],
+            suppress_health_check=list(HealthCheck),
+        )
+        @given(st.sampled_from(targets).flatmap(lambda target: st.tuples(st.just(target), strategies[target])))
+        def attempt(damaged: tuple[Path, bytes]) -> None:
+            target, data = damaged
+            _copied(whole, folder)
+            (folder / target).write_bytes(data)
+            began = time.perf_counter()
+            came = limited(kind, folder)
+            tried.slowest = max(tried.slowest, time.perf_counter() - began)
+            tried.count[came if came in ("accepted", "refused") else "failed"] += 1
+            if came not in ("accepted", "refused"):
+                where = kept / f"{name} {len(tried.failed)}".replace(" ", "_")
+                _copied(folder, where)
+                tried.failed.append(f"{name}: {target}: {came} [{where}]")
+
+        attempt()
+    return tried
+
+
+def _copied(source: Path, target: Path) -> Path:
+    shutil.rmtree(target, ignore_errors=True)
+    shutil.copytree(source, target)
+    return target
+
+
+def main() -> int:
+    """Try every kind, or those named; the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("kinds", nargs="*", metavar="KIND", help=f"of {', '.join(hostile.KINDS)} (default: all)")
+    parser.add_argument("--inputs", type=int, default=10_000, help="in all")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--kept", type=Path, default=Path(tempfile.gettempdir()) / "fuzz", help="where failures go")
+    options = parser.parse_args()
+    names = options.kinds or list(hostile.KINDS)
+    failed, total = [], 0
+    for name in names:
+        tried = fuzz(name, -(-options.inputs // len(names)), options.seed, options.kept)
+        total += sum(tried.count.values())
+        failed += tried.failed
+        counts = ", ".join(f"{count} {word}" for word, count in sorted(tried.count.items()))
+        sys.stdout.write(f"{name}: {counts or 'none'}, {tried.slowest:.1f} s at most\n")
+        sys.stdout.write("".join(f"  {line}\n" for line in tried.failed))
+        sys.stdout.flush()
+    sys.stdout.write(f"{total} inputs, {len(failed)} failed\n")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
