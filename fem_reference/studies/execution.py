@@ -31,7 +31,7 @@ from fem_reference.solvers.common.protocol import MuscleSolver
 
 log = logging.getLogger(__name__)
 
-_MACHINE_ONLY = {
+MACHINE_ONLY = {
     "ranks",
     "time_limit",
     "linear_solver",
@@ -116,9 +116,7 @@ class Bench[C: Case]:
 
     def key(self, solver: str, settings: Record) -> str:
         """The key of a run: a hash over all that determines it."""
-        numerics = {
-            name: value for name, value in settings.model_dump(mode="json").items() if name not in _MACHINE_ONLY
-        }
+        numerics = {name: value for name, value in settings.model_dump(mode="json").items() if name not in MACHINE_ONLY}
         return key(self.scene.key, solver, numerics)
 
     def origin(self, solver: str, settings: Record) -> dict[str, Any]:
