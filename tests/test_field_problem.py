@@ -193,7 +193,7 @@ def spoken(capsys, *arguments: str) -> tuple[int, str, str]:
         (["run", "hip_flexion", "--set", "effect[0].name=diffusion"], 'got "diffusion", want one of active_tension'),
         (
             ["compare", "rod", "--candidate", "magic"],
-            '--candidate: got "magic", want a folder of frames, or one of fenicsx',
+            '--candidate: got "magic", want a folder of frames, a solver, or one of fenicsx',
         ),
     ],
 )

@@ -238,7 +238,7 @@ def test_bad_input_ends_with_one_message_and_leaves_nothing(what, job, tmp_path,
 
 def test_unknown_candidate(job, capsys) -> None:
     assert job.call("compare", str(job.case), "--candidate", "nobody")[0] == cli.BAD_INPUT
-    assert '--candidate: got "nobody", want a folder of frames, or one of pbd' in capsys.readouterr().err
+    assert '--candidate: got "nobody", want a folder of frames, a solver, or one of pbd' in capsys.readouterr().err
 
 
 def test_names_of_candidates_are_used_once(job, tmp_path, capsys) -> None:

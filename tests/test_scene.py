@@ -21,6 +21,7 @@ MUSCLE_KEYS = [
     "bone",
     "candidate",
     "effect",
+    "effects",
     "expect",
     "fibres",
     "frames",
@@ -512,7 +513,28 @@ def test_changes_replace_values(bar: Path) -> None:
     assert casefile.read(bar).frames.last == 20
 
 
-@pytest.mark.parametrize("key", ["", "frames.final", "effect[7].mu", "effect.mu", "frames.last.more", "title[0]"])
+def test_a_change_may_add_what_is_optional(bar: Path) -> None:
+    assert casefile.read(bar, changes={"frames.interval": "10 ms"}).frames.interval == 0.01
+    with pytest.raises(
+        InputError, match=r"frames.intervall: got an unknown key, want interval, or another one of every"
+    ):
+        casefile.read(bar, changes={"frames.intervall": "10 ms"})
+
+
+def test_all_that_is_wrong_with_keys_is_said_at_once(bar: Path) -> None:
+    path = bar / "case.toml"
+    path.write_text(path.read_text().replace("tet_size", "tetsize").replace('title = "A bar between two plates"\n', ""))
+    with pytest.raises(InputError) as raised:
+        casefile.read(bar)
+    first, *others = str(raised.value).splitlines()
+    assert "muscle.tetsize: got an unknown key, want tet_size, or another one of" in first
+    assert sorted(line.split("case.toml: ")[1] for line in others) == [
+        "muscle.tet_size: got nothing, want this key",
+        "title: got nothing, want this key",
+    ]
+
+
+@pytest.mark.parametrize("key", ["", "effect[7].mu", "effect.mu", "frames.last.more", "title[0]"])
 def test_change_of_a_key_that_is_not_there(bar: Path, key: str) -> None:
     with pytest.raises(InputError, match="got nothing, want a key that this scene has"):
         casefile.read(bar, changes={key: 1})

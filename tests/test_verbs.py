@@ -5,9 +5,10 @@ import argparse
 import pytest
 
 from fem_reference import cli
-from fem_reference.cli._parser import parser, verbs
+from fem_reference.cli import _parser
+from fem_reference.cli._parser import parser
 
-VERBS = sorted(verbs())
+VERBS = _parser.names()
 
 
 def options_of(name: str) -> argparse.ArgumentParser:
@@ -18,7 +19,7 @@ def options_of(name: str) -> argparse.ArgumentParser:
 
 @pytest.mark.parametrize("name", VERBS)
 def test_a_verb_has_what_the_command_line_asks_for(name: str) -> None:
-    verb = verbs()[name]
+    verb = _parser.verb(name)
     assert verb.HELP.strip()
     assert not verb.HELP.endswith(".")
     assert callable(verb.run)

@@ -11,7 +11,7 @@ from fem_reference.assessment.ranking import Ranking, rankings
 from fem_reference.foundations.records import Record, parse
 from fem_reference.metrics import Measure, find
 from fem_reference.runs.store import Outcome
-from fem_reference.scenes.case import Candidate
+from fem_reference.scenes.case import Candidate, Case, SolverChoice
 
 FILE = Path(__file__).with_suffix(".toml")
 
@@ -47,6 +47,17 @@ class _File(Record):
 def solver_kinds() -> tuple[SolverKind, ...]:
     """The rows of the report's table, in its order."""
     return _file().kind
+
+
+def choice(case: Case, name: str) -> tuple[str, SolverChoice]:
+    """The name of a run and the settings for a solver, or a candidate, of a ``name``: those of the case's own candidate, else those
+    of the page table-5-1, else the solver's defaults.
+    """
+    own = [one for one in case.candidate if one.solver == name] + [one for one in case.candidate if one.name == name]
+    table = [one for kind in solver_kinds() for one in kind.candidate if one.solver == name and case.task == "solve"]
+    for one in (*own, *table):
+        return (one.name if own else name), one
+    return name, SolverChoice(solver=name)
 
 
 def report_speeds() -> dict[str, ReportSpeed]:

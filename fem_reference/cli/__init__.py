@@ -36,7 +36,8 @@ def entry() -> None:
 def main(arguments: list[str]) -> int:
     """Carry out a command line; returns the exit status."""
     try:
-        options = parser().parse_args(arguments)
+        words = [word for word in arguments if not word.startswith("-")]
+        options = parser(words[0] if words else "").parse_args(arguments)
         _show_progress(on=not options.quiet)
         _check_outputs(options)
         status: int = options.verb(options)

@@ -4,7 +4,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from fem_reference.assessment import judge
+from fem_reference import solvers
+from fem_reference.assessment import judge, solver_table
 from fem_reference.cli._printing import out
 from fem_reference.foundations.errors import InputError
 from fem_reference.problems import of_case
@@ -25,7 +26,9 @@ def own_candidates(scene: Case) -> list[tuple[Candidate, str]]:
 
 
 def choose(scene: Case, text: str, unit: str | None) -> tuple[Candidate, str]:
-    """The candidate of the scene with this name, else the recorded frames in this folder; and the place that chooses it."""
+    """The candidate of the scene with this name, else the recorded frames in this folder, else the solver of this name with the
+    settings of the page table-5-1; and the place that chooses it.
+    """
     names = [candidate.name for candidate in scene.candidate]
     if text in names:
         if Path(text).is_dir():
@@ -33,8 +36,11 @@ def choose(scene: Case, text: str, unit: str | None) -> tuple[Candidate, str]:
                 "--candidate", f'"{text}", a candidate of the case and a folder', f"another name, or ./{text}"
             )
         return scene.candidate[names.index(text)], f"candidate[{names.index(text)}]"
+    if text in solvers.names(scene.task) and not Path(text).exists():
+        found = solver_table.choice(scene, text)[1]
+        return Candidate(name=text, solver=text, **found.settings), "--candidate"
     if not text or not Path(text).exists():
-        raise InputError("--candidate", f'"{text}"', f"a folder of frames, or one of {', '.join(names)}")
+        raise InputError("--candidate", f'"{text}"', f"a folder of frames, a solver, or one of {', '.join(names)}")
     return recorded.choice(Path(text), unit, "--candidate"), "--candidate"
 
 

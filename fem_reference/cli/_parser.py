@@ -4,14 +4,15 @@ A verb has ``HELP``, ``add_options(parser)``, and ``run(options)``, which prints
 """
 
 import argparse
+import ast
 import importlib
-import pkgutil
 from pathlib import Path
 from typing import Protocol, cast
 
 from fem_reference import __version__
 
 RANKS = "MPI processes of the reference (default: 1, or 2 for large bodies where cores are free)"
+_FOLDER = Path(__file__).parent
 UNIT = "unit of length of the frames in DIR (default: that of its candidate.toml, else mm)"
 
 
@@ -27,29 +28,47 @@ class Verb(Protocol):
         """Do it; returns the exit status."""
 
 
-def verbs() -> dict[str, Verb]:
-    """Every verb there is by name."""
-    package = __package__ or ""
-    folder = [str(Path(__file__).parent)]
-    names = sorted(module.name for module in pkgutil.iter_modules(folder) if not module.name.startswith("_"))
-    return {name: cast(Verb, importlib.import_module(f"{package}.{name}")) for name in names}
+def names() -> list[str]:
+    """The names of all verbs."""
+    return sorted(path.stem for path in _FOLDER.glob("*.py") if not path.stem.startswith("_"))
 
 
-def parser() -> argparse.ArgumentParser:
-    """The parser of the whole command line; ``verb`` of its options is what carries it out."""
+def verb(name: str) -> Verb:
+    """The verb of a name."""
+    return cast(Verb, importlib.import_module(f"{__package__}.{name}"))
+
+
+def parser(only: str | None = None) -> argparse.ArgumentParser:
+    """The parser of the whole command line; ``verb`` of its options is what carries it out. With ``only`` the name of a verb, that
+    alone is imported and has its options: all of them take seconds to load.
+    """
     whole = argparse.ArgumentParser(
         prog="fem-reference", description="Finite element reference and validation for muscle deformation."
     )
     whole.add_argument("--version", action="version", version=f"fem-reference {__version__}")
     kinds = whole.add_subparsers(metavar="VERB", required=True)
-    for name, verb in verbs().items():
-        sub = kinds.add_parser(name, help=verb.HELP, description=verb.HELP)
-        sub.set_defaults(verb=verb.run, ranks=None, error_bar=False, writes=True)
-        verb.add_options(sub)
-        sub.add_argument("--out", type=Path, metavar="DIR", help="where pages and stored runs go (default: reports)")
-        sub.add_argument("--json", type=Path, metavar="FILE", help="write what is printed as JSON")
-        sub.add_argument("--quiet", action="store_true", help="show no progress")
+    for name in names():
+        text = _help(name)
+        sub = kinds.add_parser(name, help=text, description=text)
+        if only in (None, name):
+            _add(verb(name), sub)
     return whole
+
+
+def _help(name: str) -> str:
+    """What a verb says of itself, read from its file."""
+    assigned = [node for node in ast.parse((_FOLDER / f"{name}.py").read_bytes()).body if isinstance(node, ast.Assign)]
+    texts = [ast.literal_eval(node.value) for node in assigned if ast.unparse(node.targets[0]) == "HELP"]
+    return str(*texts)
+
+
+def _add(verb: Verb, sub: argparse.ArgumentParser) -> None:
+    """The options of a verb."""
+    sub.set_defaults(verb=verb.run, ranks=None, error_bar=False, writes=True)
+    verb.add_options(sub)
+    sub.add_argument("--out", type=Path, metavar="DIR", help="where pages and stored runs go (default: reports)")
+    sub.add_argument("--json", type=Path, metavar="FILE", help="write what is printed as JSON")
+    sub.add_argument("--quiet", action="store_true", help="show no progress")
 
 
 def add_case(parser: argparse.ArgumentParser) -> None:

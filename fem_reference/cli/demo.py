@@ -8,7 +8,7 @@ from fem_reference.cli._parser import add_ranks
 from fem_reference.scenes import casefile
 
 MAIN_JOB = "hip_flexion"
-HELP = f"the main job: the case {MAIN_JOB}, its reference against its candidates"
+HELP = "the main job: the case hip_flexion, its reference against its candidates"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -2,6 +2,7 @@
 
 import argparse
 
+from fem_reference.assessment import solver_table
 from fem_reference.assessment.comparison import alone
 from fem_reference.assessment.judge import check
 from fem_reference.cli._choosing import refuse_error_bar, scene_of
@@ -12,7 +13,6 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.problems import of_case
 from fem_reference.report.overview import run_text
 from fem_reference.report.tables import of_run
-from fem_reference.scenes.case import Case, SolverChoice
 from fem_reference.studies.execution import Bench
 
 HELP = "solve a case and judge what it expects of the reference"
@@ -42,16 +42,9 @@ def run(options: argparse.Namespace) -> int:
         raise InputError("--error-bar", "another solver", "the reference of a muscle")
     check(scene)
     bench = Bench(scene, out(options) / "runs", options.ranks)
-    solved = bench.obtain(*_chosen(scene, options.solver), f"--solver {options.solver}")
+    solved = bench.obtain(*solver_table.choice(scene, options.solver), f"--solver {options.solver}")
     measures, verdicts = alone(scene, bench.setup(), solved)
     write_output(of_run(scene, solved, measures, verdicts), run_text(solved, measures, verdicts), options)
     if solved.outcome.status != "converged":
         return SOLVER_FAILED
     return VERDICT_FAIL if any(verdict.word == "fail" for verdict in verdicts) else DONE
-
-
-def _chosen(scene: Case, solver: str) -> tuple[str, SolverChoice]:
-    """The name of the run and how the case chooses ``solver``: as a candidate by its solver or name, else no settings."""
-    named = [entry for entry in scene.candidate if entry.solver == solver]
-    named += [entry for entry in scene.candidate if entry.name == solver]
-    return (named[0].name, named[0]) if named else (solver, SolverChoice(solver=solver))

@@ -25,7 +25,9 @@ class Damping(Energy):
         """By the sag of a beam under the drag."""
         force = self.coefficient * scene.in_time(scene.speed)
         return Indicator(
-            "drag over the length against the shear modulus", force * scene.length / scene.shear, scene.bend(force)
+            "drag over the length against the shear modulus",
+            force * scene.length / scene.shear,
+            scene.lag(scene.bend(force)),
         )
 
     def energy(self, state: State) -> Any:

@@ -36,7 +36,7 @@ class Inertia(Energy):
             square * scene.in_time(scene.in_time(scene.acceleration)), math.sqrt(square) * scene.in_time(scene.jump)
         )
         cauchy = self.density * scene.in_time(scene.speed) ** 2 / scene.shear
-        return Indicator("Cauchy number, density times speed squared over shear modulus", cauchy, lag)
+        return Indicator("Cauchy number, density times speed squared over shear modulus", cauchy, scene.lag(lag))
 
     def energy(self, state: State) -> Any:
         """The potential of the step per rest volume [MPa]."""

@@ -30,7 +30,9 @@ class Viscosity(Energy):
         """By how much of its travel a body lags behind in the time in which it relaxes."""
         deborah = self.eta / scene.shear * scene.in_time(scene.speed) / scene.length
         return Indicator(
-            "Deborah number, relaxation time over the time of the motion", deborah, 0.25 * deborah * scene.travel
+            "Deborah number, relaxation time over the time of the motion",
+            deborah,
+            scene.lag(0.25 * deborah * scene.travel),
         )
 
     def energy(self, state: State) -> Any:

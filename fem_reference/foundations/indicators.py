@@ -66,6 +66,10 @@ class Estimates:
         middle = force / self.shear * (squared / 8 * 1.2 + squared**2 / (32 * 3 * self.thickness**2))
         return float(0.3 * middle)
 
+    def lag(self, distance: float) -> float:
+        """How far [mm] a body is behind that forces hold back by a ``distance``: no more than it travels."""
+        return distance / (1 + distance / self.travel) if self.travel else 0.0
+
     def greatest(self, effect: Any) -> float:
         """The greatest amount of an ``effect`` over the frames."""
         return max(abs(float(effect.amount(frame))) for frame in self.frames)

@@ -1,5 +1,7 @@
 """Strict frozen records read from TOML: an unknown key, a missing key or a wrong value is one InputError that names it."""
 
+from collections.abc import Sequence
+from difflib import get_close_matches
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
@@ -24,6 +26,7 @@ def _check_name(name: str) -> str:
     return name
 
 
+_SHOWN = 12  # errors of one file
 # What pages and messages call something.
 _LONGEST_NAME = 100
 Name = Annotated[str, AfterValidator(_check_name)]
@@ -38,9 +41,20 @@ def parse[R: Record](record: type[R], table: object, place: str) -> R:
     except RecursionError as error:
         raise InputError(place, "tables inside tables without end", "the keys of a file") from error
     except ValidationError as error:
-        # An unknown key first: where a key is mistyped, it says more than that the right one is missing.
-        first = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
-        raise _as_input_error(first, record, place, table) from None
+        # Unknown keys first: where a key is mistyped, it says more than that the right one is missing.
+        wrong = sorted(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
+        raise together([_as_input_error(one, record, place, table) for one in wrong]) from None
+
+
+def together(wrong: Sequence[InputError]) -> InputError:
+    """One error that says all that is ``wrong``, the first at length; what is wrong with one key is said once."""
+    places = {str(one.place): one for one in reversed(wrong)}
+    first, *others = sorted(places.values(), key=wrong.index)
+    if not others:
+        return first
+    shown = "".join(f"\n  and {one}" for one in others[:_SHOWN])
+    more = f"\n  and {len(others) - _SHOWN} more" if len(others) > _SHOWN else ""
+    return InputError(first.place, first.got, f"{first.want}{shown}{more}")
 
 
 def _frozen(value: Any) -> Any:
@@ -66,7 +80,10 @@ def _as_input_error(first: Any, record: type[Record], place: str, table: object)
     keys = _keys(table, first["loc"])
     path = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in keys).lstrip(".")
     if first["type"] == "extra_forbidden":
-        return InputError(join(place, path), "an unknown key", f"one of {', '.join(_known(record, first['loc'][:-1]))}")
+        known = _known(record, first["loc"][:-1])
+        near = get_close_matches(str(first["loc"][-1]), known, 1)
+        meant = f"{near[0]}, or another " if near else ""
+        return InputError(join(place, path), "an unknown key", f"{meant}one of {', '.join(known)}")
     if first["type"] == "missing":
         return InputError(join(place, path), "nothing", "this key")
     got = _as_written(first["input"])
@@ -98,7 +115,7 @@ def _known(record: Any, path: tuple[int | str, ...]) -> list[str]:
 def keys(record: Any) -> list[str]:
     """The keys that files have of a ``record``; none of what is no record."""
     fields = getattr(record, "model_fields", {})
-    return sorted(name for name in fields if not fields[name].exclude)
+    return sorted(field.alias or name for name, field in fields.items() if not field.exclude)
 
 
 def _record_inside(annotation: Any) -> Any:

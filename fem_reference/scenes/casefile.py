@@ -54,25 +54,34 @@ def read(case: str | Path, *, with_negative_control: bool = False, changes: dict
 
 
 def _scene_file(case: str | Path) -> Path:
-    for path in (HOME / "cases" / str(case) / "case.toml", Path(case) / "case.toml", Path(case)):
+    shipped = HOME / "cases" / str(case) / "case.toml"
+    found = list[Path]()
+    for path in (shipped, Path(case) / "case.toml", Path(case)):
         with suppress(OSError, ValueError):  # a name that is too long, or with a null character
             if path.is_file():
-                return path.resolve()
+                found.append(path.resolve())
+    if len(set(found)) > 1:
+        want = f"./{case} for the folder here, or {shipped.parent} for the shipped case"
+        raise InputError("CASE", f'"{case}", which is a shipped case and a folder here', want)
+    if found:
+        return found[0]
     raise InputError("CASE", f'"{case}"', f"a scene file, a folder with a case.toml, or one of {', '.join(cases())}")
 
 
-def _change(table: dict[str, Any], key: str, value: Any, place: str) -> None:
+def _change(table: dict[str, Any], key: str, value: Any, place: str, *, add: bool = True) -> None:
+    """Change a key of a scene, or ``add`` one to a table that it has."""
     parts = re.findall(r"[^.\[\]]+", key) or [""]
     *parents, last = [int(part) if part.isdecimal() and len(part) < 10 else part for part in parts]
     inside: Any = table
     try:
         for part in parents:
             inside = inside[part]
-        inside[last]  # a change replaces what is there
+        if not (add and last and isinstance(inside, dict)):
+            inside[last]  # a change replaces what is there
         inside[last] = value
     except (KeyError, IndexError, TypeError) as error:
         raise InputError(
-            join(place, key), "nothing", "a key that this scene has; an optional one must stand in its file"
+            join(place, key), "nothing", "a key that this scene has, or a key of a table that it has"
         ) from error
 
 
@@ -109,7 +118,7 @@ def _with_negative_control(table: dict[str, Any], path: Path) -> Case:
     control = parse(NegativeControl, table.get("negative_control"), join(place, "negative_control"))
     table = deepcopy(table)
     try:
-        _change(table, control.key, control.value, place)
+        _change(table, control.key, control.value, place, add=False)
     except InputError as error:
         raise InputError(join(place, "negative_control.key"), f'"{control.key}"', "a key of this scene") from error
     try:

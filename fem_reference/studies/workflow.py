@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fem_reference import export, report
-from fem_reference.assessment import judge
+from fem_reference.assessment import judge, solver_table
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.foundations.errors import InputError
@@ -68,7 +68,7 @@ def solve(
     progress
         Called with each line of progress.
     settings
-        Of the ``solver``, as scene files write them; without any those that the case has for it.
+        Of the ``solver``, as scene files write them; without any those that the case has for it, or else the page table-5-1.
 
     Returns
     -------
@@ -79,8 +79,7 @@ def solve(
     """
     choice: SolverChoice = case.reference
     if solver is not None:
-        own = [entry for entry in case.candidate if entry.solver == solver] if not settings else []
-        choice = own[0] if own else SolverChoice(solver=solver, **settings)
+        choice = SolverChoice(solver=solver, **settings) if settings else solver_table.choice(case, solver)[1]
     name = "reference" if solver is None else solver
     with _reported(progress):
         return Bench(case, Path(store)).obtain(name, choice, f'solver "{choice.solver}"')
