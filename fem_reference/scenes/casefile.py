@@ -60,7 +60,7 @@ def _scene_file(case: str | Path) -> Path:
         with suppress(OSError, ValueError):  # a name that is too long, or with a null character
             if path.is_file():
                 found.append(path.resolve())
-    if len(set(found)) > 1:
+    if len(set(found)) > 1 and Path(str(case)).name == str(case):
         want = f"./{case} for the folder here, or {shipped.parent} for the shipped case"
         raise InputError("CASE", f'"{case}", which is a shipped case and a folder here', want)
     if found:
