@@ -54,14 +54,15 @@ def read(case: str | Path, *, with_negative_control: bool = False, changes: dict
 
 
 def _scene_file(case: str | Path) -> Path:
-    shipped = HOME / "cases" / str(case) / "case.toml"
+    plain = Path(case).name == str(case)  # what is written as a path is no name
+    shipped = [HOME / "cases" / str(case) / "case.toml"] if plain else []
     found = list[Path]()
-    for path in (shipped, Path(case) / "case.toml", Path(case)):
+    for path in (*shipped, Path(case) / "case.toml", Path(case)):
         with suppress(OSError, ValueError):  # a name that is too long, or with a null character
             if path.is_file():
                 found.append(path.resolve())
-    if len(set(found)) > 1 and Path(str(case)).name == str(case):
-        want = f"./{case} for the folder here, or {shipped.parent} for the shipped case"
+    if plain and len(set(found)) > 1:
+        want = f"./{case} for the folder here, or {found[0].parent} for the shipped case"
         raise InputError("CASE", f'"{case}", which is a shipped case and a folder here', want)
     if found:
         return found[0]
