@@ -17,7 +17,10 @@ from fem_reference.studies.execution import Bench
 
 def scene_of(options: argparse.Namespace) -> Case:
     """The scene of the case, with what ``--set`` changes of it and the effects that it needs."""
-    return of_case.chosen(casefile.read(options.case, changes=dict(map(casefile.setting, options.set))))
+    if options.negative_control and options.set:
+        raise InputError("--negative-control", "with --set", "one of the two")
+    changes = dict(map(casefile.setting, options.set))
+    return of_case.chosen(casefile.read(options.case, with_negative_control=options.negative_control, changes=changes))
 
 
 def own_candidates(scene: Case) -> list[tuple[Candidate, str]]:

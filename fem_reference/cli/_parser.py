@@ -64,7 +64,7 @@ def _help(name: str) -> str:
 
 def _add(verb: Verb, sub: argparse.ArgumentParser) -> None:
     """The options of a verb."""
-    sub.set_defaults(verb=verb.run, ranks=None, error_bar=False, writes=True)
+    sub.set_defaults(verb=verb.run, ranks=None, error_bar=False, negative_control=False, writes=True)
     verb.add_options(sub)
     sub.add_argument("--out", type=Path, metavar="DIR", help="where pages and stored runs go (default: reports)")
     sub.add_argument("--json", type=Path, metavar="FILE", help="write what is printed as JSON")
@@ -82,6 +82,12 @@ def add_error_bar(parser: argparse.ArgumentParser) -> None:
     """Whether error bars are made where they take long."""
     known = "error bars of the reference: solve it on larger tetrahedra too, and with stiffer contact where bones press"
     parser.add_argument("--error-bar", action="store_true", help=known)
+
+
+def add_negative_control(parser: argparse.ArgumentParser) -> None:
+    """Whether the case is wrong on purpose."""
+    control = "with the one change of the case that must turn its verdict to fail"
+    parser.add_argument("--negative-control", action="store_true", help=control)
 
 
 def add_ranks(parser: argparse.ArgumentParser) -> None:

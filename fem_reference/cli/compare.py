@@ -4,7 +4,7 @@ import argparse
 
 from fem_reference.cli._choosing import choose, scene_of
 from fem_reference.cli._judging import judge
-from fem_reference.cli._parser import UNIT, add_case, add_error_bar, add_ranks
+from fem_reference.cli._parser import UNIT, add_case, add_error_bar, add_negative_control, add_ranks
 
 HELP = "measure candidates against the reference and write the page"
 
@@ -16,6 +16,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--candidate", action="append", metavar="NAME|DIR", help=either)
     parser.add_argument("--unit", help=UNIT)
     add_error_bar(parser)
+    add_negative_control(parser)
     add_ranks(parser)
 
 

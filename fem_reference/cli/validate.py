@@ -1,0 +1,59 @@
+"""The verb ``validate``: all that can be known of a case before it is solved."""
+
+import argparse
+from typing import Any
+
+from fem_reference import solvers
+from fem_reference.cli._choosing import checked_bench, own_candidates, scene_of
+from fem_reference.cli._parser import add_case
+from fem_reference.cli._printing import DONE, lines, write_output
+from fem_reference.problems import of_case
+from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle_body import as_body
+from fem_reference.report.words import duration
+from fem_reference.scenes import casefile
+from fem_reference.scenes.case import Case
+from fem_reference.solvers.fenicsx import resources
+
+HELP = "check all of a case that can be checked before it is solved, and say what running it will cost"
+# Measured on hip_flexion: seconds of processor time of one of Newton's iterations with so many unknowns, the exponent by which it
+# grows, and iterations a frame.
+_SECONDS, _UNKNOWNS, _EXPONENT, _ITERATIONS = 0.13, 5456, 1.15, 4
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options that this verb has; it writes nothing into ``--out``."""
+    parser.set_defaults(writes=False)
+    add_case(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Read, set up and mesh a case, check the settings of every solver that it chooses, and say what there is."""
+    scene = scene_of(options)
+    if scene.negative_control is not None and scene.from_file:
+        casefile.read(options.case, with_negative_control=True)
+    bench = checked_bench(scene, options, own_candidates(scene))
+    for choice, place in [(scene.reference, "reference"), *own_candidates(scene)]:
+        solvers.require(choice.solver, bench.settings(choice, place), place, scene.task)
+    built = bench.problem()
+    facts = {"case": scene.name, "read": scene.place, "mesh": built.mesh_facts} | _facts(scene, built, bench)
+    write_output(facts, "\n".join([*lines(facts), f"{scene.name} can be solved"]), options)
+    return DONE
+
+
+def _facts(scene: Case, built: Any, bench: Any) -> dict[str, Any]:
+    """What more is known of the case of a muscle."""
+    if not isinstance(built, Problem):
+        return {}
+    found = scene.decisions or of_case.explained(scene)
+    known: dict[str, Any] = {"effects": {one.effect.title: str(one).partition(": ")[2] for one in found}}
+    settings: Any = bench.settings(scene.reference, "reference")
+    if scene.reference.solver == "fenicsx":
+        count = resources.unknowns(as_body(built).mesh, settings.element)
+        each = _SECONDS * (count / _UNKNOWNS) ** _EXPONENT
+        seconds = each * _ITERATIONS * (len(scene.numbers) - 1)
+        known["unknowns"] = count
+        known["cost"] = (
+            f"about {duration(seconds)} of processor time, within a factor of three, for {len(scene.numbers)} frames"
+        )
+    return known
