@@ -109,14 +109,13 @@ def parts(scene: MuscleCase, choice: SolverChoice, place: str) -> tuple[Part, ..
 
 def without(whole: Trial, part: Part) -> Trial:
     """The trial with a part left out, by an element that suits what is left."""
-    left = _left(whole.scene, part)
+    left, choice, instead = _left(whole.scene, part), whole.choice, dict[str, Any]()
     scene = whole.scene.model_copy(update={"effect": left}) if part.effects else whole.scene
-    changed: dict[str, Any] = dict.fromkeys(part.features)
-    element = getattr(solvers.settings(whole.choice, whole.name), "element", None) if part.effects else None
+    element = getattr(solvers.settings(choice, whole.name), "element", None) if part.effects else None
     if element is not None and (other := fitting(element, left)) != element:
-        changed["element"] = other
-    choice = whole.choice.model_copy(update=changed)
-    instead = {key: value for key, value in changed.items() if value is not None}
+        instead["element"] = other
+    kept = {key: value for key, value in dict(choice).items() if key not in part.features}
+    choice = type(choice).model_validate(kept | instead)
     return Trial(scene, choice, whole.name, "without", " and ".join(part.names), instead)
 
 
@@ -157,17 +156,20 @@ def _run(one: Made) -> Run:
 
 def _omissions(one: Made) -> list[tuple[Part, Trial]]:
     """Each part of a trial that can be left out, with the trial without it, which has a time limit."""
-    trial, seconds = one.trial, LIMIT * _run(one).outcome.cost.get("seconds", 0.0) + COMPILING
-    return [(part, _limited(without(trial, part), seconds)) for part in parts(trial.scene, trial.choice, trial.name)]
+    trial, found = one.trial, list[tuple[Part, Trial]]()
+    for part in parts(trial.scene, trial.choice, trial.name):
+        other = without(trial, part)
+        found.append((part, replace(other, choice=other.choice.model_copy(update=_limit(one)))))
+    return found
 
 
-def _limited(trial: Trial, seconds: float) -> Trial:
-    """The trial, which gives up after so many ``seconds`` at most, where its solver can."""
-    settings = solvers.settings(trial.choice, trial.name)
+def _limit(one: Made) -> dict[str, str]:
+    """The setting by which a run with something left out gives up, where its solver can."""
+    settings = solvers.settings(one.trial.choice, one.trial.name)
     if "time_limit" not in type(settings).model_fields:
-        return trial
-    limit = min(seconds, getattr(settings, "time_limit", None) or math.inf)
-    return replace(trial, choice=trial.choice.model_copy(update={"time_limit": f"{limit:.6g} s"}))
+        return {}
+    seconds = LIMIT * _run(one).outcome.cost.get("seconds", 0.0) + COMPILING
+    return {"time_limit": f"{min(seconds, getattr(settings, 'time_limit', None) or math.inf):.6g} s"}
 
 
 def _listed(trials: Mapping[str, list[tuple[Part, Trial]]]) -> list[tuple[Part, Trial]]:
