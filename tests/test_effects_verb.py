@@ -157,7 +157,7 @@ def found(*more: Omission) -> CaseOmissions:
 def test_time_is_without_compilation_and_phases_are_shares_of_it() -> None:
     one = omission("contact", seconds=4.0)
     assert (one.seconds, one.phase("contact")) == (4.0, 1.0)  # a quarter of the time of solving
-    assert math.isnan(one.phase("krylov"))
+    assert math.isnan(one.phase("linear systems"))
     assert found().ablations[0].relative(one.seconds) == pytest.approx(0.4)
 
 
