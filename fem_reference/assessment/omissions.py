@@ -10,8 +10,8 @@ FORMAT = 1
 MEASURES = ("volume.deviation", "fibre_length.rms_percent", "surface_deviation.rms", "surface_deviation.max")
 # Where all changes are below this share of the error bar, an omission does not matter.
 NEGLIGIBLE = 0.1
-# Parts of the time of solving that runs may know apart; of the reference the whole of it is a little more.
-PHASES = ("assembly", "contact", "factorisation", "krylov")
+# Parts of the time of solving that runs may know apart, and what runs call them; the whole of it is a little more.
+PHASES = {"assembly": ("assembly",), "contact": ("contact",), "linear systems": ("factorisation", "krylov")}
 COUNTS = ("unknowns", "newton_iterations", "load_steps")
 
 Word = Literal["matters", "hardly", "does not matter", "not known"]
@@ -42,8 +42,8 @@ class Omission:
 
     def phase(self, name: str) -> float:
         """Processor time [s] of one of ``PHASES``: its share of the time of solving; NaN where it is not known."""
-        share = self.costs.get(f"seconds_{name}", math.nan) / (self.costs.get("seconds_solve") or math.nan)
-        return share * self.seconds
+        spent = sum(self.costs.get(f"seconds_{part}", math.nan) for part in PHASES[name])
+        return self.seconds * spent / (self.costs.get("seconds_solve") or math.nan)
 
 
 @dataclass(frozen=True)

@@ -151,9 +151,14 @@ def drawing(found: CaseOmissions) -> Curve | None:
             heights = [max(row[3], floor) for row in own]
             if own:
                 axes.plot([row[2] for row in own], heights, "o", color=colour, markersize=5, label=ablation.name)
-            for row, height in zip(own, heights, strict=True):
+            for j, (row, height) in enumerate(zip(own, heights, strict=True)):
                 below = "" if row[3] >= floor else f" ({number(row[3])} mm)"
-                place = {"xytext": (5, 4), "textcoords": "offset points", "fontsize": "small", "color": colour}
+                place = {
+                    "xytext": (5, -10 if j % 2 else 4),
+                    "textcoords": "offset points",
+                    "fontsize": "small",
+                    "color": colour,
+                }
                 axes.annotate(f"{label(ablation, row[1])}{below}", (row[2], height), **place)  # type: ignore[arg-type]
         axes.set_yscale("log")
         axes.set_ylim(floor / 2, 3 * max(*(row[3] for row in rows), bar, floor))

@@ -62,7 +62,7 @@ def carry_out(trials: Sequence[Trial], store: Path, workers: Workers) -> tuple[M
 
 def solve(trial: Trial, store: Path) -> Run:
     """The run of a trial, in this process; one that failed before is not tried again, where it would fail again."""
-    bench = _bench(trial.scene, store)
+    bench = shared_bench(trial.scene, store)
     folder = bench.folder(trial.choice, trial.label)
     if runs.status(folder) in _LASTING:
         return replace(runs.load(folder), name=trial.name)
@@ -80,7 +80,8 @@ class _Kept:
     bench: Bench[MuscleCase] | None = None
 
 
-def _bench(scene: MuscleCase, store: Path) -> Bench[MuscleCase]:
+def shared_bench(scene: MuscleCase, store: Path) -> Bench[MuscleCase]:
+    """The bench that runs on a scene share in this process."""
     kept = _cached_bench(scene.key, store, str(scene.folder))
     if kept.bench is None:
         kept.bench = Bench(scene, store, ranks=1)

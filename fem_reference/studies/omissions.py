@@ -5,6 +5,7 @@ import math
 import os
 import platform
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ import numpy as np
 from fem_reference import __version__, metrics, solvers
 from fem_reference.assessment.omissions import MEASURES, Ablation, CaseOmissions, Omission
 from fem_reference.effects import Effect, Energy, Load, Ramped
-from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.metrics import MeasurementContext, measure
 from fem_reference.problems.body import ELEMENTS
 from fem_reference.runs.key import versions
@@ -23,7 +24,7 @@ from fem_reference.scenes.case import SolverChoice
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx
 from fem_reference.studies import refinement
-from fem_reference.studies.campaign import Made, Workers, carry_out
+from fem_reference.studies.campaign import Made, Workers, carry_out, shared_bench
 from fem_reference.studies.cost import known
 from fem_reference.studies.execution import MACHINE_ONLY, Bench, complete
 from fem_reference.studies.ladders import Trial
@@ -52,12 +53,14 @@ def study(scene: MuscleCase, store: Path, workers: Workers) -> CaseOmissions:
     where that was not done before.
     """
     with fenicsx.shared():
+        if workers == Workers():
+            _warm_up(scene, store)
         wholes = carry_out([Trial(scene, *entry) for entry in _choices(scene)], store, workers)
         reference = wholes[0]
         trials = {one.trial.name: _omissions(one) for one in wholes if _is_there(one)}
         made = iter(carry_out([trial for _, trial in _listed(trials)], store, workers))
         without = {name: [(part, next(made)) for part, _ in entries] for name, entries in trials.items()}
-        bench = Bench(scene, store)
+        bench = shared_bench(scene, store)
         context = None if not _is_there(reference) else _context(bench, _run(reference))
         bars, unknown = _bars(bench, reference)
     ablations = tuple(_ablation(one, without.get(one.trial.name, []), context) for one in wholes)
@@ -109,14 +112,13 @@ def parts(scene: MuscleCase, choice: SolverChoice, place: str) -> tuple[Part, ..
 
 def without(whole: Trial, part: Part) -> Trial:
     """The trial with a part left out, by an element that suits what is left."""
-    left = _left(whole.scene, part)
+    left, choice, instead = _left(whole.scene, part), whole.choice, dict[str, Any]()
     scene = whole.scene.model_copy(update={"effect": left}) if part.effects else whole.scene
-    changed: dict[str, Any] = dict.fromkeys(part.features)
-    element = getattr(solvers.settings(whole.choice, whole.name), "element", None) if part.effects else None
+    element = getattr(solvers.settings(choice, whole.name), "element", None) if part.effects else None
     if element is not None and (other := fitting(element, left)) != element:
-        changed["element"] = other
-    choice = whole.choice.model_copy(update=changed)
-    instead = {key: value for key, value in changed.items() if value is not None}
+        instead["element"] = other
+    kept = {key: value for key, value in dict(choice).items() if key not in part.features}
+    choice = type(choice).model_validate(kept | instead)
     return Trial(scene, choice, whole.name, "without", " and ".join(part.names), instead)
 
 
@@ -146,6 +148,21 @@ def _choices(scene: MuscleCase) -> list[tuple[SolverChoice, str]]:
     return [(scene.reference, "reference"), *found]
 
 
+def _warm_up(scene: MuscleCase, store: Path) -> None:
+    """Solve the first frames with each candidate, and keep nothing: what is then measured in this process is compiled, and its
+    processor time is that of solving.
+    """
+    bench = shared_bench(scene, store)
+    for choice, name in _choices(scene)[1:]:
+        offer = solvers.find(choice.solver, name)
+        if not solvers.takes_effects(choice.solver):
+            with suppress(InputError, MissingSoftware):  # of which its run says more
+                settings = bench.settings(choice, name)
+                offer.require(settings)
+                built = bench.made_for(choice.solver, settings)
+                offer.solve(replace(built, frames=built.frames[:2]), settings, lambda _: None)
+
+
 def _is_there(one: Made) -> bool:
     return one.run is not None and one.run.outcome.status == "converged"
 
@@ -157,17 +174,20 @@ def _run(one: Made) -> Run:
 
 def _omissions(one: Made) -> list[tuple[Part, Trial]]:
     """Each part of a trial that can be left out, with the trial without it, which has a time limit."""
-    trial, seconds = one.trial, LIMIT * _run(one).outcome.cost.get("seconds", 0.0) + COMPILING
-    return [(part, _limited(without(trial, part), seconds)) for part in parts(trial.scene, trial.choice, trial.name)]
+    trial, found = one.trial, list[tuple[Part, Trial]]()
+    for part in parts(trial.scene, trial.choice, trial.name):
+        other = without(trial, part)
+        found.append((part, replace(other, choice=other.choice.model_copy(update=_limit(one)))))
+    return found
 
 
-def _limited(trial: Trial, seconds: float) -> Trial:
-    """The trial, which gives up after so many ``seconds`` at most, where its solver can."""
-    settings = solvers.settings(trial.choice, trial.name)
+def _limit(one: Made) -> dict[str, str]:
+    """The setting by which a run with something left out gives up, where its solver can."""
+    settings = solvers.settings(one.trial.choice, one.trial.name)
     if "time_limit" not in type(settings).model_fields:
-        return trial
-    limit = min(seconds, getattr(settings, "time_limit", None) or math.inf)
-    return replace(trial, choice=trial.choice.model_copy(update={"time_limit": f"{limit:.6g} s"}))
+        return {}
+    seconds = LIMIT * _run(one).outcome.cost.get("seconds", 0.0) + COMPILING
+    return {"time_limit": f"{min(seconds, getattr(settings, 'time_limit', None) or math.inf):.6g} s"}
 
 
 def _listed(trials: Mapping[str, list[tuple[Part, Trial]]]) -> list[tuple[Part, Trial]]:
@@ -190,7 +210,7 @@ def _bars(bench: Bench[MuscleCase], reference: Made) -> tuple[dict[str, float], 
     except InputError as error:
         log.info("no error bars: %s", error)
         return {}, str(error)
-    found = {name: value for name, value in found.items() if name in MEASURES}
+    found = {name: found[name] for name in MEASURES if name in found}
     return found, "" if found else "the reference has none"
 
 
