@@ -1,6 +1,5 @@
 """One process of FEniCSx that solves bodies one after the other: what it has compiled and loaded serves the next."""
 
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from contextvars import ContextVar
@@ -10,6 +9,7 @@ from typing import Any
 import cloudpickle
 import numpy as np
 
+from fem_reference.foundations import scratch
 from fem_reference.foundations.subprocesses import command
 from fem_reference.problems.body import Body, check
 from fem_reference.runs.solved import Reached, Solved
@@ -83,8 +83,8 @@ def _state(event: dict[str, Any]) -> Reached:
 def session() -> Iterator[Session]:
     """A session; its process ends with it. MissingSoftware where FEniCSx is not installed."""
     require_installed()
-    with tempfile.TemporaryDirectory(prefix="fem_reference-") as folder, ExitStack() as stack:
-        own = Session(Path(folder), stack)
+    with scratch.folder() as folder, ExitStack() as stack:
+        own = Session(folder, stack)
         try:
             yield own
         finally:
