@@ -36,8 +36,15 @@ def swell(problem, _settings, sink) -> Outcome:
     return Outcome("converged", "done", {"seconds": 1.0})
 
 
-def fail(problem, _settings, sink) -> Outcome:
-    sink(Frame(0, problem.surface.points, problem.fibres.points))
+def swell_surface(setup, _settings, sink) -> Outcome:
+    """In place of a solver of surfaces."""
+    for number in setup.frames:
+        sink(Frame(number, setup.surface.points * (1 + number * 1e-3)))
+    return Outcome("converged", "done", {"seconds": 1.0})
+
+
+def fail(setup, _settings, sink) -> Outcome:
+    sink(Frame(0, setup.surface.points))
     return Outcome("diverged", "no equilibrium")
 
 
@@ -124,7 +131,7 @@ def test_an_update_takes_current_values(work) -> None:
 
 @pytest.mark.usefixtures("solved")
 def test_a_candidate_of_the_case_is_checked_by_its_name(work, monkeypatch) -> None:
-    stand_ins.solve_by(monkeypatch, pbd, swell)
+    stand_ins.solve_by(monkeypatch, pbd, swell_surface)
     work.baseline = work.root / "pbd.json"
     assert work.check("--update", candidate="pbd") == cli.DONE
     assert work.check(candidate="pbd") == cli.DONE

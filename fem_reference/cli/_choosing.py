@@ -7,6 +7,7 @@ from typing import Any
 from fem_reference.assessment import judge
 from fem_reference.cli._printing import out
 from fem_reference.foundations.errors import InputError
+from fem_reference.problems import of_case
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Candidate, Case
 from fem_reference.solvers import recorded
@@ -14,8 +15,8 @@ from fem_reference.studies.execution import Bench
 
 
 def scene_of(options: argparse.Namespace) -> Case:
-    """The scene of the case, with what ``--set`` changes of it."""
-    return casefile.read(options.case, changes=dict(map(casefile.setting, options.set)))
+    """The scene of the case, with what ``--set`` changes of it and the effects that it needs."""
+    return of_case.chosen(casefile.read(options.case, changes=dict(map(casefile.setting, options.set))))
 
 
 def own_candidates(scene: Case) -> list[tuple[Candidate, str]]:

@@ -9,6 +9,7 @@ from fem_reference.cli._judging import judge
 from fem_reference.cli._parser import add_case, add_error_bar, add_ranks
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
 from fem_reference.foundations.errors import InputError
+from fem_reference.problems import of_case
 from fem_reference.report.overview import run_text
 from fem_reference.report.tables import of_run
 from fem_reference.scenes.case import Case, SolverChoice
@@ -23,11 +24,17 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--solver", metavar="NAME", help="another solver than the case's own reference")
     add_error_bar(parser)
     add_ranks(parser)
+    explain = "say of each effect whether the case needs it and why, and solve nothing"
+    parser.add_argument("--explain", action="store_true", help=explain)
 
 
 def run(options: argparse.Namespace) -> int:
     """Solve a case, and judge what it expects of the reference; of another solver's run what needs no reference."""
     scene = scene_of(options)
+    if options.explain:
+        found = [str(one) for one in scene.decisions or of_case.explained(scene)] or ["all effects act"]
+        write_output({"case": scene.name, "effects": found}, "\n".join(found), options)
+        return DONE
     if options.solver is None or options.solver == scene.reference.solver:
         return judge(scene, options, [])
     refuse_error_bar(scene, options)

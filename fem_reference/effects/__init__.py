@@ -15,52 +15,17 @@ import pkgutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import Field, field_validator
 
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.functions import Functions, Numpy
+from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.limits import Limit
 from fem_reference.foundations.records import Record, parse
 from fem_reference.foundations.units import unit_of, written
-
-
-class Functions(Protocol):
-    """What an expression may call besides operators, in numpy or symbolically."""
-
-    def exp(self, x: Any) -> Any:
-        """The exponential of x."""
-
-    def log(self, x: Any) -> Any:
-        """The natural logarithm of x > 0."""
-
-    def sqrt(self, x: Any) -> Any:
-        """The square root of x > 0."""
-
-    def cos(self, x: Any) -> Any:
-        """The cosine of x [rad]."""
-
-    def sin(self, x: Any) -> Any:
-        """The sine of x [rad]."""
-
-    def above(self, x: Any, limit: Any, then: Any, otherwise: Any) -> Any:
-        """``then`` where ``x > limit``, else ``otherwise``; both are evaluated everywhere and must be finite."""
-
-
-class Numpy:
-    """``Functions`` of numbers and arrays."""
-
-    exp = staticmethod(np.exp)
-    log = staticmethod(np.log)
-    sqrt = staticmethod(np.sqrt)
-    cos = staticmethod(np.cos)
-    sin = staticmethod(np.sin)
-
-    @staticmethod
-    def above(x: Any, limit: Any, then: Any, otherwise: Any) -> Any:
-        """``then`` where ``x > limit``, else ``otherwise``."""
-        return np.where(x > limit, then, otherwise)
 
 
 @dataclass(frozen=True)
@@ -159,6 +124,10 @@ class Effect(Record):
         """The ranges that it is meant for; none unless its docstring gives one."""
         return ()
 
+    def indicator(self, scene: Estimates) -> Indicator | None:  # noqa: ARG002
+        """Whether a scene needs it, by what is known of that before it is solved; None of what is part of the material: always."""
+        return None
+
     @property
     def title(self) -> str:
         """What it is called beside the other effects of a scene."""
@@ -241,6 +210,17 @@ def total_energy(acting: Sequence[tuple[Effect, Any]], state: State) -> Any:
     state = elastic_state(acting, state)
     energies = [(effect, amount) for effect, amount in acting if isinstance(effect, Energy)]
     return sum(effect.energy(replace(state, amount=amount)) for effect, amount in energies)
+
+
+def fibre_tension(effect: Energy, stretch: float, step: float = 1e-6) -> float:
+    """The force per rest area [MPa] along fibres of a ``stretch`` whose volume stays, by central differences of the energy."""
+
+    def energy(along: float) -> float:
+        across = along**-0.5
+        F = ((along, 0.0, 0.0), (0.0, across, 0.0), (0.0, 0.0, across))
+        return float(effect.energy(State(F=F, pressure=0.0, fibre=(1.0, 0.0, 0.0))))
+
+    return (energy(stretch + step) - energy(stretch - step)) / (2 * step)
 
 
 @dataclass(frozen=True)

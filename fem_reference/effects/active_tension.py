@@ -3,6 +3,7 @@
 from typing import Any, ClassVar
 
 from fem_reference.effects import Energy, Ramped, State
+from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.units import PositivePressure
 
 
@@ -15,6 +16,11 @@ class ActiveTension(Ramped, Energy):
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
     tension: PositivePressure
+
+    def indicator(self, scene: Estimates) -> Indicator:
+        """By how far fibres shorten that pull against the matrix."""
+        pull = scene.greatest(self) * self.tension
+        return Indicator("tension of the fibres over the shear modulus", pull / scene.shear, scene.shorten(pull, 0.3))
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa]."""

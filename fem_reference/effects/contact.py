@@ -1,10 +1,12 @@
 """Frictionless contact of bones with the muscle, with any sliding; attached vertices are exempt."""
 
+import math
 from collections.abc import Iterable
 
 from pydantic import Field
 
 from fem_reference.effects import Effect, Interaction
+from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.units import AreaStiffness, PositiveLength
 
 
@@ -18,6 +20,16 @@ class Contact(Interaction):
     stiffness: AreaStiffness
     smoothing: PositiveLength = 0.1
     bones: tuple[str, ...] | None = Field(default=None, min_length=1)
+
+    def indicator(self, scene: Estimates) -> Indicator:
+        """By how deep the surface may get into bones."""
+        near = {name: one for name, one in scene.near.items() if self.is_by(name)}
+        gap = min((one.gap for one in near.values()), default=math.inf)
+        depth = math.hypot(*(one.depth for one in near.values()))
+        reached = "; ".join(
+            f"{name}, nearest at frame {one.frame:g}" for name, one in near.items() if one.gap < self.smoothing
+        )
+        return Indicator(f"gap to bones that is free for certain [mm] ({reached or 'no bone is reached'})", gap, depth)
 
     def is_by(self, bone: str) -> bool:
         """Whether the bone of this name is in contact."""

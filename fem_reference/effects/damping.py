@@ -3,6 +3,7 @@
 from typing import Any, ClassVar
 
 from fem_reference.effects import Energy, State
+from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.units import VolumeDamping
 
 
@@ -19,6 +20,13 @@ class Damping(Energy):
     stored: ClassVar[bool] = False
 
     coefficient: VolumeDamping
+
+    def indicator(self, scene: Estimates) -> Indicator:
+        """By the sag of a beam under the drag."""
+        force = self.coefficient * scene.in_time(scene.speed)
+        return Indicator(
+            "drag over the length against the shear modulus", force * scene.length / scene.shear, scene.bend(force)
+        )
 
     def energy(self, state: State) -> Any:
         """The potential of the step per rest volume [MPa]."""

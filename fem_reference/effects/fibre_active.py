@@ -5,6 +5,7 @@ from typing import Any, ClassVar
 from pydantic import Field
 
 from fem_reference.effects import Energy, Ramped, State
+from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.limits import Limit
 from fem_reference.foundations.units import PositivePressure
 
@@ -26,6 +27,11 @@ class FibreActive(Ramped, Energy):
     def limits(self) -> tuple[Limit, ...]:
         """Of the fibre stretch."""
         return (Limit("fibre stretch", 0.4 * self.optimal_stretch, 1.6 * self.optimal_stretch),)
+
+    def indicator(self, scene: Estimates) -> Indicator:
+        """By how far fibres shorten that pull against the matrix."""
+        pull = scene.greatest(self) * self.stress
+        return Indicator("tension of the fibres over the shear modulus", pull / scene.shear, scene.shorten(pull, 0.3))
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa], zero at rest."""

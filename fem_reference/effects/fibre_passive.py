@@ -4,7 +4,8 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
-from fem_reference.effects import Energy, State
+from fem_reference.effects import Energy, State, fibre_tension
+from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.limits import Limit
 from fem_reference.foundations.units import PositivePressure
 
@@ -31,6 +32,15 @@ class FibrePassive(Energy):
     def limits(self) -> tuple[Limit, ...]:
         """Of the fibre stretch."""
         return (Limit("fibre stretch", high=max(1.6, self.linear_from) * self.optimal_stretch),)
+
+    def indicator(self, scene: Estimates) -> Indicator:
+        """By how much they pull at the greatest stretch that is to be expected, against the matrix."""
+        pull = fibre_tension(self, scene.stretch[1])
+        return Indicator(
+            "tension of the fibres over the shear modulus",
+            pull / scene.shear,
+            scene.shorten(pull, 0.1 * (scene.stretch[1] - 1)),
+        )
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa], zero in slack fibres."""

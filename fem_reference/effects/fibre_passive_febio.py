@@ -5,7 +5,8 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from fem_reference.effects import Energy, State
+from fem_reference.effects import Energy, State, fibre_tension
+from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.units import PositivePressure
 
 # On (0, 1), as plain numbers: those of numpy would draw symbols into arrays.
@@ -27,6 +28,15 @@ class FibrePassiveFebio(Energy):
     c4: float = Field(gt=0)
     c5: PositivePressure
     linear_from: float = Field(gt=1)
+
+    def indicator(self, scene: Estimates) -> Indicator:
+        """By how much they pull at the greatest stretch that is to be expected, against the matrix."""
+        pull = fibre_tension(self, scene.stretch[1])
+        return Indicator(
+            "tension of the fibres over the shear modulus",
+            pull / scene.shear,
+            scene.shorten(pull, 0.1 * (scene.stretch[1] - 1)),
+        )
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa], zero in slack fibres."""

@@ -1,8 +1,10 @@
 """Weight, or any other steady acceleration."""
 
+import math
 from typing import Any
 
 from fem_reference.effects import Energy, Ramped, State
+from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.units import AccelerationVector, Density
 
 
@@ -14,6 +16,13 @@ class Gravity(Ramped, Energy):
 
     density: Density
     acceleration: AccelerationVector
+
+    def indicator(self, scene: Estimates) -> Indicator:
+        """By the sag of a beam."""
+        force = scene.greatest(self) * self.density * math.hypot(*self.acceleration)
+        return Indicator(
+            "weight over the length against the shear modulus", force * scene.length / scene.shear, scene.bend(force)
+        )
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa], zero at rest."""

@@ -1,10 +1,12 @@
 """Inertia: mass resists acceleration. Without it a scene is quasi-static and has neither velocities nor a mass matrix."""
 
+import math
 from typing import Any, ClassVar
 
 from pydantic import Field
 
 from fem_reference.effects import Energy, State
+from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.units import Density
 
 
@@ -26,6 +28,15 @@ class Inertia(Energy):
 
     density: Density
     spectral_radius: float = Field(default=0.9, ge=0, le=1)
+
+    def indicator(self, scene: Estimates) -> Indicator:
+        """By how far a beam lags behind: its first frequency is that of the beam that its own weight bends by as much."""
+        square = scene.bend(self.density)  # of one over the frequency
+        lag = max(
+            square * scene.in_time(scene.in_time(scene.acceleration)), math.sqrt(square) * scene.in_time(scene.jump)
+        )
+        cauchy = self.density * scene.in_time(scene.speed) ** 2 / scene.shear
+        return Indicator("Cauchy number, density times speed squared over shear modulus", cauchy, lag)
 
     def energy(self, state: State) -> Any:
         """The potential of the step per rest volume [MPa]."""

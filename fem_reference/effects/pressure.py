@@ -5,6 +5,7 @@ from typing import Any
 
 from fem_reference.effects import Load, Ramped, State
 from fem_reference.foundations import units
+from fem_reference.foundations.indicators import Estimates, Indicator
 
 
 class Pressure(Ramped, Load):
@@ -14,6 +15,11 @@ class Pressure(Ramped, Load):
     """
 
     pressure: units.Pressure
+
+    def indicator(self, scene: Estimates) -> Indicator:
+        """By how far it presses the thickness together."""
+        part = scene.greatest(self) * abs(self.pressure) / scene.shear
+        return Indicator("pressure over the shear modulus", part, part * scene.thickness / 3)
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:
         """Force per rest area [MPa], (3,)."""

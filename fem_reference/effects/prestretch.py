@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 from pydantic import Field, model_validator
 
 from fem_reference.effects import Prestrain, Ramped, State
+from fem_reference.foundations.indicators import Estimates, Indicator
 
 
 class Prestretch(Ramped, Prestrain):
@@ -23,6 +24,11 @@ class Prestretch(Ramped, Prestrain):
         if any(1 + knot.amount * (self.stretch - 1) <= 0 for knot in self.ramp):
             raise ValueError("a ramp whose stretches 1 + amount (stretch - 1) are above zero")
         return self
+
+    def indicator(self, scene: Estimates) -> Indicator:
+        """By how far fibres shorten that are let go."""
+        part = scene.greatest(self) * abs(self.stretch - 1)
+        return Indicator("stretch of the fibres less 1", part, 0.1 * part * scene.length)
 
     def elastic(self, state: State) -> Sequence[Sequence[Any]]:
         """The deformation gradient (3, 3) that the energies see."""

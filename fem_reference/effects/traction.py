@@ -1,9 +1,11 @@
 """A dead load: a force on a part of the surface that keeps its direction and its size as the surface moves."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
 from fem_reference.effects import Load, Ramped, State
+from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.units import PressureVector
 
 
@@ -14,6 +16,11 @@ class Traction(Ramped, Load):
     """
 
     force: PressureVector
+
+    def indicator(self, scene: Estimates) -> Indicator:
+        """By how far it pulls the length."""
+        part = scene.greatest(self) * math.hypot(*self.force) / scene.shear
+        return Indicator("traction over the shear modulus", part, part * scene.length / 3)
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:  # noqa: ARG002
         """Force per rest area [MPa], (3,)."""

@@ -6,6 +6,7 @@ Short waves of an unstable state grow no faster than long ones.
 from typing import Any, ClassVar
 
 from fem_reference.effects import Energy, State
+from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.units import Viscosity as Coefficient
 
 
@@ -24,6 +25,13 @@ class Viscosity(Energy):
     stored: ClassVar[bool] = False
 
     eta: Coefficient
+
+    def indicator(self, scene: Estimates) -> Indicator:
+        """By how much of its travel a body lags behind in the time in which it relaxes."""
+        deborah = self.eta / scene.shear * scene.in_time(scene.speed) / scene.length
+        return Indicator(
+            "Deborah number, relaxation time over the time of the motion", deborah, 0.25 * deborah * scene.travel
+        )
 
     def energy(self, state: State) -> Any:
         """The potential of the step per rest volume [MPa]."""

@@ -3,12 +3,45 @@
 import logging
 from typing import Any
 
+from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import muscle, scalar
+from fem_reference.problems.estimates import Decision, decisions, missed
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.scenes.scalar import ScalarCase
 
 log = logging.getLogger(__name__)
+
+
+def explained(case: Case) -> tuple[Decision, ...]:
+    """Of each effect of a case whether that needs it, and why; nothing of a scalar field, which needs all."""
+    return decisions(case, muscle.setup(case)) if isinstance(case, MuscleCase) else ()
+
+
+def chosen[C: Case](case: C) -> C:
+    """The case with the effects that it needs, where it leaves that to be found out; with ``decisions`` that say why."""
+    if not isinstance(case, MuscleCase) or case.choice == "listed":
+        return case
+    found = explained(case)
+    for one in found:
+        log.info("%s: %s", case.name, one)
+    kept = tuple(one.effect for one in found if one.needed)
+    return case.model_copy(update={"choice": "listed", "effect": kept, "decisions": found})
+
+
+def reconsidered[C: Case](case: C, rest: Any, numbers: tuple[int, ...], positions: Floats) -> C:
+    """The case with the effects that it left out and that turned out to matter, by the ``positions`` (f, n, 3) of its surface at
+    frame ``numbers``; the same case where none did.
+    """
+    found = missed(case, rest, numbers, positions) if isinstance(case, MuscleCase) else ()
+    if not found:
+        return case
+    for one in found:
+        log.info("%s: %s, as it turned out", case.name, one)
+    new = {id(one.effect): one for one in found}
+    made = tuple(new.get(id(one.effect), one) for one in case.decisions)
+    kept = tuple(one.effect for one in made if one.needed)
+    return case.model_copy(update={"effect": kept, "decisions": made})
 
 
 def setup(case: Case) -> Any:

@@ -79,6 +79,7 @@ def _(setup: Setup, case: MuscleCase) -> dict[str, Any]:
             for one in setup.attached
         },
         "effects": {effect.title: _parameters(effect) for effect in case.effects},
+        **({"effects_chosen": [str(one) for one in case.decisions]} if case.decisions else {}),
         "frames": f"{case.frames.first} to {case.frames.last}, every {case.frames.every}",
     }
 

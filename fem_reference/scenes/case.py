@@ -83,7 +83,8 @@ class NegativeControl(Record):
 class Case(Record):
     """A case, read and checked: the keys of its file, and the ``name`` and ``folder`` that it has; ``place`` names its file in
     messages, ``from_file`` says that it has one. ``quick`` are changes, by key, with which it is solved faster and less well, as
-    tests do; ``unsolved`` says why the reference ends before the last frame, where it does.
+    tests do; ``unsolved`` says why the reference ends before the last frame, where it does. ``decisions``, where the case found out
+    itself which effects it needs, say why.
     """
 
     title: str
@@ -99,6 +100,7 @@ class Case(Record):
     folder: Path = Field(exclude=True)
     place: str = Field(default="case", exclude=True)
     from_file: bool = Field(default=False, exclude=True)
+    decisions: tuple[Any, ...] = Field(default=(), exclude=True)
 
     # What a solver of it is asked for, what its runs have, the keys that determine its solution, and those of them that name files.
     task: ClassVar[Literal["solve", "solve_field"]]

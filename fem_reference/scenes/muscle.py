@@ -117,8 +117,12 @@ class Frames(Record):
 
 
 class MuscleCase(Case):
-    """The case of a muscle: what moves what, which effects act, and which frames are wanted."""
+    """The case of a muscle: what moves what, which effects act, and which frames are wanted.
 
+    The key ``effects`` (``choice``) says whether all effects that are listed act, or those of them that the scene needs: "auto".
+    """
+
+    choice: Literal["listed", "auto"] = Field(default="listed", alias="effects")
     muscle: Muscle
     bone: tuple[Bone, ...] = Field(min_length=1)
     attachment: tuple[Attachment, ...] = ()

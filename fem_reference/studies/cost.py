@@ -85,7 +85,7 @@ def _of(scene: MuscleCase, store: Path, workers: Workers, only: Collection[str])
         truth=f"its reference on tetrahedra of {size:.3g} mm",
         points=points,
         units=metrics.units(),
-        bars=_known(bars),
+        bars=known(bars),
         claims=_claims(made, truth, context, store),
         triangles=len(truth.surface.triangles),
         travel=context.travel,
@@ -93,7 +93,7 @@ def _of(scene: MuscleCase, store: Path, workers: Workers, only: Collection[str])
     )
 
 
-def _known(bars: ErrorBars | None) -> dict[str, float]:
+def known(bars: ErrorBars | None) -> dict[str, float]:
     """The error bar of each statistic of a deviation, the greatest over the frames."""
     if bars is None:
         return {}

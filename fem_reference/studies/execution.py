@@ -31,7 +31,7 @@ from fem_reference.solvers.common.protocol import MuscleSolver
 
 log = logging.getLogger(__name__)
 
-_MACHINE_ONLY = {
+MACHINE_ONLY = {
     "ranks",
     "time_limit",
     "linear_solver",
@@ -43,9 +43,9 @@ class Bench[C: Case]:
     """A case with what is made from it once and only when needed: its setup, its problem, and where its runs are stored."""
 
     def __init__(self, scene: C, store: Path, ranks: int | None = None) -> None:
-        self.scene, self.store, self.ranks = scene, store, ranks
-        self.setup: Callable[[], Any] = cache(lambda: of_case.setup(scene))
-        self.problem: Callable[[], Any] = cache(lambda: of_case.problem(scene, self.setup()))
+        self.scene, self.store, self.ranks = of_case.chosen(scene), store, ranks
+        self.setup: Callable[[], Any] = cache(lambda: of_case.setup(self.scene))
+        self.problem: Callable[[], Any] = cache(lambda: of_case.problem(self.scene, self.setup()))
 
     def settings(self, choice: SolverChoice, place: str) -> Record:
         """The settings of ``choice``, checked; a folder that the scene names is found as its files are, and only there."""
@@ -65,11 +65,23 @@ class Bench[C: Case]:
             return self.read(name, choice, place)
         settings, folder = self.settings(choice, place), self.folder(choice, place)
         if (stored := _stored(folder, name)) is not None:
-            return stored
+            return self._with_all_that_matters(stored, choice, place)
         solvers.require(choice.solver, settings, place, self.scene.task)
         self.made_for(choice.solver, settings)  # what is wrong with the input shows before anything is written
         with _alone(folder):
-            return _stored(folder, name) or self._solve(name, choice.solver, settings, folder)
+            run = _stored(folder, name) or self._solve(name, choice.solver, settings, folder)
+        return self._with_all_that_matters(run, choice, place)
+
+    def _with_all_that_matters(self, run: Run, choice: SolverChoice, place: str) -> Run:
+        """The ``run``; where an effect that the case left out turns out to matter in it, one with that effect."""
+        if not self.scene.decisions or not solvers.takes_effects(choice.solver):
+            return run
+        scene = of_case.reconsidered(self.scene, self.setup(), run.numbers, run.positions)
+        if scene is self.scene:
+            return run
+        self.scene = scene
+        self.problem = cache(lambda: of_case.problem(scene, self.setup()))
+        return self.obtain(run.name, choice, place)
 
     def folder(self, choice: SolverChoice, place: str) -> Path:
         """Where the run of a solver of our own is stored, once there is one."""
@@ -104,9 +116,7 @@ class Bench[C: Case]:
 
     def key(self, solver: str, settings: Record) -> str:
         """The key of a run: a hash over all that determines it."""
-        numerics = {
-            name: value for name, value in settings.model_dump(mode="json").items() if name not in _MACHINE_ONLY
-        }
+        numerics = {name: value for name, value in settings.model_dump(mode="json").items() if name not in MACHINE_ONLY}
         return key(self.scene.key, solver, numerics)
 
     def origin(self, solver: str, settings: Record) -> dict[str, Any]:
@@ -118,6 +128,7 @@ class Bench[C: Case]:
             "solver": solver,
             "settings": settings.model_dump(mode="json"),
             "effects": {title: effect.model_dump(mode="json") for title, effect in acting.items()} or "none",
+            **({"effects_chosen": [str(one) for one in self.scene.decisions]} if self.scene.decisions else {}),
             "fem_reference": __version__,
             "code": code_hash(solver),
             "versions": versions(),

@@ -14,6 +14,7 @@ from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import parse
+from fem_reference.problems import of_case
 from fem_reference.problems.body import Body
 from fem_reference.runs.solved import Solved
 from fem_reference.runs.store import Run
@@ -43,7 +44,7 @@ def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Cas
         Where a key is missing, unknown or wrong; it names file, key, what was got and what is wanted.
 
     """
-    return casefile.read(case, changes=dict(changes or {}))
+    return of_case.chosen(casefile.read(case, changes=dict(changes or {})))
 
 
 def solve(

@@ -111,12 +111,12 @@ def _passive() -> tuple[Entry, ...]:
 
 def _active() -> tuple[Entry, ...]:
     """On both limbs of the force-length curve and between, free to shorten, and beside passive fibres."""
-    opposite = "Activation of the wrong sign.", _fixed(active(-1.0))
+    half = "Half the activation.", _fixed(active(0.5))
     stronger = "Peak stress 1 % too high.", active(stress=1.01 * STRESS)
     limbs = {"ascending": (0.6, "short"), "descending": (1.6, "long")}
     both, weaker = passive() + active(0.5), passive() + active(0.495)
     return (
-        _force("active_isometric", "Active fibres fixed at rest length: force", _fixed(active()), opposite),
+        _force("active_isometric", "Active fibres fixed at rest length: force", _fixed(active()), half),
         *(
             _force(
                 f"active_{limb}",
@@ -131,7 +131,7 @@ def _active() -> tuple[Entry, ...]:
             "Active fibres free to shorten: length over that at rest",
             0,
             _free(active(0.1)),
-            ("Activation of the wrong sign.", _free(active(-0.1))),
+            ("Half the activation.", _free(active(0.05))),
         ),
         _force(
             "passive_and_active",
@@ -143,7 +143,7 @@ def _active() -> tuple[Entry, ...]:
             "active_tension",
             "Fibres of constant tension fixed at 0.9 of their rest length: force",
             _fixed(tension(), 0.9),
-            ("Tension of the wrong sign.", _fixed(tension(-1.0), 0.9)),
+            ("Half the tension.", _fixed(tension(0.5), 0.9)),
         ),
     )
 

@@ -37,7 +37,7 @@ class Worker:
         self.job, self.folder, self.settings = job, folder, job.settings
         self.body = AssembledBody(job.body, job.settings)
         self.set_up = time.perf_counter() - begin
-        self.solving = self.checking = 0.0
+        self.solving = self.solving_processor = self.checking = 0.0
         self.counts = {"newton_iterations": 0, "load_steps": 0, "cut_backs": 0}
         self.unstable: dict[float, float] = {}  # negative modes by frame
         self.ranges = Ranges()
@@ -81,9 +81,10 @@ class Worker:
 
     def attempt(self, frame: float) -> Attempt:
         """Solve at ``frame`` from the last state; on failure go back to it."""
-        begin = time.perf_counter()
+        begin, processor = time.perf_counter(), time.process_time()
         result = self.body.attempt(frame)
         self.solving += time.perf_counter() - begin
+        self.solving_processor += time.process_time() - processor
         if result.failure in (None, "collapsed"):
             self.collapse = result.sentence
         return result
@@ -159,12 +160,14 @@ class Worker:
         spent = self.body.spent
         memory = self.body.comm.allreduce(peak_memory())
         processor = self.body.comm.allreduce(time.process_time() - self.began)
+        solving = self.body.comm.allreduce(self.solving_processor)
         own = {
             "seconds_set_up": self.set_up,
             "seconds_solve": self.solving,
             **{f"seconds_{name}": spent.seconds[name] for name in ("assembly", "contact", "factorisation", "krylov")},
             "seconds_stability": self.checking,
             "seconds_processor": processor,
+            "seconds_processor_solve": solving,  # without what was compiled
             **{name: float(spent.counts[name]) for name in _COUNTED},
             **{name: float(count) for name, count in self.counts.items()},
         }

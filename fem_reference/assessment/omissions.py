@@ -1,0 +1,120 @@
+"""What it changes to leave out an effect of a scene, or a feature of a solver: numbers beside the error bar, and what it saves."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+FORMAT = 1
+# What is measured of a run with something left out, against the same solver with all of it.
+MEASURES = ("volume.deviation", "fibre_length.rms_percent", "surface_deviation.rms", "surface_deviation.max")
+# Where all changes are below this share of the error bar, an omission does not matter.
+NEGLIGIBLE = 0.1
+# Parts of the time of solving that runs may know apart; of the reference the whole of it is a little more.
+PHASES = ("assembly", "contact", "factorisation", "krylov")
+COUNTS = ("unknowns", "newton_iterations", "load_steps")
+
+Word = Literal["matters", "hardly", "does not matter", "not known"]
+
+
+@dataclass(frozen=True)
+class Omission:
+    """A run with something ``left_out``, by name: nothing, one thing, or all that can be; how it ended. ``instead``: settings that
+    had to change with it. A run that was not made has the status ``"refused"``.
+
+    ``changes``: by ``metric.statistic``, the greatest magnitude over the frames of the change from the run with all of it; nothing
+    where one of them is not known. ``predicted``: by the same, what an indicator said before, where there is one. ``costs``: by
+    name, as the run has them.
+    """
+
+    left_out: tuple[str, ...]
+    status: str
+    message: str
+    changes: dict[str, float] = field(default_factory=dict)
+    costs: dict[str, float] = field(default_factory=dict)
+    instead: dict[str, Any] = field(default_factory=dict)
+    predicted: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def seconds(self) -> float:
+        """Processor time [s], of the reference that of solving alone: never of compilation. NaN where it is not known."""
+        return self.costs.get("seconds_processor_solve", self.costs.get("seconds_processor", math.nan))
+
+    def phase(self, name: str) -> float:
+        """Processor time [s] of one of ``PHASES``: its share of the time of solving; NaN where it is not known."""
+        share = self.costs.get(f"seconds_{name}", math.nan) / (self.costs.get("seconds_solve") or math.nan)
+        return share * self.seconds
+
+
+@dataclass(frozen=True)
+class Ablation:
+    """A run called ``name`` by ``solver``: the ``whole``, with each thing left out and with all of them; ``kept``: what is never
+    left out, by name.
+    """
+
+    name: str
+    solver: str
+    kept: tuple[str, ...]
+    whole: Omission
+    omissions: tuple[Omission, ...]
+
+    def relative(self, seconds: float) -> float:
+        """A time [s] over that of the whole, NaN where one of them is not known."""
+        return seconds / (self.whole.seconds or math.nan)
+
+    def count(self, omission: Omission, name: str) -> float:
+        """One of ``COUNTS`` over that of the whole, NaN where one of them is not known."""
+        return omission.costs.get(name, math.nan) / (self.whole.costs.get(name) or math.nan)
+
+
+@dataclass(frozen=True)
+class CaseOmissions:
+    """The ablations of a case, the reference's first. ``bars``: its error bars by ``metric.statistic``, the greatest over the
+    frames, and ``unknown``, why there are none; ``units`` by the same; ``origin``: with what and on what it was measured.
+    """
+
+    case: str
+    title: str
+    ablations: tuple[Ablation, ...]
+    units: dict[str, str]
+    bars: dict[str, float]
+    unknown: str = ""
+    origin: dict[str, str] = field(default_factory=dict)
+
+
+def in_bars(changes: Mapping[str, float], bars: Mapping[str, float]) -> dict[str, float]:
+    """Each of ``changes`` in error bars: NaN where the bar is not known.
+
+    >>> in_bars({"volume.deviation": 0.5, "surface_deviation.rms": 1.0}, {"volume.deviation": 0.25})
+    {'volume.deviation': 2.0, 'surface_deviation.rms': nan}
+    """
+    return {name: _ratio(value, bars.get(name, math.nan)) for name, value in changes.items()}
+
+
+def verdict(changes: Mapping[str, float], bars: Mapping[str, float]) -> Word:
+    """Whether an omission matters: it does where one of ``changes`` is above its error bar, and does not where all are below a
+    tenth of it.
+
+    >>> bars = {"volume.deviation": 0.1, "surface_deviation.rms": 1.0}
+    >>> [verdict({"volume.deviation": 0.005, "surface_deviation.rms": x}, bars) for x in (0.05, 0.5, 5.0)]
+    ['does not matter', 'hardly', 'matters']
+    """
+    ratios = list(in_bars(changes, bars).values())
+    if any(ratio > 1 for ratio in ratios):
+        return "matters"
+    if not ratios or any(map(math.isnan, ratios)):
+        return "not known"
+    return "does not matter" if all(ratio < NEGLIGIBLE for ratio in ratios) else "hardly"
+
+
+def _ratio(value: float, bar: float) -> float:
+    return value / bar if bar else math.inf if value else 0.0
+
+
+def facts(found: CaseOmissions) -> dict[str, Any]:
+    """The ablations of a case as valid JSON, with the verdict on every omission."""
+    table = {"format": FORMAT, **asdict(found)}
+    for ablation, one in zip(found.ablations, table["ablations"], strict=True):
+        for omission, row in zip(ablation.omissions, one["omissions"], strict=True):
+            row["verdict"] = verdict(omission.changes, found.bars)
+    return table

@@ -1,0 +1,35 @@
+"""The verb ``effects``: what each effect of a case changes, and what it costs."""
+
+import argparse
+
+from fem_reference import report
+from fem_reference.assessment.omissions import facts
+from fem_reference.cli._parser import add_case
+from fem_reference.cli._printing import DONE, SOLVER_FAILED, out, write_output
+from fem_reference.foundations.errors import InputError
+from fem_reference.report import effects_page
+from fem_reference.scenes import casefile
+from fem_reference.studies import omissions
+from fem_reference.studies.campaign import Workers
+
+PAGE = "effects"
+HELP = "what leaving out each effect of a case changes and saves, for its reference and its candidates, and the page"
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options that this verb has."""
+    add_case(parser)
+    parser.add_argument(
+        "--workers", type=int, default=1, metavar="N", help="how many runs are made at once (default: 1)"
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Solve a case with each thing left out that can be, and write the page."""
+    if options.workers < 1:
+        raise InputError("--workers", options.workers, "1 or more")
+    scene = casefile.read_muscle(options.case, dict(map(casefile.setting, options.set)))
+    found = omissions.study(scene, out(options) / "runs", Workers(options.workers))
+    path = report.write_effects(found, out(options) / scene.name, PAGE)
+    write_output(facts(found), f"{effects_page.text(found)}\npage: {path}", options)
+    return DONE if found.ablations[0].whole.status == "converged" else SOLVER_FAILED

@@ -1,0 +1,183 @@
+"""The page of omissions: what each effect of a scene and each feature of a candidate changes, and what it costs."""
+
+import math
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
+
+from fem_reference.assessment.fronts import COSTS
+from fem_reference.assessment.omissions import (
+    COUNTS,
+    MEASURES,
+    PHASES,
+    Ablation,
+    CaseOmissions,
+    Omission,
+    in_bars,
+    verdict,
+)
+from fem_reference.report.curves import BAND, PALETTE, REFERENCE, Curve, drawn
+from fem_reference.report.templates import template
+from fem_reference.report.words import duration, listed, number, words
+
+MAIN = "surface_deviation.rms"
+# By name the head of a column of the table.
+HEADS = {
+    "volume.deviation": "volume",
+    "fibre_length.rms_percent": "fibre length, rms",
+    "surface_deviation.rms": "surface, rms",
+    "surface_deviation.max": "surface, max",
+}
+# A change that is smaller by this factor than the least that is drawn otherwise is drawn there.
+_DEPTH = 10.0
+
+
+def render(found: CaseOmissions) -> str:
+    """The whole page as text."""
+    return template("effects_page.html").render(
+        found=found,
+        measures=[name for name in MEASURES if name in found.units],
+        heads=HEADS,
+        phases=phases(found),
+        counts={name: count_title(name) for name in COUNTS},
+        predicted=any(one.predicted for ablation in found.ablations for one in ablation.omissions),
+        sentences=sentences,
+        label=label,
+        judged=lambda one: verdict(one.changes, found.bars),
+        prediction=lambda one: [f"{title_of(name)}: {number(value)}" for name, value in one.predicted.items()],
+        instead=lambda one: [f"{words(key)} = {value}" for key, value in one.instead.items()],
+        percent=percent,
+        drawing=drawing(found),
+    )
+
+
+def title_of(name: str) -> str:
+    """A change in words.
+
+    >>> title_of("fibre_length.rms_percent")
+    'fibre length, rms percent'
+    """
+    return ", ".join(map(words, name.split(".")))
+
+
+def count_title(name: str) -> str:
+    """What is counted, in words.
+
+    >>> count_title("newton_iterations"), count_title("load_steps")
+    ('Newton iterations', 'load steps')
+    """
+    return COSTS[name][0] if name in COSTS else words(name)
+
+
+def label(ablation: Ablation, omission: Omission) -> str:
+    """What is left out, in words; one of several is not repeated where it is all of them."""
+    if not omission.left_out:
+        return "nothing"
+    if len(omission.left_out) > 1 and len(omission.left_out) == len(ablation.omissions) - 1:
+        return "all of them"
+    return listed([words(name) for name in omission.left_out])
+
+
+def percent(share: float) -> str:
+    """A share of the whole.
+
+    >>> percent(0.254)
+    '25 %'
+    """
+    return "\N{EN DASH}" if math.isnan(share) else f"{100 * share:.0f} %"
+
+
+def phases(found: CaseOmissions) -> list[str]:
+    """The phases that a run of the case knows apart and spends time on."""
+    runs = [one for ablation in found.ablations for one in (ablation.whole, *ablation.omissions)]
+    return [name for name in PHASES if any(one.phase(name) > 0 for one in runs)]
+
+
+def sentences(found: CaseOmissions, ablation: Ablation) -> list[str]:
+    """What comes of leaving things out of a run, in words."""
+    if ablation.whole.status != "converged":
+        return [f"Nothing was left out, as the whole run {ablation.whole.status}: {ablation.whole.message}"]
+    if not ablation.omissions:
+        return ["There is nothing that could be left out."]
+    said = [_sentence(found, ablation, one) for one in ablation.omissions]
+    if ablation.kept:
+        material = listed([words(name) for name in ablation.kept])
+        said.append(f"Never left out is the material itself: {material}.")
+    return said
+
+
+def _sentence(found: CaseOmissions, ablation: Ablation, one: Omission) -> str:
+    name = label(ablation, one)
+    if not one.changes:
+        return f"Without {name}: {one.status}. {one.message}"
+    said = {
+        "matters": "It matters",
+        "hardly": "It hardly matters",
+        "does not matter": "It does not matter",
+        "not known": "Whether it matters is not known",
+    }[verdict(one.changes, found.bars)]
+    saved = 1 - ablation.relative(one.seconds)
+    time = "" if math.isnan(saved) else f" and {'saves' if saved >= 0 else 'costs'} {percent(abs(saved))} of the time"
+    return f"Leaving out {name} changes {_most(found, one)}{time}. {said}."
+
+
+def _most(found: CaseOmissions, one: Omission) -> str:
+    """The change that is the most error bars."""
+    ratios = {name: ratio for name, ratio in in_bars(one.changes, found.bars).items() if not math.isnan(ratio)}
+    name = max(ratios, key=lambda name: ratios[name]) if ratios else next(iter(one.changes))
+    known = f", known to {number(found.bars[name])} {found.units[name]}," if name in found.bars else ""
+    return f"the {HEADS.get(name, title_of(name))} by {number(one.changes[name])} {found.units[name]}{known}"
+
+
+def drawing(found: CaseOmissions) -> Curve | None:
+    """The change that an omission makes against the time that it saves; None where there is none to draw."""
+    rows = [
+        (ablation, one, 100 * (1 - ablation.relative(one.seconds)), one.changes[MAIN])
+        for ablation in found.ablations
+        for one in ablation.omissions
+        if MAIN in one.changes and not math.isnan(ablation.relative(one.seconds))
+    ]
+    if not rows:
+        return None
+    bar = found.bars.get(MAIN, 0.0)
+    low = min((value for value in (*(row[3] for row in rows), bar) if value > 0), default=1.0)
+    floor = max(low, 1e-3 * (bar or max(row[3] for row in rows) or 1.0)) / _DEPTH
+
+    def draw(figure: Figure, axes: Axes) -> None:
+        for i, ablation in enumerate(found.ablations):
+            own = [row for row in rows if row[0] is ablation]
+            colour = REFERENCE if i == 0 else PALETTE[(i - 1) % len(PALETTE)]
+            heights = [max(row[3], floor) for row in own]
+            if own:
+                axes.plot([row[2] for row in own], heights, "o", color=colour, markersize=5, label=ablation.name)
+            for row, height in zip(own, heights, strict=True):
+                below = "" if row[3] >= floor else f" ({number(row[3])} mm)"
+                place = {"xytext": (5, 4), "textcoords": "offset points", "fontsize": "small", "color": colour}
+                axes.annotate(f"{label(ablation, row[1])}{below}", (row[2], height), **place)  # type: ignore[arg-type]
+        axes.set_yscale("log")
+        axes.set_ylim(floor / 2, 3 * max(*(row[3] for row in rows), bar, floor))
+        axes.yaxis.set_major_formatter(lambda value, _: number(value))
+        axes.yaxis.set_minor_formatter(NullFormatter())
+        axes.margins(x=0.2)
+        axes.axvline(0, color="#888888", linewidth=0.8)
+        if bar > 0:
+            axes.axhspan(floor / 2, bar, color=BAND, linewidth=0, label="error bar of the reference")
+        axes.set_xlabel("time saved, % of the whole run")
+        axes.set_ylabel("change of the surface, rms, mm")
+        figure.legend(loc="outside lower center", ncols=4, fontsize="small")
+
+    return drawn(f"omissions-{found.case}", "Error of omission against time saved", (7.2, 4.2), draw)
+
+
+def text(found: CaseOmissions) -> str:
+    """The omissions of a case as lines of text."""
+    known = [f"{HEADS[name]} {number(bar)} {found.units[name]}" for name, bar in found.bars.items()]
+    lines = [f"{found.case}: {'known to: ' + ', '.join(known) if known else 'no error bars: ' + found.unknown}"]
+    for ablation in found.ablations:
+        whole = ablation.whole
+        counts = [f"{number(whole.costs[name])} {count_title(name)}" for name in COUNTS if name in whole.costs]
+        time = duration(None if math.isnan(whole.seconds) else whole.seconds)
+        lines.append(f"  {', '.join([f'{ablation.name}: {whole.status}', f'{time} of processor time', *counts])}")
+        lines += [f"    {sentence}" for sentence in sentences(found, ablation)]
+    return "\n".join(lines)

@@ -1,0 +1,155 @@
+"""``effects = "auto"``: which effects a scene needs is found out before it is solved, and looked at again after."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import small
+import stand_ins
+from acting import PARAMETERS
+
+from fem_reference import cli, effects
+from fem_reference.effects import make
+from fem_reference.foundations.indicators import Estimates, Near
+from fem_reference.problems import estimates, muscle, of_case
+from fem_reference.runs.store import Frame, Outcome
+from fem_reference.scenes import casefile
+from fem_reference.solvers import fenicsx
+from fem_reference.studies.execution import Bench
+
+SCENE = Estimates(
+    length=100.0,
+    thickness=20.0,
+    shear=0.01,
+    travel=50.0,
+    stretch=(0.8, 1.3),
+    interval=0.01,
+    speed=0.5,
+    jump=0.1,
+    acceleration=0.01,
+    frames=(0.0, 10.0, 20.0),
+    tolerance=0.05,
+    near={"femur": Near(-3.0, 1.0, 10.0)},
+)
+# Of these a scene may do without; all others are the material.
+CHOSEN = [name for name in effects.names(effects.Effect) if make(name, **PARAMETERS[name]).indicator(SCENE)]
+CONTACT = '\n[[effect]]\nname = "contact"\nstiffness = "100 kPa/mm"\nsmoothing = "0.2 mm"\n'
+WEIGHT = """
+[[effect]]
+name = "gravity"
+density = "{density} kg/m3"
+acceleration = "0, 0, -9.81 m/s^2"
+ramp = [{{ frame = 0, amount = 0.0 }}, {{ frame = 5, amount = 1.0 }}]
+"""
+
+
+def test_what_loads_comes_and_goes_or_takes_time_can_be_left_out() -> None:
+    assert {"contact", "gravity", "inertia", "viscosity", "damping", "fibre_active", "fibre_passive"} <= set(CHOSEN)
+    assert not {"neo_hooke", "mooney_rivlin", "incompressible", "incompressible_penalty"} & set(CHOSEN)
+
+
+@pytest.mark.parametrize("name", CHOSEN)
+def test_an_estimate_is_a_length_whatever_the_unit_of_force(name: str) -> None:
+    """With all moduli, stresses and densities twice as large, nothing moves otherwise."""
+    effect = make(name, **PARAMETERS[name])
+    forces = {key for key, _, unit in effect.parameters if "MPa" in unit or "tonne" in unit}
+    twice = effect.model_copy(
+        update={
+            key: tuple(2 * one for one in value) if isinstance(value, tuple) else 2 * value
+            for key, value, _ in effect.parameters
+            if key in forces
+        }
+    )
+    found, other = effect.indicator(SCENE), twice.indicator(replace(SCENE, shear=2 * SCENE.shear))
+    assert other.estimate == pytest.approx(found.estimate, rel=1e-9)
+    assert found.estimate > 0
+
+
+@pytest.mark.parametrize("name", [name for name in CHOSEN if "ramp" in effects.find(name).model_fields])
+def test_what_never_acts_is_not_needed(name: str) -> None:
+    never = make(name, **PARAMETERS[name] | {"ramp": [{"frame": 0, "amount": 0.0}]})
+    assert never.indicator(SCENE).estimate == 0
+
+
+def test_the_sag_of_a_beam_is_that_of_timoshenko() -> None:
+    # Clamped ends: w L^4 / (384 E I) + w L^2 / (8 k G A), E = 3 G, I = A d^2 / 12, k = 5/6; 0.3 of it.
+    force, length, thick, shear = 1e-5, 100.0, 20.0, 0.01
+    by_hand = force * length**4 * 12 / (384 * 3 * shear * thick**2) + force * length**2 * 1.2 / (8 * shear)
+    assert SCENE.bend(force) == pytest.approx(0.3 * by_hand)
+
+
+def scene_of(folder: Path, more: str, choice: str = "auto"):
+    case = small.write(folder / "bar")
+    path = case / "case.toml"
+    path.write_text(f'effects = "{choice}"\n{path.read_text()}{more}')
+    return casefile.read_muscle(case)
+
+
+def test_a_scene_keeps_what_it_needs_and_has_the_key_of_that(tmp_path) -> None:
+    light, heavy = (scene_of(tmp_path / text, WEIGHT.format(density=text)) for text in ("0.001", "100000"))
+    kept = [of_case.chosen(one) for one in (light, heavy)]
+    assert [len(one.effects) for one in kept] == [2, 3]
+    assert [len(one.decisions) for one in kept] == [3, 3]
+    listed = scene_of(tmp_path / "listed", "", "listed")
+    assert kept[0].key == listed.key
+    assert of_case.chosen(kept[0]) is kept[0]
+    assert of_case.chosen(listed) is listed
+    assert "Gravity: left out" in str(kept[0].decisions[2])
+    assert "Gravity: needed" in str(kept[1].decisions[2])
+    assert "NeoHooke: kept, part of the material" in str(kept[0].decisions[0])
+
+
+def test_explain_says_so_before_anything_is_solved(tmp_path, capsys) -> None:
+    scene = scene_of(tmp_path, WEIGHT.format(density="0.001"))
+    assert cli.main(["run", str(scene.folder), "--explain", "--out", str(tmp_path / "out")]) == cli.DONE
+    assert "Gravity: left out, about" in capsys.readouterr().out
+    assert not (tmp_path / "out").exists()
+
+
+def test_bones_that_come_nowhere_near_are_left_out_and_those_that_do_are_not(tmp_path) -> None:
+    """A third bone beside the bar, which rests: 1.5 mm from where that goes, and 600 mm."""
+    found = []
+    for away in (1.5, 600.0):
+        ball = f'\n[[bone]]\nname = "ball"\nsphere = {{ centre = "5, {-away - 20}, 36 mm", radius = "20 mm" }}\n'
+        scene = scene_of(tmp_path / f"{away:g}", ball + CONTACT.replace("smoothing", 'bones = ["ball"]\nsmoothing'))
+        found.append(of_case.chosen(scene).decisions[-1])
+    assert [one.needed for one in found] == [True, False]
+    assert found[1].indicator.estimate == 0
+
+
+def test_an_effect_that_turns_out_to_matter_is_added(tmp_path, monkeypatch, caplog) -> None:
+    """The run goes into the ball that the guess, made blind here, did not see."""
+    solved = []
+
+    def sink_in(problem, _settings, sink) -> Outcome:
+        solved.append([effect.title for effect in problem.effects])
+        for number in problem.frames:
+            shift = np.array([number * 3.0, 0, 0])
+            sink(Frame(number, problem.surface.points + shift, problem.fibres.points + shift))
+        return Outcome("converged", "done", {"seconds": 1.0})
+
+    stand_ins.solve_by(monkeypatch, fenicsx, sink_in)
+    ball = '\n[[bone]]\nname = "ball"\nsphere = { centre = "40, 0, 15 mm", radius = "20 mm" }\n'
+    scene = scene_of(tmp_path, ball + CONTACT.replace("smoothing", 'bones = ["ball"]\nsmoothing'))
+    with monkeypatch.context() as patch:
+        patch.setattr(estimates, "_near", lambda *_: Near(1e9, 0.0, 0.0))
+        bench = Bench(scene, tmp_path / "runs")
+    assert [effect.title for effect in bench.scene.effects] == ["NeoHooke", "Incompressible"]
+    with caplog.at_level("INFO"):
+        run = bench.obtain("reference", scene.reference, "reference")
+    assert solved == [["NeoHooke", "Incompressible"], ["NeoHooke", "Incompressible", "Contact"]]
+    assert "Contact: needed" in caplog.text
+    assert "as it turned out" in caplog.text
+    assert "Contact" in run.origin["effects"]
+    assert any(text.startswith("Contact: needed") for text in run.origin["effects_chosen"])
+
+
+def test_the_estimates_of_a_bar_are_what_is_known_of_it(tmp_path) -> None:
+    scene = scene_of(tmp_path, "")
+    known = estimates.estimates(scene, muscle.setup(scene))
+    assert known.shear == pytest.approx(0.01, rel=1e-5)  # mu = 10 kPa; small strain
+    low, high = known.stretch
+    assert low < 1 < high
+    assert known.acceleration >= 0
+    assert known.jump > 0  # keyframes are joined by straight lines
