@@ -45,8 +45,13 @@ class Session:
         """Solve the ``job`` in a file, with each frame that is reported given to ``sink``; ``kept`` names what that keeps."""
         if self.process is None:
             self.process = self.stack.enter_context(running(command("-m", _WORKER, "-"), None, fed=True))
-        with self.process.limited(time_limit):
-            outcome = _followed(self.process, job, sink, kept)
+        try:
+            with self.process.limited(time_limit):
+                outcome = _followed(self.process, job, sink, kept)
+        except BaseException:  # what it still reports of this job is not of the next
+            self.process.end()
+            self.process = None
+            raise
         if self.process.overran is not None or outcome.status == "crashed":
             self.process = None
         return outcome
