@@ -48,7 +48,10 @@ def main(arguments: list[str]) -> int:
         print(f"fem-reference: {error}", file=sys.stderr)
         return SOLVER_FAILED
     except KeyboardInterrupt:
-        print("fem-reference: interrupted; a run that was not finished is solved again next time", file=sys.stderr)
+        print(
+            "fem-reference: interrupted; what is stored stays, and a run of the reference goes on next time",
+            file=sys.stderr,
+        )
         return INTERRUPTED
     except SystemExit:
         raise

@@ -7,7 +7,6 @@ crash, hang or keep its global state.
 import logging
 import subprocess
 import sys
-import tempfile
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +15,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from fem_reference.foundations import subprocesses
+from fem_reference.foundations import scratch, subprocesses
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import (
     TET_FACES,
@@ -175,8 +174,8 @@ def _near(coarse: Surface, surface: Surface, size: float) -> Surface:
 
 def _run(mesher: str, surface: Surface, size: float) -> TetMesh:
     """What ``mesher`` makes of ``surface`` in its own process; InputError where it fails, crashes or takes too long."""
-    with tempfile.TemporaryDirectory() as folder:
-        job, result = Path(folder) / "job.npz", Path(folder) / "result.npz"
+    with scratch.folder() as folder:
+        job, result = folder / "job.npz", folder / "result.npz"
         np.savez(job, mesher=mesher, points=surface.points, triangles=surface.triangles, size=size)
         try:
             done = subprocess.run(

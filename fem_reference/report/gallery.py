@@ -6,12 +6,12 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
 from fem_reference.assessment.comparison import Comparison
+from fem_reference.foundations import scratch
 from fem_reference.foundations.errors import MissingSoftware
 from fem_reference.foundations.mesh import Floats, Surface
 from fem_reference.foundations.subprocesses import command, environment
@@ -55,11 +55,11 @@ def shots(comparison: Comparison) -> list[Shot]:
 
 def draw(setup: Setup, surface: Surface, wanted: list[Shot]) -> list[tuple[bytes, bytes]]:
     """Two WebP pictures of each shot; MissingSoftware where the program that draws them did not get to its end."""
-    with TemporaryDirectory(prefix="fem_reference_") as folder:
-        job = Path(folder) / "job.npz"
+    with scratch.folder() as folder:
+        job = folder / "job.npz"
         np.savez(job, **_job(setup, surface, wanted))
-        _run(_command(job, Path(folder)))
-        names = [[Path(folder) / f"{shot}_{view}.webp" for view in (0, 1)] for shot in range(len(wanted))]
+        _run(_command(job, folder))
+        names = [[folder / f"{shot}_{view}.webp" for view in (0, 1)] for shot in range(len(wanted))]
         if not all(path.is_file() for pair in names for path in pair):
             raise _missing("it left no pictures")
         return [(first.read_bytes(), second.read_bytes()) for first, second in names]

@@ -8,8 +8,10 @@
                           /field.pvd       a scalar field on its mesh, where that is what is solved (``fields``)
                           /state/          the unknowns of the tetrahedra, where they were asked for (``states``)
 
+                          /restart/        of a run that is made or was cut off: what its solver goes on from (``cut_off``)
+
 A file appears whole or not at all; ``run.json`` is written after the frame files that it names. A run whose status is
-``running`` was cut off; it is not read as a result.
+``running`` was cut off; it is not read as a result, and goes on where its solver can.
 """
 
 import json
@@ -30,8 +32,9 @@ from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh, 
 from fem_reference.foundations.records import parse
 from fem_reference.geometry.field_mesh import FieldMesh
 from fem_reference.io import files, texts
-from fem_reference.runs import fields, states
+from fem_reference.runs import cut_off, fields, states
 from fem_reference.runs.contents import FORMAT, Contents, Status
+from fem_reference.runs.cut_off import CutOff
 from fem_reference.runs.fields import NodalField
 from fem_reference.scenes.case import Part
 
@@ -140,7 +143,9 @@ class Run:
 
 
 class Writer:
-    """Writes one run into ``folder``, which it empties first; ``add`` each frame, then ``close``."""
+    """Writes one run into ``folder``, which it empties first but for a run that was cut off and can go on; ``add`` each frame, then
+    ``close``. A frame that is stored already takes the place of the stored one and of all after it.
+    """
 
     def __init__(
         self,
@@ -158,9 +163,18 @@ class Writer:
         self.state: dict[str, Any] = {"format": FORMAT, **identity, "status": "running", "message": "", "numbers": []}
         self.state |= {"scalars": {}, "cost": {}, "parts": []}
         self.begin, self.reported = time.perf_counter(), 0.0
-        shutil.rmtree(folder, ignore_errors=True)
+        if (stored := cut_off.stored(folder, identity)) is not None:
+            self.state = stored
+            return
+        if folder.exists():
+            shutil.rmtree(folder)
         folder.mkdir(parents=True)
         self._write_state()
+
+    @property
+    def cut_off(self) -> CutOff:
+        """What is stored so far, for a solver that can go on."""
+        return CutOff(self.folder / cut_off.FOLDER, self.frames)
 
     @property
     def frames(self) -> tuple[int, ...]:
@@ -169,6 +183,7 @@ class Writer:
 
     def add(self, frame: Frame) -> None:
         """Store a frame: its files first, then the index files and run.json."""
+        cut_off.truncate(self.state, frame.number)
         parts: dict[str, Callable[[Path], None]] = {}
         if (surface := frame.surface) is not None:
             parts["surface"] = lambda path: files.write_surface(path, self.surface, surface)
@@ -202,6 +217,7 @@ class Writer:
         cost = {"seconds": time.perf_counter() - self.begin} | outcome.cost
         self.state |= {"status": outcome.status, "message": outcome.message, "cost": cost}
         self._write_state()
+        cut_off.clear(self.folder)
 
     def _write_unknowns(self, frame: Frame) -> bool:
         """The unknowns of the tets, if the frame has them."""
@@ -214,7 +230,7 @@ class Writer:
 
     def _write_rest(self) -> None:
         """The rest state, which the first frame of a solver without a surface is not."""
-        (self.folder / "rest").mkdir()
+        (self.folder / "rest").mkdir(exist_ok=True)
         files.write_surface(self.folder / "rest" / "surface.vtp", self.surface, self.surface.points)
         if self.fibres is not None:
             files.write_polylines(self.folder / "rest" / "fibres.vtp", self.fibres, self.fibres.points)

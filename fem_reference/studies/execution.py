@@ -159,7 +159,8 @@ def _write(writer: store.Writer, built: Setup, solver: Any, settings: Record, re
     """The run of a muscle, with what it cost; of one that failed before its first frame that frame, which is ``rest``."""
     forget_peak_memory()
     began = time.process_time()
-    outcome = solver.solve(built, settings, writer.add)
+    go_on = solver.go_on
+    outcome = go_on(built, settings, writer.add, writer.cut_off) if go_on else solver.solve(built, settings, writer.add)
     processor, cost = time.process_time() - began, outcome.cost
     if "seconds_compile" in cost:  # which does not count: what is left takes no more processor time than time
         processor = min(processor, cost.get("seconds_setup", 0.0) + cost.get("seconds_solve", math.inf))

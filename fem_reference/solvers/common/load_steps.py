@@ -22,7 +22,8 @@ class Attempt:
 @dataclass(frozen=True)
 class Step:
     """The steps to a requested frame: load steps, Newton iterations and cut-backs since the last one. Where it could not be
-    reached, ``status`` and ``sentence`` are those of the last attempt, and the last good state is ``at`` a frame.
+    reached, ``status`` and ``sentence`` are those of the last attempt, and the last good state is ``at`` a frame. ``size``: of
+    the load step that comes next.
     """
 
     frame: float
@@ -32,6 +33,7 @@ class Step:
     status: Status = "converged"
     sentence: str = ""
     at: float = 0.0
+    size: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -49,9 +51,9 @@ def march(
     steps: Steps,
     recall: Callable[[float], bool] = lambda _: False,
 ) -> Iterator[Step]:
-    """Go from ``frames[0]`` (where the body rests) through every frame; ``attempt`` solves at a load, from the last state that
-    converged, and must leave that state untouched where it fails. A frame whose state ``recall`` can take up from before needs no
-    step. Ends after the first frame that cannot be reached.
+    """Go from ``frames[0]`` (where the body rests, or goes on) through every frame; ``attempt`` solves at a load, from the last
+    state that converged, and must leave that state untouched where it fails. A frame whose state ``recall`` can take up from before
+    needs no step. Ends after the first frame that cannot be reached.
     """
     largest = math.inf if steps.largest is None else steps.largest
     at, step = float(frames[0]), min(steps.first, largest)
@@ -75,4 +77,4 @@ def march(
             at = frame if size == left else at + size
             taken += 1
             step = step * GROWTH if result.iterations <= EASY else size
-        yield Step(frame, taken, iterations, cutbacks, at=at)
+        yield Step(frame, taken, iterations, cutbacks, at=at, size=step)

@@ -9,6 +9,7 @@ from fem_reference.foundations.records import Record
 from fem_reference.problems.body import Body
 from fem_reference.problems.muscle import Problem
 from fem_reference.problems.scalar import FieldProblem
+from fem_reference.runs.cut_off import CutOff
 from fem_reference.runs.scalar import Solution
 from fem_reference.runs.solved import Solved
 from fem_reference.runs.store import Outcome, Sink
@@ -23,6 +24,15 @@ class SolveMuscle[S: Record](Protocol):
     def __call__(self, problem: Problem, settings: S, sink: Sink, /) -> Outcome:
         """Sink every requested frame as it is reached. Physics that fails is a status with a sentence and never an exception;
         what was reached before stays.
+        """
+
+
+class GoOn[S: Record](Protocol):
+    """Solves muscles from where a run was cut off."""
+
+    def __call__(self, problem: Problem, settings: S, sink: Sink, cut_off: CutOff, /) -> Outcome:
+        """As ``SolveMuscle``, from the last stored frame that the solver kept enough of, which need not be the last of all, else
+        from the first; it ends as the run would have ended.
         """
 
 
@@ -78,7 +88,8 @@ class Solver[S: Record]:
 class MuscleSolver[S: Record](Solver[S]):
     """A solver of muscles; ``moves``: what carries its unknowns, whose mesh its accuracy and cost depend on;
     ``check_effects`` of one that simulates the effects of a scene, None of one that does not; ``fibres``: whether one of surfaces
-    needs the fibres under such settings: without them it is given a ``Setup``, as the muscle is not filled for it.
+    needs the fibres under such settings: without them it is given a ``Setup``, as the muscle is not filled for it. ``go_on`` of one
+    that takes long: any other begins again from rest.
     """
 
     task = "solve"
@@ -88,6 +99,7 @@ class MuscleSolver[S: Record](Solver[S]):
     moves: Moves = "surface"
     check_effects: CheckEffects[S] | None = None
     fibres: Callable[[S], bool] = _none
+    go_on: GoOn[S] | None = None
 
     def fills(self, settings: S) -> bool:
         """Whether it needs the muscle filled with tetrahedra and fibres."""

@@ -4,11 +4,11 @@ This side needs no FEniCSx: it runs ``worker`` in processes of its own (``mpiexe
 a file, and sinks frames as the worker reports them. A worker that dies is the status *crashed*, not an exception.
 """
 
+import logging
 import os
 import pickle
 import shutil
 import sys
-import tempfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from fem_reference.effects import Effect
+from fem_reference.foundations import scratch
 from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.motion import apply
@@ -25,14 +26,17 @@ from fem_reference.geometry.embedding import Locator
 from fem_reference.problems.body import Body, check_element
 from fem_reference.problems.muscle import Problem
 from fem_reference.problems.muscle_body import as_body
+from fem_reference.runs.cut_off import CutOff
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers.common.protocol import BodySolver, FieldSolver, MuscleSolver
 from fem_reference.solvers.fenicsx import resources
 from fem_reference.solvers.fenicsx.field import FieldSettings, solve_field
-from fem_reference.solvers.fenicsx.jobs import Job, stored_state
+from fem_reference.solvers.fenicsx.jobs import Job, Kept, kept, stored_state
 from fem_reference.solvers.fenicsx.processes import require_installed, running
 from fem_reference.solvers.fenicsx.session import present, session, shared, solve_body
 from fem_reference.solvers.fenicsx.settings import BodySettings, Settings
+
+log = logging.getLogger(__name__)
 
 # Ranks that any machine may be asked for; more only where there are as many cores.
 _MOST_RANKS = 8
@@ -67,13 +71,34 @@ def check_effects(settings: Settings, effects: tuple[Effect, ...], place: str) -
 def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
     """Solve every requested frame in worker processes; frames carry surface, fibres and tets."""
     require(settings)
+    with scratch.folder() as folder:
+        return _solve(problem, as_body(problem), settings, sink, folder, None)
+
+
+def go_on(problem: Problem, settings: Settings, sink: Sink, cut_off: CutOff) -> Outcome:
+    """As ``solve``, from the last stored frame of a run that was cut off; states are kept until the caller removes them."""
+    require(settings)
     body = as_body(problem)
+    there = kept(cut_off, body)
+    again = settings.reuse and not any("interval" in effect.needs for effect in body.effects)  # states serve again
+    if there.frames:
+        log.info("cut off before; going on from frame %d", there.frames[-1])
+
+    def pass_on(frame: Frame) -> None:
+        sink(frame)
+        if not again:
+            for number in problem.frames[: problem.frames.index(frame.number)]:
+                there.place(number).unlink(missing_ok=True)
+
+    return _solve(problem, body, settings, pass_on, there.folder, there)
+
+
+def _solve(problem: Problem, body: Body, settings: Settings, sink: Sink, folder: Path, kept: Kept | None) -> Outcome:
     settings = _planned(settings, body)
-    with tempfile.TemporaryDirectory(prefix="fem_reference-") as folder:
-        job = Path(folder) / "job.pickle"
-        job.write_bytes(pickle.dumps(Job(body, settings, _samples(problem))))
-        passed: list[int] = []
-        outcome = _solved(job, settings, lambda frame: _pass_on(problem, frame, sink, passed))
+    job = folder / "job.pickle"
+    job.write_bytes(pickle.dumps(Job(body, settings, _samples(problem), kept)))
+    passed: list[int] = list(kept.frames) if kept else []
+    outcome = _solved(job, settings, lambda frame: _pass_on(problem, frame, sink, passed))
     if outcome.status != "converged" and body.frames[0] < body.first and not passed:
         begin = (
             "while what overlaps bones at rest was relaxed, before the first frame (which is shown as it was given): "
@@ -199,6 +224,7 @@ SOLVES = (
     MuscleSolver(
         settings=Settings,
         solve=solve,
+        go_on=go_on,
         moves="tetrahedra",
         example={"ranks": 1},
         require=require,

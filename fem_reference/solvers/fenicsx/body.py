@@ -67,6 +67,7 @@ class AssembledBody:
         self.system.balance_units()
         self.known = Known(self.comm)
         self.recalled: State | None = None
+        self.modes: float | None = None  # of the state that was examined last
         self.nodes = meshes.Nodes(body.mesh, self.cells, ufl.split(self.unknowns)[0])
         self.nodal = Nodal(self.cells, settings.element, self.unknowns, self.clock) if settings.store_state else None
 
@@ -154,6 +155,23 @@ class AssembledBody:
             self.contact.settle() if proved else self.contact.go_back()
         return proved
 
+    def know(self, frame: float, unknowns: Floats, modes: float | None) -> None:
+        """Have solved ``frame`` before, with these ``unknowns`` (n,) and negative ``modes``."""
+        if self.reuse and not self.clock.matters:
+            self._set(frame)
+            self.known.add(State(self._acting(frame), unknowns, modes))
+
+    def take_up(self, frame: float, unknowns: Floats, *, recalled: bool) -> None:
+        """Be in the state of ``frame`` with ``unknowns`` (n,), as when it was reached."""
+        self._set(frame)
+        self.unknowns.x.array[:] = unknowns
+        if self.contact:
+            self.contact.update(frame)
+            self.contact.settle()
+        if not recalled and self.stability is not None:  # an old factorisation serves on
+            with self.clock.slow(np.array(self.unknowns.x.array)):
+                self.stability.negative_modes()
+
     def _acting(self, frame: float) -> Floats:
         """All numbers that determine the state at ``frame``, beside the body itself."""
         amounts = [effect.amount(frame) for effect in self.effects]
@@ -192,13 +210,15 @@ class AssembledBody:
         the body attached still from now on: the viscous stress of this step is left out.
         """
         if self.recalled is not None:
-            return self.recalled.negative_modes
+            self.modes = self.recalled.negative_modes
+            return self.modes
         modes = None
         if self.stability is not None:
             with self.clock.slow(np.array(self.unknowns.x.array)):
                 modes = self.stability.negative_modes()
         if self.reuse and not self.clock.matters:
             self.known.add(State(self._acting(frame), np.array(self.unknowns.x.array), modes))
+        self.modes = modes
         return modes
 
     def integral(self, form: Any) -> float:

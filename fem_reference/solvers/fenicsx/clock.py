@@ -94,6 +94,28 @@ class Clock:
             if one is not None:
                 one.x.array[:] = values
 
+    def arrays(self) -> dict[str, Floats]:
+        """What is to be known of the last load step beside the unknowns that it ended with."""
+        if self.step is None:
+            return {}
+        found = {"before": np.array(self.step.before.x.array)}
+        return found | ({"velocity": self.velocity, "acceleration": self.acceleration} if self.momentum else {})
+
+    def facts(self) -> dict[str, Any]:
+        """As ``arrays``, the numbers."""
+        rate = None if self.step is None else float(self.step.rate.value)
+        return {"at": self.at, "resting": self.resting, "rate": rate}
+
+    def take_up(self, arrays: dict[str, Floats], facts: dict[str, Any]) -> None:
+        """Be as the clock that gave ``arrays`` and ``facts``."""
+        self.at, self.resting = facts["at"], facts["resting"]
+        if self.step is None:
+            return
+        self.step.before.x.array[:], self.step.rate.value = arrays["before"], facts["rate"]
+        if self.momentum is not None and self.step.velocity is not None:
+            self.velocity, self.acceleration = arrays["velocity"], arrays["acceleration"]
+            self.step.velocity.x.array[:] = self.velocity
+
     def _set(self, unknowns: Floats, seconds: float) -> None:
         assert self.step is not None  # the caller asked
         self.step.before.x.array[:], self.step.rate.value = unknowns, 1 / seconds

@@ -1,11 +1,10 @@
 """Scalar fields by Lagrange elements of FEniCSx, solved in a process of its own; this module needs no FEniCSx."""
 
 import pickle
-import tempfile
-from pathlib import Path
 
 import numpy as np
 
+from fem_reference.foundations import scratch
 from fem_reference.foundations.records import Record
 from fem_reference.foundations.subprocesses import command
 from fem_reference.foundations.units import Time
@@ -24,8 +23,8 @@ class FieldSettings(Record):
 def solve_field(problem: FieldProblem, settings: FieldSettings) -> Solution:
     """Solve in one worker process; one that dies is the status *crashed*, not an exception."""
     require_installed()
-    with tempfile.TemporaryDirectory(prefix="fem_reference-") as folder:
-        job = Path(folder) / "job.pickle"
+    with scratch.folder() as folder:
+        job = folder / "job.pickle"
         job.write_bytes(pickle.dumps(problem))
         return _run(command("-m", f"{__package__}.field_worker", str(job)), settings, len(problem.fixed))
 

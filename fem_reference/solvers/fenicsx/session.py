@@ -1,6 +1,5 @@
 """One process of FEniCSx that solves bodies one after the other: what it has compiled and loaded serves the next."""
 
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from contextvars import ContextVar
@@ -10,6 +9,7 @@ from typing import Any
 import cloudpickle
 import numpy as np
 
+from fem_reference.foundations import scratch
 from fem_reference.foundations.subprocesses import command
 from fem_reference.problems.body import Body, check
 from fem_reference.runs.solved import Reached, Solved
@@ -45,8 +45,13 @@ class Session:
         """Solve the ``job`` in a file, with each frame that is reported given to ``sink``; ``kept`` names what that keeps."""
         if self.process is None:
             self.process = self.stack.enter_context(running(command("-m", _WORKER, "-"), None, fed=True))
-        with self.process.limited(time_limit):
-            outcome = _followed(self.process, job, sink, kept)
+        try:
+            with self.process.limited(time_limit):
+                outcome = _followed(self.process, job, sink, kept)
+        except BaseException:  # what it still reports of this job is not of the next
+            self.process.end()
+            self.process = None
+            raise
         if self.process.overran is not None or outcome.status == "crashed":
             self.process = None
         return outcome
@@ -83,8 +88,8 @@ def _state(event: dict[str, Any]) -> Reached:
 def session() -> Iterator[Session]:
     """A session; its process ends with it. MissingSoftware where FEniCSx is not installed."""
     require_installed()
-    with tempfile.TemporaryDirectory(prefix="fem_reference-") as folder, ExitStack() as stack:
-        own = Session(Path(folder), stack)
+    with scratch.folder() as folder, ExitStack() as stack:
+        own = Session(folder, stack)
         try:
             yield own
         finally:

@@ -7,6 +7,7 @@ bulk modulus of a thousand shear moduli): there laws are named, and a body has c
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import basix
 import numpy as np
@@ -58,14 +59,23 @@ class Ranges:
     """The laws that were outside their ranges over the states of a run."""
 
     def __init__(self) -> None:
-        self.first: dict[str, tuple[float, Outside]] = {}
+        self.first: dict[str, tuple[float, str]] = {}
         self.frames: dict[str, set[float]] = {}
 
     def add(self, frame: float, found: Iterable[Outside]) -> None:
         """Those of the state at a frame."""
         for one in found:
-            self.first.setdefault(one.law, (frame, one))
+            self.first.setdefault(one.law, (frame, str(one)))
             self.frames.setdefault(one.law, set()).add(frame)
+
+    def facts(self) -> list[Any]:
+        """What there is to know, in JSON's types."""
+        return [[law, frame, how, sorted(self.frames[law])] for law, (frame, how) in self.first.items()]
+
+    def know(self, facts: list[Any]) -> None:
+        """Have had them added that gave ``facts``."""
+        for law, frame, how, frames in facts:
+            self.first[law], self.frames[law] = (frame, how), set(frames)
 
     def __str__(self) -> str:
         return "".join(

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from fem_reference.foundations.subprocesses import end_with_starter
 from fem_reference.foundations.usage import forget_peak_memory, peak_memory
 from fem_reference.solvers.fenicsx import dolfinx_door  # noqa: F401 - first
 from fem_reference.solvers.fenicsx.jobs import Job
@@ -17,6 +18,7 @@ from fem_reference.solvers.fenicsx.processes import MARK
 
 from fem_reference.solvers.fenicsx import compiling  # isort: skip - after the door
 from fem_reference.solvers.fenicsx.body import AssembledBody  # isort: skip
+from fem_reference.solvers.fenicsx.restart import Restart  # isort: skip
 from fem_reference.solvers.fenicsx.validity import Ranges  # isort: skip
 from fem_reference.solvers.common.load_steps import Attempt, Step, Steps, march  # isort: skip
 
@@ -40,12 +42,27 @@ class Worker:
         self.unstable: dict[float, float] = {}  # negative modes by frame
         self.ranges = Ranges()
         self.collapse = ""  # to what attempts since the last good state led, where a body collapsed in one
+        self.earlier: dict[str, float] = {}  # what processes before this one cost
+        self.restart = Restart(self.body, job.kept) if job.kept else None
+
+    def begin(self) -> tuple[tuple[float, ...], Steps]:
+        """The frames to march through and the load steps: from rest, or from where a process before this one was cut off."""
+        frames, settings = self.job.body.frames, self.settings
+        first = settings.first_step
+        if self.restart is None or not self.restart.kept.frames:
+            self.report_frame(Step(frames[0], 0, 0, 0, size=first))
+        else:
+            facts = self.restart.go_on()
+            first, self.earlier = facts["size"], facts["cost"]
+            self.unstable = dict(facts["unstable"])
+            self.ranges.know(facts["ranges"])
+            at = self.restart.kept.frames[-1]
+            frames = tuple(frame for frame in frames if frame >= at)
+        return frames, Steps(first, settings.smallest_step, settings.largest_step)
 
     def run(self) -> None:
         """March through the frames and report how it ended."""
-        frames, settings = self.job.body.frames, self.settings
-        self.report_frame(Step(frames[0], 0, 0, 0))
-        steps = Steps(settings.first_step, settings.smallest_step, settings.largest_step)
+        frames, steps = self.begin()
         for reached in march(self.attempt, frames, steps, self.body.recall):
             for name, count in (
                 ("newton_iterations", reached.iterations),
@@ -58,7 +75,7 @@ class Worker:
                 self.report(status=status, message=self.sentence(reached), cost=self.cost())
                 return
             self.report_frame(reached)
-        wanted = sum(frame >= self.job.body.first for frame in frames)
+        wanted = sum(frame >= self.job.body.first for frame in self.job.body.frames)
         message = f"all {wanted} frames reached{self.instability()}{self.ranges}"
         self.report(status="converged", message=message, cost=self.cost())
 
@@ -125,6 +142,9 @@ class Worker:
             self.unstable[reached.frame] = scalars["negative_modes"]
         if self.body.comm.rank == 0:
             np.savez(path, allow_pickle=False, **arrays)
+        if self.restart is not None and reached.frame >= self.job.body.first:
+            facts = {"size": reached.size, "cost": self.cost(), "ranges": self.ranges.facts()}
+            self.restart.write(reached.frame, facts | {"unstable": list(self.unstable.items())})
         self.report(frame=reached.frame, file=str(path), scalars=scalars)
 
     def report(self, **event: Any) -> None:
@@ -134,12 +154,14 @@ class Worker:
             sys.stdout.flush()
 
     def cost(self) -> dict[str, float]:
-        """Seconds by phase as the first rank sees them, counts, and processor time and memory over all ranks."""
+        """Seconds by phase as the first rank sees them, counts, and processor time and memory over all ranks; with what processes
+        before this one took up to the frame from which it went on.
+        """
         spent = self.body.spent
         memory = self.body.comm.allreduce(peak_memory())
         processor = self.body.comm.allreduce(time.process_time() - self.began)
         solving = self.body.comm.allreduce(self.solving_processor)
-        return {
+        own = {
             "seconds_set_up": self.set_up,
             "seconds_solve": self.solving,
             **{f"seconds_{name}": spent.seconds[name] for name in ("assembly", "contact", "factorisation", "krylov")},
@@ -148,8 +170,11 @@ class Worker:
             "seconds_processor_solve": solving,  # without what was compiled
             **{name: float(spent.counts[name]) for name in _COUNTED},
             **{name: float(count) for name, count in self.counts.items()},
+        }
+        own = {name: value + self.earlier.get(name, 0.0) for name, value in own.items()}
+        return own | {
             "unknowns": float(self.body.size),
-            "peak_memory_mb": memory,
+            "peak_memory_mb": max(memory, self.earlier.get("peak_memory_mb", 0.0)),
             "ranks": float(self.body.comm.size),
             "threads": 1.0,
         }
@@ -157,6 +182,7 @@ class Worker:
 
 def main(argument: str) -> None:
     """Solve the job in a file; or, for ``-``, one after the other those whose files standard input names."""
+    end_with_starter()
     compiling.prepare()
     for line in sys.stdin if argument == "-" else [argument]:
         path = Path(line.strip())

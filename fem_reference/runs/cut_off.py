@@ -1,0 +1,54 @@
+"""Runs that were cut off: which frames of them are stored, and the folder in which a solver keeps what it needs to go on."""
+
+import json
+import shutil
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.records import parse
+from fem_reference.io import texts
+from fem_reference.runs.contents import Contents
+
+FOLDER = "restart"
+
+
+@dataclass(frozen=True)
+class CutOff:
+    """What there is of a run: the ``numbers`` of its stored frames, none of one that begins, and the ``folder`` that its solver may
+    use until it ends.
+    """
+
+    folder: Path
+    numbers: tuple[int, ...]
+
+
+def stored(folder: Path, identity: dict[str, Any]) -> dict[str, Any] | None:
+    """What run.json says of a run in ``folder`` that was cut off and can go on as the one of ``identity``, if there is one."""
+    place = folder / "run.json"
+    with suppress(InputError):
+        state = texts.read_json(place, "a run")
+        if not isinstance(state, dict) or state.get("status") != "running" or not (folder / FOLDER).is_dir():
+            return None
+        if not state.get("numbers"):
+            return None
+        whole = parse(Contents, state | {"status": "crashed"}, f"{place}: run")
+        wanted = json.loads(json.dumps(identity))
+        same = (whole.solver, list(whole.frames)) == (wanted["solver"], wanted["frames"])
+        if same and whole.origin.versions == wanted["origin"].get("versions", {}):
+            return state
+    return None
+
+
+def truncate(state: dict[str, Any], number: int) -> None:
+    """Take the frames from ``number`` on, which are solved again, out of a ``state`` as run.json has it."""
+    kept = sum(stored < number for stored in state["numbers"])
+    state["numbers"] = state["numbers"][:kept]
+    state["scalars"] = {name: values[:kept] for name, values in state["scalars"].items()} if kept else {}
+
+
+def clear(folder: Path) -> None:
+    """Remove what a solver kept in the ``folder`` of a run that has come to its end."""
+    shutil.rmtree(folder / FOLDER, ignore_errors=True)

@@ -1,0 +1,78 @@
+"""The states of a run on disk, bit by bit: a process that finds them goes on as the one that wrote them would have done.
+
+<run>/restart/layout_<hash>.npz   by rank: its cells, and the unknowns of each
+/frame_0010.npz      by rank: the unknowns and the arrays of the clock; ``facts``, in JSON
+"""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from fem_reference.foundations.mesh import Floats, Ints, fingerprint
+from fem_reference.runs.states import read_arrays, write_arrays
+from fem_reference.solvers.fenicsx.body import AssembledBody
+from fem_reference.solvers.fenicsx.jobs import Kept
+
+
+class Restart:
+    """Writes and reads the states of a ``body``; collective. The number of ranks may be another when they are read."""
+
+    def __init__(self, body: AssembledBody, kept: Kept) -> None:
+        self.body, self.kept = body, kept
+        dofmap = body.unknowns.function_space.dofmap
+        names = np.asarray(dofmap.list, np.int64)[:, :, None] * dofmap.bs + np.arange(dofmap.bs)
+        self.dofs: Ints = names.reshape(len(names), -1)  # of this rank's cells, those that it shares too
+        self.cells = np.asarray(body.mesh.topology.original_cell_index, np.int64)[: len(names)]
+        self.layout = self._layout()
+
+    def _layout(self) -> str:
+        """The name of the file of how unknowns are distributed."""
+        own = len(self.body.cells)
+        arrays = self._gathered({"cells": self.cells[:own], "dofs": self.dofs[:own]})
+        name = f"layout_{fingerprint(*arrays.values())[:16]}.npz"
+        if self.body.comm.rank == 0 and not (self.kept.folder / name).exists():
+            write_arrays(self.kept.folder / name, arrays)
+        return name
+
+    def _gathered(self, mine: dict[str, Any]) -> dict[str, Any]:
+        """Arrays of all ranks; nothing but on the first."""
+        parts = self.body.comm.gather(mine) or []
+        return {f"{rank} {name}": array for rank, part in enumerate(parts) for name, array in part.items()}
+
+    def write(self, frame: float, facts: dict[str, Any]) -> None:
+        """Keep the present state, which is that of a ``frame``, with what is to be known of the run until then."""
+        body = self.body
+        arrays = self._gathered({"unknowns": body.unknowns.x.array} | body.clock.arrays())
+        own = {"mesh": self.kept.mesh, "layout": self.layout, "recalled": body.recalled is not None}
+        own |= {"clock": body.clock.facts(), "modes": body.modes}
+        if body.comm.rank == 0:
+            arrays["facts"] = np.array(json.dumps(facts | own))
+            write_arrays(self.kept.place(frame), arrays)
+
+    def go_on(self) -> dict[str, Any]:
+        """Take up the last of the states, and know the others again; the facts that were written with it."""
+        body, facts = self.body, dict[str, Any]()
+        for frame in self.kept.frames:
+            arrays = read_arrays(self.kept.place(frame))
+            facts = json.loads(str(arrays["facts"]))
+            layout = read_arrays(self.kept.folder / facts["layout"])
+            if not facts["recalled"]:
+                body.know(frame, self._spread("unknowns", arrays, layout), facts["modes"])
+            if frame == self.kept.frames[-1]:
+                names = {name.partition(" ")[2] for name in arrays} - {"", "unknowns"}
+                body.clock.take_up({name: self._spread(name, arrays, layout) for name in names}, facts["clock"])
+                body.take_up(frame, self._spread("unknowns", arrays, layout), recalled=facts["recalled"])
+        return facts
+
+    def _spread(self, name: str, arrays: Mapping[str, Any], layout: Mapping[str, Any]) -> Floats:
+        """The values (n,) of this rank of what all ranks had, by cell."""
+        ranks = [int(key.split()[0]) for key in layout if key.endswith(" cells")]
+        parts = [(layout[f"{rank} cells"], arrays[f"{rank} {name}"][layout[f"{rank} dofs"]]) for rank in ranks]
+        inside = np.zeros((sum(len(cells) for cells, _ in parts), self.dofs.shape[1]))
+        for cells, values in parts:
+            inside[cells] = values
+        mine = np.zeros(len(self.body.unknowns.x.array))
+        mine[self.dofs] = inside[self.cells]
+        return mine
