@@ -3,6 +3,7 @@
 Every method is collective: all ranks call it and, where it returns a value, get the same one.
 """
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any, cast
 
@@ -13,6 +14,7 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from fem_reference.effects import Energy, Ramped
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.solvers.common.load_steps import Attempt
@@ -20,11 +22,12 @@ from fem_reference.solvers.fenicsx import choice, compiling, contact_points, for
 from fem_reference.solvers.fenicsx.boundary_conditions import PointSprings, PrescribedRegion
 from fem_reference.solvers.fenicsx.clock import Clock
 from fem_reference.solvers.fenicsx.contact import ContactForces
-from fem_reference.solvers.fenicsx.determinants import Determinants
+from fem_reference.solvers.fenicsx.determinants import Determinants, Smallest
 from fem_reference.solvers.fenicsx.known import Known, State
 from fem_reference.solvers.fenicsx.linear import Factorised
 from fem_reference.solvers.fenicsx.newton import Newton
 from fem_reference.solvers.fenicsx.nodal import Nodal
+from fem_reference.solvers.fenicsx.path import Path
 from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.stability import Stability, has_energy
@@ -38,6 +41,10 @@ class AssembledBody:
     def __init__(self, body: Body, settings: BodySettings) -> None:
         self.comm, self.reuse = MPI.COMM_WORLD, settings.reuse
         self.effects = body.effects
+        # Whether the energy changes by what deforms the body only.
+        self.conserves = not any(
+            isinstance(one, Energy) and (isinstance(one, Ramped) or not one.stored) for one in self.effects
+        )
         self.mesh = meshes.distribute(self.comm, body.mesh)
         # Where each of this rank's own cells stood in the body's mesh.
         own = self.mesh.topology.index_map(3).size_local
@@ -64,6 +71,7 @@ class AssembledBody:
         self.stability = Stability(self.system, cast(Factorised, self.linear), self.unknowns) if counts else None
         self.contact = self.system.contact = self._contact(body, form) if body.contact else None
         self.system.balance_units()
+        self.path = Path(self.system, self.determinants)
         self.known = Known(self.comm)
         self.recalled: State | None = None
         self.nodes = meshes.Nodes(body.mesh, self.cells, ufl.split(self.unknowns)[0])
@@ -88,6 +96,13 @@ class AssembledBody:
             points = contact_points.on_skin(space, parents, law.on, self.local)
         return ContactForces(law, body.obstructions, points, self.unknowns, body.frames[0])
 
+    def start(self, moved: Callable[[Floats], Floats]) -> None:
+        """Begin with the nodes where ``moved`` takes rest points (n, 3) [mm]."""
+        self.displacement.interpolate(lambda points: (moved(points.T) - points.T).T)
+        self.unknowns.x.array[self.displacement_dofs] = self.displacement.x.array
+        self.unknowns.x.scatter_forward()
+        self.path.settle(self.integral(self.energy_form), connected=False)
+
     @property
     def size(self) -> int:
         """How many unknowns there are, over all ranks."""
@@ -106,8 +121,10 @@ class AssembledBody:
         smallest = self.determinants.smallest()
         through = self.contact.tunnelled(self.comm) if self.contact and failure is None else None
         lost = self.validity.collapsed() if failure is None and smallest.value > 0 else None
-        if failure is None and smallest.value > 0 and through is None and lost is None:
+        jump = self.path.jumped(before) if failure is None and smallest.value > 0 else None
+        if failure is None and smallest.value > 0 and through is None and lost is None and jump is None:
             self.clock.settle(frame)
+            self.path.settle(self.integral(self.energy_form))
             if self.contact:
                 self.contact.settle()
             return Attempt(None, iterations)
@@ -118,11 +135,15 @@ class AssembledBody:
             return Attempt("diverged", iterations, f"Newton's method converged, but {through}")
         if lost is not None:
             return Attempt("collapsed", iterations, f"Newton's method converged, but {lost}")
+        if jump is not None:
+            return Attempt("diverged", iterations, f"Newton's method converged, but {_on_the_way(jump)}")
         how = failure or f"converged, but det F fell to {smallest}"
         return Attempt("diverged" if smallest.value > 0 else "inverted", iterations, f"Newton's method {how}")
 
     def recall(self, frame: float) -> bool:
-        """Take up the state that was solved before under what acts at ``frame``, if there is one; its residual proves it."""
+        """Take up the state that was solved before under what acts at ``frame``, if there is one and it is on the path: after a
+        whole turn what acts is as at rest, and the body is not. Its residual proves it.
+        """
         if self.clock.matters or not self.reuse:
             return False
         before = np.array(self.unknowns.x.array)
@@ -134,11 +155,13 @@ class AssembledBody:
         self.unknowns.x.array[:] -= self.system.missing()  # rounding of a motion that comes back
         if self.contact:
             self.contact.update(frame)
-        proved = self.system.residual() <= self.newton.residual
+        proved = self.system.residual() <= self.newton.residual and self.path.jumped(before) is None
         if not proved:
             self.unknowns.x.array[:] = before
         if self.contact:
             self.contact.settle() if proved else self.contact.go_back()
+        if proved:
+            self.path.settle(self.integral(self.energy_form), connected=False)
         return proved
 
     def _acting(self, frame: float) -> Floats:
@@ -159,12 +182,17 @@ class AssembledBody:
     def scalars(self) -> dict[str, float]:
         """The smallest det F at quadrature points and vertices, V/V0, and the energy [N mm]."""
         contact = self.contact.scalars(self.comm) if self.contact else {}
-        return contact | {
-            "min_det_F_quadrature": self.determinants.smallest("quadrature point").value,
-            "min_det_F_vertices": self.determinants.smallest("vertex").value,
-            "volume_ratio": self.integral(self.volume_form) / self.rest_volume,
-            "energy": self.integral(self.energy_form),
-        }
+        gap = {"energy_gap": self.path.take_gap()} if self.conserves else {}
+        return (
+            contact
+            | gap
+            | {
+                "min_det_F_quadrature": self.determinants.smallest("quadrature point").value,
+                "min_det_F_vertices": self.determinants.smallest("vertex").value,
+                "volume_ratio": self.integral(self.volume_form) / self.rest_volume,
+                "energy": self.integral(self.energy_form),
+            }
+        )
 
     def examine(self, frame: float) -> float | None:
         """In how many directions the energy falls from the present state, that of a ``frame`` which was reached; the state is kept
@@ -226,6 +254,15 @@ class AssembledBody:
         for indices, values in self.comm.allgather((mine, moved)):
             result[indices] = values
         return result
+
+
+def _on_the_way(jump: Smallest) -> str:
+    """What is wrong with a step through ``jump``."""
+    x, y, z = jump.at
+    return (
+        f"to a state on another path: on the straight way from the last one det F falls to {jump.value:.2g} of itself, "
+        f"in cell {jump.cell} at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
+    )
 
 
 def _unknowns(msh: mesh.Mesh, element: str) -> fem.Function:

@@ -15,6 +15,9 @@ from types import FrameType
 from typing import Any
 
 from dolfinx import fem, jit
+from ufl.algorithms import expand_derivatives
+from ufl.corealg.map_dag import map_expr_dag
+from ufl.corealg.multifunction import MultiFunction
 
 PATIENCE = 300  # [s] that a process waits for another's compilation
 
@@ -54,8 +57,18 @@ def form(expression: Any, entity_maps: Any = None) -> Any:
 
 
 def expression(value: Any, points: Any) -> Any:
-    """A compiled expression at reference ``points`` (q, 3)."""
-    return fem.Expression(value, points, jit_options=OPTIONS)
+    """A compiled expression at reference ``points`` (q, 3). The variables that it was differentiated by are taken out: they are
+    numbered through the whole process, so that what is compiled would not be found again.
+    """
+    plain = map_expr_dag(_WithoutVariables(), expand_derivatives(value))
+    return fem.Expression(plain, points, jit_options=OPTIONS)
+
+
+class _WithoutVariables(MultiFunction):  # type: ignore[misc]  # UFL has no types
+    expr = MultiFunction.reuse_if_untouched
+
+    def variable(self, _: Any, operand: Any, label: Any) -> Any:  # noqa: ARG002
+        return operand
 
 
 def library(source: Path, sizes: dict[str, int]) -> CDLL:

@@ -34,6 +34,8 @@ class Worker:
         self.began = time.process_time()
         self.job, self.folder, self.settings = job, folder, job.settings
         self.body = AssembledBody(job.body, job.settings)
+        if job.body.start is not None:
+            self.body.start(job.body.start)
         self.set_up = time.perf_counter() - begin
         self.solving = self.checking = 0.0
         self.counts = {"newton_iterations": 0, "load_steps": 0, "cut_backs": 0}

@@ -16,7 +16,7 @@ from fem_reference.geometry.skins import attached_skin, free_skin, spacing
 from fem_reference.geometry.tessellation import tessellated
 from fem_reference.problems.muscle import AttachedVertices, Problem, RigidBody, Setup, solid
 from fem_reference.scenes.bones import Bone
-from fem_reference.studies.hard.records import Block, Hard, Hold
+from fem_reference.studies.hard.records import FACES, Block, Face, Hard, Hold, Start
 
 SEED = 17
 # What blocks are of where a case says nothing else: muscle's usual matrix.
@@ -50,11 +50,46 @@ def problem(hard: Hard) -> Problem:
     surface = Surface(points[index], triangles, f"the block of {hard.name}")
     ends = [_held(block, hold, skin_nodes, surface) for hold in hard.hold]
     bones = tuple(end.bone for end in ends) + tuple(_bone(hard, i, surface) for i in range(len(hard.bone)))
-    setup = Setup(surface, bones, tuple(ends), frames.numbers, frames.interval)
-    facets = {end.attachment: index[triangles[np.isin(triangles, end.vertices).all(axis=1)]] for end in ends}
+    start = _start(block, hard.start)
+    setup = Setup(surface, bones, tuple(ends), frames.numbers, frames.interval, start=start)
+    facets: dict[str, Ints] = {
+        face: index[triangles[np.isin(triangles, _on(block, skin_nodes, face)).all(axis=1)]] for face in FACES
+    }
+    for end, hold in zip(ends, hard.hold, strict=True):
+        if hold.middle:
+            facets[end.attachment] = index[triangles[np.isin(triangles, end.vertices).any(axis=1)]]
     mesh = TetMesh(points, _upright(points, tets), facets, maker="lattice")
     acting = tuple(_effect(table, join(hard.place, f"effect[{i}]")) for i, table in enumerate(hard.effect or MATERIAL))
     return _problem(block, setup, mesh, acting)
+
+
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """What a ``start`` makes of a block about its ``middle`` (3,) [mm], whose cells have a size of ``cell`` [mm]."""
+
+    start: Start
+    middle: Floats
+    cell: float
+
+    def __call__(self, points: Floats) -> Floats:
+        """Where rest points (n, 3) [mm] are; a point is moved at random alike, whichever others are asked for."""
+        match self.start.kind:
+            case "point":
+                return np.broadcast_to(self.middle, points.shape).copy()
+            case "plane":
+                return np.asarray(np.where([True, True, False], points, self.middle))
+            case "inside out":
+                return np.asarray(self.middle + (points - self.middle) * [1, 1, -1])
+        seeds = np.round((points - self.middle) / self.cell * 1e6).astype(np.int64) @ [1, 7919, 104729]
+        moves = np.array([np.random.default_rng(abs(seed)).uniform(-1, 1, 3) for seed in seeds])
+        return np.asarray(points + self.start.amount * self.cell * moves.reshape(-1, 3))
+
+
+def _start(block: Block, start: Start | None) -> Moved | None:
+    if start is None:
+        return None
+    size = np.asarray(block.size)
+    return Moved(start, np.asarray(block.corner) + size / 2, float((size / block.cells).min()))
 
 
 def _problem(block: Block, setup: Setup, mesh: TetMesh, acting: tuple[effects.Effect, ...]) -> Problem:
@@ -72,6 +107,7 @@ def _problem(block: Block, setup: Setup, mesh: TetMesh, acting: tuple[effects.Ef
         mesh_facts={},
         seconds=0.0,
         fibre=fibre,
+        start=setup.start,
         skin=None if among(acting) is None else free_skin(setup.surface, setup.free, mesh, apart),
         attached_skins={
             end.attachment: attached_skin(setup.surface, attached_shares(setup.surface, end.vertices), mesh, apart)
@@ -119,9 +155,19 @@ def _upright(points: Floats, tets: Ints) -> Ints:
     return tets
 
 
+def _on(block: Block, nodes: Ints, face: Face) -> Ints:
+    """Which of ``nodes`` (n, 3) of the lattice are on a ``face``, (k,)."""
+    axis = "xyz".index(face[0])
+    return np.flatnonzero(nodes[:, axis] == (block.cells[axis] if face[1] == "1" else 0))
+
+
 def _held(block: Block, hold: Hold, nodes: Ints, surface: Surface) -> AttachedVertices:
     axis, high = "xyz".index(hold.face[0]), hold.face[1] == "1"
-    vertices = np.flatnonzero(nodes[:, axis] == (block.cells[axis] if high else 0))
+    vertices = _on(block, nodes, hold.face)
+    if hold.middle:
+        off = np.abs(nodes[vertices] - np.asarray(block.cells) / 2)
+        off[:, axis] = 0
+        vertices = vertices[[np.argmin(off.sum(axis=1))]]
     largest = max(block.size)
     away = np.zeros(3)
     away[axis] = (1 if high else -1) * _AWAY * largest

@@ -3,7 +3,7 @@
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Literal, Self, get_args
 
 from pydantic import Field, field_validator, model_validator
 
@@ -18,6 +18,7 @@ from fem_reference.scenes.muscle import Frames
 
 FOLDER = HOME / "cases" / "hard"
 Face = Literal["x0", "x1", "y0", "y1", "z0", "z1"]
+FACES: tuple[Face, ...] = get_args(Face)
 
 
 class Block(Record):
@@ -42,9 +43,12 @@ class Block(Record):
 
 
 class Hold(Record):
-    """A ``face`` of the block that is attached to a bone of its own, which rests or has a ``motion``; by springs or exactly."""
+    """A ``face`` of the block, or the vertex in its ``middle`` alone, that is attached to a bone of its own, which rests or has a
+    ``motion``; by springs or exactly.
+    """
 
     face: Face
+    middle: bool = False
     motion: Motion | None = None
     stiffness: AreaStiffness | None = None
 
@@ -59,9 +63,10 @@ class Start(Record):
 
 
 class Shipped(Record):
-    """A shipped ``case`` with ``changes`` of its keys."""
+    """A shipped ``case``, where it is ``quick`` as tests solve it, with ``changes`` of its keys."""
 
     case: str
+    quick: bool = False
     changes: dict[str, Any] = Field(default_factory=dict)
 
 
@@ -70,8 +75,8 @@ class Hard(Record):
 
     ``healthy`` says in words what a healthy run shows, ``bound`` in numbers, the decisive quantity first. ``only``: the solvers
     that it is about, by default all; ``because``: why. ``no_solution``: why physics has no answer, so that a run should end with a
-    status. ``settings``: by solver, those that differ from Table 5.1. ``steps``: of how many even load steps the reference is asked
-    for the same end state.
+    status. ``by_effects``: effects are all that acts, and solvers that simulate none have nothing to do. ``settings``: by solver,
+    those that differ from Table 5.1. ``steps``: of how many even load steps the reference is asked for the same end state.
     """
 
     title: str
@@ -87,6 +92,7 @@ class Hard(Record):
     only: tuple[str, ...] = ()
     because: str = ""
     no_solution: str = ""
+    by_effects: bool = False
     settings: dict[str, dict[str, Any]] = Field(default_factory=dict)
     steps: tuple[int, ...] = ()
     name: str = Field(exclude=True)

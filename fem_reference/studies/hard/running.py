@@ -28,11 +28,11 @@ from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs.key import versions
 from fem_reference.runs.store import NO_SURFACE, Frame, Outcome
 from fem_reference.scenes import casefile
-from fem_reference.scenes.case import SolverChoice
+from fem_reference.scenes.case import Case, SolverChoice
 from fem_reference.scenes.scalar import ScalarCase
 from fem_reference.solvers import fenicsx
 from fem_reference.studies.hard import blocks
-from fem_reference.studies.hard.records import Hard
+from fem_reference.studies.hard.records import Hard, Shipped
 
 log = logging.getLogger(__name__)
 
@@ -76,7 +76,7 @@ class Posed:
             return blocks.problem(self.hard)
         shipped = self.hard.shipped
         assert shipped is not None  # a Hard record has one of the two
-        case = casefile.read(shipped.case, changes=shipped.changes)
+        case = shipped_case(shipped)
         built: Problem | FieldProblem = of_case.problem(case, of_case.setup(case))
         return built
 
@@ -84,7 +84,7 @@ class Posed:
     def range(self) -> tuple[float, float]:
         """The range of the constant boundary values of a scalar case."""
         shipped = self.hard.shipped
-        case = casefile.read(shipped.case, changes=shipped.changes) if shipped else None
+        case = shipped_case(shipped) if shipped else None
         assert isinstance(case, ScalarCase)  # asked of no other
         values = [float(entry.value) for entry in case.boundary if entry.value is not None]
         return min(values), max(values)
@@ -93,6 +93,12 @@ class Posed:
     def row(self) -> HardCase:
         """What pages say of it."""
         return HardCase(self.hard.name, self.hard.title, self.hard.healthy, self.hard.bound)
+
+
+def shipped_case(shipped: Shipped) -> Case:
+    """The case with its changes."""
+    quick = casefile.read(shipped.case).quick if shipped.quick else {}
+    return casefile.read(shipped.case, changes=quick | shipped.changes)
 
 
 def run(hard: Sequence[Hard], only: Sequence[str] = ()) -> Stress:
@@ -118,6 +124,8 @@ def cell(posed: Posed, choice: SolverChoice) -> Cell:
     try:
         if hard.only and solver not in hard.only:
             return Cell(hard.name, solver, "refused", f"the case is about {', '.join(hard.only)} only: {hard.because}")
+        if hard.by_effects and not (solver == SECOND or solvers.takes_effects(solver)):
+            return Cell(hard.name, solver, "refused", "nothing but effects acts, and this solver simulates none")
         with _limited(2 * LIMIT):
             found = _solved(posed, choice)
     except (InputError, MissingSoftware) as error:
