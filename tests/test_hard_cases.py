@@ -104,7 +104,7 @@ def test_quantities_are_zero_at_rest_and_see_what_they_are_for() -> None:
 
 
 def test_a_name_that_is_not_there() -> None:
-    with pytest.raises(InputError, match=r"NAME: got \"nothing\", want one of at_rest"):
+    with pytest.raises(InputError, match=r"NAME: got \"nothing\", want one of activation, at_rest"):
         records.read_all(("nothing",))
 
 

@@ -18,7 +18,8 @@ class Followed:
     """A run as its health is measured: ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (at rest) at frame ``numbers``;
     of a solver with tetrahedra their ``mesh`` at rest and ``nodes`` (f, k, 3); the ``bones``, of which vertices that are ``free``
     (n,) may be in contact; ``truth`` (f, n, 3), where the reference has the vertices; ``integrated`` (f,), V/V0 as a solver has
-    that itself; or a scalar field's ``values`` (f, N) and the ``range`` that its boundary values span.
+    that itself; ``negative_modes`` (f,), where they were counted; or a scalar field's ``values`` (f, N) and the ``range`` that its
+    boundary values span.
     """
 
     numbers: tuple[int, ...]
@@ -30,6 +31,7 @@ class Followed:
     free: NDArray[np.bool_] | None = None
     truth: Floats | None = None
     integrated: Floats | None = None
+    negative_modes: Floats | None = None
     values: Floats | None = None
     range: tuple[float, float] = (0.0, 0.0)
 
@@ -150,6 +152,36 @@ QUANTITIES: dict[str, tuple[str, Callable[[Followed], Found]]] = {
     "penetration": ("%", penetration),
     "overshoot": ("%", overshoot),
 }
+
+
+# Beyond this squeeze mixed elements count negative modes that the material has not (README).
+_CERTAIN = 2 / 3
+
+
+def unstable(run: Followed) -> str:
+    """Where a run is an unstable equilibrium, in words; empty where it is not, or nobody counted."""
+    if run.negative_modes is None or not (run.negative_modes > 0).any():
+        return ""
+    first, most = int(np.argmax(run.negative_modes > 0)), run.negative_modes.max()
+    squeezed = least_stretch(run)
+    doubt = ""
+    if squeezed < _CERTAIN:
+        doubt = f", some of which may be the elements' alone: tetrahedra are squeezed to {squeezed:.2g}"
+    return f"an unstable equilibrium from frame {run.numbers[first]} on, with up to {most:.0f} negative modes{doubt}"
+
+
+def least_stretch(run: Followed) -> float:
+    """The least principal stretch of any tetrahedron at any frame; 1 of what has none."""
+    if run.mesh is None or run.nodes is None:
+        return 1.0
+    corners = run.mesh.points[run.mesh.tets]
+    rest = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))
+    least = 1.0
+    for nodes in run.nodes:
+        corners = nodes[run.mesh.tets]
+        stretches = np.linalg.svd(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2) @ rest, compute_uv=False)
+        least = min(least, float(stretches.min()))
+    return least
 
 
 def course(run: Followed, quantity: str) -> Course:

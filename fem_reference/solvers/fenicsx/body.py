@@ -34,6 +34,8 @@ from fem_reference.solvers.fenicsx.stability import Stability, has_energy
 from fem_reference.solvers.fenicsx.system import System
 from fem_reference.solvers.fenicsx.validity import Validity
 
+_SAME = 1e-9  # [mm], rounding of a motion that comes back
+
 
 class AssembledBody:
     """The unknowns of a body, made of an element of ``ELEMENTS``, and their equations."""
@@ -74,6 +76,7 @@ class AssembledBody:
         self.path = Path(self.system, self.determinants)
         self.known = Known(self.comm)
         self.recalled: State | None = None
+        self.at = body.frames[0]  # the frame of the last good state
         self.nodes = meshes.Nodes(body.mesh, self.cells, ufl.split(self.unknowns)[0])
         self.nodal = Nodal(self.cells, settings.element, self.unknowns, self.clock) if settings.store_state else None
 
@@ -113,6 +116,8 @@ class AssembledBody:
         quadrature point or a vertex, is inverted whatever Newton's method says, and one in which cells have lost most of their
         volume is collapsed.
         """
+        if self._comes_back(frame):
+            return Attempt("diverged", 0, "what is prescribed turns, or comes back, within the load step")
         before = np.array(self.unknowns.x.array)
         self.clock.start(frame, before)
         self._set(frame)
@@ -123,6 +128,7 @@ class AssembledBody:
         lost = self.validity.collapsed() if failure is None and smallest.value > 0 else None
         jump = self.path.jumped(before) if failure is None and smallest.value > 0 else None
         if failure is None and smallest.value > 0 and through is None and lost is None and jump is None:
+            self.at = frame
             self.clock.settle(frame)
             self.path.settle(self.integral(self.energy_form))
             if self.contact:
@@ -144,7 +150,7 @@ class AssembledBody:
         """Take up the state that was solved before under what acts at ``frame``, if there is one and it is on the path: after a
         whole turn what acts is as at rest, and the body is not. Its residual proves it.
         """
-        if self.clock.matters or not self.reuse:
+        if self.clock.matters or not self.reuse or self._comes_back(frame):
             return False
         before = np.array(self.unknowns.x.array)
         self._set(frame)
@@ -161,8 +167,24 @@ class AssembledBody:
         if self.contact:
             self.contact.settle() if proved else self.contact.go_back()
         if proved:
+            self.at = frame
             self.path.settle(self.integral(self.energy_form), connected=False)
         return proved
+
+    def _comes_back(self, frame: float) -> bool:
+        """Whether what is prescribed is farther from the straight way halfway from the last good state to ``frame`` than it moves
+        in all: a step through a turn by 250 degrees or more, or there and back, would leave it out.
+        """
+        values = []
+        for number in (self.at, (self.at + frame) / 2, frame):
+            self._set(number)
+            values.append(np.concatenate([np.zeros(0), *(one.prescribed for one in self.conditions)]))
+        start, halfway, end = values
+        aside, moved = (
+            float(self.comm.allreduce(np.abs(away).max(initial=0.0), MPI.MAX))
+            for away in (halfway - (start + end) / 2, end - start)
+        )
+        return aside > moved + _SAME
 
     def _acting(self, frame: float) -> Floats:
         """All numbers that determine the state at ``frame``, beside the body itself."""

@@ -70,13 +70,20 @@ class Shipped(Record):
     changes: dict[str, Any] = Field(default_factory=dict)
 
 
+class Steps(Record):
+    """Numbers of even load steps (``counts``) in which the reference goes to the frame ``until``: they shall end alike."""
+
+    until: int
+    counts: tuple[int, ...] = (1, 10, 40)
+
+
 class Hard(Record):
     """A hard case: a ``block`` with what acts on it, or a ``shipped`` case.
 
     ``healthy`` says in words what a healthy run shows, ``bound`` in numbers, the decisive quantity first. ``only``: the solvers
     that it is about, by default all; ``because``: why. ``no_solution``: why physics has no answer, so that a run should end with a
     status. ``by_effects``: effects are all that acts, and solvers that simulate none have nothing to do. ``settings``: by solver,
-    those that differ from Table 5.1. ``steps``: of how many even load steps the reference is asked for the same end state.
+    those that differ from Table 5.1. ``steps``: in which numbers of load steps the reference is asked for the same end state.
     """
 
     title: str
@@ -94,7 +101,7 @@ class Hard(Record):
     no_solution: str = ""
     by_effects: bool = False
     settings: dict[str, dict[str, Any]] = Field(default_factory=dict)
-    steps: tuple[int, ...] = ()
+    steps: Steps | None = None
     name: str = Field(exclude=True)
     place: str = Field(exclude=True)
 
