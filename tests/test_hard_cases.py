@@ -64,6 +64,11 @@ def test_what_explodes_with_finite_numbers_is_found_out() -> None:
     assert (folded.verdict, folded.quantity, folded.status) == ("degraded", "inside_out", "converged")
 
 
+def test_a_bone_that_passes_between_frames_is_found_out() -> None:
+    found = cell("bones.crosses_in_a_frame", "pbd")
+    assert (found.verdict, found.quantity) == ("degraded", "passed")
+
+
 def test_a_solver_that_raises_has_failed(monkeypatch) -> None:
     monkeypatch.setattr(running, "_solved", lambda *_: 1 / 0)
     found = cell("at_rest.millimetres", "pbd")

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +41,8 @@ class Followed:
         """The diagonal of the body at rest [mm]."""
         return float(np.linalg.norm(np.ptp(self.surface.points, axis=0)))
 
+
+_LOOKS = 33  # how often on the way from a frame to the next it is looked where vertices are
 
 # Values (f,), words (f,) and points (f, 3) of where they are worst, the last two None where that is nowhere in particular.
 Found = tuple[Floats, list[str] | None, Floats | None]
@@ -121,6 +124,24 @@ def penetration(run: Followed) -> Found:
     return _worst(run, 100 * np.where(free, depths, 0.0) / run.size)
 
 
+def passed(run: Followed) -> Found:
+    """How deep any free vertex was inside a bone on the straight way from the frame before, as seen from the bone, in per cent of
+    the body's size: a bone that crossed the body is outside of it before and after.
+    """
+    free = np.ones(len(run.surface.points), bool) if run.free is None else run.free
+    depths = np.zeros(run.positions.shape[:2])
+    for bone in run.bones:
+        seen = [
+            apply(np.linalg.inv(bone.pose(number)), points)
+            for number, points in zip(run.numbers, run.positions, strict=True)
+        ]
+        for i, (before, after) in enumerate(pairwise(seen)):
+            for share in np.linspace(0, 1, _LOOKS):
+                depth = -bone.shape.sample(before + share * (after - before)).distance
+                depths[i + 1] = np.maximum(depths[i + 1], depth)
+    return _worst(run, 100 * np.where(free, depths, 0.0) / run.size)
+
+
 def overshoot(run: Followed) -> Found:
     """How far a scalar field is outside the range of its boundary values, in per cent of that range."""
     assert run.values is not None  # asked of scalar fields only
@@ -150,6 +171,7 @@ QUANTITIES: dict[str, tuple[str, Callable[[Followed], Found]]] = {
     "unrest": ("%", unrest),
     "stretch": ("", stretch),
     "penetration": ("%", penetration),
+    "passed": ("%", passed),
     "overshoot": ("%", overshoot),
 }
 

@@ -3,6 +3,7 @@
 import logging
 import os
 import platform
+import re
 import signal
 import time
 from collections.abc import Iterator, Sequence
@@ -44,6 +45,10 @@ _OWN: dict[str, dict[str, Any]] = {
     SECOND: {},
     "line_of_action": {},
 }
+
+
+# How messages name a place at rest [mm].
+_PLACE = re.compile(r"cell \d+ at \((-?[\d.]+), (-?[\d.]+), (-?[\d.]+)\) mm")
 
 
 class _Late(Exception):  # noqa: N818 - it is what happened to a run, and caught beside it
@@ -258,10 +263,16 @@ def _field(posed: Posed, built: FieldProblem, choice: SolverChoice) -> tuple[Out
 
 
 def _scene(found: Cell, followed: Followed) -> Scene | None:
-    """The picture of the frame that decided; None of what has no surface, or is not finite."""
-    points = followed.positions[found.at]
+    """The picture of the frame that decided, of a run that ended before all of them the last one, with the place that its message
+    names; None of what has no surface, or is not finite.
+    """
+    ended = found.status != "converged"
+    i = len(followed.positions) - 1 if ended else found.at
+    points, course = followed.positions[i], found.course
     if not len(points) or not np.isfinite(points).all():
         return None
-    course = found.course
-    place = None if course is None or course.points is None else course.points[found.at]
+    place = None if course is None or course.points is None else course.points[i]
+    if ended and (named := _PLACE.search(found.sentence)):
+        off = followed.surface.points - [float(number) for number in named.groups()]
+        place = points[np.argmin(np.linalg.norm(off, axis=1))]
     return Scene(points, followed.surface.triangles, place)
