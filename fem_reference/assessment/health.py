@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fem_reference.assessment.stress import Course
 from fem_reference.foundations.mesh import Floats, Surface, TetMesh, enclosed_volume, tet_volumes
 from fem_reference.foundations.motion import apply
+from fem_reference.geometry.signed_distance import signed_distances
 from fem_reference.geometry.windings import outer_windings
 from fem_reference.problems.muscle import RigidBody
 
@@ -142,6 +143,20 @@ def passed(run: Followed) -> Found:
     return _worst(run, 100 * np.where(free, depths, 0.0) / run.size)
 
 
+def pierced(run: Followed) -> Found:
+    """How deep any vertex of a bone is inside the body, in per cent of its size: thin bones fit between the body's vertices."""
+    values, places = np.zeros(len(run.numbers)), np.tile(run.surface.points[0], (len(run.numbers), 1))
+    for i, (number, points) in enumerate(zip(run.numbers, run.positions, strict=True)):
+        body = run.surface.moved_to(points)
+        for bone in run.bones:
+            there = apply(bone.pose(number), bone.surface.points)
+            near = there[((there >= points.min(axis=0)) & (there <= points.max(axis=0))).all(axis=1)]
+            depth = -signed_distances(near, body) if len(near) and np.isfinite(points).all() else np.zeros(0)
+            if len(depth) and depth.max() > values[i]:
+                values[i], places[i] = depth.max(), near[np.argmax(depth)]
+    return 100 * values / run.size, None, places
+
+
 def overshoot(run: Followed) -> Found:
     """How far a scalar field is outside the range of its boundary values, in per cent of that range."""
     assert run.values is not None  # asked of scalar fields only
@@ -172,6 +187,7 @@ QUANTITIES: dict[str, tuple[str, Callable[[Followed], Found]]] = {
     "stretch": ("", stretch),
     "penetration": ("%", penetration),
     "passed": ("%", passed),
+    "pierced": ("%", pierced),
     "overshoot": ("%", overshoot),
 }
 
