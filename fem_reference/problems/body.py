@@ -199,7 +199,7 @@ class ByCell:
 class Body:
     """A body of ``mesh`` with its ``effects``; at ``frames[0]`` it rests. A load acts on the facets that its ``on`` names; by
     ``contact``, where there is one, with every obstruction. ``interval`` [s]: from a frame number to the next, None where nothing
-    depends on time.
+    depends on time. ``start``: at ``frames[0]`` the body is where this takes rest points (n, 3), and not at rest.
     """
 
     mesh: Cells
@@ -210,6 +210,7 @@ class Body:
     contact: Contact | None = None
     obstructions: tuple[Obstruction, ...] = ()
     interval: float | None = None
+    start: Callable[[Floats], Floats] | None = None
 
     @property
     def first(self) -> float:

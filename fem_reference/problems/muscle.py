@@ -2,6 +2,7 @@
 
 import logging
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -98,7 +99,8 @@ class AttachedVertices:
 @dataclass(frozen=True, eq=False)
 class Setup:
     """What a surface solver needs: the muscle ``surface`` at rest, the bones, the attached vertices, and the frames wanted;
-    ``interval`` [s] from a frame number to the next where the scene says it.
+    ``interval`` [s] from a frame number to the next where the scene says it; ``start``, where the body is at the first frame, by
+    its rest positions (n, 3), where that is not at rest.
     """
 
     surface: Surface
@@ -106,6 +108,11 @@ class Setup:
     attached: tuple[AttachedVertices, ...]
     frames: tuple[int, ...]
     interval: float | None
+    start: Callable[[Floats], Floats] | None = field(default=None, kw_only=True)
+
+    def begin(self, rest: Floats) -> Floats:
+        """Where points that are at ``rest`` (n, 3) [mm] are at the first frame; an array of the caller's own."""
+        return np.array(rest) if self.start is None else np.array(self.start(rest))
 
     @cached_property
     def attached_vertices(self) -> Ints:

@@ -62,7 +62,9 @@ def as_body(problem: Problem) -> Body:
         for entry in problem.attached
     )
     acting = tuple(effect for effect in problem.effects if not isinstance(effect, Interaction))
-    body = Body(cells, acting, prescribed, problem.frames, problem.fibre, interval=problem.interval)
+    body = Body(
+        cells, acting, prescribed, problem.frames, problem.fibre, interval=problem.interval, start=problem.start
+    )
     return body if problem.contact is None else _among_bones(body, problem, problem.contact)
 
 

@@ -3,14 +3,24 @@
 import json
 from pathlib import Path
 
-from fem_reference.assessment import cost_study, omissions
+from fem_reference.assessment import cost_study, omissions, stress
 from fem_reference.assessment.claims import Claims
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.cost_study import Study
 from fem_reference.assessment.omissions import CaseOmissions
 from fem_reference.assessment.solver_table import Table
+from fem_reference.assessment.stress import Stress
 from fem_reference.io import files
-from fem_reference.report import claims_page, effects_page, field_page, page, ranking_page, study_page, verify_page
+from fem_reference.report import (
+    claims_page,
+    effects_page,
+    field_page,
+    page,
+    ranking_page,
+    stress_page,
+    study_page,
+    verify_page,
+)
 from fem_reference.report.tables import as_csv, summary
 from fem_reference.report.verify_page import Verification
 
@@ -21,6 +31,7 @@ __all__ = [
     "write_effects",
     "write_examples",
     "write_ranking",
+    "write_stress",
     "write_study",
     "write_verification",
 ]
@@ -101,6 +112,16 @@ def write_effects(found: CaseOmissions, folder: Path, name: str) -> Path:
     texts = {
         f"{name}.json": json.dumps(omissions.facts(found), indent=1, allow_nan=False),
         f"{name}.html": effects_page.render(found),
+    }
+    _write(texts, folder)
+    return folder / f"{name}.html"
+
+
+def write_stress(found: Stress, folder: Path, name: str) -> Path:
+    """Write the page ``name`` of hard cases and its numbers as JSON into ``folder``; the path of the page."""
+    texts = {
+        f"{name}.json": json.dumps(stress.facts(found), indent=1, allow_nan=False),
+        f"{name}.html": stress_page.render(found),
     }
     _write(texts, folder)
     return folder / f"{name}.html"

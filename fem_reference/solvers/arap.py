@@ -181,7 +181,7 @@ class Alternation:
         self, setup: Setup, system: System, relax: Callable[[Floats], Relaxed], cost: dict[str, float]
     ) -> None:
         self.setup, self.system, self.relax = setup, system, relax
-        self.relaxed = Relaxed(np.array(setup.surface.points), 0, True)
+        self.relaxed = Relaxed(setup.begin(setup.surface.points), 0, True)
         free = len(setup.surface.points) - len(np.unique(setup.attached_vertices))
         self.cost = cost | {"unknowns": 3.0 * free, "local_global_steps": 0, "frames_off_tolerance": 0}
 

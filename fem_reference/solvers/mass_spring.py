@@ -207,7 +207,7 @@ class Motion:
     def __init__(self, model: Model, settings: Settings, wanted: float, seconds_compile: float) -> None:
         """``wanted``: how many steps, rounded up, in a frame number."""
         self.model, self.settings = model, settings
-        self.points = np.array(model.problem.mesh.points)
+        self.points = model.problem.begin(model.problem.mesh.points)
         self.previous = self.points.copy()
         self.rest = Surface(model.problem.mesh.points, boundary(model.problem.mesh.tets)[0])
         self.steps = max(1, math.ceil(wanted - 1e-9))

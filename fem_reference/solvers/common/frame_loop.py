@@ -96,7 +96,7 @@ class MovingSurface:
     kept: Floats = field(init=False)
 
     def __post_init__(self) -> None:
-        self.points = np.array(self.setup.surface.points)
+        self.points = self.setup.begin(self.setup.surface.points)
         self.kept = np.zeros(self.points.shape)
         free = len(self.points) - len(np.unique(self.setup.attached_vertices))
         self.cost |= {"unknowns": 3.0 * free, "projections": 0.0}

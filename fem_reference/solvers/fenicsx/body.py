@@ -3,7 +3,7 @@
 Every method is collective: all ranks call it and, where it returns a value, get the same one.
 """
 
-from functools import cached_property
+from collections.abc import Callable
 from typing import Any, cast
 
 import basix.ufl
@@ -13,6 +13,7 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from fem_reference.effects import Energy, Ramped
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.solvers.common.load_steps import Attempt
@@ -25,11 +26,15 @@ from fem_reference.solvers.fenicsx.known import Known, State
 from fem_reference.solvers.fenicsx.linear import Factorised
 from fem_reference.solvers.fenicsx.newton import Newton
 from fem_reference.solvers.fenicsx.nodal import Nodal
+from fem_reference.solvers.fenicsx.path import Path, on_the_way
+from fem_reference.solvers.fenicsx.reactions import Reactions
 from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.stability import Stability, has_energy
 from fem_reference.solvers.fenicsx.system import System
 from fem_reference.solvers.fenicsx.validity import Validity
+
+_SAME = 1e-9  # [mm], rounding of a motion that comes back
 
 
 class AssembledBody:
@@ -38,6 +43,10 @@ class AssembledBody:
     def __init__(self, body: Body, settings: BodySettings) -> None:
         self.comm, self.reuse = MPI.COMM_WORLD, settings.reuse
         self.effects = body.effects
+        # Whether the energy changes by what deforms the body only.
+        self.conserves = not any(
+            isinstance(one, Energy) and (isinstance(one, Ramped) or not one.stored) for one in self.effects
+        )
         self.mesh = meshes.distribute(self.comm, body.mesh)
         # Where each of this rank's own cells stood in the body's mesh.
         own = self.mesh.topology.index_map(3).size_local
@@ -65,9 +74,12 @@ class AssembledBody:
         self.stability = Stability(self.system, cast(Factorised, self.linear), self.unknowns) if counts else None
         self.contact = self.system.contact = self._contact(body, form) if body.contact else None
         self.system.balance_units()
+        self.path = Path(self.system, self.determinants)
+        self.reactions = Reactions(self.system, self.conditions, self.contact)
         self.known = Known(self.comm)
         self.recalled: State | None = None
         self.modes: float | None = None  # of the state that was examined last
+        self.at = body.frames[0]  # the frame of the last good state
         self.nodes = meshes.Nodes(body.mesh, self.cells, ufl.split(self.unknowns)[0])
         self.nodal = Nodal(self.cells, settings.element, self.unknowns, self.clock) if settings.store_state else None
 
@@ -90,6 +102,13 @@ class AssembledBody:
             points = contact_points.on_skin(space, parents, law.on, self.local)
         return ContactForces(law, body.obstructions, points, self.unknowns, body.frames[0])
 
+    def start(self, moved: Callable[[Floats], Floats]) -> None:
+        """Begin with the nodes where ``moved`` takes rest points (n, 3) [mm]."""
+        self.displacement.interpolate(lambda points: (moved(points.T) - points.T).T)
+        self.unknowns.x.array[self.displacement_dofs] = self.displacement.x.array
+        self.unknowns.x.scatter_forward()
+        self.path.settle(self.integral(self.energy_form), connected=False)
+
     @property
     def size(self) -> int:
         """How many unknowns there are, over all ranks."""
@@ -100,6 +119,8 @@ class AssembledBody:
         quadrature point or a vertex, is inverted whatever Newton's method says, and one in which cells have lost most of their
         volume is collapsed.
         """
+        if self._comes_back(frame):
+            return Attempt("diverged", 0, "what is prescribed turns, or comes back, within the load step")
         before = np.array(self.unknowns.x.array)
         if self.clock.begins():
             self._begin(before)
@@ -110,8 +131,11 @@ class AssembledBody:
         smallest = self.determinants.smallest()
         through = self.contact.tunnelled(self.comm) if self.contact and failure is None else None
         lost = self.validity.collapsed() if failure is None and smallest.value > 0 else None
-        if failure is None and smallest.value > 0 and through is None and lost is None:
+        jump = self.path.jumped(before) if failure is None and smallest.value > 0 else None
+        if failure is None and smallest.value > 0 and through is None and lost is None and jump is None:
+            self.at = frame
             self.clock.settle(frame, self.unknowns.x.array)
+            self.path.settle(self.integral(self.energy_form))
             if self.contact:
                 self.contact.settle()
             return Attempt(None, iterations)
@@ -122,6 +146,8 @@ class AssembledBody:
             return Attempt("diverged", iterations, f"Newton's method converged, but {through}")
         if lost is not None:
             return Attempt("collapsed", iterations, f"Newton's method converged, but {lost}")
+        if jump is not None:
+            return Attempt("diverged", iterations, f"Newton's method converged, but {on_the_way(jump)}")
         how = failure or f"converged, but det F fell to {smallest}"
         return Attempt("diverged" if smallest.value > 0 else "inverted", iterations, f"Newton's method {how}")
 
@@ -136,8 +162,10 @@ class AssembledBody:
             self.contact.go_back()
 
     def recall(self, frame: float) -> bool:
-        """Take up the state that was solved before under what acts at ``frame``, if there is one; its residual proves it."""
-        if self.clock.matters or not self.reuse:
+        """Take up the state that was solved before under what acts at ``frame``, if there is one and it is on the path: after a
+        whole turn what acts is as at rest, and the body is not. Its residual proves it.
+        """
+        if self.clock.matters or not self.reuse or self._comes_back(frame):
             return False
         before = np.array(self.unknowns.x.array)
         self._set(frame)
@@ -148,11 +176,14 @@ class AssembledBody:
         self.unknowns.x.array[:] -= self.system.missing()  # rounding of a motion that comes back
         if self.contact:
             self.contact.update(frame)
-        proved = self.system.residual() <= self.newton.residual
+        proved = self.system.residual() <= self.newton.residual and self.path.jumped(before) is None
         if not proved:
             self.unknowns.x.array[:] = before
         if self.contact:
             self.contact.settle() if proved else self.contact.go_back()
+        if proved:
+            self.at = frame
+            self.path.settle(self.integral(self.energy_form), connected=False)
         return proved
 
     def know(self, frame: float, unknowns: Floats, modes: float | None) -> None:
@@ -165,12 +196,29 @@ class AssembledBody:
         """Be in the state of ``frame`` with ``unknowns`` (n,), as when it was reached."""
         self._set(frame)
         self.unknowns.x.array[:] = unknowns
+        self.at = frame
         if self.contact:
             self.contact.update(frame)
             self.contact.settle()
+        self.path.settle(self.integral(self.energy_form), connected=False)
         if not recalled and self.stability is not None:  # an old factorisation serves on
             with self.clock.slow(np.array(self.unknowns.x.array)):
                 self.stability.negative_modes()
+
+    def _comes_back(self, frame: float) -> bool:
+        """Whether what is prescribed is farther from the straight way halfway from the last good state to ``frame`` than it moves
+        in all: a step through a turn by 250 degrees or more, or there and back, would leave it out.
+        """
+        values = []
+        for number in (self.at, (self.at + frame) / 2, frame):
+            self._set(number)
+            values.append(np.concatenate([np.zeros(0), *(one.prescribed for one in self.conditions)]))
+        start, halfway, end = values
+        aside, moved = (
+            float(self.comm.allreduce(np.abs(away).max(initial=0.0), MPI.MAX))
+            for away in (halfway - (start + end) / 2, end - start)
+        )
+        return aside > moved + _SAME
 
     def _acting(self, frame: float) -> Floats:
         """All numbers that determine the state at ``frame``, beside the body itself."""
@@ -191,9 +239,11 @@ class AssembledBody:
         """The smallest det F at quadrature points and vertices, V/V0, and the energies [N mm]."""
         contact = self.contact.scalars(self.comm) if self.contact else {}
         moving = {} if self.kinetic_form is None else {"kinetic_energy": self.integral(self.kinetic_form)}
+        gap = {"energy_gap": self.path.take_gap()} if self.conserves else {}
         return (
             contact
             | moving
+            | gap
             | {
                 "min_det_F_quadrature": self.determinants.smallest("quadrature point").value,
                 "min_det_F_vertices": self.determinants.smallest("vertex").value,
@@ -224,27 +274,6 @@ class AssembledBody:
     def integral(self, form: Any) -> float:
         """A compiled form, summed over the ranks."""
         return float(self.comm.allreduce(fem.assemble_scalar(form), MPI.SUM))
-
-    def forces(self, *, divided: bool) -> tuple[dict[str, Floats], dict[str, Floats]]:
-        """By name of what is prescribed, the force (3,) [N] that keeps it there and its moment (3,) [N mm] about the origin. What
-        an unknown of several regions takes is ``divided`` between them, so that all forces are in balance, or counts in each.
-        """
-        balance, now = self.system.reactions(), np.array(self.unknowns.x.array)
-        shared = self._shared if divided else np.ones(len(now), np.int64)
-        found = {one.entry.name: one.force(balance, now, shared) for one in self.conditions}
-        found |= self.contact.forces() if self.contact else {}
-        forces = {name: self.comm.allreduce(force, MPI.SUM) for name, (force, _) in found.items()}
-        moments = {name: self.comm.allreduce(moment, MPI.SUM) for name, (_, moment) in found.items()}
-        return forces, moments
-
-    @cached_property
-    def _shared(self) -> Ints:
-        """By how many regions each unknown (n,) is prescribed."""
-        count = np.zeros(len(self.unknowns.x.array), np.int64)
-        for one in self.conditions:
-            for component in one.components if isinstance(one, PrescribedRegion) else ():
-                count[component.dofs[0]] += 1
-        return count
 
     def node_positions(self) -> Floats:
         """Where the nodes of the body's mesh are now (n, 3) [mm]."""

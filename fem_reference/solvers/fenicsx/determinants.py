@@ -40,7 +40,14 @@ class Determinants:
 
     def smallest(self, where: str | None = None) -> Smallest:
         """The smallest det F at points of one kind, ``"quadrature point"`` or ``"vertex"``, or at both; NaN counts as smallest."""
-        mine = [self._mine(name) for name in ([where] if where else self.points)]
+        return self._least([self._mine(name, self._at(name)) for name in ([where] if where else self.points)])
+
+    def smallest_of(self, values: Floats) -> Smallest:
+        """The smallest of other ``values`` (p,) at the quadrature points of this rank's cells, and where; NaN is smallest."""
+        where = "quadrature point"
+        return self._least([self._mine(where, values.reshape(len(self.cells), len(self.points[where])))])
+
+    def _least(self, mine: list[Smallest]) -> Smallest:
         everywhere: list[Smallest] = [found for rank in self.mesh.comm.allgather(mine) for found in rank]
         return min(everywhere, key=lambda found: (not np.isnan(found.value), found.value))
 
@@ -59,10 +66,9 @@ class Determinants:
         values = self.values[where].eval(self.mesh, np.arange(len(self.cells), dtype=np.int32))
         return np.asarray(values).reshape(len(self.cells), -1)
 
-    def _mine(self, where: str) -> Smallest:
+    def _mine(self, where: str, values: Floats) -> Smallest:
         if len(self.cells) == 0:  # a rank without cells
             return Smallest(float("inf"), where, -1, (0.0, 0.0, 0.0))
-        values = self._at(where)
         cell, point = np.unravel_index(np.argmin(np.where(np.isnan(values), -np.inf, values)), values.shape)
         at = self.places[where].eval(self.mesh, np.array([cell], np.int32))
         x, y, z = at.reshape(-1, 3)[point]

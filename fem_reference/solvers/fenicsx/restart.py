@@ -46,7 +46,7 @@ class Restart:
         body = self.body
         arrays = self._gathered({"unknowns": body.unknowns.x.array} | body.clock.arrays())
         own = {"mesh": self.kept.mesh, "layout": self.layout, "recalled": body.recalled is not None}
-        own |= {"clock": body.clock.facts(), "modes": body.modes}
+        own |= {"clock": body.clock.facts(), "modes": body.modes, "greatest_energy": body.path.greatest}
         if body.comm.rank == 0:
             arrays["facts"] = np.array(json.dumps(facts | own))
             write_arrays(self.kept.place(frame), arrays)
@@ -64,6 +64,7 @@ class Restart:
                 names = {name.partition(" ")[2] for name in arrays} - {"", "unknowns"}
                 body.clock.take_up({name: self._spread(name, arrays, layout) for name in names}, facts["clock"])
                 body.take_up(frame, self._spread("unknowns", arrays, layout), recalled=facts["recalled"])
+                body.path.greatest = facts["greatest_energy"]
         return facts
 
     def _spread(self, name: str, arrays: Mapping[str, Any], layout: Mapping[str, Any]) -> Floats:

@@ -22,6 +22,9 @@ class BodySettings(Record):
     own; ``"lagged"``, as exactly as it is worth it, by FGMRES with a factorisation that serves until a new one is cheaper; by
     default as the size asks. ``precision``: of factorisations, by default double of direct ones and single of lagged ones. Both
     change the time and not the answer.
+    ``follow``: ``"equilibrium"`` as Newton's method finds it, or ``"stable"``: at a frame whose equilibrium is unstable, as far as
+    negative modes are counted, the body is moved along its lowest mode by a ``perturbation``, a share of its size (up to eight
+    times that, in both directions, until there are fewer), and solved anew.
     ``reuse``: whether a frame under the same load as an earlier one takes up the state of then.
     ``time_limit``: when to give up, by default never. ``store_state``: whether each frame also carries the unknowns of every cell,
     from which ``results`` evaluates stress, pressure, det F and fibre stretch.
@@ -36,6 +39,8 @@ class BodySettings(Record):
     quadrature_degree: Annotated[int | None, Trade((2, 3, 4, 6))] = Field(default=None, gt=0)
     linear_solver: Literal["direct", "lagged", "multigrid"] | None = None
     precision: Literal["single", "double"] | None = None
+    follow: Literal["equilibrium", "stable"] = "equilibrium"
+    perturbation: float = Field(default=0.01, gt=0, lt=1)
     reuse: bool = True
     time_limit: Time | None = None
     store_state: bool = False

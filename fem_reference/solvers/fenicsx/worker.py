@@ -18,6 +18,7 @@ from fem_reference.solvers.fenicsx.processes import MARK
 
 from fem_reference.solvers.fenicsx import compiling  # isort: skip - after the door
 from fem_reference.solvers.fenicsx.body import AssembledBody  # isort: skip
+from fem_reference.solvers.fenicsx.branching import leave  # isort: skip
 from fem_reference.solvers.fenicsx.restart import Restart  # isort: skip
 from fem_reference.solvers.fenicsx.validity import Ranges  # isort: skip
 from fem_reference.solvers.common.load_steps import Attempt, Step, Steps, march  # isort: skip
@@ -36,10 +37,13 @@ class Worker:
         self.began = time.process_time()
         self.job, self.folder, self.settings = job, folder, job.settings
         self.body = AssembledBody(job.body, job.settings)
+        if job.body.start is not None:
+            self.body.start(job.body.start)
         self.set_up = time.perf_counter() - begin
         self.solving = self.solving_processor = self.checking = 0.0
         self.counts = {"newton_iterations": 0, "load_steps": 0, "cut_backs": 0}
         self.unstable: dict[float, float] = {}  # negative modes by frame
+        self.left: dict[float, float] = {}  # perturbation [mm] by frame
         self.ranges = Ranges()
         self.collapse = ""  # to what attempts since the last good state led, where a body collapsed in one
         self.earlier: dict[str, float] = {}  # what processes before this one cost
@@ -74,9 +78,10 @@ class Worker:
                 status = "collapsed" if self.collapse else reached.status
                 self.report(status=status, message=self.sentence(reached), cost=self.cost())
                 return
+            self.stabilise(reached.frame)
             self.report_frame(reached)
         wanted = sum(frame >= self.job.body.first for frame in self.job.body.frames)
-        message = f"all {wanted} frames reached{self.instability()}{self.ranges}"
+        message = f"all {wanted} frames reached{self.departures()}{self.instability()}{self.ranges}"
         self.report(status="converged", message=message, cost=self.cost())
 
     def attempt(self, frame: float) -> Attempt:
@@ -88,6 +93,23 @@ class Worker:
         if result.failure in (None, "collapsed"):
             self.collapse = result.sentence
         return result
+
+    def stabilise(self, frame: float) -> None:
+        """Leave the equilibrium of a ``frame`` where it is unstable and that is not wanted."""
+        if self.settings.follow == "stable":
+            left = leave(self.body, frame, self.settings.perturbation)
+            if left is not None:
+                self.left[frame] = left
+
+    def departures(self) -> str:
+        """The note on equilibria that were left, nothing where there are none."""
+        if not self.left:
+            return ""
+        most = max(self.left.values())
+        return (
+            f"; in {len(self.left)} of them an unstable equilibrium was left along its lowest mode, "
+            f"first at frame {min(self.left):g}, by a perturbation of up to {most:.3g} mm"
+        )
 
     def negative_modes(self, frame: float) -> dict[str, float]:
         """In how many directions the energy falls from the state of a frame that was reached, where that can be known; the time
@@ -126,7 +148,7 @@ class Worker:
 
     def report_frame(self, reached: Step) -> None:
         """Write the frame's positions and forces beside the job and report it."""
-        forces, moments = self.body.forces(divided=bool(self.job.samples))
+        forces, moments = self.body.reactions.now(divided=bool(self.job.samples))
         arrays = {name: self.body.positions(*sample) for name, sample in self.job.samples.items()}
         arrays |= {"nodes": self.body.node_positions()}
         arrays |= {f"force {name}": force for name, force in forces.items()}

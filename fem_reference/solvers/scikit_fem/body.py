@@ -53,6 +53,8 @@ def solve_body(body: Body, settings: BodySettings) -> Solved:
         raise InputError(
             "prescribed", "springs at points of a skin", "springs on facets, as this solver knows no others"
         )
+    if body.start is not None:
+        raise InputError("start", "a state other than rest", "rest, from which this solver begins")
     timed = [effect.title for effect in body.effects if "interval" in effect.needs]
     if timed:
         raise InputError("effects", ", ".join(timed), "effects without rates, as this solver knows no time")

@@ -1,0 +1,229 @@
+"""Quantities that show whether a run is stable, each at every frame and where it is worst: 0 where all is well."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_reference.assessment.stress import Course
+from fem_reference.foundations.mesh import Floats, Surface, TetMesh, enclosed_volume, tet_volumes
+from fem_reference.foundations.motion import apply
+from fem_reference.geometry.signed_distance import signed_distances
+from fem_reference.geometry.windings import outer_windings
+from fem_reference.problems.muscle import RigidBody
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """A run as its health is measured: ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (at rest) at frame ``numbers``;
+    of a solver with tetrahedra their ``mesh`` at rest and ``nodes`` (f, k, 3); the ``bones``, of which vertices that are ``free``
+    (n,) may be in contact; ``truth`` (f, n, 3), where the reference has the vertices; ``integrated`` (f,), V/V0 as a solver has
+    that itself; ``negative_modes`` (f,), where they were counted; or a scalar field's ``values`` (f, N) and the ``range`` that its
+    boundary values span.
+    """
+
+    numbers: tuple[int, ...]
+    surface: Surface
+    positions: Floats
+    mesh: TetMesh | None = None
+    nodes: Floats | None = None
+    bones: tuple[RigidBody, ...] = ()
+    free: NDArray[np.bool_] | None = None
+    truth: Floats | None = None
+    integrated: Floats | None = None
+    negative_modes: Floats | None = None
+    values: Floats | None = None
+    range: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def size(self) -> float:
+        """The diagonal of the body at rest [mm]."""
+        return float(np.linalg.norm(np.ptp(self.surface.points, axis=0)))
+
+
+_LOOKS = 33  # how often on the way from a frame to the next it is looked where vertices are
+
+# Values (f,), words (f,) and points (f, 3) of where they are worst, the last two None where that is nowhere in particular.
+Found = tuple[Floats, list[str] | None, Floats | None]
+
+
+def volume(run: Followed) -> Found:
+    """By how much the enclosed volume is off that at rest, in per cent of it."""
+    if run.integrated is not None:
+        return 100 * np.abs(run.integrated - 1), None, None
+    triangles, whole = run.surface.triangles, enclosed_volume(run.surface.points, run.surface.triangles)
+    now = np.array([enclosed_volume(points, triangles) for points in run.positions])
+    return 100 * np.abs(now / whole - 1), None, None
+
+
+def inside_out(run: Followed) -> Found:
+    """How much is turned inside out: tetrahedra, in per cent of the volume at rest, where there are some, else the surface, in
+    per cent of its area.
+    """
+    if run.mesh is not None and run.nodes is not None:
+        rest = tet_volumes(run.mesh.points, run.mesh.tets)
+        ratios = np.array([tet_volumes(nodes, run.mesh.tets) for nodes in run.nodes]) / rest
+        worst = np.argmin(np.where(np.isnan(ratios), -np.inf, ratios), axis=1)
+        share = 100 * np.where(ratios > 0, 0.0, rest).sum(axis=1) / rest.sum()
+        frames = np.arange(len(ratios))
+        words = [f"V/V0 is {ratios[i, k]:.2g} in tetrahedron {k}" for i, k in enumerate(worst)]
+        return share, words, run.nodes[frames[:, None], run.mesh.tets[worst]].mean(axis=1)
+    shares, points = [], []
+    for positions in run.positions:
+        moved = run.surface.moved_to(positions)
+        windings = outer_windings(moved)
+        shares.append(np.nan if np.isnan(windings).all() else 100 * float(np.mean(~(windings >= 0))))
+        points.append(positions[moved.triangles[np.argmin(np.nan_to_num(windings, nan=-np.inf))]].mean(axis=0))
+    return np.array(shares), None, np.array(points)
+
+
+def from_rest(run: Followed) -> Found:
+    """How far any vertex is from where it was at rest, in per cent of the body's size."""
+    return _off(run, np.broadcast_to(run.surface.points, run.positions.shape))
+
+
+def from_first(run: Followed) -> Found:
+    """How far any vertex is from where it is with the bone of the first face that is held, in per cent of the body's size."""
+    poses = [run.bones[0].pose(number) for number in run.numbers]
+    return _off(run, np.array([apply(pose, run.surface.points) for pose in poses]))
+
+
+def from_reference(run: Followed) -> Found:
+    """How far any vertex is from where the reference has it, in per cent of the body's size; not a number without a reference."""
+    nowhere = np.full(run.positions.shape, np.nan)
+    return _off(run, nowhere if run.truth is None else run.truth)
+
+
+def unrest(run: Followed) -> Found:
+    """How far any vertex moved since the frame before, in per cent of the body's size."""
+    return _off(run, np.concatenate([run.positions[:1], run.positions[:-1]]))
+
+
+def stretch(run: Followed) -> Found:
+    """The greatest stretch of an edge of the surface, over that at rest."""
+    edges = np.unique(np.sort(run.surface.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+
+    def lengths(points: Floats) -> Floats:
+        return np.asarray(np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1))
+
+    ratios = np.array([lengths(points) for points in run.positions]) / lengths(run.surface.points)
+    worst = np.argmax(np.where(np.isnan(ratios), np.inf, ratios), axis=1)
+    frames = np.arange(len(ratios))
+    return ratios[frames, worst], None, run.positions[frames[:, None], edges[worst]].mean(axis=1)
+
+
+def penetration(run: Followed) -> Found:
+    """How deep any free vertex is inside a bone, in per cent of the body's size."""
+    free = np.ones(len(run.surface.points), bool) if run.free is None else run.free
+    depths = np.zeros(run.positions.shape[:2])
+    for bone in run.bones:
+        for i, (number, points) in enumerate(zip(run.numbers, run.positions, strict=True)):
+            back = np.linalg.inv(bone.pose(number))
+            depths[i] = np.maximum(depths[i], -bone.shape.sample(apply(back, points)).distance)
+    return _worst(run, 100 * np.where(free, depths, 0.0) / run.size)
+
+
+def passed(run: Followed) -> Found:
+    """How deep any free vertex was inside a bone on the straight way from the frame before, as seen from the bone, in per cent of
+    the body's size: a bone that crossed the body is outside of it before and after.
+    """
+    free = np.ones(len(run.surface.points), bool) if run.free is None else run.free
+    depths = np.zeros(run.positions.shape[:2])
+    for bone in run.bones:
+        seen = [
+            apply(np.linalg.inv(bone.pose(number)), points)
+            for number, points in zip(run.numbers, run.positions, strict=True)
+        ]
+        for i, (before, after) in enumerate(pairwise(seen)):
+            for share in np.linspace(0, 1, _LOOKS):
+                depth = -bone.shape.sample(before + share * (after - before)).distance
+                depths[i + 1] = np.maximum(depths[i + 1], depth)
+    return _worst(run, 100 * np.where(free, depths, 0.0) / run.size)
+
+
+def pierced(run: Followed) -> Found:
+    """How deep any vertex of a bone is inside the body, in per cent of its size: thin bones fit between the body's vertices."""
+    values, places = np.zeros(len(run.numbers)), np.tile(run.surface.points[0], (len(run.numbers), 1))
+    for i, (number, points) in enumerate(zip(run.numbers, run.positions, strict=True)):
+        body = run.surface.moved_to(points)
+        for bone in run.bones:
+            there = apply(bone.pose(number), bone.surface.points)
+            near = there[((there >= points.min(axis=0)) & (there <= points.max(axis=0))).all(axis=1)]
+            depth = -signed_distances(near, body) if len(near) and np.isfinite(points).all() else np.zeros(0)
+            if len(depth) and depth.max() > values[i]:
+                values[i], places[i] = depth.max(), near[np.argmax(depth)]
+    return 100 * values / run.size, None, places
+
+
+def overshoot(run: Followed) -> Found:
+    """How far a scalar field is outside the range of its boundary values, in per cent of that range."""
+    assert run.values is not None  # asked of scalar fields only
+    low, high = run.range
+    beyond = np.maximum(run.values - high, low - run.values).max(axis=1)
+    return 100 * np.maximum(beyond, 0.0) / (high - low), None, None
+
+
+def _off(run: Followed, wanted: Floats) -> Found:
+    with np.errstate(over="ignore", invalid="ignore"):
+        return _worst(run, 100 * np.linalg.norm(run.positions - wanted, axis=2) / run.size)
+
+
+def _worst(run: Followed, each: Floats) -> Found:
+    """The greatest of ``each`` (f, n) vertex in each frame."""
+    worst = np.argmax(np.where(np.isnan(each), np.inf, each), axis=1)
+    frames = np.arange(len(each))
+    return each[frames, worst], [f"at vertex {vertex}" for vertex in worst], run.positions[frames, worst]
+
+
+QUANTITIES: dict[str, tuple[str, Callable[[Followed], Found]]] = {
+    "volume": ("%", volume),
+    "inside_out": ("%", inside_out),
+    "from_rest": ("%", from_rest),
+    "from_first": ("%", from_first),
+    "from_reference": ("%", from_reference),
+    "unrest": ("%", unrest),
+    "stretch": ("", stretch),
+    "penetration": ("%", penetration),
+    "passed": ("%", passed),
+    "pierced": ("%", pierced),
+    "overshoot": ("%", overshoot),
+}
+
+
+# Beyond this squeeze mixed elements count negative modes that the material has not (README).
+_CERTAIN = 2 / 3
+
+
+def unstable(run: Followed) -> str:
+    """Where a run is an unstable equilibrium, in words; empty where it is not, or nobody counted."""
+    if run.negative_modes is None or not (run.negative_modes > 0).any():
+        return ""
+    first, most = int(np.argmax(run.negative_modes > 0)), run.negative_modes.max()
+    squeezed = least_stretch(run)
+    doubt = ""
+    if squeezed < _CERTAIN:
+        doubt = f", some of which may be the elements' alone: tetrahedra are squeezed to {squeezed:.2g}"
+    return f"an unstable equilibrium from frame {run.numbers[first]} on, with up to {most:.0f} negative modes{doubt}"
+
+
+def least_stretch(run: Followed) -> float:
+    """The least principal stretch of any tetrahedron at any frame; 1 of what has none."""
+    if run.mesh is None or run.nodes is None:
+        return 1.0
+    corners = run.mesh.points[run.mesh.tets]
+    rest = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))
+    least = 1.0
+    for nodes in run.nodes:
+        corners = nodes[run.mesh.tets]
+        stretches = np.linalg.svd(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2) @ rest, compute_uv=False)
+        least = min(least, float(stretches.min()))
+    return least
+
+
+def course(run: Followed, quantity: str) -> Course:
+    """A ``quantity`` of a run over its frames."""
+    unit, measure = QUANTITIES[quantity]
+    values, words, points = measure(run)
+    return Course(quantity, unit, run.numbers, values, tuple(words or ()), points)

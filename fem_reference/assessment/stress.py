@@ -1,0 +1,173 @@
+"""What became of hard cases: a cell for each case and solver, with its verdict and what shows it."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.foundations.records import Record
+
+Verdict = Literal["ok", "degraded", "failed", "refused"]
+VERDICTS: tuple[Verdict, ...] = ("ok", "degraded", "failed", "refused")
+
+
+class Bound(Record):
+    """What a healthy run keeps: a ``quantity`` of ``assessment.health`` at most ``at_most``, at every frame or at the ``last``."""
+
+    quantity: str
+    at_most: float
+    frame: Literal["any", "last"] = "any"
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A quantity over frames: ``values`` (f,) in ``unit`` at frame ``numbers``, ``where`` each is worst in words, the ``points``
+    (f, 3) [mm] there, where it is at a place.
+    """
+
+    quantity: str
+    unit: str
+    numbers: tuple[int, ...]
+    values: Floats
+    where: tuple[str, ...] = ()
+    points: Floats | None = None
+
+    def worst(self, frame: Literal["any", "last"]) -> int:
+        """The index of the frame that counts; what is not a number is worst of all."""
+        if frame == "last":
+            return len(self.values) - 1
+        return int(np.argmax(np.where(np.isnan(self.values), np.inf, self.values)))
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What a picture shows: ``points`` (n, 3) [mm] of ``triangles`` (m, 3) at a frame, and the ``place`` (3,) that is marked."""
+
+    points: Floats
+    triangles: Ints
+    place: Floats | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """A hard case by a solver: the verdict, a sentence on what happened, the status of the run (empty where there is none), the
+    decisive quantity's ``value``, ``bound`` and ``course``, which of its frames decided (``at``), and a picture of
+    the worst place.
+    """
+
+    case: str
+    solver: str
+    verdict: Verdict
+    sentence: str
+    status: str = ""
+    quantity: str = ""
+    unit: str = ""
+    value: float | None = None
+    bound: float | None = None
+    seconds: float = 0.0
+    course: Course | None = None
+    at: int = 0
+    scene: Scene | None = None
+
+
+@dataclass(frozen=True)
+class HardCase:
+    """A row: the name, title, what a healthy run shows in words, and the bounds that say the same in numbers."""
+
+    name: str
+    title: str
+    healthy: str
+    bounds: tuple[Bound, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Stress:
+    """All cells, the cases and the solvers in the order of the page; ``origin``: with what it was made."""
+
+    cases: tuple[HardCase, ...]
+    solvers: tuple[str, ...]
+    cells: tuple[Cell, ...]
+    seconds: float
+    origin: dict[str, str] = field(default_factory=dict)
+
+    def at(self, case: str, solver: str) -> Cell:
+        """The cell of a case and a solver."""
+        return next(cell for cell in self.cells if (cell.case, cell.solver) == (case, solver))
+
+    def count(self, solver: str) -> Counter[Verdict]:
+        """How many cases of each verdict a solver has."""
+        return Counter(cell.verdict for cell in self.cells if cell.solver == solver)
+
+
+Weighed = Sequence[tuple[Bound, Course]]
+
+
+def judge(cell: Cell, weighed: Weighed) -> Cell:
+    """``cell``, of a run that reached every frame, with the verdict of what it must keep: the first bound that is passed, else
+    the first of all. What is not finite has failed, whatever the status says.
+    """
+    shown = _decisive(cell, weighed)
+    if shown.value is None or shown.bound is None or not np.isfinite(shown.value):
+        return replace(shown, verdict="failed", sentence=f"{cell.status}, but {shown.sentence}")
+    return replace(shown, verdict="ok" if shown.value <= shown.bound else "degraded")
+
+
+def unfinished(cell: Cell, message: str, weighed: Weighed, no_solution: str) -> Cell:
+    """``cell``, of a run that ended with a status: failed, or refused where there is ``no_solution`` that it could have reached."""
+    shown = _decisive(cell, weighed)
+    if no_solution:
+        sentence = f"as it should, for {no_solution}: {cell.status}: {message}"
+        return replace(shown, verdict="refused", sentence=sentence)
+    return replace(shown, verdict="failed", sentence=f"{cell.status}: {message}")
+
+
+def _decisive(cell: Cell, weighed: Weighed) -> Cell:
+    """``cell`` with the first quantity that is beyond its bound, else the first of all."""
+    values = [(bound, course, course.worst(bound.frame)) for bound, course in weighed]
+    bound, course, i = next((one for one in values if not one[1].values[one[2]] <= one[0].at_most), values[0])
+    where = f" {course.where[i]}" if course.where else ""
+    unit = f" {course.unit}" if course.unit else ""
+    value = float(course.values[i])
+    sentence = (
+        f"{course.quantity.replace('_', ' ')} {value:.3g}{unit} at frame {course.numbers[i]}{where}; "
+        f"a healthy run has at most {bound.at_most:.3g}{unit}"
+    )
+    return replace(
+        cell,
+        sentence=sentence,
+        quantity=course.quantity,
+        unit=course.unit,
+        value=value,
+        bound=bound.at_most,
+        course=course,
+        at=i,
+    )
+
+
+def _row(case: HardCase) -> dict[str, Any]:
+    bounds = [bound.model_dump() for bound in case.bounds]
+    return {"name": case.name, "title": case.title, "healthy": case.healthy, "bounds": bounds}
+
+
+def facts(stress: Stress) -> dict[str, Any]:
+    """All that pages show but pictures, as valid JSON."""
+    cells = []
+    for cell in stress.cells:
+        plain = {
+            name: getattr(cell, name) for name in cell.__dataclass_fields__ if name not in ("course", "at", "scene")
+        }
+        for name in ("value", "bound"):
+            if plain[name] is not None and not np.isfinite(plain[name]):
+                plain[name] = None
+        cells.append(plain)
+    return {
+        "format": 1,
+        "cases": [_row(case) for case in stress.cases],
+        "solvers": list(stress.solvers),
+        "cells": cells,
+        "seconds": stress.seconds,
+        "origin": stress.origin,
+    }

@@ -1,0 +1,30 @@
+"""The verb ``stress``: every solver on hard cases, and whether it stays stable."""
+
+import argparse
+
+from fem_reference import report
+from fem_reference.assessment.stress import facts
+from fem_reference.cli._printing import DONE, out, write_output
+from fem_reference.report import stress_page
+from fem_reference.studies.hard import records, running
+
+PAGE = "stress"
+HELP = "run the hard cases by every solver, and write the page of who stays stable"
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The options that this verb has."""
+    which = "a hard case, or a folder of several variants, below cases/hard (default: all, about 15 minutes)"
+    parser.add_argument("names", metavar="NAME", nargs="*", help=which)
+    only = "only this solver; may be repeated (default: all)"
+    parser.add_argument(
+        "--solver", action="append", default=[], choices=list(running.choices()), metavar="NAME", help=only
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run them all and write the page: whatever becomes of a run is a result, and not a failure of this."""
+    found = running.run(records.read_all(tuple(options.names)), options.solver)
+    path = report.write_stress(found, out(options), PAGE)
+    write_output(facts(found), f"{stress_page.text(found)}\npage: {path}", options)
+    return DONE

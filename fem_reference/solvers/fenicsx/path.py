@@ -1,0 +1,96 @@
+"""Whether the states that a body took one after the other belong to one path: signs of a jump that ask for no other solution."""
+
+import numpy as np
+from dolfinx import la
+from mpi4py import MPI
+
+from fem_reference.foundations.mesh import Floats
+from fem_reference.solvers.fenicsx.determinants import Determinants, Smallest
+from fem_reference.solvers.fenicsx.system import System
+
+# On the straight line from one state to the next det F, a cubic of the share of the way, keeps this share of the less of both ends.
+# A turn by 143 degrees within a step takes it to a tenth; half a turn, or a way through a mirrored state, to 0 or below.
+KEPT = 0.1
+_SHARES = (0.0, 1 / 3, 2 / 3, 1.0)
+_CUBIC = np.linalg.inv(np.vander(_SHARES, 4))  # takes values at these shares to the coefficients of a cubic
+
+
+class Path:
+    """The states of a ``system``, one after the other. Its methods are collective."""
+
+    def __init__(self, system: System, determinants: Determinants) -> None:
+        self.system, self.determinants = system, determinants
+        self.energy, self.greatest, self.gap = 0.0, 0.0, 0.0
+        self.unknowns, self.forces = np.array(system.unknowns.x.array), self._forces()
+
+    def jumped(self, before: Floats) -> Smallest | None:
+        """Where det F falls to next to nothing of itself on the straight line from the unknowns ``before`` to those at present, as
+        a share of itself; None where it does not. A body that deforms steadily in small steps never gets there.
+        """
+        unknowns = self.system.unknowns.x
+        after, values = np.array(unknowns.array), []
+        for share in _SHARES:
+            unknowns.array[:] = before + share * (after - before)
+            values.append(self.determinants.values_now())
+        unknowns.array[:] = after
+        ends = np.minimum(values[0], values[-1])
+        found = self.determinants.smallest_of(least(np.array(values)) / np.where(ends > 0, ends, np.nan))
+        return None if found.value > KEPT else found
+
+    def settle(self, energy: float, *, connected: bool = True) -> None:
+        """The state at present, with an ``energy`` [N mm] of what acts inside, is the next one; where it is ``connected`` with the
+        one before, what the energy grew by is compared with the work of the forces inside, by the trapezoidal rule.
+
+        The rule is exact where forces change in proportion to the displacement, and its error falls with the square of the
+        step; of a body that jumped, the energy has fallen without work. ``gap`` is the greatest difference since it was
+        taken, over the greatest energy so far.
+        """
+        forces, unknowns = self._forces(), np.array(self.system.unknowns.x.array)
+        own = self.system.owned
+        work = float(np.dot((self.forces + forces)[:own] / 2, (unknowns - self.unknowns)[:own]))
+        work = float(self.system.unknowns.function_space.mesh.comm.allreduce(work, MPI.SUM))
+        self.greatest = max(self.greatest, energy)
+        if connected and self.greatest > 0:
+            gap = (energy - self.energy - work) / self.greatest
+            self.gap = gap if abs(gap) > abs(self.gap) else self.gap
+        self.energy, self.forces, self.unknowns = energy, forces, unknowns
+
+    def take_gap(self) -> float:
+        """The gap, which is 0 from now on."""
+        gap, self.gap = self.gap, 0.0
+        return gap
+
+    def _forces(self) -> Floats:
+        """What cells are out of balance by (n,), on the ranks that own the unknowns."""
+        self.system.work.array[:] = 0
+        self.system.cells.add_residual(self.system.work.array)
+        self.system.work.scatter_reverse(la.InsertMode.add)
+        return np.array(self.system.work.array)
+
+
+def least(values: Floats) -> Floats:
+    """The least value (p,) from 0 to 1 of the cubics that have ``values`` (4, p) at 0, 1/3, 2/3 and 1.
+
+    >>> abs(least(np.array([[1.0], [1 / 9], [1 / 9], [1.0]]))).round(12).tolist()
+    [0.0]
+    """
+    a, b, c, _ = coefficients = _CUBIC @ values
+    found = np.minimum(values[0], values[-1])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        root = np.sqrt(b**2 - 3 * a * c)
+        # The turning points; the second form of each holds where the cubic is next to none.
+        turns = [-c / (b + root), -c / (b - root), (-b + root) / (3 * a), (-b - root) / (3 * a)]
+    for turn in turns:
+        inside = np.isfinite(turn) & (turn > 0) & (turn < 1)
+        share = np.where(inside, turn, 0.0)
+        found = np.minimum(found, ((coefficients[0] * share + b) * share + c) * share + coefficients[3])
+    return np.asarray(found)
+
+
+def on_the_way(jump: Smallest) -> str:
+    """What is wrong with a step through ``jump``."""
+    x, y, z = jump.at
+    return (
+        f"to a state on another path: on the straight way from the last one det F falls to {jump.value:.2g} of itself, "
+        f"in cell {jump.cell} at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
+    )

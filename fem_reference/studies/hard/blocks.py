@@ -1,0 +1,199 @@
+"""Blocks as problems: an axis-aligned lattice of tetrahedra whose skin is the surface that solvers get."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fem_reference import effects
+from fem_reference.effects.contact import among
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh, tet_volumes
+from fem_reference.foundations.records import join
+from fem_reference.geometry.block import kuhn, lattice_skin
+from fem_reference.geometry.rigid_bodies import Sphere
+from fem_reference.geometry.sectors import attached_shares
+from fem_reference.geometry.skins import attached_skin, free_skin, spacing
+from fem_reference.geometry.tessellation import tessellated
+from fem_reference.problems.muscle import AttachedVertices, Problem, RigidBody, Setup, solid
+from fem_reference.scenes.bones import Bone
+from fem_reference.studies.hard.records import FACES, Block, Face, Hard, Hold, Start
+
+SEED = 17
+# What blocks are of where a case says nothing else: muscle's usual matrix.
+MATERIAL = ({"name": "neo_hooke", "mu": "10 kPa"}, {"name": "incompressible", "bulk": "10 MPa"})
+_LINES, _POINTS = 4, 9  # measured lines of each block, and points of each
+# The bones of held faces are balls of this share of the block's size, so far away that nothing meets them.
+_BALL, _AWAY = 0.01, 50.0
+
+
+@dataclass(frozen=True, eq=False)
+class Along:
+    """One fibre direction (3,) everywhere."""
+
+    direction: tuple[float, float, float]
+
+    def __call__(self, cells: Ints, points: Floats) -> Floats:  # noqa: ARG002
+        """The directions (n, 3) at ``points`` (n, 3)."""
+        unit = np.asarray(self.direction) / np.linalg.norm(self.direction)
+        return np.broadcast_to(unit, (len(points), 3)).copy()
+
+
+def problem(hard: Hard) -> Problem:
+    """The problem that the block of ``hard`` poses."""
+    block, frames = hard.block, hard.frames
+    assert block is not None  # a Hard record with a block has frames
+    assert frames is not None
+    nodes, tets = kuhn(block.cells)
+    points = _placed(block, nodes)
+    skin_nodes, triangles = lattice_skin(block.cells)
+    index = _index(block, skin_nodes)
+    surface = Surface(points[index], triangles, f"the block of {hard.name}")
+    ends = [_held(block, hold, skin_nodes, surface) for hold in hard.hold]
+    bones = tuple(end.bone for end in ends) + tuple(_bone(hard, i, surface) for i in range(len(hard.bone)))
+    start = _start(block, hard.start)
+    setup = Setup(surface, bones, tuple(ends), frames.numbers, frames.interval, start=start)
+    facets: dict[str, Ints] = {
+        face: index[triangles[np.isin(triangles, _on(block, skin_nodes, face)).all(axis=1)]] for face in FACES
+    }
+    for end, hold in zip(ends, hard.hold, strict=True):
+        if hold.middle:
+            facets[end.attachment] = index[triangles[np.isin(triangles, end.vertices).any(axis=1)]]
+    mesh = TetMesh(points, _upright(points, tets), facets, maker="lattice")
+    acting = tuple(_effect(table, join(hard.place, f"effect[{i}]")) for i, table in enumerate(hard.effect or MATERIAL))
+    return _problem(block, setup, mesh, acting)
+
+
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """What a ``start`` makes of a block about its ``middle`` (3,) [mm], whose cells have a size of ``cell`` [mm]."""
+
+    start: Start
+    middle: Floats
+    cell: float
+
+    def __call__(self, points: Floats) -> Floats:
+        """Where rest points (n, 3) [mm] are; a point is moved at random alike, whichever others are asked for."""
+        match self.start.kind:
+            case "point":
+                return np.broadcast_to(self.middle, points.shape).copy()
+            case "plane":
+                return np.asarray(np.where([True, True, False], points, self.middle))
+            case "inside out":
+                return np.asarray(self.middle + (points - self.middle) * [1, 1, -1])
+        seeds = np.round((points - self.middle) / self.cell * 1e6).astype(np.int64) @ [1, 7919, 104729]
+        moves = np.array([np.random.default_rng(abs(seed)).uniform(-1, 1, 3) for seed in seeds])
+        return np.asarray(points + self.start.amount * self.cell * moves.reshape(-1, 3))
+
+
+def _start(block: Block, start: Start | None) -> Moved | None:
+    if start is None:
+        return None
+    size = np.asarray(block.size)
+    return Moved(start, np.asarray(block.corner) + size / 2, float((size / block.cells).min()))
+
+
+def _problem(block: Block, setup: Setup, mesh: TetMesh, acting: tuple[effects.Effect, ...]) -> Problem:
+    apart = spacing(setup.surface)
+    fibre = Along(block.fibre) if any("fibre" in effect.needs for effect in acting) else None
+    return Problem(
+        setup.surface,
+        setup.bones,
+        setup.attached,
+        setup.frames,
+        setup.interval,
+        mesh=mesh,
+        effects=acting,
+        fibres=_lines(block),
+        mesh_facts={},
+        seconds=0.0,
+        fibre=fibre,
+        start=setup.start,
+        skin=None if among(acting) is None else free_skin(setup.surface, setup.free, mesh, apart),
+        attached_skins={
+            end.attachment: attached_skin(setup.surface, attached_shares(setup.surface, end.vertices), mesh, apart)
+            for end in setup.attached
+            if end.stiffness is not None
+        },
+    )
+
+
+def _effect(table: dict[str, object], place: str) -> effects.Effect:
+    values = {key: value for key, value in table.items() if key != "name"}
+    try:
+        return effects.make(str(table.get("name")), **values)
+    except InputError as error:
+        raise InputError(f"{place}, {error.place}", error.got, error.want) from None
+
+
+def _placed(block: Block, nodes: Ints) -> Floats:
+    """Where the lattice's ``nodes`` (n, 3) are [mm]."""
+    axes = [_ticks(count, ratio) for count, ratio in zip(block.cells, block.grading, strict=True)]
+    shares = np.column_stack([ticks[nodes[:, k]] for k, ticks in enumerate(axes)])
+    if block.jitter:
+        random = np.random.default_rng(SEED).uniform(-1, 1, shares.shape) * block.jitter / np.array(block.cells)
+        random[(nodes == 0) | (nodes == block.cells)] = 0  # faces stay flat, and edges and corners where they are
+        shares = shares + random
+    return np.asarray(np.asarray(block.corner) + shares * np.asarray(block.size))
+
+
+def _ticks(count: int, ratio: float) -> Floats:
+    """From 0 to 1 in ``count`` cells, the last of them ``ratio`` times as long as the first."""
+    lengths = ratio ** (np.arange(count) / max(count - 1, 1))
+    return np.concatenate([[0.0], np.cumsum(lengths) / lengths.sum()])
+
+
+def _index(block: Block, nodes: Ints) -> Ints:
+    """Where ``nodes`` (n, 3) stand among all of the lattice."""
+    _, y, z = block.cells
+    return np.asarray(nodes @ [(y + 1) * (z + 1), z + 1, 1])
+
+
+def _upright(points: Floats, tets: Ints) -> Ints:
+    """``tets`` (k, 4) of positive volume; InputError where jitter has turned one."""
+    if not tet_volumes(points, tets).min() > 0:
+        raise InputError("block.jitter", "a tetrahedron turned inside out", "less")
+    return tets
+
+
+def _on(block: Block, nodes: Ints, face: Face) -> Ints:
+    """Which of ``nodes`` (n, 3) of the lattice are on a ``face``, (k,)."""
+    axis = "xyz".index(face[0])
+    return np.flatnonzero(nodes[:, axis] == (block.cells[axis] if face[1] == "1" else 0))
+
+
+def _held(block: Block, hold: Hold, nodes: Ints, surface: Surface) -> AttachedVertices:
+    axis, high = "xyz".index(hold.face[0]), hold.face[1] == "1"
+    vertices = _on(block, nodes, hold.face)
+    if hold.middle:
+        off = np.abs(nodes[vertices] - np.asarray(block.cells) / 2)
+        off[:, axis] = 0
+        vertices = vertices[[np.argmin(off.sum(axis=1))]]
+    largest = max(block.size)
+    away = np.zeros(3)
+    away[axis] = (1 if high else -1) * _AWAY * largest
+    x, y, z = (surface.points.mean(axis=0) + away).tolist()
+    ball = Sphere((x, y, z), _BALL * largest)
+    motion = hold.motion.poses() if hold.motion else None
+    bone = RigidBody(f"bone of {hold.face}", tessellated(ball, surface.points, "hold"), motion, solid=ball)
+    return AttachedVertices(hold.face, bone, vertices, hold.stiffness)
+
+
+def _bone(hard: Hard, i: int, surface: Surface) -> RigidBody:
+    bone: Bone = hard.bone[i]
+    form = solid(bone)
+    if form is None:
+        raise InputError(join(hard.place, f"bone[{i}].surface"), "a file", "a closed form")
+    motion = bone.motion.poses() if bone.motion else None
+    return RigidBody(bone.name, tessellated(form, surface.points, join(hard.place, f"bone[{i}]")), motion, solid=form)
+
+
+def _lines(block: Block) -> Polylines:
+    """Straight lines through the block along its fibres' greatest axis."""
+    axis = int(np.argmax(np.abs(block.fibre)))
+    shares = np.full((_LINES, _POINTS, 3), 0.5)
+    shares[:, :, axis] = np.linspace(0.05, 0.95, _POINTS)
+    one, other = (axis + 1) % 3, (axis + 2) % 3
+    shares[:, :, one] = np.array([0.3, 0.3, 0.7, 0.7])[:, None]
+    shares[:, :, other] = np.array([0.3, 0.7, 0.3, 0.7])[:, None]
+    points = np.asarray(block.corner) + shares.reshape(-1, 3) * np.asarray(block.size)
+    return Polylines(points, np.arange(0, _LINES * _POINTS + 1, _POINTS))

@@ -1,0 +1,278 @@
+"""Every solver on every hard case: runs, and what became of them."""
+
+import logging
+import os
+import platform
+import re
+import signal
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from fem_reference import __version__, solvers
+from fem_reference.assessment import health, stress
+from fem_reference.assessment.health import Followed
+from fem_reference.assessment.solver_table import solver_kinds
+from fem_reference.assessment.stress import Cell, HardCase, Scene, Stress
+from fem_reference.foundations.errors import InputError, MissingSoftware
+from fem_reference.foundations.mesh import Floats
+from fem_reference.geometry.embedding import Locator
+from fem_reference.problems import of_case
+from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle_body import as_body
+from fem_reference.problems.scalar import FieldProblem
+from fem_reference.runs.key import versions
+from fem_reference.runs.store import NO_SURFACE, Frame, Outcome
+from fem_reference.scenes import casefile
+from fem_reference.scenes.case import Case, SolverChoice
+from fem_reference.scenes.scalar import ScalarCase
+from fem_reference.solvers import fenicsx
+from fem_reference.studies.hard import blocks, steps
+from fem_reference.studies.hard.records import Hard, Shipped
+
+log = logging.getLogger(__name__)
+
+REFERENCE, SECOND = "fenicsx", "scikit_fem"
+LIMIT = 120.0  # [s] of a run
+_MOST_FOR_SECOND = 200  # tetrahedra, for which it takes seconds
+_OWN: dict[str, dict[str, Any]] = {
+    REFERENCE: {"ranks": 1, "time_limit": f"{LIMIT:g} s", "residual": 1e-8},
+    SECOND: {},
+    "line_of_action": {},
+}
+
+
+# How messages name a place at rest [mm].
+_PLACE = re.compile(r"cell \d+ at \((-?[\d.]+), (-?[\d.]+), (-?[\d.]+)\) mm")
+
+
+class _Late(Exception):  # noqa: N818 - it is what happened to a run, and caught beside it
+    """A run took too long."""
+
+
+def choices() -> dict[str, SolverChoice]:
+    """By solver, the settings that hard cases are solved with: those of the first candidate of Table 5.1 that has it."""
+    found: dict[str, SolverChoice] = {}
+    for candidate in (one for kind in solver_kinds() for one in kind.candidate):
+        found.setdefault(candidate.solver, SolverChoice(solver=candidate.solver, **candidate.settings))
+    for name in solvers.names():
+        if name != "recorded" and (name in _OWN or name in found):
+            found.setdefault(name, SolverChoice(solver=name, **_OWN.get(name, {})))
+    first = [name for name in (REFERENCE, SECOND) if name in found]
+    return {name: found[name] for name in (*first, *sorted(set(found) - {*first}))}
+
+
+class Posed:
+    """A hard case with the problem that it poses, made once, and the reference's run of it."""
+
+    def __init__(self, hard: Hard) -> None:
+        self.hard = hard
+        self.truth: tuple[Floats, tuple[int, ...]] | None = None
+
+    @cached_property
+    def problem(self) -> Problem | FieldProblem:
+        """The problem; InputError where the case cannot be posed."""
+        if self.hard.block is not None:
+            return blocks.problem(self.hard)
+        shipped = self.hard.shipped
+        assert shipped is not None  # a Hard record has one of the two
+        case = shipped_case(shipped)
+        built: Problem | FieldProblem = of_case.problem(case, of_case.setup(case))
+        return built
+
+    @cached_property
+    def range(self) -> tuple[float, float]:
+        """The range of the constant boundary values of a scalar case."""
+        shipped = self.hard.shipped
+        case = shipped_case(shipped) if shipped else None
+        assert isinstance(case, ScalarCase)  # asked of no other
+        values = [float(entry.value) for entry in case.boundary if entry.value is not None]
+        return min(values), max(values)
+
+    @property
+    def row(self) -> HardCase:
+        """What pages say of it."""
+        return HardCase(self.hard.name, self.hard.title, self.hard.healthy, self.hard.bound)
+
+
+def shipped_case(shipped: Shipped) -> Case:
+    """The case with its changes."""
+    quick = casefile.read(shipped.case).quick if shipped.quick else {}
+    return casefile.read(shipped.case, changes=quick | shipped.changes)
+
+
+def run(hard: Sequence[Hard], only: Sequence[str] = ()) -> Stress:
+    """Every solver, or ``only`` these, on each of the cases; the reference first, which others may be measured against."""
+    begin, cells = time.perf_counter(), list[Cell]()
+    chosen = {name: choice for name, choice in choices().items() if not only or name in only}
+    with fenicsx.shared():
+        for i, one in enumerate(hard):
+            posed = Posed(one)
+            for name, choice in chosen.items():
+                cells.append(cell(posed, one.choice(choice)))
+                found = cells[-1]
+                log.info(
+                    "case %d of %d: %s, %s: %s: %s", i + 1, len(hard), one.name, name, found.verdict, found.sentence
+                )
+    machine = f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores"
+    origin = {"fem_reference": __version__, "machine": machine, **versions()}
+    rows = tuple(Posed(one).row for one in hard)
+    return Stress(rows, tuple(chosen), tuple(cells), time.perf_counter() - begin, origin)
+
+
+def cell(posed: Posed, choice: SolverChoice) -> Cell:
+    """What becomes of a case by a solver: never an exception."""
+    begin = time.perf_counter()
+    hard, solver = posed.hard, choice.solver
+    try:
+        if hard.only and solver not in hard.only:
+            return Cell(hard.name, solver, "refused", f"the case is about {', '.join(hard.only)} only: {hard.because}")
+        if hard.by_effects and not (solver == SECOND or solvers.takes_effects(solver)):
+            return Cell(hard.name, solver, "refused", "nothing but effects acts, and this solver simulates none")
+        with _limited(2 * LIMIT):
+            found = _solved(posed, choice)
+    except (InputError, MissingSoftware) as error:
+        found = Cell(hard.name, solver, "refused", str(error))
+    except _Late:
+        found = Cell(hard.name, solver, "failed", f"timed out: it took more than {2 * LIMIT:g} s", "timed out")
+    except Exception as error:  # whatever a solver does wrong is what this measures
+        log.info("%s, %s: %r", hard.name, solver, error, exc_info=True)
+        found = Cell(hard.name, solver, "failed", f"crashed: {type(error).__name__}: {error}", "crashed")
+    return replace(found, seconds=time.perf_counter() - begin)
+
+
+@contextmanager
+def _limited(seconds: float) -> Iterator[None]:
+    """_Late where what is done meanwhile takes longer, as far as it is in the main thread and lets itself be interrupted."""
+
+    def late(*_: object) -> None:
+        raise _Late
+
+    try:
+        before = signal.signal(signal.SIGALRM, late)
+    except ValueError:  # in another thread
+        yield
+        return
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def _solved(posed: Posed, choice: SolverChoice) -> Cell:
+    """The cell of a solver that is asked for the case."""
+    built, hard = posed.problem, posed.hard
+    if isinstance(built, FieldProblem):
+        outcome, followed = _field(posed, built, choice)
+    elif choice.solver == SECOND:
+        outcome, followed = _second(built, choice)
+    else:
+        outcome, followed = _muscle(built, choice)
+    blank = Cell(hard.name, choice.solver, "ok", "", outcome.status)
+    if choice.solver == REFERENCE and isinstance(built, Problem) and outcome.status == "converged":
+        posed.truth = followed.positions, followed.numbers
+    if posed.truth is not None and posed.truth[1][: len(followed.numbers)] == followed.numbers:
+        followed = replace(followed, truth=posed.truth[0][: len(followed.numbers)])
+    courses = [(bound, health.course(followed, bound.quantity)) for bound in hard.bound]
+    if outcome.status != "converged":
+        found = stress.unfinished(blank, outcome.message, courses, hard.no_solution)
+    else:
+        found = stress.judge(blank, courses)
+    if choice.solver == REFERENCE and isinstance(built, Problem) and hard.steps is not None:
+        ends = steps.compare(built, choice, hard.steps)
+        found = replace(found, sentence=f"{found.sentence}; {ends.sentence}")
+        found = found if ends.same else replace(found, verdict="failed")
+    if found.verdict == "ok" and (told := health.unstable(followed)):
+        found = replace(found, verdict="degraded", sentence=f"{told}; {found.sentence}")
+    return replace(found, scene=_scene(found, followed))
+
+
+def _muscle(built: Problem, choice: SolverChoice) -> tuple[Outcome, Followed]:
+    offer = solvers.find(choice.solver, choice.solver)
+    if offer.moves not in ("surface", "tetrahedra"):
+        raise InputError(
+            choice.solver, f"a solver that moves {offer.moves}", "one that moves a surface, which health is of"
+        )
+    settings = solvers.settings(choice, choice.solver)
+    solvers.check(choice.solver, settings, built.effects, choice.solver)
+    solvers.require(choice.solver, settings, choice.solver)
+    frames = list[Frame]()
+    outcome = offer.solve(built, settings, frames.append)
+    if not frames:
+        frames.append(Frame(built.frames[0], np.array(built.surface.points)))
+    return outcome, _followed(built, frames)
+
+
+def _followed(built: Problem, frames: list[Frame]) -> Followed:
+    tets = [frame.tets for frame in frames if frame.tets is not None]
+    whole = len(tets) == len(frames)
+    return Followed(
+        tuple(frame.number for frame in frames),
+        built.surface,
+        np.array([frame.surface for frame in frames if frame.surface is not None]),
+        built.mesh if whole else None,
+        np.array(tets) if whole else None,
+        built.bones,
+        built.free,
+        integrated=_all(frames, "volume_ratio"),
+        negative_modes=_all(frames, "negative_modes"),
+    )
+
+
+def _all(frames: list[Frame], scalar: str) -> Floats | None:
+    """A scalar of all frames (f,), None where not all have it."""
+    found = [frame.scalars[scalar] for frame in frames if scalar in frame.scalars]
+    return np.array(found) if len(found) == len(frames) else None
+
+
+def _second(built: Problem, choice: SolverChoice) -> tuple[Outcome, Followed]:
+    """By a solver of bodies of any shape; the surface goes along with the tetrahedra."""
+    if len(built.mesh.tets) > _MOST_FOR_SECOND:
+        want = f"at most {_MOST_FOR_SECOND}: it is written in Python, to be right and not fast"
+        raise InputError(choice.solver, f"{len(built.mesh.tets)} tetrahedra", want)
+    offer = solvers.find(choice.solver, choice.solver, "solve_body")
+    solved = offer.solve_body(as_body(built), solvers.settings(choice, choice.solver, "solve_body"))
+    where = Locator(built.mesh).embed(built.surface.points)
+    frames = [
+        Frame(
+            int(state.frame),
+            built.surface.points + where.interpolate(built.mesh, state.points - built.mesh.points),
+            tets=state.points,
+            scalars=state.scalars,
+        )
+        for state in solved.states
+    ]
+    return solved.outcome, _followed(built, frames)
+
+
+def _field(posed: Posed, built: FieldProblem, choice: SolverChoice) -> tuple[Outcome, Followed]:
+    """By a solver of scalar fields, whose settings for bodies do not matter there."""
+    offer = solvers.find(choice.solver, choice.solver, "solve_field")
+    changes = posed.hard.settings.get(choice.solver, {})
+    settings = solvers.settings(SolverChoice(solver=choice.solver, **changes), choice.solver, "solve_field")
+    solution = offer.solve_field(built, settings)
+    nothing = np.zeros((1, 0, 3))
+    return solution.outcome, Followed((0,), NO_SURFACE, nothing, values=solution.values[None], range=posed.range)
+
+
+def _scene(found: Cell, followed: Followed) -> Scene | None:
+    """The picture of the frame that decided, of a run that ended before all of them the last one, with the place that its message
+    names; None of what has no surface, or is not finite.
+    """
+    ended = found.status != "converged"
+    i = len(followed.positions) - 1 if ended else found.at
+    points, course = followed.positions[i], found.course
+    if not len(points) or not np.isfinite(points).all():
+        return None
+    place = None if course is None or course.points is None else course.points[i]
+    if ended and (named := _PLACE.search(found.sentence)):
+        off = followed.surface.points - [float(number) for number in named.groups()]
+        place = points[np.argmin(np.linalg.norm(off, axis=1))]
+    return Scene(points, followed.surface.triangles, place)

@@ -1,0 +1,55 @@
+"""The same end state whatever the load steps: the reference on a hard case in few steps and in many."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fem_reference.foundations.mesh import Floats
+from fem_reference.problems.muscle import Problem
+from fem_reference.runs.store import Frame
+from fem_reference.scenes.case import SolverChoice
+from fem_reference.solvers import fenicsx
+from fem_reference.studies.hard.records import Steps
+
+SAME = 0.01  # [%] of the body's size: states that differ by more are different
+_CUTS = 64  # a load step is cut to this part of itself before it is given up
+
+
+@dataclass(frozen=True)
+class SameEnd:
+    """Whether all runs that reached the end ended alike, and what became of each in words."""
+
+    same: bool
+    sentence: str
+
+
+def compare(built: Problem, choice: SolverChoice, steps: Steps) -> SameEnd:
+    """The reference up to a frame in several numbers of even load steps; the finest run that got there is the standard."""
+    ends, words = dict[int, Floats](), list[str]()
+    for count in steps.counts:
+        status, end = _end(built, choice, steps.until, count)
+        if end is None:
+            words.append(f"{count}: {status}")
+        else:
+            ends[count] = end
+    if not ends:
+        return SameEnd(True, f"no number of load steps reaches frame {steps.until} ({', '.join(words)})")
+    standard, size = ends[max(ends)], float(np.linalg.norm(np.ptp(built.surface.points, axis=0)))
+    off = {count: 100 * float(np.linalg.norm(end - standard, axis=1).max()) / size for count, end in ends.items()}
+    words = [
+        f"{count}: {share:.2g} % from that of {max(ends)}" for count, share in off.items() if count != max(ends)
+    ] + words
+    return SameEnd(
+        max(off.values()) <= SAME,
+        f"end state at frame {steps.until} by number of load steps: {', '.join(words) or 'one only'}",
+    )
+
+
+def _end(built: Problem, choice: SolverChoice, until: int, count: int) -> tuple[str, Floats | None]:
+    """How a run in ``count`` steps ended, and where the tetrahedra's points (n, 3) [mm] are, None where it did not get there."""
+    span = until - built.frames[0]
+    step = {"first_step": span / count, "largest_step": span / count, "smallest_step": span / count / _CUTS}
+    settings = fenicsx.Settings(**{**choice.settings, **step})
+    frames = list[Frame]()
+    outcome = fenicsx.solve(replace(built, frames=(built.frames[0], until)), settings, frames.append)
+    return outcome.status, frames[-1].tets if outcome.status == "converged" else None

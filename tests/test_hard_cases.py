@@ -1,0 +1,138 @@
+"""Hard cases: every folder is whole, runs become verdicts and never tracebacks, and what explodes is found out."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fem_reference import cli
+from fem_reference.assessment import health, stress
+from fem_reference.assessment.stress import Bound, Cell, Course
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import tet_volumes
+from fem_reference.scenes.case import SolverChoice
+from fem_reference.studies.hard import blocks, records, running
+
+CASES = {hard.name: hard for hard in records.read_all()}
+FAST = [name for name in running.choices() if name not in ("fenicsx", "scikit_fem")]
+
+
+def cell(name: str, solver: str, **settings: object) -> Cell:
+    choice = running.choices()[solver]
+    return running.cell(running.Posed(CASES[name]), SolverChoice(**{"solver": solver, **choice.settings, **settings}))
+
+
+def test_every_folder_is_there_and_every_case_has_a_name_of_its_own() -> None:
+    assert {name.partition(".")[0] for name in CASES} == set(records.folders())
+    assert len(CASES) == len(records.read_all())
+
+
+@pytest.mark.parametrize("hard", [hard for hard in CASES.values() if hard.block], ids=lambda hard: hard.name)
+def test_blocks_are_whole(hard) -> None:
+    problem = blocks.problem(hard)
+    assert tet_volumes(problem.mesh.points, problem.mesh.tets).min() > 0
+    assert all(len(problem.mesh.facets[entry.attachment]) for entry in problem.attached)
+    assert np.isin(problem.surface.points, problem.mesh.points).all()
+    assert hard.healthy
+    assert set(hard.settings) <= set(running.choices())
+    assert set(hard.only) <= set(running.choices())
+    for choice in running.choices().values():
+        running.solvers.settings(
+            hard.choice(choice), hard.place, "solve_body" if choice.solver == "scikit_fem" else "solve"
+        )
+
+
+@pytest.mark.parametrize("solver", FAST)
+def test_at_rest_stays_at_rest(solver) -> None:
+    found = cell("at_rest.millimetres", solver)
+    assert found.verdict == ("refused" if solver == "line_of_action" else "ok")
+
+
+@pytest.mark.slow
+def test_the_reference_stays_at_rest_in_every_unit_and_place() -> None:
+    for name in ("at_rest.millimetres", "at_rest.metres", "at_rest.kilometre_away"):
+        assert cell(name, "fenicsx").verdict == "ok"
+
+
+def test_what_explodes_with_finite_numbers_is_found_out() -> None:
+    """Negative controls: a time step far beyond the stable one, and one time step for each frame."""
+    exploded = cell("twist.one_radian_at_once", "mass_spring", time_step="20 ms")
+    assert exploded.verdict == "failed"
+    assert "stable one" in exploded.sentence
+    folded = cell("twist.whole_turn", "xpbd", sub_steps=1)
+    assert (folded.verdict, folded.quantity, folded.status) == ("degraded", "inside_out", "converged")
+
+
+def test_a_bone_that_passes_between_frames_is_found_out() -> None:
+    found = cell("bones.crosses_in_a_frame", "pbd")
+    assert (found.verdict, found.quantity) == ("degraded", "passed")
+
+
+def test_a_solver_that_raises_has_failed(monkeypatch) -> None:
+    monkeypatch.setattr(running, "_solved", lambda *_: 1 / 0)
+    found = cell("at_rest.millimetres", "pbd")
+    assert (found.verdict, found.status) == ("failed", "crashed")
+    assert "ZeroDivisionError" in found.sentence
+
+
+def test_what_a_case_is_not_about_is_refused_with_the_reason() -> None:
+    hard = CASES["at_rest.millimetres"].model_copy(update={"only": ("pbd",), "because": "it is about PBD"})
+    found = running.cell(running.Posed(hard), running.choices()["arap"])
+    assert (found.verdict, found.sentence) == ("refused", "the case is about pbd only: it is about PBD")
+
+
+def test_judging() -> None:
+    course = Course("volume", "%", (0, 1, 2), np.array([0.0, 3.0, 1.0]))
+    blank = Cell("case", "pbd", "ok", "", "converged")
+    assert stress.judge(blank, [(Bound(quantity="volume", at_most=2.0), course)]).verdict == "degraded"
+    assert stress.judge(blank, [(Bound(quantity="volume", at_most=2.0, frame="last"), course)]).verdict == "ok"
+    lost = replace(course, values=np.array([0.0, np.nan, 0.0]))
+    found = stress.judge(blank, [(Bound(quantity="volume", at_most=2.0), lost)])
+    assert (found.verdict, found.at) == ("failed", 1)
+    ended = replace(blank, status="inverted")
+    bounds = [(Bound(quantity="volume", at_most=2.0), course)]
+    assert stress.unfinished(ended, "a cell", bounds, "").verdict == "failed"
+    assert stress.unfinished(ended, "a cell", bounds, "it is flat").verdict == "refused"
+
+
+def test_quantities_are_zero_at_rest_and_see_what_they_are_for() -> None:
+    problem = blocks.problem(CASES["at_rest.millimetres"])
+    rest = problem.surface.points
+    mirrored = rest * [1, 1, -1]
+    run = health.Followed((0, 1), problem.surface, np.array([rest, mirrored]), bones=problem.bones)
+    assert health.course(run, "inside_out").values.tolist() == [0.0, 100.0]
+    np.testing.assert_allclose(health.course(run, "volume").values, [0, 200])
+    np.testing.assert_allclose(health.course(run, "stretch").values, [1, 1])
+    assert health.course(run, "from_rest").values[1] > 100
+    assert health.course(run, "penetration").values.tolist() == [0.0, 0.0]
+
+
+def test_a_name_that_is_not_there() -> None:
+    with pytest.raises(InputError, match=r"NAME: got \"nothing\", want one of activation, at_rest"):
+        records.read_all(("nothing",))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('title = "a"\nhealthy = "b"\n[[bound]]\nquantity = "colour"\nat_most = 1', "as colour is not"),
+        ('title = "a"\nhealthy = "b"', "bound: got nothing"),
+        ("title = ", "a TOML file"),
+    ],
+)
+def test_a_wrong_file_is_refused(text, message, tmp_path) -> None:
+    (tmp_path / "case.toml").write_text(text)
+    with pytest.raises(InputError, match=message):
+        list(records.read(tmp_path / "case.toml"))
+
+
+def test_the_verb_and_its_page(tmp_path, capsys) -> None:
+    words = ["stress", "at_rest.millimetres", "--solver", "pbd", "--solver", "xpbd", "--out", str(tmp_path)]
+    assert cli.main([*words, "--json", str(tmp_path / "facts.json"), "--quiet"]) == cli.DONE
+    assert "1 hard cases by 2 solvers: 2 ok, 0 degraded, 0 failed, 0 refused" in capsys.readouterr().out
+    page = (tmp_path / "stress.html").read_text(encoding="utf-8")
+    assert page.count('class="cell"') == 2
+    assert page.count("data:image/webp") == 2
+    facts = json.loads((tmp_path / "facts.json").read_text())
+    assert [entry["verdict"] for entry in facts["cells"]] == ["ok", "ok"]

@@ -1,0 +1,49 @@
+"""States that do not belong to one path are not taken, and an unstable equilibrium is left where that is wanted."""
+
+import numpy as np
+import pytest
+from test_stability import THIN, column, critical, flesh, session  # noqa: F401 - a fixture
+
+from fem_reference.foundations.motion import Rotation
+from fem_reference.problems import shapes
+from fem_reference.problems.body import Body, Prescribed
+from fem_reference.problems.muscle_body import Follows
+from fem_reference.problems.paths import Rest
+from fem_reference.solvers.fenicsx import BodySettings
+
+pytestmark = pytest.mark.slow
+
+
+def twisted(angle: float, frames: tuple[float, ...]) -> Body:
+    """A bar whose end turns by ``angle`` [rad] from frame 0 to 1."""
+    mesh = shapes.box((1, 1, 3), (1.0, 1.0, 3.0), "hexahedron")
+    turn = Follows(Rotation((0, 0, 1), (0.5, 0.5, 0.0), (0.0, 1.0), (0.0, angle)).pose)
+    fixed = Prescribed("foot", "z0", (0, 1, 2), Rest()), Prescribed("head", "z1", (0, 1, 2), turn)
+    return Body(mesh, flesh("Q2/Q1"), fixed, frames)
+
+
+@pytest.mark.parametrize("frames", [(0.0, 1.0), (0.0, 0.25, 0.5, 0.75, 1.0)])
+def test_a_bar_that_is_twisted_by_a_whole_turn_is_not_at_rest(frames, session) -> None:  # noqa: F811
+    """All that is prescribed is as at rest, which one step, or the state of before, would take for the answer."""
+    solved = session.solve(twisted(2 * np.pi, frames), BodySettings(element="Q2/Q1", first_step=1.0))
+    half = session.solve(twisted(np.pi, (0.0, 0.5, 1.0)), BodySettings(element="Q2/Q1", first_step=0.5))
+    assert solved.outcome.status == half.outcome.status == "converged"
+    assert solved.last.scalars["energy"] > 3 * half.last.scalars["energy"] > 0
+    assert abs(solved.last.scalars["energy_gap"]) < 0.2
+
+
+def test_a_column_leaves_the_straight_state_where_it_is_unstable(session) -> None:  # noqa: F811
+    body = column("Q2/Q1", (1, 1, 10), [0.97 * critical(THIN), 1.1 * critical(THIN)])
+    straight, bent = (
+        session.solve(body, BodySettings(element="Q2/Q1", first_step=100.0, follow=follow))
+        for follow in ("equilibrium", "stable")
+    )
+    assert [state.scalars["negative_modes"] for state in straight.states] == [0, 0, 1]
+    assert [state.scalars["negative_modes"] for state in bent.states] == [0, 0, 0]
+    assert bent.last.scalars["energy"] < straight.last.scalars["energy"]
+    aside = [np.ptp(solved.last.points[:, 0]) for solved in (straight, bent)]
+    assert aside[1] > 1.2 * aside[0]
+    assert (
+        "in 1 of them an unstable equilibrium was left along its lowest mode, first at frame 2" in bent.outcome.message
+    )
+    assert "unstable" in straight.outcome.message
