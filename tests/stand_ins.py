@@ -10,6 +10,6 @@ from fem_reference.solvers.common.protocol import MuscleSolver, SolveMuscle
 
 def solve_by(monkeypatch: pytest.MonkeyPatch, module: ModuleType, solve: SolveMuscle) -> None:
     """Let the solver in ``module`` solve muscles by ``solve``, whatever is installed."""
-    changes = {"solve": solve, "require": lambda _: None}
+    changes = {"solve": solve, "require": lambda _: None, "go_on": None}
     offers = (replace(one, **changes) if isinstance(one, MuscleSolver) else one for one in module.SOLVES)
     monkeypatch.setattr(module, "SOLVES", tuple(offers))

@@ -181,8 +181,8 @@ def spoken(capsys, *arguments: str) -> tuple[int, str, str]:
         (["run", "hip_flexion", "--solver", "listing"], 'got "listing", which does not solve muscles'),
         (["run", "rod", "--set", "peclet"], '--set: got "peclet", want KEY=VALUE'),
         (
-            ["run", "rod", "--set", "candidate[1].speed=2"],
-            "candidate[1].speed: got nothing, want a key that this scene has",
+            ["compare", "rod", "--candidate", "listing", "--set", "candidate[1].speed=2"],
+            "candidate[1].speed: got an unknown key, want",
         ),
         (
             ["run", "rod", "--set", "expect[0].metric=beauty"],

@@ -140,7 +140,7 @@ def test_a_distance_that_no_grid_resolves_is_refused(key: str, value: str, tmp_p
 
 @pytest.mark.parametrize("key", [f"effect[{'9' * 5000}].mu", f"effect[{'9' * 9}].mu", "9" * 5000])
 def test_a_key_with_a_number_without_end_is_refused(key: str) -> None:
-    with pytest.raises(InputError, match=r"got nothing, want a key that this scene has"):
+    with pytest.raises(InputError, match=r"got (nothing, want a key that this scene has|an unknown key)"):
         casefile.read("box_squeeze", changes={key: "1 kPa"})
 
 

@@ -683,7 +683,8 @@ def test_shipped_case_reads_and_its_files_exist(case: str) -> None:
 
 
 def test_every_folder_of_cases_is_a_case() -> None:
-    assert casefile.cases() == sorted(path.name for path in (HOME / "cases").iterdir() if path.is_dir())
+    folders = sorted(path.name for path in (HOME / "cases").iterdir() if path.is_dir())
+    assert casefile.cases() == [name for name in folders if name != "hard"]  # which has those of the verb stress
 
 
 def test_a_case_of_ones_own_may_expect_nothing(bar: Path) -> None:
