@@ -342,7 +342,7 @@ def test_a_candidate_may_say_nothing(tmp_path: Path) -> None:
     [
         (
             'nme = "x"',
-            r"candidate\.toml: nme: got an unknown key, want name, or another one of name, seconds_per_frame, threads, unit, version",
+            r"candidate\.toml: nme: got an unknown key, want name, or another one of name, seconds_per_frame, threads, unit",
         ),
         ('name = "my solver"', r'candidate\.toml: name: got "my solver", want .*pattern'),
         ('name = ""', r"candidate\.toml: name: got"),

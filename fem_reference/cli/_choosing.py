@@ -8,9 +8,10 @@ from fem_reference import solvers
 from fem_reference.assessment import judge, solver_table
 from fem_reference.cli._printing import out
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.records import parse
 from fem_reference.problems import of_case
 from fem_reference.scenes import casefile
-from fem_reference.scenes.case import Candidate, Case
+from fem_reference.scenes.case import Candidate, Case, Expectation
 from fem_reference.solvers import recorded
 from fem_reference.studies.execution import Bench
 
@@ -21,6 +22,22 @@ def scene_of(options: argparse.Namespace) -> Case:
         raise InputError("--negative-control", "with --set", "one of the two")
     changes = dict(map(casefile.setting, options.set))
     return of_case.chosen(casefile.read(options.case, with_negative_control=options.negative_control, changes=changes))
+
+
+def with_limits(scene: Case, limits: list[str]) -> Case:
+    """The scene, expecting of every candidate too that statistics deviate no more than ``limits``, METRIC.STATISTIC=VALUE each."""
+    asked = []
+    for text in limits:
+        name, equals, value = text.partition("=")
+        metric, dot, statistic = name.strip().partition(".")
+        if not equals or not dot or not value.strip():
+            raise InputError("--limit", f'"{text}"', "METRIC.STATISTIC=VALUE, such as surface_deviation.max='5 mm'")
+        within = value.strip()
+        unit = within.lstrip("+-.0123456789eE ")
+        table = {"of": "candidates", "metric": metric, "statistic": statistic, "truth": f"0 {unit}" if unit else 0.0}
+        table |= {"within": within if unit else float(within), "kind": "property", "because": "asked for by --limit"}
+        asked.append(parse(Expectation, table, "--limit"))
+    return scene.model_copy(update={"expect": (*scene.expect, *asked)})
 
 
 def own_candidates(scene: Case) -> list[tuple[Candidate, str]]:

@@ -29,6 +29,7 @@ def run(options: argparse.Namespace) -> int:
     if options.workers < 1:
         raise InputError("--workers", options.workers, "1 or more")
     scene = casefile.read_muscle(options.case, dict(map(casefile.setting, options.set)))
+    scene = scene.model_copy(update={"choice": "listed"})  # what it would leave out is measured too
     found = omissions.study(scene, out(options) / "runs", Workers(options.workers))
     path = report.write_effects(found, out(options) / scene.name, PAGE)
     write_output(facts(found), f"{effects_page.text(found)}\npage: {path}", options)

@@ -1,5 +1,6 @@
 """The page of a comparison. It contains everything itself, and reads without a network."""
 
+import math
 from functools import partial
 from typing import Any
 
@@ -9,6 +10,7 @@ from matplotlib.colors import to_hex
 
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import Of
+from fem_reference.assessment.judge import overall
 from fem_reference.metrics import Measure, find
 from fem_reference.report import pictures
 from fem_reference.report.curves import label_of
@@ -16,9 +18,19 @@ from fem_reference.report.sections import sections
 from fem_reference.report.tables import DEVIATIONS, known, runs
 from fem_reference.report.templates import template
 from fem_reference.report.viewer import view
-from fem_reference.report.words import listed, ratio
+from fem_reference.report.words import listed, number, ratio
 from fem_reference.runs.cost import seconds_per_frame
 from fem_reference.runs.store import Run
+
+# What the headline says of a candidate; of a field the last two.
+_HEADLINE = (
+    ("surface_deviation", "rms"),
+    ("fibre_length", "rms_percent"),
+    ("volume", "deviation"),
+    ("difference", "max"),
+    ("l2_error", "norm"),
+)
+_LOW = 0.1  # det F, below which a state is hardly valid
 
 
 def render(comparison: Comparison) -> str:
@@ -29,7 +41,9 @@ def render(comparison: Comparison) -> str:
         for name, section in sections().items()
         if section.has_numbers(comparison)
     ]
-    return template("page.html").render(shared | {"sentence": _sentence(comparison), "sections": shown})
+    return template("page.html").render(
+        shared | {"sentence": _sentence(comparison), "headlines": headlines(comparison), "sections": shown}
+    )
 
 
 def _shared(comparison: Comparison) -> dict[str, Any]:
@@ -75,6 +89,50 @@ def _bar_at(comparison: Comparison, of: Of, metric: str, statistic: str, frame: 
     bars = comparison.error_bars
     found = None if bars is None else bars.find(of, metric, statistic)
     return None if bars is None or found is None else float(found.values[bars.numbers.index(frame)])
+
+
+def headlines(comparison: Comparison) -> list[tuple[str, str, str]]:
+    """What was asked: by candidate its verdict, "not judged" where nothing is expected of it, and its greatest deviations; then the
+    reference's own checks, and what makes it doubtful.
+    """
+    found = list[tuple[str, str, str]]()
+    for run in comparison.candidates:
+        words = [one.word for one in comparison.verdicts if one.expectation.of == run.name]
+        ended = "" if run.outcome.status == "converged" else f"{run.outcome.status}; "
+        found.append((run.name, overall(words) if words else "not judged", ended + _greatest(comparison, run)))
+    words = [one.word for one in comparison.verdicts if one.expectation.of == "reference"]
+    checks = f"{words.count('pass')} of {len(words)} of its own checks met" if words else "nothing is expected of it"
+    found.append(
+        ("reference", overall(words) if words else "not judged", "; ".join([checks, *_doubts(comparison.reference)]))
+    )
+    return found
+
+
+def _greatest(comparison: Comparison, run: Run) -> str:
+    """The greatest deviations of a candidate, with the error bars of the reference."""
+    said = []
+    for metric, statistic in _HEADLINE:
+        one = find(comparison.deviations.get(run.name, ()), metric, statistic)
+        if one is None:
+            continue
+        at = worst(run, one)
+        bar = _bar_at(comparison, "deviation", metric, statistic, at["frame"]) if math.isfinite(at["value"]) else None
+        value = f"{number(at['value'])}{f' ± {number(bar)}' if bar is not None else ''} {one.unit}".strip()
+        said.append(f"{label_of(one)} up to {value}")
+    return "; ".join(said) or "nothing of it can be measured"
+
+
+def _doubts(reference: Run) -> list[str]:
+    """What makes a reference doubtful: that it did not reach all frames, is unstable, or nearly turned inside out."""
+    said = list[str]() if reference.outcome.status == "converged" else [str(reference.outcome.status)]
+    modes = reference.scalars.get("negative_modes")
+    unstable = 0 if modes is None else int((np.nan_to_num(modes) > 0).sum())
+    if unstable:
+        said.append(f"unstable equilibrium in {unstable} of {len(reference.numbers)} frames")
+    smallest = [np.nanmin(values) for name, values in reference.scalars.items() if name.startswith("min_det_F")]
+    if smallest and min(smallest) < _LOW:
+        said.append(f"det F falls to {number(float(min(smallest)))}")
+    return said
 
 
 def _sentence(comparison: Comparison) -> str:

@@ -17,6 +17,7 @@ from fem_reference.assessment.omissions import MEASURES, Ablation, CaseOmissions
 from fem_reference.effects import Effect, Energy, Load, Ramped
 from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.metrics import MeasurementContext, measure
+from fem_reference.problems import of_case
 from fem_reference.problems.body import ELEMENTS
 from fem_reference.runs.key import versions
 from fem_reference.runs.store import Run
@@ -221,10 +222,20 @@ def _ablation(one: Made, omitted: Sequence[tuple[Part, Made]], context: Measurem
     found = []
     for part, other in omitted:
         changes = {} if context is None else _changes(other, _run(one), context)
-        found.append(replace(_omission(other, part.names), changes=changes))
+        predicted = _predicted(trial.scene, part) if takes_effects else {}
+        found.append(replace(_omission(other, part.names), changes=changes, predicted=predicted))
     named = {name for part in parts(trial.scene, trial.choice, trial.name) for name in part.names}
     kept = tuple(name for name in there if name not in named)
     return Ablation(trial.name, trial.choice.solver, kept, _omission(one, ()), tuple(found))
+
+
+def _predicted(scene: MuscleCase, part: Part) -> dict[str, float]:
+    """What the indicator of an effect says of how far the surface moves by it, where that alone is left out."""
+    if len(part.effects) != 1:
+        return {}
+    (left_out,) = part.effects.values()
+    (found,) = (one.indicator for one in of_case.explained(scene) if one.effect is left_out)
+    return {"surface_deviation.rms": found.estimate} if found else {}
 
 
 def _omission(one: Made, left_out: tuple[str, ...]) -> Omission:

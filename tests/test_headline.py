@@ -1,0 +1,64 @@
+"""The head of the page says what was asked: whether a candidate was judged, and the reference's own checks beside it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import small
+import stand_ins
+
+from fem_reference import cli
+from fem_reference.runs.store import Frame, Outcome
+from fem_reference.solvers import fenicsx, pbd
+
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_pictures")]
+
+
+def still(problem, _settings, sink) -> Outcome:
+    """In place of the reference: nothing moves, and its equilibrium is unstable at the end."""
+    for number in problem.frames:
+        unstable = {"negative_modes": float(number == problem.frames[-1]), "min_det_F_quadrature": 0.05}
+        sink(Frame(number, problem.surface.points, problem.fibres.points, scalars=unstable))
+    return Outcome("converged", "done", {"seconds": 1.0})
+
+
+def shift(setup, _settings, sink) -> Outcome:
+    """In place of a candidate: it is 0.1 mm a frame number away."""
+    for number in setup.frames:
+        sink(Frame(number, setup.surface.points + np.array([0.1 * number, 0, 0])))
+    return Outcome("converged", "done", {"seconds": 1.0})
+
+
+@pytest.fixture
+def words(tmp_path: Path, monkeypatch) -> list[str]:
+    stand_ins.solve_by(monkeypatch, fenicsx, still)
+    stand_ins.solve_by(monkeypatch, pbd, shift)
+    return ["compare", str(small.write(tmp_path / "bar")), "--quiet", "--out", str(tmp_path / "out")]
+
+
+def head(folder: Path) -> str:
+    text = (folder / "out" / "bar" / "report.html").read_text()
+    return text[text.index("<header>") : text.index("</header>")]
+
+
+def test_a_candidate_that_nobody_judged_says_so_and_its_numbers(words, tmp_path: Path) -> None:
+    assert cli.main(words) == cli.DONE
+    found = head(tmp_path)
+    assert '<span class="badge not">not judged</span> <b>pbd</b>: ' in found
+    assert "up to 2 mm" in found  # 0.1 mm times frame 20, everywhere
+    assert '<span class="badge pass">pass</span> <b>reference</b>: 1 of 1 of its own checks met; ' in found
+    assert "unstable equilibrium in 1 of 5 frames; det F falls to 0.05" in found
+
+
+def test_limits_judge_candidates_without_a_change_of_the_case(words, tmp_path: Path, capsys) -> None:
+    assert cli.main([*words, "--limit", "surface_deviation.max=2.1 mm"]) == cli.DONE
+    assert '<span class="badge pass">pass</span> <b>pbd</b>' in head(tmp_path)
+    assert cli.main([*words, "--limit", "surface_deviation.max=2.1 mm", "--limit", "surface_deviation.rms=1.9 mm"]) == 1
+    assert '<span class="badge fail">fail</span> <b>pbd</b>' in head(tmp_path)
+    for limit, want in (
+        ("surface_deviation.max", '--limit: got "surface_deviation.max", want METRIC.STATISTIC=VALUE'),
+        ("surface_deviation.max=2 kPa", "want a length with its unit"),
+        ("beauty.max=2 mm", "beauty"),
+    ):
+        assert cli.main([*words, "--limit", limit]) == cli.BAD_INPUT
+        assert want in capsys.readouterr().err
