@@ -38,6 +38,7 @@ def test_what_is_a_formula(value) -> None:
     "value",
     [
         True,
+        10**400,
         None,
         [1],
         float("nan"),

@@ -1,15 +1,25 @@
-"""Runs that are cut off go on and end as those that were not; where nothing can be written, nothing is half-written."""
+"""Runs that are cut off go on and end as those that were not; what cannot be written is one sentence, and nothing is half there."""
 
+import errno
+import os
+import re
+import subprocess
+import sys
+import time
 from pathlib import Path
 from typing import Any
 
 import kills
+import numpy as np
 import pytest
 import shapes
 import small
 
-from fem_reference.runs import cut_off
-from fem_reference.runs.store import Frame, Run, Writer
+from fem_reference import cli
+from fem_reference.foundations import scratch, subprocesses
+from fem_reference.io import files
+from fem_reference.runs import cut_off, store
+from fem_reference.runs.store import Frame, Outcome, Run, Writer
 from fem_reference.scenes import casefile
 from fem_reference.studies.execution import Bench
 
@@ -81,3 +91,171 @@ def test_a_run_that_was_cut_off_goes_on(kind: str, tmp_path: Path, monkeypatch: 
     for name in ("newton_iterations", "load_steps", "cut_backs"):
         assert ended.outcome.cost[name] == whole.outcome.cost[name]
     assert not (ended.folder / cut_off.FOLDER).exists()  # type: ignore[operator]
+
+
+@pytest.mark.slow
+def test_a_command_that_is_killed_ends_as_if_it_had_not_been(tmp_path: Path) -> None:
+    """``tests/kills.py`` does so more often, with error bars, pages and studies too."""
+    subject = kills.Subject("run", tmp_path, 5)
+    for number, share in enumerate((0.6, 0.8)):
+        assert subject.kill(f"out{number}", share * subject.seconds)
+        assert subject.compare(subject.finish(f"out{number}")) == []
+
+
+def begun(folder: Path, frames: int = 2, status: str | None = None) -> Writer:
+    """A run of which some frames are stored, and something is kept to go on from."""
+    writer = Writer(folder, IDENTITY, SURFACE)
+    for number in IDENTITY["frames"][:frames]:  # type: ignore[index]
+        writer.add(Frame(number, SURFACE.points + number, scalars={"energy": 1.0 * number}))
+    writer.cut_off.folder.mkdir()
+    (writer.cut_off.folder / "kept.npz").touch()
+    if status is not None:
+        writer.close(Outcome(status, "so"))  # type: ignore[arg-type]
+    return writer
+
+
+@pytest.mark.parametrize("status", [None, "crashed"])
+def test_a_writer_goes_on_where_a_run_was_cut_off(status: str | None, tmp_path: Path) -> None:
+    begun(tmp_path / "run", status=status)
+    (tmp_path / "run" / "surface" / ".frame_0010-1.vtp").touch()
+    writer = Writer(tmp_path / "run", IDENTITY | {"name": "other"}, SURFACE)
+    assert writer.cut_off == cut_off.CutOff(tmp_path / "run" / "restart", (0, 5))
+    writer.add(Frame(5, SURFACE.points + 6, scalars={"energy": 6.0}))  # one that is there already
+    assert writer.frames == (0, 5)
+    writer.add(Frame(10, SURFACE.points + 10, scalars={"energy": 10.0}))
+    writer.close(Outcome("converged", "done"))
+    run = store.load(tmp_path / "run")
+    assert (run.name, run.numbers, run.scalars["energy"].tolist()) == ("other", (0, 5, 10), [0, 6, 10])
+    assert np.array_equal(run.positions[1], SURFACE.points + 6)
+    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == ["run.json", "surface", "surface.pvd"]
+    assert len(list((tmp_path / "run" / "surface").iterdir())) == 3
+
+
+@pytest.mark.parametrize(
+    "change", ["converged", "diverged", "no folder", "other frames", "other solver", "other versions", "damaged"]
+)
+def test_a_run_that_cannot_go_on_begins_anew(change: str, tmp_path: Path) -> None:
+    identity = dict(IDENTITY)
+    begun(tmp_path / "run", status=change if change in ("converged", "diverged") else None)
+    assert (tmp_path / "run" / "restart").exists() == (change not in ("converged", "diverged"))
+    if change == "no folder":
+        cut_off.clear(tmp_path / "run")
+    elif change == "damaged":
+        text = (tmp_path / "run" / "run.json").read_text(encoding="utf-8")
+        (tmp_path / "run" / "run.json").write_text(text.replace('"energy"', '"energy": 1, "x"'), encoding="utf-8")
+    elif change.startswith("other"):
+        others = {"frames": (0, 5), "solver": "another", "versions": {"versions": {"numpy": "3"}}}
+        key = change.removeprefix("other ")
+        identity[{"versions": "origin"}.get(key, key)] = others[key]
+    assert Writer(tmp_path / "run", identity, SURFACE).frames == ()
+    assert not (tmp_path / "run" / "surface").exists()
+
+
+# What a process does that may write no file beyond so many bytes: as on a disk that is full.
+_SMALL_DISK = """
+import resource, sys
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]),) * 2)
+from fem_reference.cli import main
+sys.exit(main(sys.argv[2:]))
+"""
+
+
+@pytest.mark.slow
+def test_a_disk_that_is_full_is_one_sentence(tmp_path: Path) -> None:
+    """And once there is room all goes well."""
+    scene = small.write(tmp_path / "bar")
+    line = ["run", str(scene), "--solver", "pbd", "--out", str(tmp_path / "out"), "--quiet"]
+
+    def ended(most: int) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            subprocesses.command("-c", _SMALL_DISK, str(most), *line),
+            env=subprocesses.environment(),
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+
+    full = ended(20_000)
+    assert full.returncode == cli.BAD_INPUT
+    assert re.fullmatch(r"fem-reference: .*vtp: cannot be written: File too large; .* MB are free .*\n", full.stderr)
+    assert [path for path in tmp_path.rglob(".*") if path.suffix != ".lock"] == []
+    done = ended(10**9)
+    assert done.returncode in (cli.DONE, cli.VERDICT_FAIL), done.stderr
+
+
+@pytest.mark.parametrize("name", ["a.vtp", "a.vtk", "a.vtu", "a.ply", "a.msh", "a.stl"])
+def test_what_was_there_stays_where_there_is_no_room(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / name
+    files.write_surface(path, SURFACE, SURFACE.points)
+    before = path.read_bytes()
+
+    def full(part: Path, *_: Any) -> None:
+        part.write_bytes(before[:100])
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(files.formats()[path.suffix].__class__, "write", property(lambda _self: full), raising=False)
+    with pytest.raises(OSError, match=rf"{name}: cannot be written: No space left on device; .* MB are free there"):
+        files.write_surface(path, SURFACE, SURFACE.points)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def dead() -> int:
+    """The number of a process that has ended."""
+    process = subprocess.Popen([sys.executable, "-c", ""])
+    process.wait()
+    return process.pid
+
+
+def test_what_killed_processes_left_is_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And not what one that lives still writes, nor what is young."""
+    gone, now = dead(), time.time()
+    parts = [tmp_path / f".page-{number}.html" for number in (gone, os.getppid())]
+    parts.append(tmp_path / f".page-{gone}.json")
+    (tmp_path / f".exported-{gone}").mkdir()
+    for path in (*parts, tmp_path / f".exported-{gone}"):
+        path.touch()
+        os.utime(path, (now - 100, now - 100))
+    files.write_text(tmp_path / "page.html", "whole")
+    files.clear(tmp_path / "exported")
+    assert {path.name for path in tmp_path.iterdir()} == {"page.html", parts[1].name, parts[2].name}
+    monkeypatch.setattr(scratch.tempfile, "gettempdir", lambda: str(tmp_path))
+    with scratch.folder() as mine:
+        os.utime(mine, (now - 100, now - 100))
+        left = tmp_path / "fem_reference_scratch-left"
+        left.mkdir()
+        (left / ".lock").touch()
+        with scratch.folder() as young:
+            assert mine.is_dir()
+            assert left.is_dir()
+            assert young != mine
+        os.utime(left, (now - 100, now - 100))
+        with scratch.folder():
+            assert mine.is_dir()
+            assert not left.exists()
+
+
+def test_a_worker_ends_with_whom_it_works_for() -> None:
+    """Even where that is killed and cannot end it."""
+    worker = (
+        "import time; from fem_reference.foundations.subprocesses import end_with_starter as e; e(); time.sleep(60)"
+    )
+    starter = (
+        "import subprocess, sys, time; from fem_reference.foundations import subprocesses as s\n"
+        f"p = subprocess.Popen(s.command('-c', {worker!r}), env=s.environment()); print(p.pid, flush=True); time.sleep(60)"
+    )
+    process = subprocess.Popen(
+        subprocesses.command("-c", starter), env=subprocesses.environment(), stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    number = int(process.stdout.readline())
+    assert subprocesses.lives(number)
+    process.kill()
+    process.communicate()
+    until = time.monotonic() + 20
+    while subprocesses.lives(number) and time.monotonic() < until:
+        time.sleep(0.1)
+    assert not subprocesses.lives(number)

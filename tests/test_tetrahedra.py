@@ -247,3 +247,10 @@ def test_only_the_largest_part_is_kept_outward() -> None:
 def test_the_muscles_of_the_report(data: Path, name: str, size: float) -> None:
     surface = check_closed(files.read_surface(data / f"hip/muscles/{name}.vtk", 1.0))
     _check(tetrahedralise(surface, size), surface, size)
+
+
+def test_no_room_for_tetrahedra_is_not_the_fault_of_the_surface(monkeypatch: pytest.MonkeyPatch) -> None:
+    ended = subprocess.CompletedProcess([], 1, "", "OSError: [Errno 28] No space left on device")
+    monkeypatch.setattr(tetrahedra.subprocess, "run", lambda *_, **__: ended)
+    with pytest.raises(OSError, match=r"cannot be written: No space left on device; tetrahedra of .* need room there"):
+        tetrahedra._run("gmsh", shapes.sphere(1), 5.0)

@@ -38,6 +38,7 @@ def export(scene: MuscleCase, build: Callable[[], Problem], folder: Path, form: 
         febio.check(scene)
     problem = build()
     folder.parent.mkdir(parents=True, exist_ok=True)
+    files.clear(folder)
     part = folder.with_name(f".{folder.name}-{os.getpid()}")
     part.mkdir()
     try:

@@ -1,5 +1,9 @@
 """The two exceptions of this package: input that is not usable, and software that is not installed."""
 
+import errno
+
+# What the system calls a disk, or a share of one, that is full, and a file that is too large.
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 # Of what was got, a message shows this many characters.
 _SHOWN = 400
 

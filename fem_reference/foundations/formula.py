@@ -2,6 +2,7 @@
 
 import ast
 import math
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any
 
@@ -25,7 +26,7 @@ _OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
 
 def _checked(value: object) -> str:
     """The text of a formula; ValueError where it is none."""
-    if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
+    if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max:
         return repr(float(value))
     if not isinstance(value, str) or len(value) > _LONGEST:
         raise ValueError(_WANT)

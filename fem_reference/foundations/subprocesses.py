@@ -30,12 +30,12 @@ def end_with_starter() -> None:
 
 
 def _watch(process: int) -> None:
-    while _lives(process):
+    while lives(process):
         time.sleep(1.0)
     os._exit(1)
 
 
-def _lives(process: int) -> bool:
+def lives(process: int) -> bool:
     """Whether a process does; one that ended and whose end nobody has taken note of does not."""
     try:
         os.kill(process, 0)

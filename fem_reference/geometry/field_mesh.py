@@ -55,6 +55,10 @@ class FieldMesh:
         return np.asarray(np.sqrt(np.maximum(np.linalg.det(gram), 0)) / (self.cells.shape[1] - 1))
 
 
+# No coordinate is larger: areas and what is made of them are numbers still.
+FURTHEST = 1e50
+
+
 def check(mesh: FieldMesh) -> FieldMesh:
     """``mesh`` itself; InputError where a number is not finite, a vertex is none or in no cell, a cell is flat, or three triangles
     share an edge.
@@ -62,6 +66,8 @@ def check(mesh: FieldMesh) -> FieldMesh:
     count = len(mesh.points)
     if not np.isfinite(mesh.points).all():
         raise InputError(mesh.place, "a coordinate that is no finite number", "finite coordinates")
+    if np.abs(mesh.points).max(initial=0.0) > FURTHEST:
+        raise InputError(mesh.place, f"a coordinate beyond {FURTHEST:g}", "coordinates whose squares are numbers")
     if mesh.cells.size == 0 or mesh.cells.min() < 0 or mesh.cells.max() >= count:
         raise InputError(mesh.place, f"a cell with a vertex outside of 1 to {count}", "vertices of its points")
     lonely = np.flatnonzero(np.bincount(mesh.cells.ravel(), minlength=count) == 0)

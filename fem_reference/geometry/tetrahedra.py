@@ -5,6 +5,7 @@ crash, hang or keep its global state.
 """
 
 import logging
+import os
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -16,7 +17,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from fem_reference.foundations import scratch, subprocesses
-from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.errors import NO_ROOM, InputError
 from fem_reference.foundations.mesh import (
     TET_FACES,
     Floats,
@@ -191,6 +192,8 @@ def _run(mesher: str, surface: Surface, size: float) -> TetMesh:
         except subprocess.TimeoutExpired:
             got = f"a surface that {mesher} could not fill in {SECONDS_ALLOWED:g} s"
             raise InputError(surface.place, got, "larger tetrahedra or a cleaner surface") from None
+        if no_room := next((words for words in map(os.strerror, NO_ROOM) if words in done.stderr), None):
+            raise OSError(f"{folder}: cannot be written: {no_room}; tetrahedra of {surface.place} need room there")
         if done.returncode != 0 or not result.exists():
             raise InputError(surface.place, f"a surface that {mesher} refuses ({_last_words(done)})", "a clean surface")
         with np.load(result, allow_pickle=False) as arrays:

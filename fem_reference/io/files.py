@@ -4,16 +4,20 @@ A reader keeps the points of its file as they are: their order, their number, an
 """
 
 import csv
+import glob
 import os
+import shutil
+import time
 from collections.abc import Callable, Collection, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.errors import NO_ROOM, InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh
+from fem_reference.foundations.subprocesses import lives
 from fem_reference.io import soup, xdmf
 from fem_reference.io.formats import Format, formats, vtk
 from fem_reference.io.references import beside, parsed_xml
@@ -23,6 +27,8 @@ from fem_reference.io.texts import check_size
 # The most bytes of a mesh, a table or an index: a million triangles, which no mesher and no solver of ours takes. What is read
 # of a text takes up to thirty times as much.
 MOST_BYTES = 2**26
+# So old [s] is what a process left half-written that is not there: it may have been one of another machine.
+_SETTLED = 10.0
 
 
 def surface_suffixes() -> tuple[str, ...]:
@@ -127,7 +133,7 @@ def write_surface(path: Path, surface: Surface, positions: Floats) -> None:
     ``displacement`` [mm], float64.
     """
     write = _format(path, f"one of {' '.join(formats())}", formats()).write
-    with _written(path) as part:
+    with whole(path) as part:
         write(part, surface.moved_to(positions), positions - surface.points)
 
 
@@ -136,24 +142,14 @@ def write_polylines(path: Path, polylines: Polylines, positions: Floats) -> None
     known = _suffixes_of_lines()
     write = _format(path, f"one of {' '.join(known)}", known).write_lines
     assert write is not None  # of a suffix in ``lines``
-    with _written(path) as part:
+    with whole(path) as part:
         write(part, Polylines(positions, polylines.offsets), positions - polylines.points)
 
 
 def write_tets(path: Path, mesh: TetMesh, positions: Floats) -> None:
     """VTU of the tets with their points at ``positions`` (n, 3) [mm] and point data ``displacement`` [mm], float64."""
-    with _written(path) as part:
-        vtk.write_tets(part, TetMesh(positions, mesh.tets, mesh.facets), positions - mesh.points)
-
-
-@contextmanager
-def _written(path: Path) -> Iterator[Path]:
-    """As ``whole``; what cannot be written is an OSError that names ``path``."""
     with whole(path) as part:
-        try:
-            yield part
-        except OSError as error:
-            raise OSError(f"{path}: {error.strerror or error}") from error
+        vtk.write_tets(part, TetMesh(positions, mesh.tets, mesh.facets), positions - mesh.points)
 
 
 def write_field(
@@ -188,13 +184,39 @@ def write_text(path: Path, text: str) -> None:
 
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
-    """A name beside ``path`` to write to, which takes its place when all went well and is gone otherwise."""
+    """A name beside ``path`` to write to, which takes its place when all went well and is gone otherwise. An OSError names ``path``
+    and, where that is why, how much room there is.
+    """
     part = path.with_name(f".{path.stem}-{os.getpid()}{path.suffix}")
+    clear(path)
     try:
         yield part
         part.replace(path)
+    except OSError as error:
+        raise _unwritten(path, error) from error
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
+def _unwritten(path: Path, error: OSError) -> OSError:
+    """Why ``path`` could not be written, in a sentence."""
+    why = error.strerror or str(error)
+    if error.errno in (None, *NO_ROOM):  # numpy does not say why
+        free = shutil.disk_usage(path.parent).free
+        why += f"; {free / 2**20:.3g} MB are free there. What was there before is as it was, and what is done goes on from it"
+    found = OSError(f"{path}: cannot be written: {why}")
+    found.errno = error.errno
+    return found
+
+
+def clear(path: Path) -> None:
+    """Remove what processes that were killed have left of ``path``, a file or a folder."""
+    for part in path.parent.glob(f".{glob.escape(path.stem)}-*{glob.escape(path.suffix)}"):
+        process = part.name.removeprefix(f".{path.stem}-").removesuffix(path.suffix)
+        with suppress(OSError):
+            if process.isdecimal() and not lives(int(process)) and time.time() - part.stat().st_mtime > _SETTLED:
+                shutil.rmtree(part) if part.is_dir() else part.unlink()
 
 
 def _attempt[T](read: Callable[[Path], T], path: Path, want: str) -> T:

@@ -13,6 +13,8 @@ from fem_reference.io import texts
 from fem_reference.runs.contents import Contents
 
 FOLDER = "restart"
+# Killed with the process that stores it, or alone: for want of memory or room, say.
+ENDED_EARLY = ("running", "crashed")
 
 
 @dataclass(frozen=True)
@@ -30,7 +32,7 @@ def stored(folder: Path, identity: dict[str, Any]) -> dict[str, Any] | None:
     place = folder / "run.json"
     with suppress(InputError):
         state = texts.read_json(place, "a run")
-        if not isinstance(state, dict) or state.get("status") != "running" or not (folder / FOLDER).is_dir():
+        if not isinstance(state, dict) or state.get("status") not in ENDED_EARLY or not (folder / FOLDER).is_dir():
             return None
         if not state.get("numbers"):
             return None
@@ -38,7 +40,9 @@ def stored(folder: Path, identity: dict[str, Any]) -> dict[str, Any] | None:
         wanted = json.loads(json.dumps(identity))
         same = (whole.solver, list(whole.frames)) == (wanted["solver"], wanted["frames"])
         if same and whole.origin.versions == wanted["origin"].get("versions", {}):
-            return state
+            for part in folder.rglob(".*"):  # what was being written
+                part.unlink()
+            return state | {"status": "running", "message": "", "cost": {}}
     return None
 
 

@@ -10,8 +10,8 @@
 
                           /restart/        of a run that is made or was cut off: what its solver goes on from (``cut_off``)
 
-A file appears whole or not at all; ``run.json`` is written after the frame files that it names. A run whose status is
-``running`` was cut off; it is not read as a result, and goes on where its solver can.
+A file appears whole or not at all; ``run.json`` after the frame files that it names. A run whose status is ``running`` was cut off;
+it is not read as a result, and goes on where its solver can, as one that crashed.
 """
 
 import json
@@ -164,10 +164,9 @@ class Writer:
         self.state |= {"scalars": {}, "cost": {}, "parts": []}
         self.begin, self.reported = time.perf_counter(), 0.0
         if (stored := cut_off.stored(folder, identity)) is not None:
-            self.state = stored
+            self.state = stored | {"name": identity["name"]}
             return
-        if folder.exists():
-            shutil.rmtree(folder)
+        shutil.rmtree(folder) if folder.exists() else None
         folder.mkdir(parents=True)
         self._write_state()
 
@@ -178,7 +177,7 @@ class Writer:
 
     @property
     def frames(self) -> tuple[int, ...]:
-        """The numbers of the frames stored so far."""
+        """The numbers of those stored so far."""
         return tuple(self.state["numbers"])
 
     def add(self, frame: Frame) -> None:
@@ -217,7 +216,8 @@ class Writer:
         cost = {"seconds": time.perf_counter() - self.begin} | outcome.cost
         self.state |= {"status": outcome.status, "message": outcome.message, "cost": cost}
         self._write_state()
-        cut_off.clear(self.folder)
+        if outcome.status not in cut_off.ENDED_EARLY:
+            cut_off.clear(self.folder)
 
     def _write_unknowns(self, frame: Frame) -> bool:
         """The unknowns of the tets, if the frame has them."""

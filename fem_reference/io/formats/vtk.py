@@ -1,5 +1,7 @@
 """VTK's own formats, legacy and XML: read with numpy, written by pyvista."""
 
+import errno
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -81,6 +83,9 @@ def write_tets(path: Path, mesh: TetMesh, displacement: Floats) -> None:
     _save(path, data, displacement)
 
 
+_NO_ROOM = 20007  # what VTK calls a disk that is full; other errors of the system have the system's numbers
+
+
 def _save(path: Path, data: Any, displacement: Floats) -> None:
     """Write ``data`` with its ``displacement`` (n, 3) [mm]; OSError where that fails."""
     import pyvista
@@ -99,7 +104,8 @@ def _save(path: Path, data: Any, displacement: Floats) -> None:
             writer.writer.SetDataModeToAppended()
         writer.write()
         if code := writer.writer.GetErrorCode():
-            raise OSError(f"VTK could not write it (its error {code})")
+            number = errno.ENOSPC if code == _NO_ROOM else int(code)
+            raise OSError(number, os.strerror(number) if number in errno.errorcode else f"error {code} of VTK")
 
 
 FORMAT = Format((".vtk", ".vtp", ".vtu"), _read, _write, _read_lines, _write_lines, lines=(".vtk", ".vtp"))

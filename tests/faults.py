@@ -1,0 +1,89 @@
+"""Faults of one line, planted one after the other in a copy of the project: each must turn one of the tests named red.
+
+``python tests/faults.py [NAME ...]`` (all without names) prints a line for each; exit status 1 where one is not noticed.
+"""
+
+import argparse
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import tomllib
+from pathlib import Path
+from typing import NamedTuple
+
+from fem_reference.foundations.subprocesses import command
+
+ROOT = Path(__file__).resolve().parent.parent
+LIST = Path(__file__).with_suffix(".toml")
+
+
+class Fault(NamedTuple):
+    """In a ``file`` of the package, ``new`` in place of ``old``, which is there once, and the ``tests`` that should notice."""
+
+    name: str
+    file: str
+    old: str
+    new: str
+    tests: str
+
+
+FAULTS = [Fault(*row) for row in tomllib.loads(LIST.read_text(encoding="utf-8"))["faults"]]
+
+
+def plant(fault: Fault, copy: Path) -> tuple[bool, str]:
+    """Whether a test noticed the fault, planted in ``copy`` for as long, and which or what was said; the quick tests come first."""
+    path = copy / "fem_reference" / fault.file
+    text = path.read_text(encoding="utf-8")
+    if text.count(fault.old) != 1:
+        return False, f"{fault.old!r} is there {text.count(fault.old)} times"
+    path.write_text(text.replace(fault.old, fault.new), encoding="utf-8")
+    try:
+        for marker in ("not slow", "slow"):
+            red, said = _tried(fault, copy, marker)
+            if red:
+                break
+        return red, said
+    finally:
+        path.write_text(text, encoding="utf-8")
+
+
+def _tried(fault: Fault, copy: Path, marker: str) -> tuple[bool, str]:
+    files = [f"tests/{name}.py" for name in fault.tests.split()]
+    words = ["-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "--no-header", "-m", marker, *files]
+    settings = {"PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1", "OMP_NUM_THREADS": "1"}
+    done = subprocess.run(
+        command(*words), cwd=copy, env=os.environ | settings, capture_output=True, text=True, check=False
+    )
+    failed = re.findall(r"^(?:FAILED|ERROR) (\S+)", done.stdout, re.MULTILINE)
+    last = (done.stdout.strip().splitlines() or [done.stderr[-300:]])[-1]
+    return done.returncode == 1 and bool(failed), failed[0] if failed else last
+
+
+def main() -> int:
+    """Plant the faults; the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="NAME", help="a part of a name or of a file (default: all faults)")
+    names = parser.parse_args().names
+    chosen = [one for one in FAULTS if not names or any(name in one.name or name in one.file for name in names)]
+    missed = 0
+    with tempfile.TemporaryDirectory(prefix="faults-") as folder:
+        copy = Path(folder) / "copy"
+        ignored = shutil.ignore_patterns(".git", ".venv", "__pycache__", "reports")
+        shutil.copytree(ROOT, copy, ignore=ignored)
+        for fault in chosen:
+            begin = time.perf_counter()
+            red, said = plant(fault, copy)
+            missed += not red
+            taken = time.perf_counter() - begin
+            sys.stdout.write(f"{'red' if red else 'GREEN':5} {fault.name} ({fault.file}): {said}, {taken:.0f} s\n")
+            sys.stdout.flush()
+    sys.stdout.write(f"{len(chosen)} faults, {missed} not noticed\n")
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
