@@ -182,7 +182,11 @@ def _solved(posed: Posed, choice: SolverChoice) -> Cell:
         followed = replace(followed, truth=posed.truth[0][: len(followed.numbers)])
     known = [bound for bound in hard.bound if bound.quantity != "from_reference" or followed.truth is not None]
     courses = [(bound, health.course(followed, bound.quantity)) for bound in known]
-    if outcome.status != "converged":
+    begins = followed.least_determinant
+    if hard.start is not None and begins is not None and not begins[0] > 0:
+        said = f"it begins with det F down to {begins[0]:.2g}, where it needs more than 0: {outcome.status}"
+        found = replace(blank, verdict="refused", sentence=said)
+    elif outcome.status != "converged":
         found = stress.unfinished(blank, outcome.message, courses, hard.no_solution)
     else:
         found = stress.judge(blank, courses)
