@@ -20,8 +20,8 @@ class Followed:
     """A run as its health is measured: ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (at rest) at frame ``numbers``;
     of a solver with tetrahedra their ``mesh`` at rest and ``nodes`` (f, k, 3); the ``bones``, of which vertices that are ``free``
     (n,) may be in contact; ``truth`` (f, n, 3), where the reference has the vertices; ``integrated`` (f,), V/V0 as a solver has
-    that itself; ``negative_modes`` (f,), where they were counted; or a scalar field's ``values`` (f, N) and the ``range`` that its
-    boundary values span.
+    that itself; ``negative_modes`` (f,) and ``least_determinant`` (f,), the least det F, where those are known; or a scalar
+    field's ``values`` (f, N) and the ``range`` that its boundary values span.
     """
 
     numbers: tuple[int, ...]
@@ -34,6 +34,7 @@ class Followed:
     truth: Floats | None = None
     integrated: Floats | None = None
     negative_modes: Floats | None = None
+    least_determinant: Floats | None = None
     values: Floats | None = None
     range: tuple[float, float] = (0.0, 0.0)
 
@@ -60,8 +61,11 @@ def volume(run: Followed) -> Found:
 
 def inside_out(run: Followed) -> Found:
     """How much is turned inside out: tetrahedra, in per cent of the volume at rest, where there are some, else the surface, in
-    per cent of its area.
+    per cent of its area. Of curved elements, whose corners do not say it, all or nothing, as the least det F is.
     """
+    if run.least_determinant is not None:
+        words = [f"det F is at least {value:.2g}" for value in run.least_determinant]
+        return np.where(run.least_determinant > 0, 0.0, 100.0), words, None
     if run.mesh is not None and run.nodes is not None:
         rest = tet_volumes(run.mesh.points, run.mesh.tets)
         ratios = np.array([tet_volumes(nodes, run.mesh.tets) for nodes in run.nodes]) / rest

@@ -102,6 +102,7 @@ class Stress:
         return Counter(cell.verdict for cell in self.cells if cell.solver == solver)
 
 
+_OTHER_REASONS = ("timed out", "crashed")  # that a run may have to end than that there is no solution
 Weighed = Sequence[tuple[Bound, Course]]
 
 
@@ -116,9 +117,11 @@ def judge(cell: Cell, weighed: Weighed) -> Cell:
 
 
 def unfinished(cell: Cell, message: str, weighed: Weighed, no_solution: str) -> Cell:
-    """``cell``, of a run that ended with a status: failed, or refused where there is ``no_solution`` that it could have reached."""
+    """``cell``, of a run that ended with a status: failed, or refused where it came some way and found
+    that there is ``no_solution``, for the reason given.
+    """
     shown = _decisive(cell, weighed)
-    if no_solution:
+    if no_solution and cell.status not in _OTHER_REASONS and len(weighed[0][1].numbers) > 1:
         sentence = f"as it should, for {no_solution}: {cell.status}: {message}"
         return replace(shown, verdict="refused", sentence=sentence)
     return replace(shown, verdict="failed", sentence=f"{cell.status}: {message}")

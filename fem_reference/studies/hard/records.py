@@ -111,6 +111,8 @@ class Hard(Record):
         strange = [bound.quantity for bound in bounds if bound.quantity not in health.QUANTITIES]
         if strange:
             raise ValueError(f"quantities that are among {', '.join(health.QUANTITIES)}, as {strange[0]} is not")
+        if all(bound.quantity == "from_reference" for bound in bounds):
+            raise ValueError("another quantity beside from_reference, which a run without a reference has not")
         return bounds
 
     @model_validator(mode="after")

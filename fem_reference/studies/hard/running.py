@@ -180,8 +180,13 @@ def _solved(posed: Posed, choice: SolverChoice) -> Cell:
         posed.truth = followed.positions, followed.numbers
     if posed.truth is not None and posed.truth[1][: len(followed.numbers)] == followed.numbers:
         followed = replace(followed, truth=posed.truth[0][: len(followed.numbers)])
-    courses = [(bound, health.course(followed, bound.quantity)) for bound in hard.bound]
-    if outcome.status != "converged":
+    known = [bound for bound in hard.bound if bound.quantity != "from_reference" or followed.truth is not None]
+    courses = [(bound, health.course(followed, bound.quantity)) for bound in known]
+    begins = followed.least_determinant
+    if hard.start is not None and begins is not None and not begins[0] > 0:
+        said = f"it begins with det F down to {begins[0]:.2g}, where it needs more than 0: {outcome.status}"
+        found = replace(blank, verdict="refused", sentence=said)
+    elif outcome.status != "converged":
         found = stress.unfinished(blank, outcome.message, courses, hard.no_solution)
     else:
         found = stress.judge(blank, courses)
@@ -223,7 +228,15 @@ def _followed(built: Problem, frames: list[Frame]) -> Followed:
         built.free,
         integrated=_all(frames, "volume_ratio"),
         negative_modes=_all(frames, "negative_modes"),
+        least_determinant=_least(frames),
     )
+
+
+def _least(frames: list[Frame]) -> Floats | None:
+    """The least det F at any point that a solver looks at (f,), None where it does not say."""
+    found = [_all(frames, f"min_det_F_{where}") for where in ("quadrature", "vertices")]
+    known = [one for one in found if one is not None]
+    return np.min(known, axis=0) if known else None
 
 
 def _all(frames: list[Frame], scalar: str) -> Floats | None:
