@@ -7,6 +7,7 @@ import argparse
 import inspect
 import re
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 
@@ -22,6 +23,7 @@ from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.scenes.scalar import ScalarCase
 
+EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 _BOUNDS = {Gt: ("gt", ">"), Ge: ("ge", "≥"), Lt: ("lt", "<"), Le: ("le", "≤")}
 _WORDS = {str: "text", float: "number", int: "whole number", bool: "true or false", NoneType: "", Any: "any"}
 
@@ -80,6 +82,12 @@ def gallery() -> str:
     return "\n".join(_shown(casefile.read(name)) for name in casefile.cases())
 
 
+def examples() -> str:
+    """The scripts, whole."""
+    scripts = sorted(EXAMPLES.glob("*.py")) + sorted(EXAMPLES.glob("effects/*.py"))
+    return "\n".join(_script(path.relative_to(EXAMPLES).as_posix()) for path in scripts)
+
+
 GENERATED: dict[str, Callable[[], str]] = {
     "scenes": scenes,
     "solvers": settings,
@@ -87,7 +95,12 @@ GENERATED: dict[str, Callable[[], str]] = {
     "verbs": verbs,
     "api": api,
     "gallery": gallery,
+    "examples": examples,
 }
+
+
+def _script(name: str) -> str:
+    return f"## {name}\n\n```{{literalinclude}} ../examples/{name}\n:language: python\n```\n"
 
 
 def _automatic(name: str) -> str:
