@@ -289,7 +289,7 @@ def find(name: str) -> type[Record]:
     """The record of the effect ``name``; KeyError where there is none."""
     if name not in {module.name for module in pkgutil.iter_modules(__path__)}:
         raise KeyError(name)
-    return outside.only_record(importlib.import_module(f"{__name__}.{name}"), __path__, Effect | FieldEffect)
+    return outside.only_record(importlib.import_module(f"{__name__}.{name}"), __path__, (Effect, FieldEffect))
 
 
 def make(name: str, **parameters: Any) -> "Effect":

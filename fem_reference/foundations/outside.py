@@ -3,10 +3,10 @@
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from types import ModuleType, UnionType
-from typing import Any
+from types import ModuleType
 
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.records import Record
 
 SETTING = "FEM_REFERENCE_EFFECTS"
 _PACKAGE = Path(__file__).resolve().parent.parent
@@ -17,7 +17,7 @@ def folders() -> list[str]:
     return [str(Path(folder).absolute()) for folder in os.environ.get(SETTING, "").split(os.pathsep) if folder]
 
 
-def only_record(module: ModuleType, places: Sequence[str], kinds: UnionType) -> Any:
+def only_record(module: ModuleType, places: Sequence[str], kinds: tuple[type[Record], ...]) -> type[Record]:
     """The one record of ``kinds`` that a ``module`` defines, whose file stands in one of the ``places`` and in no other."""
     name = module.__name__.rpartition(".")[2]
     found = [place for place in places if (Path(place) / f"{name}.py").is_file()]
