@@ -1,5 +1,7 @@
 """The examples: short, and each ends in the number that it should."""
 
+import importlib.util
+import json
 import re
 import shutil
 import subprocess
@@ -54,6 +56,32 @@ def test_it_ends_in_its_number(folder: Path, name: str) -> None:
     printed = output(folder, str(EXAMPLES / f"{name}.py"))
     number = re.findall(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?", printed.splitlines()[-1])[-1]
     assert float(number) == ENDS[name]
+
+
+# The last number of the last cell.
+NOTEBOOKS = {
+    "fast_solvers": pytest.approx(0.90, abs=0.05),  # pinned
+    "rod": pytest.approx(2, abs=1e-3),  # linear elements
+}
+
+
+def test_every_notebook_has_a_number_and_is_stored_without_output() -> None:
+    assert {path.stem for path in EXAMPLES.glob("*.ipynb")} == set(NOTEBOOKS)
+    for path in EXAMPLES.glob("*.ipynb"):
+        cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+        assert not any(cell.get("outputs") for cell in cells), path.name
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not processes.installed(), reason="FEniCSx is not installed")
+@pytest.mark.parametrize("name", sorted(NOTEBOOKS))
+def test_a_notebook_ends_in_its_number(folder: Path, name: str) -> None:
+    if not all(importlib.util.find_spec(package) for package in ("nbclient", "ipykernel")):
+        pytest.skip("nbclient and ipykernel are not installed (extra dev)")
+    shutil.copy(EXAMPLES / "own_scene.py", folder)
+    shutil.copy(EXAMPLES / f"{name}.ipynb", folder)
+    printed = output(folder, str(Path(__file__).with_name("run_notebook.py")), f"{name}.ipynb")
+    assert float(printed.split()[-1]) == NOTEBOOKS[name]
 
 
 @pytest.mark.slow
