@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-collect_ignore = ["foreign_solver.py"]  # a program: it runs where it is imported
+collect_ignore = ["foreign_solver.py", "run_notebook.py"]  # programs: they run where they are imported
 # Of these files each test takes long, and only those of one parameter, a case or an entry, have something in common; the tests of
 # any other file share its fixtures.
 SINGLE = ("test_cases.py", "test_verification_entries.py")

@@ -1,12 +1,11 @@
 """The package as Python has it: a case from file to page in a few lines, and a body from scratch."""
 
-import re
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
+import pages
 import pytest
 import small
 
@@ -17,8 +16,7 @@ from fem_reference.solvers.fenicsx import processes
 
 pytestmark = pytest.mark.slow
 
-README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
-(STRETCHED_BLOCK,) = (block for block in re.findall(r"```python\n(.*?)```", README, re.DOTALL) if "Prescribed" in block)
+STRETCHED_BLOCK = pages.snippet("docs/python.md", "Prescribed")
 
 
 def test_every_public_name_is_there_and_said_what_it_is() -> None:
@@ -158,7 +156,7 @@ def test_a_reference_is_compared_exported_and_written(tmp_path) -> None:
 
 
 @pytest.mark.skipif(not processes.installed(), reason="FEniCSx is not installed")
-def test_the_script_of_the_readme_stretches_a_block_in_25_lines(tmp_path) -> None:
+def test_the_script_of_the_pages_stretches_a_block_in_25_lines(tmp_path) -> None:
     assert len(STRETCHED_BLOCK.strip().splitlines()) <= 25
     script = tmp_path / "block.py"
     script.write_text(STRETCHED_BLOCK)

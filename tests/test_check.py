@@ -1,13 +1,13 @@
-"""The verb ``check`` on a small case: exit statuses, files, what is bad input, and the example of the README."""
+"""The verb ``check`` on a small case: exit statuses, files, what is bad input, and the example of the page."""
 
 import json
-import re
 import shutil
 import sys
 from pathlib import Path
 from types import SimpleNamespace
 from xml.etree import ElementTree
 
+import pages
 import pytest
 import small
 import stand_ins
@@ -21,9 +21,8 @@ from fem_reference.solvers import fenicsx, pbd
 
 pytestmark = pytest.mark.slow
 
-# What the README shows, in the repository of a user.
-README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
-EXAMPLE = next(block for block in re.findall(r"```python\n(.*?)```", README, re.DOTALL) if "write_frames" in block)
+# What the page shows, in the repository of a user.
+EXAMPLE = pages.snippet("docs/your_own_solver.md", "write_frames")
 
 
 def swell(problem, _settings, sink) -> Outcome:

@@ -20,12 +20,15 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field, field_validator
 
+from fem_reference.foundations import outside
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.functions import Functions, Numpy
 from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.limits import Limit
 from fem_reference.foundations.records import Record, parse
 from fem_reference.foundations.units import unit_of, written
+
+__path__ += outside.folders()
 
 
 @dataclass(frozen=True)
@@ -266,13 +269,7 @@ def find(name: str) -> type[Record]:
     """The record of the effect ``name``; KeyError where there is none."""
     if name not in {module.name for module in pkgutil.iter_modules(__path__)}:
         raise KeyError(name)
-    module = importlib.import_module(f"{__name__}.{name}")
-    (record,) = (
-        entry
-        for entry in vars(module).values()
-        if isinstance(entry, type) and issubclass(entry, Effect | FieldEffect) and entry.__module__ == module.__name__
-    )
-    return record
+    return outside.only_record(importlib.import_module(f"{__name__}.{name}"), __path__, (Effect, FieldEffect))
 
 
 def make(name: str, **parameters: Any) -> "Effect":

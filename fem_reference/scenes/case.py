@@ -6,12 +6,14 @@
 import hashlib
 import json
 import os
+import sys
 from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 from pydantic import ConfigDict, Field
 
+from fem_reference.foundations import outside
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.markup import fact_table
 from fem_reference.foundations.records import FileName, Name, Record, join
@@ -181,13 +183,15 @@ class Case(Record):
     @property
     def key(self) -> str:
         """A hash over everything that determines the solution: the keys of ``determined_by``, the effects, and the content of
-        the files that they name.
+        the files that they name and that effects from outside the package are.
         """
         tables = self.model_dump(mode="json", include=set(self.determined_by))
         tables["effect"] = [[type(effect).__name__, effect.model_dump(mode="json")] for effect in self.effects]
         digest = hashlib.sha256(json.dumps(tables, sort_keys=True).encode())
         for key, text in _files(tables, self.naming_files):
             digest.update(self.file(text, key).read_bytes())
+        for effect in self.effects:
+            digest.update(outside.source(sys.modules[type(effect).__module__]))
         return digest.hexdigest()
 
 

@@ -1,0 +1,206 @@
+"""What the pages of reference say, made from what the code reads: keys of records, verbs, public names, cases.
+
+``fill`` puts it in place of each ``<!-- generated: WHAT -->`` of a page.
+"""
+
+import argparse
+import inspect
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Any, Literal, Union, get_args, get_origin
+
+from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
+from pydantic_core import PydanticUndefined
+
+import fem_reference as fr
+from fem_reference import effects, solvers
+from fem_reference.cli._parser import parser
+from fem_reference.foundations.records import Record, keys
+from fem_reference.foundations.units import length_unit, unit_of
+from fem_reference.scenes import casefile
+from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.scenes.scalar import ScalarCase
+
+EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
+_BOUNDS = {Gt: ("gt", ">"), Ge: ("ge", "≥"), Lt: ("lt", "<"), Le: ("le", "≤")}
+_WORDS = {str: "text", float: "number", int: "whole number", bool: "true or false", NoneType: "", Any: "any"}
+
+
+def fill(text: str) -> str:
+    """``text`` of a page with what is generated in its places."""
+    return re.sub(r"<!-- generated: (\w+) -->\n", lambda found: GENERATED[found[1]](), text)
+
+
+def scene_records() -> list[type[Record]]:
+    """The records of scene files: each case, and all that it is made of, once."""
+    return list(dict.fromkeys(inner for case in (MuscleCase, ScalarCase) for inner in _and_below(case)))
+
+
+def solver_records() -> dict[str, list[type[Record]]]:
+    """By the name of a solver the records of its settings, for whatever it solves."""
+    return {
+        name: list(dict.fromkeys(record for offer in solvers.offers(name) for record in _and_below(offer.settings)))
+        for name in solvers.names()
+    }
+
+
+def effect_records() -> dict[str, list[type[Record]]]:
+    """By the name of an effect its record and those inside."""
+    return {name: list(_and_below(effects.find(name))) for name in effects.names(Record)}
+
+
+def scenes() -> str:
+    """The keys of scene files."""
+    return "".join(_section(record.__name__, record) for record in scene_records())
+
+
+def settings() -> str:
+    """The settings of solvers."""
+    return _sections(solver_records())
+
+
+def laws() -> str:
+    """The effects with their formulas."""
+    return _sections(effect_records())
+
+
+def verbs() -> str:
+    """The help of each verb."""
+    (kinds,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
+    return "\n".join(f"### {name}\n\n```text\n{verb.format_help()}```\n" for name, verb in kinds.choices.items())
+
+
+def api() -> str:
+    """The public names."""
+    return "\n".join(_automatic(name) for name in fr.__all__)
+
+
+def gallery() -> str:
+    """The shipped cases."""
+    return "\n".join(_shown(casefile.read(name)) for name in casefile.cases())
+
+
+def examples() -> str:
+    """The scripts, whole."""
+    scripts = sorted(EXAMPLES.glob("*.py")) + sorted(EXAMPLES.glob("effects/*.py"))
+    return "\n".join(_script(path.relative_to(EXAMPLES).as_posix()) for path in scripts)
+
+
+GENERATED: dict[str, Callable[[], str]] = {
+    "scenes": scenes,
+    "solvers": settings,
+    "effects": laws,
+    "verbs": verbs,
+    "api": api,
+    "gallery": gallery,
+    "examples": examples,
+}
+
+
+def _script(name: str) -> str:
+    return f"## {name}\n\n```{{literalinclude}} ../examples/{name}\n:language: python\n```\n"
+
+
+def _automatic(name: str) -> str:
+    entry = getattr(fr, name)
+    kind = (
+        ("autoexception" if issubclass(entry, Exception) else "autoclass") if inspect.isclass(entry) else "autofunction"
+    )
+    members = "   :members:\n" if kind == "autoclass" and not issubclass(entry, Record) else ""
+    return f"## {name}\n\n```{{eval-rst}}\n.. {kind}:: fem_reference.{name}\n{members}```\n"
+
+
+def _shown(case: Any) -> str:
+    candidates = ", ".join(f"`{one.name}`" for one in case.candidate) or "none"
+    rows = [*case.facts.items(), ("effects", ", ".join(case.acting)), ("reference", f"`{case.reference.solver}`")]
+    table = "".join(f"| {name} | {_cell(text)} |\n" for name, text in [*rows, ("candidates", candidates)])
+    return f"## {case.name}\n\n{case.title}. {case.proves}\n\n| | |\n|---|---|\n{table}"
+
+
+def _sections(records: dict[str, list[type[Record]]]) -> str:
+    """A section a name, with the first record's table and those that it is made of below it, each record once."""
+    made, seen = "", set()
+    for name, of_it in records.items():
+        for record in of_it:
+            title = f"`{name}`" if record is of_it[0] else f"{record.__name__} of `{name}`"
+            made += "" if record in seen else _section(title, record)
+            seen.add(record)
+    return made
+
+
+def _section(title: str, record: type[Record]) -> str:
+    rows = [_row(name, record.model_fields[name]) for name in keys(record)]
+    table = "| key | value | without it |\n|---|---|---|\n" + "".join(rows) if rows else "No keys of its own.\n"
+    return f"### {title}\n\n{_markdown(inspect.getdoc(record) or '')}\n\n{table}\n"
+
+
+def _row(name: str, field: Any) -> str:
+    default = field.default_factory() if field.default_factory else field.default
+    absent = {PydanticUndefined: "required", None: "none"}.get(_hashable(default)) or f"`{_plain(default)}`"
+    return f"| `{name}` | {_cell(_value(field.annotation, field.metadata))} | {_cell(absent)} |\n"
+
+
+def _value(annotation: Any, metadata: Any = ()) -> str:
+    """What may stand as the value of a key, in words."""
+    unit, origin, inside = unit_of(metadata), get_origin(annotation), get_args(annotation)
+    if any(getattr(entry, "func", None) is length_unit for entry in metadata):
+        return 'unit of length, such as `"mm"`'
+    bounds = [
+        f"{sign} {getattr(one, key):g}" for one in metadata for of, (key, sign) in _BOUNDS.items() if type(one) is of
+    ]
+    bounds += [f"at least {one.min_length}" for one in metadata if isinstance(one, MinLen)]
+    bounds += [f"at most {one.max_length}" for one in metadata if isinstance(one, MaxLen)]
+    after = f" ({', '.join(bounds)})" if bounds else ""
+    if unit:
+        return f"{'three quantities' if origin is tuple else 'quantity'}, kept in {unit}{after}"
+    if hasattr(annotation, "__metadata__"):
+        return _value(annotation.__origin__, (*annotation.__metadata__, *metadata))
+    if origin is Literal:
+        return " or ".join(f"`{_plain(value)}`" for value in inside) + after
+    if origin in (Union, UnionType):
+        return " or ".join(dict.fromkeys(filter(None, map(_value, inside)))) + after
+    if origin is tuple and inside[-1:] == (Ellipsis,):
+        return f"list of {_value(inside[0])}{after}"
+    if origin is tuple:
+        return f"list of {len(inside)}: {_value(inside[0])}{after}"
+    if origin is dict:
+        return f"table of {_value(inside[1])}{after}"
+    if isinstance(annotation, type) and issubclass(annotation, Record):
+        return f"table {annotation.__name__}"
+    return _WORDS.get(annotation, getattr(annotation, "__name__", str(annotation))) + after
+
+
+def _and_below(record: type[Record]) -> Iterator[type[Record]]:
+    """A record and every record that its keys are made of; effects have pages of their own."""
+    yield record
+    for name in keys(record):
+        yield from (inner for kind in _kinds(record.model_fields[name].annotation) for inner in _and_below(kind))
+
+
+def _kinds(annotation: Any) -> Iterator[type[Record]]:
+    if isinstance(annotation, type) and issubclass(annotation, Record):
+        yield annotation
+    for inside in (*get_args(annotation), *((annotation.__origin__,) if hasattr(annotation, "__metadata__") else ())):
+        yield from _kinds(inside)
+
+
+def _markdown(docstring: str) -> str:
+    """A docstring as Markdown: its roles are plain code, its double backticks single ones."""
+    return re.sub(r":\w+:`~?([^`]+)`", r"`\1`", docstring).replace("``", "`")
+
+
+def _cell(text: str) -> str:
+    return str(text).replace("|", "\\|").replace("\n", " ")
+
+
+def _plain(value: Any) -> str:
+    """A value as a scene file writes it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f'"{value}"' if isinstance(value, str) else str(list(value) if isinstance(value, tuple) else value)
+
+
+def _hashable(value: Any) -> Any:
+    return value if value is None or value is PydanticUndefined else ""

@@ -1,0 +1,19 @@
+"""How far may the reference itself be from the truth? Its error bars, and what is known of a candidate with them."""
+
+from own_scene import PBD, make
+
+import fem_reference as fr
+
+case = make()
+reference = fr.solve(case)
+bars = fr.error_bars(case, reference, progress=print)
+if bars is None:
+    raise SystemExit(f"the reference has none: {reference.outcome.message}")
+result = fr.compare(case, reference, [fr.solve(case, "pbd", **PBD)], error_bars=bars)
+
+deviation = result["pbd", "surface_deviation", "rms"]
+bar = bars.find("deviation", "surface_deviation", "rms")
+assert bar is not None
+for number, value, known in zip(reference.numbers, deviation.values, bar.values, strict=True):
+    print(f"frame {number}: {value:.3f} mm, known to {known:.3f} mm")
+print("bar over deviation in the worst frame:", bar.values[deviation.worst] / deviation.values[deviation.worst])

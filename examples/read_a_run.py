@@ -1,0 +1,27 @@
+"""A stored run in numpy, and the same file by ParaView's reader: the greatest displacement of the muscle's surface."""
+
+import json
+
+import numpy as np
+import pyvista
+from own_scene import make
+
+import fem_reference as fr
+
+case = make()
+run = fr.solve(case)  # solved before, it is read
+assert run.folder is not None
+facts = json.loads((run.folder / "run.json").read_text(encoding="utf-8"))
+print(facts["status"], "after", facts["cost"]["newton_iterations"], "Newton iterations, in", run.folder)
+
+moved = np.linalg.norm(run.positions - run.surface.points, axis=2)  # (f, n) [mm]
+print("by frame [mm]:", dict(zip(run.numbers, moved.max(axis=1).round(3).tolist(), strict=True)))
+if run.fibre_positions is not None and run.fibres is not None:
+    print("fibres:", len(run.fibres.offsets) - 1, "with", run.fibre_positions.shape[1], "points")
+
+# ParaView: File > Open > surface.pvd, then Apply. The reader of VTK behind it, in Python:
+reader = pyvista.get_reader(run.folder / "surface.pvd")
+reader.set_active_time_value(reader.time_values[-1])
+points = np.asarray(reader.read()[0].points)
+print("largest difference of the two [mm]:", np.abs(points - run.positions[-1]).max())
+print("greatest displacement [mm]:", moved.max())

@@ -1,0 +1,36 @@
+"""Effects of one's own: files outside the package, in the folders that the setting FEM_REFERENCE_EFFECTS lists."""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from types import ModuleType
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.records import Record
+
+SETTING = "FEM_REFERENCE_EFFECTS"
+_PACKAGE = Path(__file__).resolve().parent.parent
+
+
+def folders() -> list[str]:
+    """The folders that the setting lists, which are divided as those of PATH are."""
+    return [str(Path(folder).absolute()) for folder in os.environ.get(SETTING, "").split(os.pathsep) if folder]
+
+
+def only_record(module: ModuleType, places: Sequence[str], kinds: tuple[type[Record], ...]) -> type[Record]:
+    """The one record of ``kinds`` that a ``module`` defines, whose file stands in one of the ``places`` and in no other."""
+    name = module.__name__.rpartition(".")[2]
+    found = [place for place in places if (Path(place) / f"{name}.py").is_file()]
+    if len(found) > 1:
+        raise InputError(SETTING, f'"{name}" in {" and in ".join(found)}', "effects of different names")
+    own = [one for one in vars(module).values() if isinstance(one, type) and one.__module__ == module.__name__]
+    records = [one for one in own if issubclass(one, kinds)]
+    if len(records) != 1:
+        raise InputError(str(module.__file__), f"{len(records)} effects", "one class that is an effect")
+    return records[0]
+
+
+def source(module: ModuleType) -> bytes:
+    """What stands in the file of a ``module`` outside the package, and nothing of one inside: its code counts elsewhere."""
+    file = Path(str(module.__file__)).resolve()
+    return b"" if file.is_relative_to(_PACKAGE) else file.read_bytes()

@@ -1,0 +1,126 @@
+"""The documentation: it builds, nothing is missing in its reference, and its commands and snippets are such."""
+
+import argparse
+import importlib.util
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+
+import pages
+import pytest
+import reference_pages
+
+import fem_reference as fr
+from fem_reference import effects, metrics, solvers
+from fem_reference.cli._parser import parser
+from fem_reference.foundations.records import keys, parse
+from fem_reference.scenes import casefile
+from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.scenes.scalar import ScalarCase
+
+
+def listed(page: str, heading: str) -> list[str]:
+    """The names at the beginning of rows of the first table of a page whose head begins with ``heading``."""
+    text = pages.page(page)
+    return re.findall(r"^\| `(\w+)", text[text.index(f"| {heading} |") :].split("\n\n")[0], re.MULTILINE)
+
+
+def test_tables_list_what_there_is() -> None:
+    (verbs,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
+    assert sorted(set(listed("docs/command_line.md", "verb"))) == sorted(verbs.choices)
+    assert sorted(listed("docs/fast_solvers.md", "solver")) == solvers.names("solve")
+    assert sorted(listed("docs/measures.md", "metric")) == metrics.names()
+
+
+def test_every_effect_of_a_muscle_is_in_the_table() -> None:
+    text = pages.page("docs/laws.md")
+    table = text[text.index("| effect |") :].split("\n\n")[0]
+    first = "".join(row.split("|")[1] for row in table.splitlines())
+    assert sorted(re.findall(r"`(\w+)`", first)) == effects.names()
+
+
+def test_every_key_of_every_record_is_in_the_reference() -> None:
+    scene, laws, settings = (reference_pages.GENERATED[what]() for what in ("scenes", "effects", "solvers"))
+    places = [(scene, reference_pages.scene_records())]
+    places += [(laws, records) for records in reference_pages.effect_records().values()]
+    places += [(settings, records) for records in reference_pages.solver_records().values()]
+    for text, records in places:
+        for record in records:
+            section = next(part for part in text.split("### ") if _said(record) in part)
+            assert re.findall(r"^\| `(\w+)` \|", section, re.MULTILINE) == keys(record), record
+    assert {MuscleCase, ScalarCase} < set(reference_pages.scene_records())
+    assert sorted(reference_pages.effect_records()) == effects.names(reference_pages.Record)
+    for name, records in reference_pages.solver_records().items():
+        assert {offer.settings for offer in solvers.offers(name)} <= set(records)
+    assert not re.search(r"annotated|typing|<class", scene + laws + settings, re.IGNORECASE)
+
+
+def _said(record: type) -> str:
+    """What begins the section of a record, apart from its heading."""
+    return reference_pages._section("", record).partition("\n")[2].strip()
+
+
+def test_every_public_name_verb_and_case_is_in_the_reference() -> None:
+    assert re.findall(r"^## (\w+)$", reference_pages.api(), re.MULTILINE) == fr.__all__
+    assert re.findall(r"^## (\w+)$", reference_pages.gallery(), re.MULTILINE) == fr.cases()
+    (verbs,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
+    assert re.findall(r"^### (\w+)$", reference_pages.verbs(), re.MULTILINE) == sorted(verbs.choices)
+    places = re.findall(r"<!-- generated: (\w+) -->", "".join(pages.page(name) for name in pages.PAGES))
+    assert sorted(places) == sorted(reference_pages.GENERATED)
+
+
+def test_every_page_is_in_a_table_of_contents() -> None:
+    listed = set(re.findall(r"^(\w+)$", pages.page("docs/index.md"), re.MULTILINE))
+    assert {f"docs/{name}.md" for name in listed} == set(pages.PAGES) - {"README.md", "docs/index.md"}
+
+
+def commands() -> list[tuple[str, str]]:
+    """Every command line of ours in the pages, without its comment."""
+    lines = [(name, line) for name, text in pages.snippets("sh") for line in text.splitlines()]
+    return [(name, line) for name, line in lines if re.match(r"(\./fem|fem-reference) ", line)]
+
+
+def test_commands_can_be_given() -> None:
+    reader = parser()
+    for page, line in commands():
+        words = shlex.split(line, comments=True)[1:]
+        try:
+            if words[0] not in ("test", "docs"):
+                reader.parse_args(words)
+        except SystemExit:
+            pytest.fail(f"{page}: {line}")
+
+
+def test_python_is_python() -> None:
+    found = list(pages.snippets("python"))
+    assert len(found) >= 5
+    for name, text in found:
+        compile(text, name, "exec")
+
+
+def test_scenes_and_effects_can_be_read() -> None:
+    whole = 0
+    for name, text in pages.snippets("toml"):
+        table = tomllib.loads(text)
+        if "reference" in table and "title" in table:
+            assert fr.make_case(table, name="my_muscle").numbers, name
+            whole += 1
+        elif "effect" in table:
+            for i, effect in enumerate(table["effect"]):
+                record = effects.find(effect.pop("name"))
+                assert isinstance(parse(record, effect, f"{name}: effect[{i}]"), record)
+    assert whole >= 1
+    assert casefile.cases()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not importlib.util.find_spec("sphinx"), reason="Sphinx is not installed (extra docs)")
+def test_the_pages_build_without_a_warning_and_load_nothing_from_elsewhere(tmp_path) -> None:
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", "docs", str(tmp_path)]
+    done = subprocess.run(command, cwd=pages.ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    for path in tmp_path.glob("*.html"):
+        assert not re.search(r"(src|<link[^>]*href)=\"(https?:)?//", path.read_text(encoding="utf-8")), path.name
+    assert "compare" in (tmp_path / "api.html").read_text(encoding="utf-8")
