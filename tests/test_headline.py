@@ -45,7 +45,7 @@ def test_a_candidate_that_nobody_judged_says_so_and_its_numbers(words, tmp_path:
     assert cli.main(words) == cli.DONE
     found = head(tmp_path)
     assert '<span class="badge not">not judged</span> <b>pbd</b>: ' in found
-    assert "up to 2 mm" in found  # 0.1 mm times frame 20, everywhere
+    assert "surface off by up to 2 mm rms; " in found  # 0.1 mm times frame 20, everywhere
     assert '<span class="badge pass">pass</span> <b>reference</b>: 1 of 1 of its own checks met; ' in found
     assert "unstable equilibrium in 1 of 5 frames; det F falls to 0.05" in found
 

@@ -22,13 +22,13 @@ from fem_reference.report.words import listed, number, ratio
 from fem_reference.runs.cost import seconds_per_frame
 from fem_reference.runs.store import Run
 
-# What the headline says of a candidate; of a field the last two.
+# What the headline says of a candidate, and how; of a field the last two.
 _HEADLINE = (
-    ("surface_deviation", "rms"),
-    ("fibre_length", "rms_percent"),
-    ("volume", "deviation"),
-    ("difference", "max"),
-    ("l2_error", "norm"),
+    ("surface_deviation", "rms", "surface off by up to {} rms"),
+    ("fibre_length", "rms_percent", "lengths of fibres by {} rms"),
+    ("volume", "deviation", "volume by {}"),
+    ("difference", "max", "off by up to {}"),
+    ("l2_error", "norm", "L2 error {}"),
 )
 _LOW = 0.1  # det F, below which a state is hardly valid
 
@@ -111,14 +111,14 @@ def headlines(comparison: Comparison) -> list[tuple[str, str, str]]:
 def _greatest(comparison: Comparison, run: Run) -> str:
     """The greatest deviations of a candidate, with the error bars of the reference."""
     said = []
-    for metric, statistic in _HEADLINE:
+    for metric, statistic, words in _HEADLINE:
         one = find(comparison.deviations.get(run.name, ()), metric, statistic)
         if one is None:
             continue
         at = worst(run, one)
         bar = _bar_at(comparison, "deviation", metric, statistic, at["frame"]) if math.isfinite(at["value"]) else None
         value = f"{number(at['value'])}{f' ± {number(bar)}' if bar is not None else ''} {one.unit}".strip()
-        said.append(f"{label_of(one)} up to {value}")
+        said.append(words.format(value))
     return "; ".join(said) or "nothing of it can be measured"
 
 
