@@ -122,9 +122,11 @@ class Subject:
             raise RuntimeError(f"{self.words} ended with {process.returncode}: {errors[-1000:]}")
         return _ended(self.place / out, self.place / f"{out}-tmp")
 
-    def kill(self, out: str, after: float) -> bool:
-        """Start it, and kill it, and nobody else, after so many seconds; whether it still ran."""
-        process = self.start(out)
+    def kill(self, out: str, after: float, frames: int = 0) -> bool:
+        """Start it, and kill it, and nobody else, so many seconds after so many more frames are stored; whether it still ran."""
+        process, stored = self.start(out), self.stored(out)
+        while process.poll() is None and self.stored(out) < stored + frames:
+            time.sleep(0.01)
         try:
             process.communicate(timeout=after)
         except subprocess.TimeoutExpired:
@@ -132,6 +134,10 @@ class Subject:
             process.communicate()
             return True
         return False
+
+    def stored(self, out: str) -> int:
+        """How many frames of its runs are stored."""
+        return len(list((self.place / out).glob("runs/*/surface/frame_*.vtp")))
 
     def compare(self, end: dict[str, Any]) -> list[str]:
         """What is not as where nothing befell it."""
@@ -147,14 +153,17 @@ class Subject:
 
 def trial(subject: Subject, number: int, moments: random.Random) -> tuple[str, list[str]]:
     """Kill a command once or twice, let it end, and compare."""
-    out = f"out{number}"
-    times = [subject.seconds * moments.uniform(0.1, 0.95) for _ in range(moments.choice((1, 1, 2)))]
-    killed = [subject.kill(out, after) for after in times]
+    out, frames = f"out{number}", subject.stored("whole")
+    times = [(subject.seconds * moments.uniform(0.1, 0.95), 0), (moments.uniform(0, 0.3), moments.randrange(1, frames))]
+    chosen = moments.choice((times[:1], times[1:], times[1:], [times[1], times[1]]))
+    killed = [subject.kill(out, *one) for one in chosen]
     found = subject.compare(subject.finish(out))
     shutil.rmtree(subject.place / out)
-    return ", ".join(
-        f"{after:.1f} s{'' if dead else ' (it had ended)'}" for after, dead in zip(times, killed, strict=True)
-    ), found
+    said = [
+        f"{after:.2f} s after {stored} frames{'' if dead else ' (it had ended)'}"
+        for (after, stored), dead in zip(chosen, killed, strict=True)
+    ]
+    return ", then ".join(said), found
 
 
 def main() -> int:
