@@ -131,7 +131,7 @@ def _sections(records: dict[str, list[type[Record]]]) -> str:
 
 
 def _section(title: str, record: type[Record]) -> str:
-    rows = [_row(name, record.model_fields[name]) for name in keys(record)]
+    rows = [_row(key, field) for key, field in _fields(record).items()]
     table = "| key | value | without it |\n|---|---|---|\n" + "".join(rows) if rows else "No keys of its own.\n"
     return f"### {title}\n\n{_markdown(inspect.getdoc(record) or '')}\n\n{table}\n"
 
@@ -175,8 +175,14 @@ def _value(annotation: Any, metadata: Any = ()) -> str:
 def _and_below(record: type[Record]) -> Iterator[type[Record]]:
     """A record and every record that its keys are made of; effects have pages of their own."""
     yield record
-    for name in keys(record):
-        yield from (inner for kind in _kinds(record.model_fields[name].annotation) for inner in _and_below(kind))
+    for field in _fields(record).values():
+        yield from (inner for kind in _kinds(field.annotation) for inner in _and_below(kind))
+
+
+def _fields(record: type[Record]) -> dict[str, Any]:
+    """The fields of a record by the keys that files have."""
+    found = {field.alias or name: field for name, field in record.model_fields.items()}
+    return {key: found[key] for key in keys(record)}
 
 
 def _kinds(annotation: Any) -> Iterator[type[Record]]:
