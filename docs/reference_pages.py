@@ -148,7 +148,7 @@ def _sections(records: dict[str, list[type[Record]]]) -> str:
 
 
 def _section(title: str, record: type[Record]) -> str:
-    rows = [_row(key, field) for key, field in _fields(record).items()]
+    rows = [_row(name, field) for name, field in _fields(record).items()]
     table = "| key | value | without it |\n|---|---|---|\n" + "".join(rows) if rows else "No keys of its own.\n"
     return f"### {title}\n\n{_markdown(inspect.getdoc(record) or '')}\n\n{table}\n"
 
@@ -198,8 +198,8 @@ def _and_below(record: type[Record]) -> Iterator[type[Record]]:
 
 def _fields(record: type[Record]) -> dict[str, Any]:
     """The fields of a record by the keys that files have."""
-    found = {field.alias or name: field for name, field in record.model_fields.items()}
-    return {key: found[key] for key in keys(record)}
+    named = {field.alias or name: field for name, field in record.model_fields.items()}
+    return {key: named[key] for key in keys(record)}
 
 
 def _kinds(annotation: Any) -> Iterator[type[Record]]:

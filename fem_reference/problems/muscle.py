@@ -34,6 +34,7 @@ from fem_reference.geometry import block
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.fibres import Directions
 from fem_reference.geometry.intersections import self_intersections
+from fem_reference.geometry.kept_meshes import cached as cached_mesh
 from fem_reference.geometry.nested import refined
 from fem_reference.geometry.rigid_bodies import CLOSED_FORMS, Obstacle
 from fem_reference.geometry.sectors import attached_area, attached_shares
@@ -56,6 +57,11 @@ DISTANCE_MARGIN = 12.0
 def kept_distances() -> Path:
     """The folder where grids of distances are kept; it may be deleted."""
     return platformdirs.user_cache_path("fem_reference") / "distances"
+
+
+def kept_meshes() -> Path | None:
+    """The folder where tetrahedra are kept; it may be deleted. None: they are made each time."""
+    return platformdirs.user_cache_path("fem_reference") / "meshes"
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,7 +240,8 @@ def _filled(scene: MuscleCase, rest: Setup, size: float) -> TetMesh:
     """
     shares = {attached.attachment: attached_shares(rest.surface, attached.vertices) for attached in rest.attached}
     blocks = scene.muscle.mesher == "block"
-    mesh = block.fill(rest.surface, size) if blocks else tetrahedralise(rest.surface, size, shares)
+    filled = partial(cached_mesh, tetrahedralise, shares=shares, folder=kept_meshes())
+    mesh = block.fill(rest.surface, size) if blocks else filled(rest.surface, size)
     if set(mesh.facets) == set(shares):
         return mesh
     return replace(mesh, facets={name: facets_under(mesh, rest.surface, attached) for name, attached in shares.items()})

@@ -1,0 +1,72 @@
+"""Tetrahedra that were made before are read, as they were made; whatever they depend on makes others."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapes
+
+from fem_reference.foundations.mesh import Surface, TetMesh
+from fem_reference.geometry import kept_meshes
+from fem_reference.geometry.kept_meshes import cached
+
+BOX = shapes.skin(shapes.box((2, 2, 2), (10, 10, 10)))
+SHARES = {"top": np.ones((len(BOX.triangles), 3))}
+
+
+class Mesher:
+    """Counts what it is asked for."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def __call__(self, _: Surface, size: float, shares: dict) -> TetMesh:
+        self.count += 1
+        tets = shapes.box((1, 1, 1), (size, size, size))
+        return TetMesh(tets.points, tets.tets, {name: np.array([[0, 1, 2]]) for name in shares}, "gmsh")
+
+
+def test_what_was_made_is_read_bit_by_bit(tmp_path: Path) -> None:
+    mesher = Mesher()
+    made, read = (cached(mesher, BOX, 3.0, SHARES, tmp_path / "kept") for _ in range(2))
+    assert mesher.count == 1
+    assert np.array_equal(read.points, made.points)
+    assert np.array_equal(read.tets, made.tets)
+    assert read.maker == made.maker
+    assert list(read.facets) == ["top"]
+    assert np.array_equal(read.facets["top"], made.facets["top"])
+    assert [path.suffix for path in (tmp_path / "kept").iterdir()] == [".npz"]
+
+
+def test_another_surface_size_attachment_or_code_is_another_mesh(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mesher, half = Mesher(), {"top": SHARES["top"] / 2}
+    moved = Surface(BOX.points + 1e-9, BOX.triangles, "")
+    for surface, size, shares in (
+        (BOX, 3.0, SHARES),
+        (moved, 3.0, SHARES),
+        (BOX, 3.1, SHARES),
+        (BOX, 3.0, half),
+        (BOX, 3.0, {"bottom": SHARES["top"]}),
+    ):
+        cached(mesher, surface, size, shares, tmp_path)
+    assert mesher.count == 5
+    monkeypatch.setattr(kept_meshes, "_code", lambda: "another")
+    cached(mesher, BOX, 3.0, SHARES, tmp_path)
+    assert mesher.count == 6
+    assert cached(mesher, BOX, 3.0, SHARES, None).maker == "gmsh"
+    assert mesher.count == 7
+
+
+def test_a_damaged_file_is_made_anew_and_a_folder_that_cannot_be_is_no_reason_to_fail(tmp_path: Path, caplog) -> None:
+    mesher = Mesher()
+    cached(mesher, BOX, 3.0, SHARES, tmp_path)
+    (path,) = tmp_path.iterdir()
+    path.write_bytes(path.read_bytes()[:100])
+    assert cached(mesher, BOX, 3.0, SHARES, tmp_path).maker == "gmsh"
+    assert mesher.count == 2
+    assert "damaged, made anew" in caplog.text
+    (tmp_path / "file").write_text("")
+    assert cached(mesher, BOX, 3.0, SHARES, tmp_path / "file" / "kept").maker == "gmsh"
+    assert "not kept" in caplog.text
