@@ -16,12 +16,16 @@ from pydantic_core import PydanticUndefined
 
 import fem_reference as fr
 from fem_reference import effects, solvers
+from fem_reference.assessment.baseline import Baseline
 from fem_reference.cli._parser import parser
 from fem_reference.foundations.records import Record, keys
 from fem_reference.foundations.units import length_unit, unit_of
+from fem_reference.runs.contents import Contents
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.scenes.scalar import ScalarCase
+from fem_reference.solvers.recorded import About
+from fem_reference.studies.hard.records import Hard
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 _BOUNDS = {Gt: ("gt", ">"), Ge: ("ge", "≥"), Lt: ("lt", "<"), Le: ("le", "≤")}
@@ -49,6 +53,18 @@ def solver_records() -> dict[str, list[type[Record]]]:
 def effect_records() -> dict[str, list[type[Record]]]:
     """By the name of an effect its record and those inside."""
     return {name: list(_and_below(effects.find(name))) for name in effects.names(Record)}
+
+
+def file_records() -> dict[str, list[type[Record]]]:
+    """By the name of another file that people write or read its record and those inside, but those of scenes."""
+    files = {"candidate.toml": About, "a hard case": Hard, "a baseline": Baseline, "run.json": Contents}
+    known = scene_records()
+    return {name: [one for one in dict.fromkeys(_and_below(top)) if one not in known] for name, top in files.items()}
+
+
+def files() -> str:
+    """The keys of other files."""
+    return _sections(file_records())
 
 
 def scenes() -> str:
@@ -90,6 +106,7 @@ def examples() -> str:
 
 GENERATED: dict[str, Callable[[], str]] = {
     "scenes": scenes,
+    "files": files,
     "solvers": settings,
     "effects": laws,
     "verbs": verbs,

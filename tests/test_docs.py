@@ -46,6 +46,7 @@ def test_every_key_of_every_record_is_in_the_reference() -> None:
     places = [(scene, reference_pages.scene_records())]
     places += [(laws, records) for records in reference_pages.effect_records().values()]
     places += [(settings, records) for records in reference_pages.solver_records().values()]
+    places += [(reference_pages.files(), records) for records in reference_pages.file_records().values()]
     for text, records in places:
         for record in records:
             section = next(part for part in text.split("### ") if _said(record) in part)

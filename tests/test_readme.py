@@ -1,42 +1,18 @@
-"""What the README lists is what there is, in both directions."""
+"""The README is short, and what it and the pages link to is there; their tables and snippets are those of test_docs.py."""
 
-import argparse
 import re
-import tomllib
 from pathlib import Path
 
-import fem_reference as fr
-from fem_reference import metrics, solvers
-from fem_reference.cli._parser import parser
+import pages
 
-README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
-
-
-def listed(heading: str) -> list[str]:
-    """The names at the beginning of rows of the first table whose head begins with ``heading``."""
-    table = README[README.index(f"| {heading} |") :].split("\n\n")[0]
-    return re.findall(r"^\| `(\w+)", table, re.MULTILINE)
+LINES, COLUMNS = 130, 120
+README = pages.page("README.md")
 
 
-def test_the_solvers() -> None:
-    assert sorted(listed("solver")) == solvers.names("solve")
-
-
-def test_the_metrics() -> None:
-    assert sorted(listed("metric")) == metrics.names()
-
-
-def test_the_verbs() -> None:
-    (verbs,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
-    assert sorted(set(listed("verb"))) == sorted(verbs.choices)
-
-
-def test_the_scene_is_complete() -> None:
-    scene = README[README.index("## Write a scene") :]
-    table = tomllib.loads(scene.split("```toml\n")[1].split("```")[0])
-    case = fr.make_case(table, name="my_muscle")
-    assert [bone.name for bone in case.bone] == ["femur", "pelvis"]
-    assert case.frames.numbers[-1] == 100
+def test_it_is_short() -> None:
+    lines = README.splitlines()
+    assert len(lines) <= LINES
+    assert not [line for line in lines if len(line) > COLUMNS]
 
 
 def test_nothing_is_left_to_fill_in() -> None:
