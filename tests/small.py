@@ -85,7 +85,7 @@ because = "the bulk modulus is 1000 times the shear modulus"
 
 [negative_control]
 key = "effect[1].bulk"
-value = "40 kPa"
+value = "10 kPa"
 because = "a body that yields loses volume"
 """
 

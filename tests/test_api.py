@@ -192,5 +192,7 @@ def test_a_body_with_a_path_or_setting_that_cannot_be_is_refused_before_it_is_so
     with pytest.raises(fr.InputError, match=r'prescribed "top": path: got displacements \(2,\) of points \(2, 3\)'):
         fr.solve_body(body)
     still = fr.Prescribed("top", "z1", (2,), lambda points, _: 0 * points)
-    with pytest.raises(fr.InputError, match=r"settings\.elemnt: got an unknown key, want one of element"):
+    with pytest.raises(
+        fr.InputError, match=r"settings\.elemnt: got an unknown key, want element, or another one of element"
+    ):
         fr.solve_body(replace(body, prescribed=(still,)), elemnt="P2")

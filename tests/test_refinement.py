@@ -125,7 +125,7 @@ def test_it_is_kept_with_its_run_until_the_metrics_change_or_the_file_is_damaged
     path.write_text("{")
     capsys.readouterr()
     assert call(case, "run")[0] == cli.BAD_INPUT
-    assert "error_bar.json: got JSONDecodeError" in capsys.readouterr().err
+    assert "error_bar.json: got Expecting property name" in capsys.readouterr().err
     again = rows(call(case, "run", "--error-bar")[1], "deviation", "surface_deviation", "rms")
     assert np.array_equal(again, first)
 

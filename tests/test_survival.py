@@ -176,7 +176,7 @@ def test_a_disk_that_is_full_is_one_sentence(tmp_path: Path) -> None:
             check=False,
         )
 
-    full = ended(4_000)
+    full = ended(3_000)
     assert full.returncode == cli.BAD_INPUT
     assert re.fullmatch(r"fem-reference: .*vtp: cannot be written: File too large; .* MB are free .*\n", full.stderr)
     assert [path for path in tmp_path.rglob(".*") if path.suffix != ".lock"] == []

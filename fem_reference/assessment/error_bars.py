@@ -245,7 +245,7 @@ def load(folder: Path, of: dict[str, str]) -> ErrorBars | None:
     if not place.exists():
         return None
     try:
-        table = texts.read_json(place, "the error bar of a stored run")
+        table = texts.read_json(place, "the error bar of a stored run (--error-bar makes it anew)")
         if table["format"] != FORMAT or table["of"] != of:
             return None
         numbers = tuple(int(number) for number in table["numbers"])

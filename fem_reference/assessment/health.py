@@ -196,7 +196,7 @@ QUANTITIES: dict[str, tuple[str, Callable[[Followed], Found]]] = {
 }
 
 
-# Beyond this squeeze mixed elements count negative modes that the material has not (README).
+# Beyond this squeeze mixed elements count negative modes that the material has not (docs/laws.md).
 _CERTAIN = 2 / 3
 
 
