@@ -64,3 +64,9 @@ def test_a_gradient_is_nowhere_steeper_than_said() -> None:
     points = np.random.default_rng(6).uniform(-18, 18, (20_000, 3))
     lengths = np.linalg.norm(grid.sample(points).gradient, axis=1)
     assert 1 <= lengths.max() <= grid.steepest
+
+
+def test_what_overlaps_at_rest_is_felt_more_and_more() -> None:
+    law = Contact("skin", 1.0, 0.1, relaxed=(-4.0, 0.0))
+    assert [law.allowance(frame) for frame in (-5.0, -4.0, -3.0, -2.0, 0.0, 7.0)] == [1, 1, 0.75, 0.5, 0, 0]
+    assert Contact("skin", 1.0, 0.1).allowance(-4.0) == 0

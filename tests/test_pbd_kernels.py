@@ -232,3 +232,12 @@ def test_rigid_motion_costs_nothing(name):
 def test_machine_code_is_kept_by_what_all_loops_are_and_numba_is_left_as_it_was() -> None:
     assert Path(kernels.distance.stats.cache_path).parent == kept_code()
     assert not numba.config.CACHE_DIR
+
+
+def test_a_segment_ends_at_both_ends() -> None:
+    """Beyond an end the distance is that from the end, however near the line passes."""
+    starts, ends = np.array([[0.0, 0, 0], [4.0, 3, 0]]), np.array([[2.0, 0, 0], [6.0, 3, 0]])
+    points = np.array([[5.0, 0.5, 0], [-3.0, 0.5, 0], [1.0, 0.5, 0]])
+    assert kernels.to_segment((5.0, 0.5, 0.0), (0.0, 0.0, 0.0), (2.0, 0.0, 0.0)) == pytest.approx(np.hypot(3, 0.5))
+    assert kernels.to_segment((-3.0, 0.5, 0.0), (0.0, 0.0, 0.0), (2.0, 0.0, 0.0)) == pytest.approx(np.hypot(3, 0.5))
+    assert kernels.nearest_segments(points, starts, ends, 1e-9).tolist() == [1, 0, 0]

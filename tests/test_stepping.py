@@ -69,3 +69,9 @@ def test_what_was_solved_before_needs_no_step() -> None:
 
 def marched_back(attempt, known):
     return list(march(attempt, (0, 10, 20, 30, 40), Steps(10.0, 0.5), lambda frame: frame in known))
+
+
+def test_a_frame_that_is_a_little_further_than_the_largest_step_takes_two() -> None:
+    tried = []
+    list(march(lambda at: tried.append(at) or Attempt(None, 2), (0, 3.5), Steps(3.0, 0.5, 3.0)))
+    assert tried == [1.75, 3.5]
