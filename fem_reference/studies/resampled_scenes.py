@@ -32,7 +32,8 @@ def resample(scene: MuscleCase, setup: Setup, power: int, folder: Path) -> Muscl
         files.write_text(place / f"{name}.csv", "".join(f"{vertex}\n" for vertex in vertices))
     muscle = scene.muscle.model_copy(update={"surface": str(place / "surface.vtp"), "unit": 1.0})
     attachments = tuple(_listed(entry, place) for entry in scene.attachment)
-    return scene.model_copy(update={"muscle": muscle, "attachment": attachments})
+    # No file names these surfaces, so that they may be where they are.
+    return scene.model_copy(update={"muscle": muscle, "attachment": attachments, "from_file": False})
 
 
 def _listed(entry: Attachment, place: Path) -> Attachment:
