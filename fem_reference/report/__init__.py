@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 from fem_reference.assessment import cost_study, omissions, stress
 from fem_reference.assessment.claims import Claims
@@ -68,62 +69,38 @@ def write_examples(title: str, examples: tuple[Comparison, ...], path: Path, *, 
 
 def write_verification(verification: Verification, folder: Path, name: str) -> Path:
     """Write a page ``name`` and its numbers as JSON into ``folder``; the path of the page."""
-    texts = {
-        f"{name}.json": json.dumps(verify_page.facts(verification), indent=1, allow_nan=False),
-        f"{name}.html": verify_page.render(verification),
-    }
-    _write(texts, folder)
-    return folder / f"{name}.html"
+    return _write_page(folder, name, verify_page.facts(verification), verify_page.render(verification))
 
 
 def write_ranking(table: Table, folder: Path, name: str) -> Path:
     """Write the page ``name`` over the kinds of solvers and its numbers as JSON into ``folder``; the path of the page."""
-    texts = {
-        f"{name}.json": json.dumps(ranking_page.facts(table), indent=1, allow_nan=False),
-        f"{name}.html": ranking_page.render(table),
-    }
-    _write(texts, folder)
-    return folder / f"{name}.html"
+    return _write_page(folder, name, ranking_page.facts(table), ranking_page.render(table))
 
 
 def write_claims(claims: Claims, folder: Path, name: str) -> Path:
     """Write the page ``name`` of error bars beside errors and its numbers as JSON into ``folder``; the path of the page."""
-    texts = {
-        f"{name}.json": json.dumps(claims_page.facts(claims), indent=1, allow_nan=False),
-        f"{name}.html": claims_page.render(claims),
-    }
-    _write(texts, folder)
-    return folder / f"{name}.html"
+    return _write_page(folder, name, claims_page.facts(claims), claims_page.render(claims))
 
 
 def write_study(study: Study, folder: Path, name: str) -> Path:
     """Write the page ``name`` of what accuracy costs and its numbers as JSON into ``folder``; the path of the page."""
     cases = [cost_study.facts(case, study.origin) for case in study.cases]
-    texts = {
-        f"{name}.json": json.dumps(cases[0] if len(cases) == 1 else cases, indent=1, allow_nan=False),
-        f"{name}.html": study_page.render(study),
-    }
-    _write(texts, folder)
-    return folder / f"{name}.html"
+    return _write_page(folder, name, cases[0] if len(cases) == 1 else cases, study_page.render(study))
 
 
 def write_effects(found: CaseOmissions, folder: Path, name: str) -> Path:
     """Write the page ``name`` of what each effect changes and its numbers as JSON into ``folder``; the path of the page."""
-    texts = {
-        f"{name}.json": json.dumps(omissions.facts(found), indent=1, allow_nan=False),
-        f"{name}.html": effects_page.render(found),
-    }
-    _write(texts, folder)
-    return folder / f"{name}.html"
+    return _write_page(folder, name, omissions.facts(found), effects_page.render(found))
 
 
 def write_stress(found: Stress, folder: Path, name: str) -> Path:
     """Write the page ``name`` of hard cases and its numbers as JSON into ``folder``; the path of the page."""
-    texts = {
-        f"{name}.json": json.dumps(stress.facts(found), indent=1, allow_nan=False),
-        f"{name}.html": stress_page.render(found),
-    }
-    _write(texts, folder)
+    return _write_page(folder, name, stress.facts(found), stress_page.render(found))
+
+
+def _write_page(folder: Path, name: str, facts: Any, text: str) -> Path:
+    """Write a page and its ``facts`` as JSON; the path of the page."""
+    _write({f"{name}.json": json.dumps(facts, indent=1, allow_nan=False), f"{name}.html": text}, folder)
     return folder / f"{name}.html"
 
 
