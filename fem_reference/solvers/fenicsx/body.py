@@ -8,7 +8,6 @@ from typing import Any, cast
 
 import basix.ufl
 import numpy as np
-import ufl
 from dolfinx import fem, mesh
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -32,6 +31,7 @@ from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.stability import Stability, has_energy
 from fem_reference.solvers.fenicsx.system import System
+from fem_reference.solvers.fenicsx.tabulated import Displacement
 from fem_reference.solvers.fenicsx.validity import Validity
 
 _SAME = 1e-9  # [mm], rounding of a motion that comes back
@@ -53,17 +53,15 @@ class AssembledBody:
         self.cells: Ints = np.asarray(self.mesh.topology.original_cell_index, np.int64)[:own]
         self.local = {int(cell): i for i, cell in enumerate(self.cells)}
         self.unknowns = _unknowns(self.mesh, settings.element)
-        self.displacement_space, self.displacement_dofs = self.unknowns.function_space.sub(0).collapse()
-        self.displacement = fem.Function(self.displacement_space)
+        self.displacement = Displacement(self.unknowns)
         form = forms.Form(self.mesh, body, self.unknowns, settings, self.cells)
         self.amounts = form.amounts
         self.clock = Clock(body, form.step)
-        self.volume_form, self.energy_form = compiling.form(form.volume), compiling.form(form.energy)
+        self.energy_form = compiling.form(form.energy)
         self.kinetic_form = compiling.form(form.kinetic) if form.kinetic else None
-        self.rest_volume = self.integral(self.volume_form)
         self.conditions = [self._condition(entry, form) for entry in body.prescribed]
-        self.determinants = Determinants(self.mesh, self.cells, form.determinant, form.rule[0], body.mesh.kind)
-        self.validity = Validity(self.mesh, self.cells, form, body)
+        self.determinants = Determinants(self.displacement, self.cells, form.determinant, form.rule[0], body.mesh.kind)
+        self.validity = Validity(self.determinants, form, body)
         self.spent = Spent()
         self.system = System(form, self.unknowns, settings.element, self.conditions, self.spent)
         symmetric = has_energy(body)
@@ -80,20 +78,22 @@ class AssembledBody:
         self.recalled: State | None = None
         self.modes: float | None = None  # of the state that was examined last
         self.at = body.frames[0]  # the frame of the last good state
-        self.nodes = meshes.Nodes(body.mesh, self.cells, ufl.split(self.unknowns)[0])
-        self.nodal = Nodal(self.cells, settings.element, self.unknowns, self.clock) if settings.store_state else None
+        self.nodes = meshes.Nodes(body.mesh, self.cells, self.displacement)
+        self.nodal = (
+            Nodal(self.cells, settings.element, self.displacement, self.clock) if settings.store_state else None
+        )
 
     def _condition(self, entry: Prescribed, form: forms.Form) -> PrescribedRegion | PointSprings:
         """What prescribes ``entry``."""
         if isinstance(entry.on, str):
-            return PrescribedRegion(self.unknowns, entry, form.regions[entry.on])
-        parents = np.ravel(self.displacement_dofs)
-        points = contact_points.on_skin(self.displacement_space, parents, entry.on, self.local)
+            return PrescribedRegion(self.displacement, entry, form.regions[entry.on])
+        parents = self.displacement.dofs.ravel()
+        points = contact_points.on_skin(self.displacement.space, parents, entry.on, self.local)
         return PointSprings(self.unknowns, entry, points)
 
     def _contact(self, body: Body, form: forms.Form) -> ContactForces:
         """What obstructions do."""
-        law, space, parents = body.contact, self.displacement_space, np.ravel(self.displacement_dofs)
+        law, space, parents = body.contact, self.displacement.space, self.displacement.dofs.ravel()
         assert law is not None  # asked for only where it is there
         if isinstance(law.on, str):
             facets = form.regions[law.on]
@@ -104,8 +104,8 @@ class AssembledBody:
 
     def start(self, moved: Callable[[Floats], Floats]) -> None:
         """Begin with the nodes where ``moved`` takes rest points (n, 3) [mm]."""
-        self.displacement.interpolate(lambda points: (moved(points.T) - points.T).T)
-        self.unknowns.x.array[self.displacement_dofs] = self.displacement.x.array
+        rest = self.displacement.space.tabulate_dof_coordinates()
+        self.unknowns.x.array[self.displacement.dofs] = moved(rest) - rest
         self.unknowns.x.scatter_forward()
         self.path.settle(self.integral(self.energy_form), connected=False)
 
@@ -247,7 +247,7 @@ class AssembledBody:
             | {
                 "min_det_F_quadrature": self.determinants.smallest("quadrature point").value,
                 "min_det_F_vertices": self.determinants.smallest("vertex").value,
-                "volume_ratio": self.integral(self.volume_form) / self.rest_volume,
+                "volume_ratio": self.validity.volume_ratio(),
                 "energy": self.integral(self.energy_form),
             }
         )
@@ -277,7 +277,7 @@ class AssembledBody:
 
     def node_positions(self) -> Floats:
         """Where the nodes of the body's mesh are now (n, 3) [mm]."""
-        return self.nodes.positions(self.mesh)
+        return self.nodes.positions()
 
     def state(self) -> dict[str, Any]:
         """By name, the arrays of ``states.NodalState``; nothing where they were not asked for."""
@@ -285,10 +285,11 @@ class AssembledBody:
 
     def positions(self, cells: Ints, points: Floats) -> Floats:
         """Where the material points ``points`` (n, 3), each seen from cell ``cells`` (n,), are now; (n, 3) on every rank."""
-        self.displacement.x.array[:] = self.unknowns.x.array[self.displacement_dofs]
+        displacement = fem.Function(self.displacement.space)
+        displacement.x.array[:] = self.unknowns.x.array[self.displacement.dofs.ravel()]
         mine = np.array([i for i, cell in enumerate(cells) if int(cell) in self.local], dtype=np.int64)
         local = np.array([self.local[int(cells[i])] for i in mine], dtype=np.int32)
-        moved = points[mine] + self.displacement.eval(points[mine], local).reshape(-1, 3) if len(mine) else points[mine]
+        moved = points[mine] + displacement.eval(points[mine], local).reshape(-1, 3) if len(mine) else points[mine]
         result = np.empty_like(points)
         for indices, values in self.comm.allgather((mine, moved)):
             result[indices] = values

@@ -10,44 +10,38 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import Prescribed
 from fem_reference.solvers.fenicsx.contact_points import ContactPoints
 from fem_reference.solvers.fenicsx.forms import Form
-
-
-class _Component:
-    """One component of the displacement on a region: its unknowns, where they are at rest, and the values they shall have."""
-
-    def __init__(self, unknowns: fem.Function, component: int, facets: Ints) -> None:
-        whole = unknowns.function_space.sub(0).sub(component)
-        space, _ = whole.collapse()
-        self.component = component
-        self.dofs = fem.locate_dofs_topological((whole, space), 2, facets)
-        self.values = fem.Function(space)
-        self.rest: Floats = space.tabulate_dof_coordinates()[self.dofs[1]]
-        owned = whole.dofmap.index_map.size_local * whole.dofmap.index_map_bs
-        self.own = self.dofs[0] < owned
+from fem_reference.solvers.fenicsx.tabulated import Displacement
 
 
 class PrescribedRegion:
-    """A ``Prescribed`` on this rank's ``facets``."""
+    """A ``Prescribed`` of a ``displacement`` on this rank's ``facets``."""
 
-    def __init__(self, unknowns: fem.Function, entry: Prescribed, facets: Ints) -> None:
-        self.entry, self.unknowns = entry, unknowns
-        # All three of the nodes, for where the forces act now, and those that are prescribed.
-        self.all = [_Component(unknowns, component, facets) for component in range(3)]
-        self.components = [self.all[component] for component in entry.components]
+    def __init__(self, displacement: Displacement, entry: Prescribed, facets: Ints) -> None:
+        self.entry, self.unknowns, self.along = entry, displacement.unknowns, list(entry.components)
+        self.nodes = fem.locate_dofs_topological(displacement.space, 2, facets)
+        self.rest: Floats = displacement.space.tabulate_dof_coordinates()[self.nodes]
+        self.all = displacement.dofs[self.nodes]  # the unknowns (m, 3) of the nodes
+        self.wanted = fem.Function(displacement.space)
+
+    @property
+    def dofs(self) -> Ints:
+        """The unknowns (n,) that are prescribed, exactly or by springs."""
+        return np.ravel(self.all[:, self.along])
 
     @property
     def exact(self) -> Ints:
         """The unknowns (n,) that are prescribed exactly: none by springs."""
-        if self.entry.stiffness is not None:
-            return np.zeros(0, np.int64)
-        return np.concatenate([component.dofs[0] for component in self.components]).astype(np.int64)
+        return self.dofs if self.entry.stiffness is None else np.zeros(0, np.int64)
+
+    @property
+    def prescribed(self) -> Floats:
+        """What (n,) the unknowns ``dofs`` shall be now."""
+        return np.ravel(np.reshape(self.wanted.x.array, (-1, 3))[self.nodes][:, self.along])
 
     @property
     def targets(self) -> Floats:
         """What (n,) the unknowns ``exact`` shall be."""
-        if self.entry.stiffness is not None:
-            return np.zeros(0)
-        return np.concatenate([component.values.x.array[component.dofs[1]] for component in self.components])
+        return self.prescribed if self.entry.stiffness is None else np.zeros(0)
 
     def springs(self, form: Form) -> Any:
         """The weak form of springs that pull towards what is prescribed, 0 where it is exact."""
@@ -57,31 +51,21 @@ class PrescribedRegion:
         displacement = ufl.split(self.unknowns)[0]
         test = ufl.split(ufl.TestFunction(self.unknowns.function_space))[0]
         stiffness = fem.Constant(self.unknowns.function_space.mesh, float(self.entry.stiffness))
-        return sum(
-            stiffness * (displacement[entry.component] - entry.values) * test[entry.component] * measure
-            for entry in self.components
-        )
-
-    @property
-    def prescribed(self) -> Floats:
-        """All numbers (n,) that are prescribed now."""
-        return np.concatenate([entry.values.x.array for entry in self.components])
+        return sum(stiffness * (displacement[i] - self.wanted[i]) * test[i] * measure for i in self.along)
 
     def move_to(self, frame: float) -> None:
         """Prescribe the displacement of the path at ``frame``."""
-        for entry in self.components:
-            entry.values.x.array[entry.dofs[1]] = self.entry.path(entry.rest, frame)[:, entry.component]
+        self.wanted.x.array.reshape(-1, 3)[self.nodes] = self.entry.path(self.rest, frame)
 
     def force(self, residual: Floats, now: Floats, shared: Ints) -> tuple[Floats, Floats]:
         """The force (3,) [N] and its moment (3,) [N mm] about the origin that this rank's part of the region takes, from the
         out-of-balance ``residual`` of what acts in the body and the unknowns ``now``. Of an unknown that several regions prescribe
         each takes an equal part: ``shared`` (n,) says how many do.
         """
-        places = np.stack([entry.rest[:, i] + now[entry.dofs[0]] for i, entry in enumerate(self.all)], axis=1)
-        forces = np.zeros_like(places)
-        for entry in self.components:
-            own = entry.dofs[0][entry.own]
-            forces[entry.own, entry.component] = residual[own] / shared[own]
+        places, forces = self.rest + now[self.all], np.zeros_like(self.rest)
+        forces[:, self.along] = (residual[self.all] / np.maximum(shared[self.all], 1))[:, self.along]
+        index_map = self.unknowns.function_space.dofmap.index_map
+        forces[self.all >= index_map.size_local * self.unknowns.function_space.dofmap.index_map_bs] = 0  # other ranks'
         return forces.sum(axis=0), np.cross(places, forces).sum(axis=0)
 
 

@@ -46,7 +46,7 @@ def lowest(body: AssembledBody) -> Floats:
     assert stability is not None  # asked for only where modes are counted
     system.linearise()
     free = np.zeros(system.size)
-    free[np.ravel(body.displacement_dofs)] = 1.0
+    free[body.displacement.dofs.ravel()] = 1.0
     free[system.fixed] = 0.0
     mask, diagonal = system.b.duplicate(), system.b.duplicate()
     mask.array[:] = free[: system.owned]

@@ -4,13 +4,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from dolfinx import mesh
 from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import Kind, reference_nodes
-from fem_reference.solvers.fenicsx import compiling, meshes
+from fem_reference.solvers.fenicsx import compiling
+from fem_reference.solvers.fenicsx.tabulated import Displacement, geometry
 
 
 @dataclass(frozen=True)
@@ -30,13 +30,14 @@ class Smallest:
 class Determinants:
     """Det F at the quadrature points and the vertices of this rank's cells."""
 
-    def __init__(self, msh: mesh.Mesh, cells: Ints, determinant: Any, rule: Floats, kind: Kind) -> None:
+    def __init__(self, displacement: Displacement, cells: Ints, determinant: Any, rule: Floats, kind: Kind) -> None:
         """``cells``: which cell of the body each of this rank's is; ``rule``: quadrature points (q, 3) of a ``kind`` of cell."""
-        self.mesh, self.cells = msh, cells
+        self.mesh, self.cells, self.unknowns = displacement.space.mesh, cells, displacement.unknowns.x
         self.points = {"quadrature point": rule, "vertex": reference_nodes(kind, 1)}
-        # Compiled here and by all ranks together: one without cells evaluates none of them.
-        self.values = {where: compiling.expression(determinant, points) for where, points in self.points.items()}
-        self.places = {where: meshes.coordinates(msh, points) for where, points in self.points.items()}
+        # Compiled, since each iteration asks for it, and by all ranks together: one without cells evaluates it nowhere.
+        self.inside = compiling.expression(determinant, rule)
+        self.at_vertices = displacement.tabulated(self.points["vertex"], len(cells))
+        self.to_reference = np.linalg.inv(geometry(self.mesh, self.points["vertex"], slice(len(cells)))[1])
 
     def smallest(self, where: str | None = None) -> Smallest:
         """The smallest det F at points of one kind, ``"quadrature point"`` or ``"vertex"``, or at both; NaN counts as smallest."""
@@ -63,13 +64,15 @@ class Determinants:
         """By cell of this rank and point of a kind."""
         if len(self.cells) == 0:
             return np.zeros((0, len(self.points[where])))
-        values = self.values[where].eval(self.mesh, np.arange(len(self.cells), dtype=np.int32))
+        if where == "vertex":
+            slopes = self.at_vertices.slopes_at(self.unknowns.array)
+            return np.asarray(np.linalg.det(np.eye(3) + slopes @ self.to_reference))
+        values = self.inside.eval(self.mesh, np.arange(len(self.cells), dtype=np.int32))
         return np.asarray(values).reshape(len(self.cells), -1)
 
     def _mine(self, where: str, values: Floats) -> Smallest:
         if len(self.cells) == 0:  # a rank without cells
             return Smallest(float("inf"), where, -1, (0.0, 0.0, 0.0))
         cell, point = np.unravel_index(np.argmin(np.where(np.isnan(values), -np.inf, values)), values.shape)
-        at = self.places[where].eval(self.mesh, np.array([cell], np.int32))
-        x, y, z = at.reshape(-1, 3)[point]
+        x, y, z = geometry(self.mesh, self.points[where][[point]], np.array([cell]))[0].ravel()
         return Smallest(float(values[cell, point]), where, int(self.cells[cell]), (float(x), float(y), float(z)))

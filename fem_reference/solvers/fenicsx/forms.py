@@ -15,6 +15,7 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import Body
 from fem_reference.solvers.fenicsx import compiling, meshes, quadrature
 from fem_reference.solvers.fenicsx.settings import BodySettings
+from fem_reference.solvers.fenicsx.tabulated import geometry
 
 Rule = tuple[Floats, Floats]
 
@@ -39,7 +40,7 @@ class Form:
     triangle of the second ones, ``second``: compiled expressions of what ``cells.c`` names, with ``kinds`` variables a component
     of the displacement. ``loads`` on the surface, a residual, 0 where there are none.
 
-    ``energy`` that is stored and ``volume`` as integrals, det F as ``determinant``, the ``fibre_stretch`` that energies see (None
+    ``energy`` that is stored as an integral, det F as ``determinant``, the ``fibre_stretch`` that energies see (None
     without fibres); to be set: ``amounts`` by effect, and the ``step`` of time (None where nothing depends on it), with
     ``kinetic`` energy of its velocity (0 without inertia); ``rule``: points (q, 3) and weights (q,) of the quadrature, of
     ``degree``; ``regions``: by name, this rank's facets.
@@ -59,7 +60,7 @@ class Form:
         self.determinant = state.J
         self.fibre_stretch = None if state.fibre is None else elastic_state(acting, state).fibre_stretch
         stored = [(effect, amount) for effect, amount in acting if not isinstance(effect, Energy) or effect.stored]
-        self.volume, self.energy = state.J * self.dx, total_energy(stored, state) * self.dx
+        self.energy = total_energy(stored, state) * self.dx
         self.kinetic = self._kinetic(effects)
         self.kinds, first, second = _derivatives(total_energy(acting, state), variables)
         self.first = compiling.expression(ufl.as_vector(first), self.rule[0])
@@ -92,8 +93,7 @@ class Form:
         points, weights = self.rule
         element = basix.ufl.quadrature_element(body.mesh.kind, value_shape=(3,), points=points, weights=weights)
         function = fem.Function(fem.functionspace(self.mesh, element))
-        mine = np.arange(len(cells), dtype=np.int32)
-        places = meshes.coordinates(self.mesh, points).eval(self.mesh, mine).reshape(-1, 3)
+        places = geometry(self.mesh, points, slice(len(cells)))[0].reshape(-1, 3)
         directions = body.fibre(np.repeat(cells, len(points)), places)
         function.x.array[: directions.size] = directions.ravel()
         function.x.scatter_forward()

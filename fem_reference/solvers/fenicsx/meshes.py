@@ -1,17 +1,14 @@
 """A body's mesh in DOLFINx: distributed over the ranks, with its regions found again, and its nodes' positions."""
 
-from typing import Any
-
 import basix
 import basix.ufl
 import numpy as np
-import ufl
 from dolfinx import mesh
 from mpi4py import MPI
 
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import Cells, reference_nodes
-from fem_reference.solvers.fenicsx import compiling
+from fem_reference.solvers.fenicsx.tabulated import Displacement
 
 
 def distribute(comm: MPI.Comm, cells: Cells) -> mesh.Mesh:
@@ -61,22 +58,16 @@ def _original_points(msh: mesh.Mesh) -> Ints:
 class Nodes:
     """The nodes of the body's mesh and where a displacement takes them."""
 
-    def __init__(self, cells: Cells, own: Ints, displacement: Any) -> None:
+    def __init__(self, cells: Cells, own: Ints, displacement: Displacement) -> None:
         """``own``: the cells of the body's mesh that are this rank's, in the rank's order."""
-        self.cells, self.own = cells, own
-        self.moves = compiling.expression(displacement, reference_nodes(cells.kind, cells.degree))
+        self.cells, self.own, self.unknowns = cells, own, displacement.unknowns.x
+        self.comm = displacement.space.mesh.comm
+        self.moves = displacement.tabulated(reference_nodes(cells.kind, cells.degree), len(own))
 
-    def positions(self, msh: mesh.Mesh) -> Floats:
+    def positions(self) -> Floats:
         """Where the nodes are now (n, 3) [mm], on every rank."""
         points = np.array(self.cells.points)
-        mine = np.arange(len(self.own), dtype=np.int32)
-        moves = self.moves.eval(msh, mine).reshape(len(mine), -1, 3) if len(mine) else np.zeros((0, 1, 3))
-        for own, moved in msh.comm.allgather((self.own, moves)):
+        for own, moved in self.comm.allgather((self.own, self.moves.at(self.unknowns.array))):
             if len(own):
                 points[self.cells.cells[own]] = self.cells.points[self.cells.cells[own]] + moved
         return points
-
-
-def coordinates(msh: mesh.Mesh, points: Floats) -> Any:
-    """An expression that is a rest position at reference ``points``."""
-    return compiling.expression(ufl.SpatialCoordinate(msh), points)

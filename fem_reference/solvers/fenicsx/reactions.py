@@ -39,6 +39,6 @@ class Reactions:
         """By how many regions each unknown (n,) is prescribed."""
         count = np.zeros(len(self.system.unknowns.x.array), np.int64)
         for one in self.conditions:
-            for component in one.components if isinstance(one, PrescribedRegion) else ():
-                count[component.dofs[0]] += 1
+            if isinstance(one, PrescribedRegion):
+                count[one.dofs] += 1
         return count

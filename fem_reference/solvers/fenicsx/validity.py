@@ -5,20 +5,21 @@ off in a cell that has kept its volume. A mean may be off there too, in single c
 bulk modulus of a thousand shear moduli): there laws are named, and a body has collapsed only where more of it than that is lost.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
-import basix
 import numpy as np
 from dolfinx import mesh
 from mpi4py import MPI
 
 from fem_reference.foundations.limits import Limit
-from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.body import Body
 from fem_reference.solvers.fenicsx import compiling
+from fem_reference.solvers.fenicsx.determinants import Determinants
 from fem_reference.solvers.fenicsx.forms import Form, Rule
+from fem_reference.solvers.fenicsx.tabulated import geometry
 
 # A cell with less of its volume at rest has collapsed, whatever the laws say: about four fifths of muscle are water, which does not
 # leave it in a motion (Ward and Lieber 2005, Density and hydration of fresh and fixed human skeletal muscle); below a fifth there
@@ -88,15 +89,23 @@ class Ranges:
 class Validity:
     """The means over the cells of a body of what its laws have limits on. Its methods are collective."""
 
-    def __init__(self, msh: mesh.Mesh, cells: Ints, form: Form, body: Body) -> None:
-        """``cells``: which cell of the body each of this rank's is."""
-        self.mesh, self.cells, self.effects = msh, cells, body.effects
-        wanted = {"V/V0": form.determinant}
+    def __init__(self, determinants: Determinants, form: Form, body: Body) -> None:
+        self.mesh, self.cells, self.effects = determinants.mesh, determinants.cells, body.effects
+        self.values: dict[str, Callable[[], Floats]] = {"V/V0": determinants.values_now}
         if any(limit.measure == "fibre stretch" for effect in body.effects for limit in effect.limits()):
-            wanted["fibre stretch"] = form.fibre_stretch
-        # Compiled here and by all ranks together: one without cells evaluates none of them.
-        self.values = {name: compiling.expression(value, form.rule[0]) for name, value in wanted.items()}
-        self.volumes, self.centres = _volumes(msh, len(cells), form.rule)
+            # Compiled here and by all ranks together: one without cells evaluates none of it.
+            stretch, mine = (
+                compiling.expression(form.fibre_stretch, form.rule[0]),
+                np.arange(len(self.cells), dtype=np.int32),
+            )
+            self.values["fibre stretch"] = lambda: np.asarray(stretch.eval(self.mesh, mine))
+        self.volumes, self.centres = _volumes(self.mesh, len(self.cells), form.rule)
+
+    def volume_ratio(self) -> float:
+        """The volume of the body over that at rest."""
+        now = self.volumes.ravel() @ self.values["V/V0"]()
+        present, rest = self.mesh.comm.allreduce(np.array([now, self.volumes.sum()]), MPI.SUM)
+        return float(present / rest)
 
     def collapsed(self) -> str | None:
         """How much of the body has lost too much of its volume, and where most, None where that is none or next to none."""
@@ -138,8 +147,7 @@ class Validity:
         """By cell of this rank (n,)."""
         if len(self.cells) == 0:
             return np.zeros(0)
-        values = self.values[measure].eval(self.mesh, np.arange(len(self.cells), dtype=np.int32))
-        return np.average(np.asarray(values).reshape(self.volumes.shape), axis=1, weights=self.volumes)
+        return np.average(self.values[measure]().reshape(self.volumes.shape), axis=1, weights=self.volumes)
 
     def _least(self, means: Floats, sign: float = 1.0) -> Extreme:
         """The least of ``sign means`` (n,) over all ranks."""
@@ -157,11 +165,6 @@ def _volumes(msh: mesh.Mesh, count: int, rule: Rule) -> tuple[Floats, Floats]:
     (n, 3) [mm].
     """
     points, weights = rule
-    kind = basix.CellType[msh.topology.cell_name()]
-    warped = basix.LagrangeVariant.gll_warped
-    element = basix.create_element(basix.ElementFamily.P, kind, msh.geometry.cmap.degree, warped)
-    shape, *slopes = element.tabulate(1, points)[..., 0]
-    nodes = msh.geometry.x[msh.geometry.dofmap[:count]]
-    volumes = weights * np.abs(np.linalg.det(np.einsum("dqk,nki->nqid", np.stack(slopes), nodes)))
-    centres = np.einsum("nq,qk,nki->ni", volumes, shape, nodes)
-    return volumes, centres / volumes.sum(axis=1)[:, None]
+    places, slopes = geometry(msh, points, slice(count))
+    volumes = weights * np.abs(np.linalg.det(slopes))
+    return volumes, np.einsum("nq,nqi->ni", volumes, places) / volumes.sum(axis=1)[:, None]
