@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from fem_reference.foundations.mesh import Floats
 
@@ -37,7 +37,7 @@ class Growth:
         rest = y - y.mean() - self.exponent * (x - x.mean())
         scatter = float(rest @ rest) / (len(x) - 2)
         spread = math.sqrt(scatter * (1 + 1 / len(x)) + (self.uncertainty * away) ** 2)
-        reach = float(student.ppf((1 + CONFIDENCE) / 2, len(x) - 2)) * spread
+        reach = float(stdtrit(len(x) - 2, (1 + CONFIDENCE) / 2)) * spread
         return _exp(middle), _exp(middle - reach), _exp(middle + reach)
 
     @property

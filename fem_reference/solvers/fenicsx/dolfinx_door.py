@@ -1,16 +1,34 @@
 """The import of DOLFINx: the PyPI wheel if it is there, else whatever build is installed (conda, Debian)."""
 
 import contextlib
-
-with contextlib.suppress(ImportError):
-    import dolfinx_solver  # noqa: F401 - makes the wheel's own dolfinx importable
-
-import dolfinx
-from petsc4py import PETSc
+import sys
+from collections.abc import Iterator
 
 from fem_reference.foundations.errors import MissingSoftware
 
 __all__ = ["PETSc", "dolfinx"]
+
+
+@contextlib.contextmanager
+def _without(name: str) -> Iterator[None]:
+    """Meanwhile a module that was not loaded yet is as if it were not installed."""
+    hidden = name not in sys.modules
+    if hidden:
+        sys.modules[name] = None  # type: ignore[assignment]
+    try:
+        yield
+    finally:
+        if hidden:
+            del sys.modules[name]
+
+
+# FFCx loads numba where it is installed, for kernels that nothing here has: a quarter of the time in which a process starts.
+with _without("numba"):
+    with contextlib.suppress(ImportError):
+        import dolfinx_solver  # noqa: F401 - makes the wheel's own dolfinx importable
+    import dolfinx
+    import dolfinx.fem.petsc
+    from petsc4py import PETSc
 
 _VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
 if _VERSION < (0, 10):
