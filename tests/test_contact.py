@@ -6,7 +6,7 @@ import pytest
 from fem_reference.geometry.rigid_bodies import Box, Sphere
 from fem_reference.geometry.signed_distance import Grid, build
 from fem_reference.geometry.tessellation import tessellated
-from fem_reference.problems.contact import Contact, Nearby, Obstruction
+from fem_reference.problems.contact import Contact
 
 D, K = 0.1, 2.0
 LAW = Contact("top", K, D)
@@ -35,23 +35,30 @@ def test_neither_pressure_nor_slope_jumps() -> None:
 
 
 @pytest.mark.parametrize("kind", ["sphere", "box", "grid"])
-def test_no_point_that_is_near_goes_unasked(kind) -> None:
-    # Points walk at random, now and then by a leap; whoever is within the smoothing must be among those that are asked.
+def test_no_way_as_long_as_the_clearance_comes_near(kind) -> None:
     shape = {"sphere": Sphere((0.0, 0.0, 0.0), 10.0), "box": Box((0.0, 0.0, 0.0), (16.0, 10.0, 6.0), 0.0)}.get(
         kind
     ) or ball()
-    obstruction = Obstruction("ball", shape, lambda _: np.eye(4))
     random = np.random.default_rng(5)
-    points = random.uniform(-60, 60, (4000, 3))
-    nearby, asked = Nearby(LAW, obstruction, len(points)), 0
-    for step in range(60):
-        points = points + random.normal(size=points.shape) * (20.0 if step % 20 == 19 else 0.3)
-        near = nearby.ask(points)
-        distance = shape.sample(points).distance
-        assert np.isin(np.flatnonzero(distance <= LAW.smoothing), near).all()
-        nearby.note(near, points, distance[near])
-        asked += len(near)
-    assert asked < 0.35 * 60 * len(points)
+    points, directions = random.uniform(-40, 40, (20_000, 3)), random.normal(size=(20_000, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    clear, gap = shape.clearance(D)(points), shape.sample(points).distance
+    assert (clear[gap <= D] <= 0).all()
+    some = clear > 0
+    ends = points[some] + 0.999999 * clear[some, None] * directions[some]
+    assert (shape.sample(ends).distance > D).all()
+    # and on a grid it is not less than there is by more than the diagonals of two cells
+    true = np.linalg.norm(points, axis=1) - 10.0 - D if kind != "box" else gap - D
+    on_grid = (np.abs(points) < 16).all(axis=1)
+    assert (true - clear)[some & on_grid].max() < (2 * 3**0.5 if kind == "grid" else 1e-9)
+
+
+def test_where_a_point_without_a_place_is_nobody_knows() -> None:
+    assert np.isnan(ball().clearance(D)(np.array([[0.0, np.nan, 0.0], [np.inf, 0.0, 0.0]]))).all()
+
+
+def test_what_is_nowhere_as_near_as_wanted_is_clear_everywhere() -> None:
+    assert (ball().clearance(-30.0)(np.zeros((2, 3))) == np.inf).all()
 
 
 def ball() -> Grid:

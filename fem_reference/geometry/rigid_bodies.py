@@ -5,7 +5,7 @@ nearest part of the surface, curvatures the second derivatives. On ridges, where
 is taken; a curvature that would be infinite (on a sharp edge, at a centre, on an axis) is zero.
 """
 
-import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple, Protocol
 
@@ -27,18 +27,15 @@ class Sampled(NamedTuple):
 
 
 class Obstacle(Protocol):
-    """A rigid body that knows how far away it is: up to ``reach`` [mm]; a distance changes by at most ``steepest`` times how far
-    one goes.
-    """
-
-    @property
-    def reach(self) -> float:
-        """A point that is farther away [mm] is known to be at least so far away."""
-        ...
+    """A rigid body that knows how far away it is; that distance changes by at most ``steepest`` times how far one goes."""
 
     @property
     def steepest(self) -> float:
         """A bound of the length of the gradient."""
+        ...
+
+    def clearance(self, within: float) -> Callable[[Floats], Floats]:
+        """What bounds from below how far (n,) [mm] each of points (n, 3) is from where the distance is at most ``within`` [mm]."""
         ...
 
     def sample(self, points: Floats) -> Sampled:
@@ -47,10 +44,13 @@ class Obstacle(Protocol):
 
 
 class Exact:
-    """What bodies of closed form have in common: their distance is known everywhere, and is one."""
+    """What bodies of closed form have in common: their distance is one, everywhere."""
 
-    reach: ClassVar[float] = math.inf
     steepest: ClassVar[float] = 1.0
+
+    def clearance(self: Obstacle, within: float) -> Callable[[Floats], Floats]:
+        """By how much they are farther away than ``within`` [mm]."""
+        return lambda points: self.sample(points).distance - within
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from fem_reference.foundations.mesh import (
     read_only,
     triangle_areas,
 )
+from fem_reference.geometry.clearance import Clearance, of_spline
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.rigid_bodies import Sampled, Vector
 
@@ -66,16 +67,15 @@ class Grid:
     def __post_init__(self) -> None:
         object.__setattr__(self, "coefficients", read_only(self.coefficients, np.float64))
 
-    @property
-    def reach(self) -> float:
-        """Where the grid ends, and beyond, the surface is at least so far away [mm]."""
-        return self.margin
-
     @cached_property
     def steepest(self) -> float:
         """A bound of the length of the gradient: a spline is along each axis no steeper than its coefficients."""
         steps = [np.abs(np.diff(self.coefficients, axis=axis)).max() for axis in range(3)]
         return float(np.linalg.norm(steps)) / self.spacing
+
+    def clearance(self, within: float) -> Clearance:
+        """How far points are at least from where the distance is at most ``within`` [mm]."""
+        return of_spline(self.coefficients, np.asarray(self.origin), self.spacing, within)
 
     def sample(self, points: Floats) -> Sampled:
         """Distance, gradient and curvature at ``points`` (n, 3) [mm]; outside the grid ``FAR`` and zeros, NaN for NaN."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.rigid_bodies import Obstacle
 from fem_reference.geometry.signed_distance import FAR
 from fem_reference.geometry.skins import Skin
@@ -51,26 +51,6 @@ class Contact:
             return 0.0
         first, last = self.relaxed
         return float(np.clip((last - frame) / (last - first), 0, 1))
-
-
-class Nearby:
-    """Which of the points may be within ``law.smoothing`` of an ``obstruction``: by the ``gap`` (n,) that each had at least where
-    it was ``asked`` last (n, 3), in the obstruction's frame.
-    """
-
-    def __init__(self, law: Contact, obstruction: Obstruction, count: int) -> None:
-        self.law, self.shape = law, obstruction.shape
-        self.gap, self.asked = np.full(count, -np.inf), np.zeros((count, 3))
-        self.touched = np.ones(count, bool)  # asked since the last settled state
-
-    def ask(self, local: Floats) -> Ints:
-        """Which points may be near, (k,), at positions ``local`` (n, 3) [mm] in the rest frame of the body."""
-        moved = np.linalg.norm(local - self.asked, axis=1)
-        return np.flatnonzero(~(self.gap - self.shape.steepest * moved > self.law.smoothing))
-
-    def note(self, near: Ints, local: Floats, gap: Floats) -> None:
-        """Keep the answer: the gaps (k,) [mm] of the points ``near`` (k,), at positions ``local`` (n, 3) [mm]."""
-        self.gap[near], self.asked[near], self.touched[near] = np.minimum(gap, self.shape.reach), local[near], True
 
 
 def nearest_on_path(obstruction: Obstruction, starts: Floats, paths: Floats, least: float) -> Floats:

@@ -129,7 +129,8 @@ class AssembledBody:
         self.recalled = None
         failure, iterations = self.newton.solve(frame)
         smallest = self.determinants.smallest()
-        through = self.contact.tunnelled(self.comm) if self.contact and failure is None else None
+        with self.spent.on("contact"):
+            through = self.contact.tunnelled(self.comm) if self.contact and failure is None else None
         lost = self.validity.collapsed() if failure is None and smallest.value > 0 else None
         jump = self.path.jumped(before) if failure is None and smallest.value > 0 else None
         if failure is None and smallest.value > 0 and through is None and lost is None and jump is None:

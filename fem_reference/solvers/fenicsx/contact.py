@@ -1,11 +1,11 @@
 """Contact of rigid bodies with material points of a body: pressure of the gap, with its tangent, added to what cells contribute.
 
-Only points that may be near a body are asked for their distance to it: how far the others were when they were asked last, and how
-far they moved since, says that they cannot be.
+Only points that may be near a body are asked for their distance to it (``broad_phase``), and only those that it presses are summed.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from dolfinx import fem
@@ -13,23 +13,29 @@ from mpi4py import MPI
 
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.motion import apply
-from fem_reference.problems.contact import Contact, Nearby, Obstruction, nearest_on_path
+from fem_reference.geometry.rigid_bodies import Sampled
+from fem_reference.problems.contact import Contact, Obstruction, nearest_on_path
+from fem_reference.solvers.fenicsx.broad_phase import Nearby, Patches
 from fem_reference.solvers.fenicsx.contact_points import ContactPoints
 
 
 @dataclass(frozen=True, eq=False)
 class Pressed:
-    """What one obstruction does at the m of n points that are ``near``: ``gap`` (m,) [mm], negative inside, ``pressure`` (m,) [MPa
-    per rest area], ``traction`` (m, 3) and its ``slope`` (m, 3, 3) [MPa/mm]; and in the obstruction's rest frame all points,
-    ``local`` (n, 3) [mm]. No other point is within the smoothing.
+    """What one obstruction does: ``gap`` (m,) [mm], negative inside, of the points ``near`` (m,), no other point is within the
+    smoothing; and of the ``pressed`` points (k,) among them the ``pressure`` (k,) [MPa per rest area], ``traction`` (k, 3) and its
+    ``slope`` (k, 3, 3) [MPa/mm].
     """
 
     near: Ints
     gap: Floats
+    pressed: Ints
     pressure: Floats
     traction: Floats
     slope: Floats
-    local: Floats
+
+
+# Tractions (n, 3) [MPa] at points (n,), of which some may be there more than once.
+Tractions = tuple[Ints, Floats]
 
 
 class ContactForces:
@@ -45,76 +51,86 @@ class ContactForces:
     ) -> None:
         """``frame``: where the body rests."""
         self.law, self.obstructions, self.points, self.unknowns, self.frame = law, obstructions, points, unknowns, frame
-        count = len(points.areas)
-        self.nearby = [Nearby(law, entry, count) for entry in obstructions]
-        self.overlaps = [np.zeros(count) for _ in obstructions]
+        patches = Patches(points)
+        self.nearby = [Nearby(entry.shape, law.smoothing, patches) for entry in obstructions]
+        self.overlaps = [np.zeros(len(points.areas)) for _ in obstructions]
         self.update(frame)
         if law.relaxed:
-            self.overlaps = [np.maximum(law.smoothing - one.gap, 0) for one in self.now]  # at first all points are near
+            for overlap, one in zip(self.overlaps, self.now, strict=True):
+                overlap[one.near] = np.maximum(law.smoothing - one.gap, 0)
             self.update(frame)
         self.settle()
 
     def update(self, frame: float) -> None:
         """What obstructions do with the unknowns as they are and the obstructions where they are at ``frame``."""
-        self.frame = frame
-        points = self.points.positions(self.unknowns.x.array)
-        self.now = [self._pressed(i, points, frame) for i in range(len(self.obstructions))]
+        self.frame, carried = frame, self.points.carried
+        self.moved = self.unknowns.x.array[carried.dofs]
+        self.now = [self._pressed(i, carried.rest + self.moved) for i in range(len(self.obstructions))]
 
-    def _pressed(self, i: int, points: Floats, frame: float) -> Pressed:
-        """What an obstruction, where it is at ``frame``, does to ``points`` (n, 3) [mm]; they feel what overlaps at rest less."""
-        pose, shape = self.obstructions[i].pose(frame), self.obstructions[i].shape
-        turn = pose[:3, :3]
-        local = (points - pose[:3, 3]) @ turn
-        near = self.nearby[i].ask(local)
-        sampled = shape.sample(local[near])
-        self.nearby[i].note(near, local, sampled.distance)
-        allowed = self.law.allowance(frame) * self.overlaps[i][near]
-        pressure, change = self.law.pressure(sampled.distance + allowed)
+    def _pressed(self, i: int, nodes: Floats) -> Pressed:
+        """What an obstruction does, with the ``nodes`` (m, 3) [mm] that carry the points; these feel what overlaps at rest less."""
+        pose = self.obstructions[i].pose(self.frame)
+        turn, local = pose[:3, :3], partial(self._local, i, self.frame, self.moved)
+        near, (gap, gradient, bend) = self.nearby[i].find((nodes - pose[:3, 3]) @ turn, local)
+        allowed = self.law.allowance(self.frame) * self.overlaps[i][near]
+        pressure, change = self.law.pressure(gap + allowed)
+        some = np.flatnonzero(pressure)
+        pressure, change, sampled = pressure[some], change[some], Sampled(gap[some], gradient[some], bend[some])
         normal, curvature = sampled.gradient @ turn.T, turn @ sampled.curvature @ turn.T
         slope = change[:, None, None] * normal[:, :, None] * normal[:, None, :] + pressure[:, None, None] * curvature
-        return Pressed(near, sampled.distance, pressure, pressure[:, None] * normal, slope, local)
+        return Pressed(near, gap, near[some], pressure, pressure[:, None] * normal, slope)
 
-    def tractions(self) -> Floats:
-        """What all of them do together (n, 3) [MPa]."""
-        found = np.zeros_like(self.points.rest)
-        for one in self.now:
-            found[one.near] += one.traction
-        return found
+    def _local(self, i: int, frame: float, moved: Floats, some: Ints) -> Floats:
+        """Where ``some`` points (k,) are in the frame of an obstruction, with nodes ``moved`` (m, 3) by ``frame``: (k, 3) [mm]."""
+        pose = self.obstructions[i].pose(frame)
+        return np.asarray((self._places(moved, some) - pose[:3, 3]) @ pose[:3, :3])
 
-    def predicted(self, frame: float, moves: Floats) -> Floats:
+    def _places(self, moved: Floats, some: Ints) -> Floats:
+        """Where ``some`` points (k,) are, with nodes ``moved`` (m, 3): (k, 3) [mm]."""
+        return np.asarray(self.points.rest[some] + self.points.carried.shares[some] @ moved)
+
+    def tractions(self) -> Tractions:
+        """What all of them do."""
+        which = np.concatenate([np.zeros(0, np.int64), *(one.pressed for one in self.now)])
+        return which, np.concatenate([np.zeros((0, 3)), *(one.traction for one in self.now)])
+
+    def predicted(self, frame: float, moves: Floats) -> Tractions:
         """As ``tractions``, if the unknowns made ``moves`` and the obstructions went on to ``frame``, linearly in both."""
-        points = self.points.positions(self.unknowns.x.array)
-        displacement = self.points.positions(moves) - self.points.rest
-        found = self.tractions()
+        which, found = self.tractions()
+        ahead, carried = [np.zeros((0, 3))], self.points.carried
         for entry, one in zip(self.obstructions, self.now, strict=True):
             step = entry.pose(frame) @ np.linalg.inv(entry.pose(self.frame))
-            ahead = displacement[one.near] - (apply(step, points[one.near]) - points[one.near])
-            found[one.near] += np.einsum("nij,nj->ni", one.slope, ahead)
-        return found
+            points, displacement = (
+                self._places(self.moved, one.pressed),
+                carried.shares[one.pressed] @ moves[carried.dofs],
+            )
+            ahead.append(np.einsum("nij,nj->ni", one.slope, displacement - (apply(step, points) - points)))
+        return which, found + np.concatenate(ahead)
 
-    def add_residual(self, residual: Floats, tractions: Floats | None) -> None:
-        """Add the weak form of ``tractions`` (n, 3), by default those at present, to ``residual`` over this rank's unknowns."""
-        tractions = self.tractions() if tractions is None else tractions
-        self.points.add_forces(residual, -self.points.areas[:, None] * tractions)
+    def add_residual(self, residual: Floats, tractions: Tractions | None) -> None:
+        """Add the weak form of ``tractions``, by default those at present, to ``residual`` over this rank's unknowns."""
+        which, found = self.tractions() if tractions is None else tractions
+        if len(which):
+            self.points.add_forces(residual, -self.points.areas[which, None] * found, which)
 
     def tangent(self) -> Iterator[tuple[Ints, Floats, Floats]]:
         """The slope of the residual, obstruction by obstruction: cells (p,) of the points in contact, the basis (p, k) that
         carries them, and the slope (p, 3, 3) of what is out of balance there.
         """
         for one in self.now:
-            some = np.flatnonzero(one.slope.any(axis=(1, 2)))
-            touched = one.near[some]
-            areas = self.points.areas[touched, None, None]
-            yield self.points.cells[touched], self.points.basis[touched], -areas * one.slope[some]
+            if len(touched := one.pressed):
+                areas = self.points.areas[touched, None, None]
+                yield self.points.cells[touched], self.points.basis[touched], -areas * one.slope
 
     def forces(self) -> dict[str, tuple[Floats, Floats]]:
         """By name of an obstruction, the force (3,) [N] that it exerts on this rank's points and its moment (3,) [N mm] about the
         origin.
         """
-        points, found = self.points.positions(self.unknowns.x.array), {}
+        found = {}
         for entry, one in zip(self.obstructions, self.now, strict=True):
-            forces = self.points.areas[one.near, None] * one.traction
-            found[entry.name] = forces.sum(axis=0), np.cross(points[one.near], forces).sum(axis=0)
+            forces = self.points.areas[one.pressed, None] * one.traction
+            places = self._places(self.moved, one.pressed)
+            found[entry.name] = forces.sum(axis=0), np.cross(places, forces).sum(axis=0)
         return found
 
     def scalars(self, comm: MPI.Comm) -> dict[str, float]:
@@ -124,7 +140,7 @@ class ContactForces:
         touched = np.zeros(len(self.points.areas), bool)
         depth = pressure = overlap = 0.0
         for one, before in zip(self.now, self.overlaps, strict=True):
-            touched[one.near[one.pressure > 0]] = True
+            touched[one.pressed] = True
             depth = max(depth, float(-one.gap.min(initial=0.0)))
             pressure = max(pressure, float(one.pressure.max(initial=0.0)))
             overlap = max(overlap, float(before.max(initial=0.0)) - self.law.smoothing)
@@ -137,9 +153,8 @@ class ContactForces:
 
     def deepest(self, comm: MPI.Comm) -> str:
         """Where the deepest point is, and in which obstruction."""
-        points = self.points.positions(self.unknowns.x.array)
         mine = [
-            (float(-one.gap.min()), entry.name, points[one.near[int(np.argmin(one.gap))]].tolist())
+            (float(-one.gap.min()), entry.name, self._places(self.moved, one.near[[np.argmin(one.gap)]])[0].tolist())
             for entry, one in zip(self.obstructions, self.now, strict=True)
             if len(one.near)
         ]
@@ -151,13 +166,13 @@ class ContactForces:
 
     def settle(self) -> None:
         """Take the present state as the one that the next step starts from."""
-        self.settled, self.settled_at = self.now, self.frame
+        self.settled = self.now, self.frame, self.moved
         for one in self.nearby:
-            one.touched[:] = False
+            one.met[:] = False
 
     def go_back(self) -> None:
         """Take up the settled state again, as the unknowns have."""
-        self.now, self.frame = self.settled, self.settled_at
+        self.now, self.frame, self.moved = self.settled
 
     def tunnelled(self, comm: MPI.Comm) -> str | None:
         """Where a point went through an obstruction since the last settled state: on its straight path through the obstruction's
@@ -168,9 +183,9 @@ class ContactForces:
         return max(found)[1] if found else None
 
     def _through(self, i: int) -> tuple[float, str] | None:
-        # A point that was not asked is in a ball without any of the obstruction, which it did not leave since the settled state.
-        met = np.flatnonzero(self.nearby[i].touched)
-        starts, ends = self.settled[i].local[met], self.now[i].local[met]
+        _, settled_at, settled = self.settled
+        there, here = partial(self._local, i, settled_at, settled), partial(self._local, i, self.frame, self.moved)
+        met, starts, ends = self.nearby[i].crossing(there, here)
         before, now = (self.obstructions[i].shape.sample(places) for places in (starts, ends))
         displacements = ends - starts
         # A gap is not known far away: what points outward there is the direction back, and the direction on.

@@ -17,32 +17,49 @@ from fem_reference.problems.body import Cells
 @dataclass(frozen=True, eq=False)
 class ContactPoints:
     """n points of this rank's cells: where they ``rest`` (n, 3) [mm], the rest ``areas`` (n,) [mm2] they stand for, the ``cells``
-    (n,) they move with, and how: the values ``basis`` (n, k) there of the nodal functions whose unknowns are ``dofs`` (n, k, 3).
+    (n,) they move with, and how: the values ``basis`` (n, k) there of the functions of nodes at ``nodes`` (n, k, 3) [mm], whose
+    unknowns are ``dofs`` (n, k, 3).
     """
 
     rest: Floats
     areas: Floats
     cells: Ints
     basis: Floats
+    nodes: Floats
     dofs: Ints
 
     def positions(self, unknowns: Floats) -> Floats:
         """Where the points are now (n, 3) [mm]."""
-        nodes, carried = self._carried
-        return np.asarray(self.rest + carried @ unknowns[nodes])
+        carried = self.carried
+        return np.asarray(self.rest + carried.shares @ unknowns[carried.dofs])
 
-    def add_forces(self, residual: Floats, forces: Floats) -> None:
-        """Add the weak form of ``forces`` (n, 3) [N] at the points to ``residual``, over this rank's unknowns."""
-        nodes, carried = self._carried
-        residual[nodes] += carried.T @ forces  # each unknown once
+    def add_forces(self, residual: Floats, forces: Floats, some: Ints | None = None) -> None:
+        """Add the weak form of ``forces`` (n, 3) [N] at the points, or at ``some`` of them (n,), to ``residual``, over this rank's
+        unknowns.
+        """
+        shares = self.carried.shares if some is None else self.carried.shares[some]
+        residual[self.carried.dofs] += shares.T @ forces  # each unknown once
 
     @cached_property
-    def _carried(self) -> tuple[Ints, csr_array]:
-        """The unknowns (m, 3) of the nodes, and how much (n, m) of each a point has."""
+    def carried(self) -> "Carried":
+        """The nodes that carry the points."""
         _, first, which = np.unique(self.dofs[:, :, 0], return_index=True, return_inverse=True)
+        which = which.reshape(self.basis.shape)
         points = np.repeat(np.arange(len(self.basis)), self.basis.shape[1])
-        entries = (self.basis.ravel(), (points, which.ravel()))
-        return self.dofs.reshape(-1, 3)[first], csr_array(entries, shape=(len(self.basis), len(first)))
+        shares = csr_array((self.basis.ravel(), (points, which.ravel())), shape=(len(self.basis), len(first)))
+        return Carried(self.dofs.reshape(-1, 3)[first], self.nodes.reshape(-1, 3)[first], which, shares)
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """The m nodes that carry n points, each once: their unknowns ``dofs`` (m, 3), where they ``rest`` (m, 3) [mm], by point
+    ``which`` of them (n, k), and the ``shares`` (n, m) that a point has of each.
+    """
+
+    dofs: Ints
+    rest: Floats
+    which: Ints
+    shares: csr_array
 
 
 def on_facets(space: fem.FunctionSpace, parents: Ints, mesh: Cells, facets: Ints, degree: int) -> ContactPoints:
@@ -88,13 +105,15 @@ def _points(
     basis = _element(space).tabulate(0, within)[0, :, :, 0]
     nodes = space.dofmap.list[cells].astype(np.int64)
     dofs = np.asarray(parents, np.int64)[3 * nodes[:, :, None] + np.arange(3)]
-    return ContactPoints(rest.reshape(-1, 3), areas.ravel(), np.asarray(cells), basis, dofs)
+    places = space.tabulate_dof_coordinates()[nodes]
+    return ContactPoints(rest.reshape(-1, 3), areas.ravel(), np.asarray(cells), basis, places, dofs)
 
 
 def _empty(space: fem.FunctionSpace) -> ContactPoints:
     count = space.dofmap.list.shape[1]
     no = np.zeros(0, np.int64)
-    return ContactPoints(np.zeros((0, 3)), np.zeros(0), no, np.zeros((0, count)), np.zeros((0, count, 3), np.int64))
+    none = np.zeros((0, count, 3))
+    return ContactPoints(np.zeros((0, 3)), np.zeros(0), no, np.zeros((0, count)), none, none.astype(np.int64))
 
 
 def _element(space: fem.FunctionSpace) -> Any:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats
+from fem_reference.solvers.fenicsx.contact import Tractions
 from fem_reference.solvers.fenicsx.determinants import Determinants
 from fem_reference.solvers.fenicsx.linear import LinearSolveError, LinearSolver
 from fem_reference.solvers.fenicsx.settings import BodySettings
@@ -77,7 +78,7 @@ class Newton:
             norm = self._linearise(moves)
         return norm
 
-    def _linearise(self, moves: Floats | None = None, tractions: Floats | None = None) -> float:
+    def _linearise(self, moves: Floats | None = None, tractions: Tractions | None = None) -> float:
         moves = -self.system.missing() if moves is None else moves
         self.linear.changed()
         return self.system.linearise(moves if moves.any() else None, tractions)

@@ -18,7 +18,7 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.solvers.fenicsx import compiling
 from fem_reference.solvers.fenicsx.boundary_conditions import PointSprings, PrescribedRegion
 from fem_reference.solvers.fenicsx.cells import CellSums, Structure, Tangent
-from fem_reference.solvers.fenicsx.contact import ContactForces
+from fem_reference.solvers.fenicsx.contact import ContactForces, Tractions
 from fem_reference.solvers.fenicsx.forms import Form
 from fem_reference.solvers.fenicsx.spent import Spent
 
@@ -72,7 +72,7 @@ class System:
         own = np.flatnonzero(self.fixed[: self.owned])
         self.prescribed_diagonal = diagonal[own]  # each row has its diagonal entry, in the order of the rows
 
-    def residual(self, tractions: Floats | None = None) -> float:
+    def residual(self, tractions: Tractions | None = None) -> float:
         """Sum what is out of balance into ``b``, and return its norm; ``tractions`` of contact other than those at present may be
         given.
         """
@@ -81,7 +81,7 @@ class System:
             self.cells.add_residual(self.work.array)
             return self._finish(tractions, None)
 
-    def linearise(self, moves: Floats | None = None, tractions: Floats | None = None) -> float:
+    def linearise(self, moves: Floats | None = None, tractions: Tractions | None = None) -> float:
         """As ``residual``, and sum the tangent into ``matrix``; what ``moves`` (n,) of prescribed unknowns change is added to first
         order.
         """
@@ -102,7 +102,7 @@ class System:
     def _on_surface(self) -> list["SurfaceSums"]:
         return [terms for terms in (self.springs, self.loads) if terms is not None]
 
-    def _finish(self, tractions: Floats | None, moves: Floats | None) -> float:
+    def _finish(self, tractions: Tractions | None, moves: Floats | None) -> float:
         """What is not of the cells, and the parts of other ranks."""
         for terms in self._on_surface:
             terms.add_residual(self.work.array, moves)

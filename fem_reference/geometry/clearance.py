@@ -1,0 +1,72 @@
+"""How far one can go from a point, whatever the direction, before a tricubic spline on a grid falls to a level."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
+
+from fem_reference.foundations.mesh import Floats
+
+# The four Bernstein coefficients of a cubic (rows) by those of the B-splines that reach into its cell: weights of means.
+_BERNSTEIN = np.array([[1, 4, 1, 0], [0, 4, 2, 0], [0, 2, 4, 0], [0, 1, 4, 1]]) / 6
+_CHUNK = 20_000  # cells at once
+
+
+@dataclass(frozen=True, eq=False)
+class Clearance:
+    """``away`` (i, j, k): how far [mm] each node is from the nearest cell in which the spline may be as low as the level. Nodes are
+    ``spacing`` [mm] apart, the first at ``origin``; beyond the last ones there is nothing as low.
+    """
+
+    away: Floats
+    origin: Floats
+    spacing: float
+
+    def __call__(self, points: Floats) -> Floats:
+        """A lower bound (n,) of the clearance [mm] of ``points`` (n, 3), 0 or below where there may be none; NaN for NaN."""
+        at = (points - self.origin) / self.spacing
+        known = np.isfinite(at).all(axis=1)
+        at = np.where(known[:, None], at, 0.0)
+        within = np.clip(at, 0, np.array(self.away.shape) - 1)
+        nodes = np.rint(within).astype(np.int64)
+        found = self.away[tuple(nodes.T)] - self.spacing * np.linalg.norm(within - nodes, axis=1)
+        beyond = self.spacing * np.linalg.norm(at - within, axis=1)
+        # The grid is convex: from beyond it, the way on from the nearest point of it makes no acute angle with that to it.
+        found = np.where(beyond > 0, np.hypot(beyond, np.maximum(found, 0)), found)
+        return np.where(known, found, np.nan)
+
+
+def of_spline(coefficients: Floats, origin: Floats, spacing: float, level: float) -> Clearance:
+    """The clearance of a spline with ``coefficients`` (i, j, k) of the B-splines about nodes, which has values between the second
+    nodes from either end.
+    """
+    low = _may_be_low(coefficients, level)
+    nodes = np.zeros(coefficients.shape, bool)
+    for corner in np.ndindex(2, 2, 2):
+        nodes[tuple(slice(1 + i, 1 + i + count) for i, count in zip(corner, low.shape, strict=True))] |= low
+    away = distance_transform_edt(~nodes, sampling=spacing) if nodes.any() else np.full(nodes.shape, np.inf)
+    return Clearance(np.asarray(away), np.asarray(origin, float), spacing)
+
+
+def _may_be_low(coefficients: Floats, level: float) -> NDArray[np.bool_]:
+    """In which cells, three fewer along each axis, a spline may be at ``level`` or below: it is no lower than the least of the
+    64 coefficients that reach into it, and than the least of its Bernstein coefficients.
+    """
+    found = _least_of_four(coefficients) <= level
+    cells = np.argwhere(found)
+    for first in range(0, len(cells), _CHUNK):
+        i, j, k = cells[first : first + _CHUNK].T
+        around = np.lib.stride_tricks.sliding_window_view(coefficients, (4, 4, 4))[i, j, k]
+        least = (_BERNSTEIN @ (_BERNSTEIN @ (around @ _BERNSTEIN.T)).reshape(-1, 4, 16)).min(axis=(1, 2))
+        found[i, j, k] = least <= level
+    return found
+
+
+def _least_of_four(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The least of four neighbours along each axis, each of which gets shorter by three."""
+    for axis in range(values.ndim):
+        windows = [values[(slice(None),) * axis + (slice(i, values.shape[axis] - 3 + i),)] for i in range(4)]
+        pairs = np.minimum(windows[0], windows[1]), np.minimum(windows[2], windows[3])
+        values = np.minimum(*pairs)
+    return values
