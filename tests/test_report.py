@@ -234,6 +234,7 @@ def test_page_names_everything_and_needs_no_network(comparison, tmp_path):
     assert re.findall(r"<script.*?>", text) == [
         '<script type="application/json" id="viewer-data">',
         '<script type="module">',
+        "<script>",
     ]
     bare = re.sub(r"<script.*?</script>", "", text, flags=re.DOTALL)
     links = re.findall(r'\b(?:src|href|action|data|srcset)\s*=\s*["\']?([^"\'\s>]*)', bare)

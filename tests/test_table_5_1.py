@@ -60,7 +60,8 @@ def case(tmp_path, monkeypatch):
 def page(case, *words: str) -> tuple[int, dict, str]:
     out = case.parent / "out"
     status = cli.main(["page", "table-5-1", "--case", str(case), *words, "--out", str(out), "--quiet"])
-    return status, json.loads((out / "table-5-1.json").read_text()), (out / "table-5-1.html").read_text()
+    (written,) = out.glob("table-5-1*.json")
+    return status, json.loads(written.read_text()), written.with_suffix(".html").read_text()
 
 
 def test_the_rows_are_those_of_the_report() -> None:

@@ -4,7 +4,7 @@ import argparse
 
 from fem_reference.cli._choosing import choose, scene_of, with_limits
 from fem_reference.cli._judging import judge
-from fem_reference.cli._parser import UNIT, add_case, add_error_bar, add_negative_control, add_ranks
+from fem_reference.cli._parser import UNIT, add_case, add_error_bar, add_name, add_negative_control, add_ranks
 
 HELP = "measure candidates against the reference and write the page"
 
@@ -21,6 +21,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--limit", action="append", default=[], metavar="METRIC.STATISTIC=VALUE", help=limit)
     add_error_bar(parser)
     add_negative_control(parser)
+    add_name(parser)
     add_ranks(parser)
 
 

@@ -42,6 +42,21 @@ LOOK: Any = {
     "ytick.color": "#444444",
     "legend.frameon": False,
 }
+# What a page in dark colours draws otherwise: what style.css has by these names there, and what is black here.
+_NAMED = {
+    "#e8e8e8": "grid",
+    "#888888": "axis",
+    "#444444": "soft",
+    "#dddddd": "line",
+    "#bbbbbb": "axis",
+    "#555555": "soft",
+} | {
+    "#1d1d1f": "ink",
+    "#000000": "ink",
+    "#ffffff": "paper",
+    "#14713a": "good",
+    "#b3261e": "bad",
+}
 _STATISTICS = (
     ("max", "worst vertex", "-"),
     ("hausdorff", "Hausdorff", "--"),
@@ -203,11 +218,23 @@ def logarithmic(axes: Axes) -> None:
 
 
 def inline(svg: str, name: str, title: str) -> str:
-    """The ``<svg>`` alone, as wide as its place, with ``name`` before every id, which has letters and digits only."""
+    """The ``<svg>`` alone, as wide as its place, with ``name`` before every id, which has letters and digits only, and colours that
+    the page may set by their names.
+    """
     name = re.sub(r"[^\w.-]", "_", name)
     svg = re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)
     svg = re.sub(r' xmlns(:\w+)?="[^"]*"', "", svg).replace("xlink:href", "href")
     svg = re.sub(r'(id="|href="#|url\(#)', rf"\g<1>{name}-", svg)
+    svg = re.sub(r"(?<=: )#[0-9a-f]{6}\b", lambda found: _named(found[0]), svg)
     box = re.search(r'viewBox="[^"]*"', svg)
     assert box is not None  # matplotlib writes one in every drawing
     return f'<svg {box[0]} role="img" aria-label="{escape(title)}">{svg[svg.index(">") + 1 :]}'
+
+
+def _named(colour: str) -> str:
+    """A colour as a page may change it, which stays what it is where the page says nothing.
+
+    >>> _named("#e8e8e8"), _named("#d55e00")
+    ('var(--grid, #e8e8e8)', 'var(--c-d55e00, #d55e00)')
+    """
+    return f"var(--{_NAMED.get(colour, f'c-{colour[1:]}')}, {colour})"
