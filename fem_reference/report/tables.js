@@ -31,8 +31,9 @@
   function sort(table, column, direction) {
     const body = table.tBodies[0], rows = groups(body).map(group => ({ group, said: text(group[0].cells[column]) }));
     for (const row of rows) row.value = number(row.said);
-    const numeric = rows.filter(row => !Number.isNaN(row.value)).length * 2 > rows.length;
-    const empty = row => row.said === "" || row.said === "–" || (numeric && Number.isNaN(row.value));
+    const nothing = said => ["", "–", "not a number"].includes(said);
+    const numeric = rows.every(row => nothing(row.said) || !Number.isNaN(row.value));
+    const empty = row => nothing(row.said) || (numeric && Number.isNaN(row.value));
     rows.sort((a, b) => empty(a) - empty(b) || (empty(a) ? 0 : direction * (numeric ? a.value - b.value || 0 : a.said.localeCompare(b.said))));
     body.append(...rows.flatMap(row => row.group));
   }

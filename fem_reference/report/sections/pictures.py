@@ -50,7 +50,7 @@ def _figures(comparison: Comparison) -> tuple[list[Figure], str]:
         return [], str(error)
     figures = []
     for shot, (first, second) in zip(wanted, drawn, strict=True):
-        top = None if shot.distances is None else float(shot.distances.max())
+        top = None if shot.distances is None else gallery.top(wanted)
         figures.append(Figure(shot.name, shot.number, (_source(first), _source(second)), top))
     return figures, ""
 
