@@ -582,7 +582,8 @@ def test_of_a_reference_that_failed_the_frames_that_it_reached_are_shown(compari
     assert "not a number" not in text
     assert "frame 40" not in text.replace("from frame 0", "")
     nowhere = replace(failed, positions=np.full_like(positions, NAN))
-    text = page.render(replace(one, reference=nowhere))
+    apart = {"quick": measured(quick, nowhere.positions)}
+    text = page.render(replace(one, reference=nowhere, deviations=apart))
     assert "No frame was reached, so that nothing could be measured against it." in text
     assert "How far from the reference" not in text
     assert "not a number" not in re.sub(r"<script.*?</script>", "", text, flags=re.DOTALL)

@@ -15,8 +15,11 @@ from fem_reference.assessment.judge import overall
 from fem_reference.assessment.omissions import CaseOmissions
 from fem_reference.assessment.solver_table import Table
 from fem_reference.assessment.stress import Stress
+from fem_reference.assessment.versions import Versions
 from fem_reference.io import files
+from fem_reference.problems.muscle import Setup
 from fem_reference.report import (
+    against_page,
     claims_page,
     effects_page,
     field_page,
@@ -41,6 +44,7 @@ __all__ = [
     "write_stress",
     "write_study",
     "write_verification",
+    "write_versions",
 ]
 
 
@@ -122,6 +126,14 @@ def write_stress(found: Stress, folder: Path, name: str, asked: str = "") -> Pat
     """Write the page ``name`` of hard cases and its numbers as JSON into ``folder``; the path of the page."""
     about = About("hard cases", "Hard cases", (("", "", stress_page.summary(found)),), asked)
     return _write_page(folder, name, stress.facts(found), stress_page.render(found), about)
+
+
+def write_versions(versions: Versions, setup: Setup, folder: Path, name: str, asked: str = "") -> Path:
+    """Write the page ``name`` of two versions of a solver and its numbers as JSON into ``folder``; the path of the page."""
+    title = f"{versions.current.candidate.name} against what it was: {versions.current.scene.title}"
+    said = (("", against_page.word(versions), against_page.headline(versions)),)
+    text = against_page.render(versions, setup)
+    return _write_page(folder, name, against_page.facts(versions), text, About("two versions", title, said, asked))
 
 
 def _write_page(folder: Path, name: str, facts: Any, text: str, about: About) -> Path:

@@ -4,19 +4,18 @@ import math
 from functools import partial
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.colors import to_hex
 
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import Of
 from fem_reference.assessment.judge import overall
 from fem_reference.metrics import Measure, find
-from fem_reference.report import pictures, reached
+from fem_reference.report import reached
 from fem_reference.report.at_frames import columns, label
 from fem_reference.report.curves import colour_of, label_of
 from fem_reference.report.sections import sections
 from fem_reference.report.sections.origin import changes
+from fem_reference.report.sections.pictures import ramp
 from fem_reference.report.tables import DEVIATIONS, known, runs
 from fem_reference.report.templates import template
 from fem_reference.report.viewer import view
@@ -86,7 +85,7 @@ def _shared(comparison: Comparison) -> dict[str, Any]:
         if comparison.extension_error is None
         else worst(comparison.reference, comparison.extension_error),
         "viewer": view(comparison),
-        "colours": _colours(),
+        "colours": ramp(),
         "worst": worst,
         "find": find,
         "ratio": ratio,
@@ -184,8 +183,3 @@ def _sentence(comparison: Comparison) -> str:
     if not names:
         return f"The reference computed by {solver}, {over}, without a candidate: {judged}"
     return f"{listed(names)} compared with the reference computed by {solver}, {over}: {judged}"
-
-
-def _colours() -> str:
-    """The colour map of the pictures as the stops of a CSS gradient."""
-    return ", ".join(to_hex(colour) for colour in mpl.colormaps[pictures.COLOURS](np.linspace(0, 1, 17)))
