@@ -10,6 +10,7 @@ import test_field_page
 import test_study_page
 import test_table_5_1
 import test_verify_page
+import test_versions
 
 from fem_reference import report
 from fem_reference.assessment.comparison import Comparison
@@ -28,6 +29,7 @@ KINDS = (
     "claims",
     "effects",
     "stress",
+    "versions",
     "index",
 )
 
@@ -75,6 +77,10 @@ def write(folder: Path, comparison: Comparison, alone: Comparison) -> dict[str, 
         "effects": report.write_effects(test_effects_verb.found(), folder, "effects", "fem-reference effects hip"),
         "stress": report.write_stress(stress(comparison), folder, "stress", "fem-reference stress"),
     }
+    pair = test_versions.pair(comparison)
+    written["versions"] = report.write_versions(
+        pair, comparison.setup, folder / "quick-against_old", "against", "fem-reference compare"
+    )
     index_page.write(folder)
     return written | {"index": folder / "index.html"}
 

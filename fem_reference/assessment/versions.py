@@ -57,6 +57,12 @@ class Change:
         return float(self.bars[self.at])
 
     @property
+    def greatest(self) -> tuple[float, float]:
+        """How far it was and is from the reference at the most, NaN where it has no number."""
+        was, now = (np.abs(values[np.isfinite(values)]) for values in (self.was, self.now))
+        return float(was.max()) if len(was) else math.nan, float(now.max()) if len(now) else math.nan
+
+    @property
     def in_bars(self) -> float:
         """The change there in error bars, NaN where these are not known."""
         return self.by / self.bar if self.bar > 0 else math.nan
@@ -64,7 +70,7 @@ class Change:
     @property
     def size(self) -> float:
         """What changes are sorted by: the change in error bars, without these as a share of what it was and is."""
-        whole = np.nanmax(np.abs([self.was[self.at], self.now[self.at], 1e-300]))
+        whole = np.nanmax([*self.greatest, 1e-300])
         return abs(self.by / whole) if math.isnan(self.in_bars) else abs(self.in_bars)
 
     @property

@@ -126,7 +126,7 @@ def _curve(one: Change, i: int) -> Curve:
 
     def draw(figure: Figure, axes: Axes) -> None:
         frames = np.array(one.numbers)
-        if np.isfinite(one.bars).any():
+        if np.nan_to_num(one.bars).any():
             axes.fill_between(frames, 0, one.bars, color=BAND, linewidth=0, label="error bar")
         axes.plot(frames, np.abs(one.was), "--", color=PALETTE[1], linewidth=1.4, label="before")
         axes.plot(frames, np.abs(one.now), color=PALETTE[0], linewidth=1.8, label="now")

@@ -25,7 +25,7 @@ REFERENCE = "#222222"
 # Okabe and Ito's palette for all kinds of colour vision, without its black and yellow.
 PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 _NOT_A_NUMBER = "not a number"
-BAND = "#00000020"
+BAND = "#01010120"  # a black that the drawing names: pure black is left out of SVG
 _KNOWN = "error bar"
 _FAR = 50.0  # of two candidates' greatest distances, beyond which they share a logarithmic axis
 LOOK: Any = {
@@ -53,7 +53,7 @@ _NAMED = {
     "#555555": "soft",
 } | {
     "#1d1d1f": "ink",
-    "#000000": "band",
+    "#010101": "band",
     "#ffffff": "paper",
     "#14713a": "good",
     "#b3261e": "bad",
