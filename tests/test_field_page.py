@@ -175,6 +175,7 @@ def test_nothing_but_a_diverged_reference_has_a_page(tmp_path):
     assert "there is a reference alone" in text
     assert "No run has values that are numbers" in text
     assert "What was expected" not in text
+    assert "not a number" not in text[text.index("<h3>Runs") : text.index("<h3>Convergence")]
     bad = replace(alone, ladders=(replace(LADDERS[1], errors=(NAN, 0.0, NAN)),))
     assert field_figures.convergence(bad).missing
 

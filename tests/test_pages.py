@@ -1,5 +1,6 @@
 """Pages have names that hold what makes them different, none is lost to another, and the index knows them all."""
 
+import os
 import re
 from argparse import Namespace
 from pathlib import Path
@@ -116,6 +117,22 @@ def test_an_index_of_somebody_else_stays(tmp_path: Path) -> None:
     put(tmp_path / "a.html", "a")
     index_page.write(tmp_path)
     assert (tmp_path / "index.html").read_text() == "my own site"
+
+
+def test_where_the_index_cannot_be_written_the_page_is(tmp_path: Path, monkeypatch) -> None:
+    def refuse(_: Path) -> None:
+        raise OSError("no room")
+
+    monkeypatch.setattr(index_page, "write", refuse)
+    options, asked = Namespace(out=tmp_path, page_name=None), Asked("study", "study")
+    path, lines = written(options, asked, lambda folder, name, command: put(folder / f"{name}.html", command))
+    assert path.is_file()
+    assert lines == [f"page: {path}", "  no index: no room"]
+
+
+def test_a_pipe_is_no_page(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "a.html")
+    assert pages.read(tmp_path / "a.html") is None
 
 
 def test_the_small_picture_is_the_first_that_can_be_read(tmp_path: Path) -> None:

@@ -193,6 +193,16 @@ def test_what_is_not_a_number_stands_on_the_page_and_not_in_the_drawing() -> Non
     json.dumps(ranking_page.facts(made), allow_nan=False)
 
 
+def test_of_a_reference_that_failed_one_sentence_stands_there_and_no_table() -> None:
+    made = table(solver_result("case0", math.nan), solver_result("case1", 2.0))
+    lost = replace(made.scenarios[0], reference=Outcome("diverged", "No equilibrium; try smaller steps."))
+    html = ranking_page.render(replace(made, scenarios=(lost, made.scenarios[1])))
+    part = html[html.index('<h2 id="case0">') : html.index('<h2 id="case1">')]
+    assert "<b>The reference: diverged.</b> No equilibrium; try smaller steps. Nothing could be measured" in part
+    assert "<table" not in part
+    assert "<table" in html[html.index('<h2 id="case1">') :]
+
+
 def test_the_page_is_whole_or_not_there(tmp_path) -> None:
     path = report.write_ranking(table(solver_result("case0", 1.0)), tmp_path / "new", "table-5-1")
     assert sorted(file.name for file in path.parent.iterdir()) == ["table-5-1.html", "table-5-1.json"]

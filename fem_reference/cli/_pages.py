@@ -91,5 +91,9 @@ def written(
     name, note = pages.free(where, options.page_name or asked.name, asked.command)
     parent, file = (folder / name, asked.page) if asked.page else (folder, name)
     path = write(parent, file, asked.command)
-    index_page.write(folder)
-    return path, [f"page: {path}", *([f"  {note}"] if note else [])]
+    notes = [note] if note else []
+    try:
+        index_page.write(folder)
+    except OSError as error:  # the page is there, and worth more than its index
+        notes.append(f"no index: {error}")
+    return path, [f"page: {path}", *(f"  {line}" for line in notes)]

@@ -47,6 +47,8 @@ def stamped(text: str, about: About) -> str:
 
 def read(path: Path) -> About | None:
     """What the page at ``path`` says of itself; None where there is none of ours, or a damaged one."""
+    if not path.is_file():  # a pipe would be waited for
+        return None
     try:
         with path.open("rb") as file:
             head = file.read(_HEAD).decode("utf-8", "ignore")
