@@ -550,19 +550,15 @@ def test_candidates_share_one_colour_scale_and_one_axis(comparison):
 
 
 def test_a_frame_is_its_number_with_what_is_known_there(comparison):
-    assert label(comparison, 20) == "frame 20 (plate 28.6°)"  # half of 1 rad
+    assert label(comparison.scene, comparison.setup, 20) == "frame 20 (plate 28.6°)"  # half of 1 rad
     text = page.render(comparison)
     assert "from frame 0 (plate 0°) to frame 40 (plate 57.3°)" in text
     assert '<th>Frame</th><th>plate <span class="unit">°</span></th>' in text
-    timed = replace(
-        comparison,
-        scene=comparison.scene.model_copy(
-            update={"frames": comparison.scene.frames.model_copy(update={"interval": 0.05})}
-        ),
-    )
-    assert label(timed, 20) == "frame 20 (time 1 s, plate 28.6°)"
+    frames = comparison.scene.frames.model_copy(update={"interval": 0.05})
+    timed = comparison.scene.model_copy(update={"frames": frames})
+    assert label(timed, comparison.setup, 20) == "frame 20 (time 1 s, plate 28.6°)"
     slid = replace(comparison.setup.bones[0], motion=Translation((1, 0, 0), (0, 40), (0.0, 8.0)))
-    assert label(replace(comparison, setup=replace(comparison.setup, bones=(slid,))), 10) == "frame 10 (plate 2 mm)"
+    assert label(comparison.scene, replace(comparison.setup, bones=(slid,)), 10) == "frame 10 (plate 2 mm)"
 
 
 def test_of_a_reference_that_failed_the_frames_that_it_reached_are_shown(comparison):

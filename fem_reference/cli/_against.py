@@ -28,6 +28,8 @@ def against(case: Case, options: argparse.Namespace, chosen: list[tuple[Candidat
     scene = casefile.muscle(case, "--against")
     if len(chosen) != 1:
         raise InputError("--against", f"{len(chosen)} candidates", "one, by --candidate or --solver")
+    if options.limit:
+        raise InputError("--limit", "with --against", "one of the two: check judges a candidate by its past")
     ((entry, place),) = chosen
     check_names([entry.name])
     bench, path = checked_bench(scene, options, chosen), options.against

@@ -1,6 +1,7 @@
 """The page of two versions of one solver: what got better, what worse, and where."""
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from fem_reference.foundations.errors import MissingSoftware
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.muscle import Setup
 from fem_reference.report import gallery
+from fem_reference.report.at_frames import label
 from fem_reference.report.curves import BAND, PALETTE, Curve, drawn
 from fem_reference.report.gallery import Shot
 from fem_reference.report.sections.pictures import picture_source, ramp, ticks
@@ -45,6 +47,7 @@ def render(versions: Versions, setup: Setup) -> str:
         seconds=seconds_per_frame(versions.current.candidate),
         title_of=title_of,
         infinite=math.inf,
+        label=partial(label, versions.current.scene, setup),
     )
 
 
@@ -144,10 +147,8 @@ def _moved(versions: Versions) -> Curve | None:
         frames = np.array(versions.current.candidate.numbers)
         known = np.where(np.isfinite(versions.moved), versions.moved, np.nan)
         rows = [row[np.isfinite(row)] for row in known]
-        for label, style, value in (("furthest", "-", np.max), ("rms", ":", lambda row: np.sqrt((row**2).mean()))):
-            axes.plot(
-                frames, [value(row) if len(row) else np.nan for row in rows], style, color=PALETTE[0], label=label
-            )
+        for name, style, value in (("furthest", "-", np.max), ("rms", ":", lambda row: np.sqrt((row**2).mean()))):
+            axes.plot(frames, [value(row) if len(row) else np.nan for row in rows], style, color=PALETTE[0], label=name)
         _finish(figure, axes, "mm")
 
     return drawn("moved", "Distance of vertices from where they were", (5.4, 3.0), draw)

@@ -3,12 +3,13 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.motion import Rotation, Translation
 from fem_reference.report.words import number
+from fem_reference.scenes.case import Case
 
 
 @dataclass(frozen=True)
@@ -20,11 +21,11 @@ class Column:
     at: Callable[[int], float]
 
 
-def columns(comparison: Comparison) -> list[Column]:
+def columns(scene: Case, setup: Any) -> list[Column]:
     """Time [s], where the case has any, and how far each bone that moves is turned [°] or shifted [mm]."""
-    interval = getattr(getattr(comparison.scene, "frames", None), "interval", None)
+    interval = getattr(getattr(scene, "frames", None), "interval", None)
     found = [] if interval is None else [Column("time", "s", lambda frame: frame * float(interval))]
-    for bone in getattr(comparison.setup, "bones", ()):
+    for bone in getattr(setup, "bones", ()):
         motion = bone.motion
         if isinstance(motion, Rotation):
             found.append(Column(bone.name, "°", _at(motion.frames, [math.degrees(angle) for angle in motion.angles])))
@@ -33,10 +34,10 @@ def columns(comparison: Comparison) -> list[Column]:
     return found
 
 
-def label(comparison: Comparison, frame: int) -> str:
+def label(scene: Case, setup: Any, frame: int) -> str:
     """A frame in words: its number, and in brackets what is known of it."""
     known = [
-        f"{one.name} {number(one.at(frame))}{'' if one.unit == '°' else ' '}{one.unit}" for one in columns(comparison)
+        f"{one.name} {number(one.at(frame))}{'' if one.unit == '°' else ' '}{one.unit}" for one in columns(scene, setup)
     ]
     return f"frame {frame}" + (f" ({', '.join(known)})" if known else "")
 

@@ -59,7 +59,7 @@ def _failed(comparison: Comparison) -> str:
     why = f"{reference.outcome.message.rstrip('.')}."
     if not len(kept):
         return f"{why} No frame was reached, so that nothing could be measured against it."
-    last = label(comparison, reference.numbers[kept[-1]])
+    last = label(comparison.scene, comparison.setup, reference.numbers[kept[-1]])
     return f"{why} {len(kept)} of {wanted} frames were reached, up to {last}: what follows is about these."
 
 
@@ -67,7 +67,7 @@ def _key(comparison: Comparison) -> dict[str, Any]:
     """How to read the page: colours of the curves, frames, and what was set otherwise than in the file of the case."""
     names = [run.name for run in comparison.runs]
     numbers = comparison.reference.numbers
-    ends = [label(comparison, number) for number in (numbers[0], numbers[-1])]
+    ends = [label(comparison.scene, comparison.setup, number) for number in (numbers[0], numbers[-1])]
     return {"colours": list(zip(names, map(colour_of, range(len(names))), strict=True)), "ends": ends}
 
 
@@ -90,8 +90,8 @@ def _shared(comparison: Comparison) -> dict[str, Any]:
         "find": find,
         "ratio": ratio,
         "label_of": label_of,
-        "label": partial(label, comparison),
-        "frame_columns": columns(comparison),
+        "label": partial(label, comparison.scene, comparison.setup),
+        "frame_columns": columns(comparison.scene, comparison.setup),
         "changes": changes(comparison.scene),
         "seconds_per_frame": seconds_per_frame,
     }
