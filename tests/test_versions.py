@@ -33,6 +33,9 @@ def change(was, now, bars=(NAN, NAN), unit="mm") -> Change:
     ("was", "now", "bars", "word", "by"),
     [
         ((0, 2), (0, 3), (NAN, NAN), "worse", 1),
+        ((1, 2), (0.5, 3), (NAN, NAN), "mixed", 1),
+        ((1, 2), (0.95, 3), (NAN, NAN), "worse", 1),  # a twentieth of it does not count
+        ((1, 2), (0.5, 3), (0.6, 0.6), "worse", 1),
         ((0, 3), (0, -2), (NAN, NAN), "better", -1),  # on the other side and nearer
         ((0, 2), (0, 3), (0.1, 1.5), "within the error bar", 1),
         ((0, 2), (0, 3), (0.1, 0.5), "worse", 1),
@@ -53,7 +56,8 @@ def test_nearer_is_better_and_what_is_less_than_the_bar_is_neither(was, now, bar
 def test_the_frame_that_counts_is_the_one_that_changed_most_and_a_change_is_said_in_bars() -> None:
     found = change((4, 1), (1, 2), (0.5, 0.5))
     assert (found.frame, found.by, found.in_bars, found.greatest) == (0, -3, -6, (4, 2))
-    said = "surface deviation, rms is 3 mm nearer in frame 0: 4 before, 1 mm now, 6 times the error bar"
+    said = "surface deviation, rms is 3 mm nearer in frame 0: 4 before, 1 mm now, 6 times the error bar, "
+    said += "and 1 mm further in frame 10"
     assert against_page.sentence(found) == said
     assert "has no number any more in frame 10" in against_page.sentence(change((0, 2), (0, NAN)))
 
@@ -127,7 +131,7 @@ def test_the_verb_compares_with_a_baseline_and_with_a_stored_run(tmp_path: Path,
         # It was 2 mm away at frame 20 and is 4.
         assert "worse: surface deviation, rms is 2 mm further in frame 20: 2 before, 4 mm now" in printed
         assert "moved most: 2" in printed
-        name = f"bar-candidate_0_.sub_iterations=4-pbd-against_{against.stem if against is past else against.name}"
+        name = f"bar-candidate0.sub_iterations=4-pbd-against_{against.stem if against is past else against.name}"
         assert f"page: {out / name / 'against.html'}" in printed
         assert json.loads(facts.read_text())["counts"]["worse"] > 3
     html = next(out.glob(f"*against_{old.name}/against.html")).read_text()

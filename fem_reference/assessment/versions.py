@@ -12,8 +12,9 @@ from fem_reference.assessment.measured import CurrentMeasures
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints
 
-Word = Literal["worse", "better", "within the error bar", "as it was", "no number"]
-ORDER: tuple[Word, ...] = ("worse", "better", "within the error bar", "as it was", "no number")
+Word = Literal["worse", "mixed", "better", "within the error bar", "as it was", "no number"]
+SHARE = 0.1
+ORDER: tuple[Word, ...] = ("worse", "mixed", "better", "within the error bar", "as it was", "no number")
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,14 +76,32 @@ class Change:
 
     @property
     def word(self) -> Word:
-        """Whether that is better; what is less than rounding or than the error bar is neither."""
+        """Whether that is better; what is less than rounding or than the error bar is neither, and "mixed" what is nearer in some
+        frames and further away in others.
+        """
         if math.isnan(self.by):
             return "no number"
         if abs(self.by) <= 10.0 ** -PLACES[self.unit]:
             return "as it was"
-        if not math.isinf(self.by) and abs(self.by) <= self.bar:
-            return "within the error bar"
-        return "worse" if self.by > 0 else "better"
+        nearer, further = bool((self._counted < 0).any()), bool((self._counted > 0).any())
+        if nearer and further:
+            return "mixed"
+        return "worse" if further else "better" if nearer else "within the error bar"
+
+    @property
+    def _counted(self) -> Floats:
+        """The changes (f,) that are more than rounding, their error bar and ``SHARE`` of the greatest; 0 for the others."""
+        change = np.nan_to_num(self.further, nan=0.0, posinf=np.inf, neginf=-np.inf)
+        finite = np.abs(change[np.isfinite(change)])
+        least = max(10.0 ** -PLACES[self.unit], SHARE * float(finite.max(initial=0.0)))
+        return np.where(np.abs(change) > np.fmax(self.bars, least), change, 0.0)
+
+    @property
+    def other(self) -> int | None:
+        """Of what is mixed, the index of the frame that changed most the other way; None of all else."""
+        if self.word != "mixed":
+            return None
+        return int(np.argmin(self._counted) if self.by > 0 else np.argmax(self._counted))
 
 
 @dataclass(frozen=True, eq=False)

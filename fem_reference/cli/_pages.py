@@ -50,9 +50,9 @@ def _plain(text: str) -> str:
     """What may stand in the name of a file.
 
     >>> _plain("muscle.tet_size=8 mm"), _plain("effect[0].mu=1 kPa")
-    ('muscle.tet_size=8mm', 'effect_0_.mu=1kPa')
+    ('muscle.tet_size=8mm', 'effect0.mu=1kPa')
     """
-    return re.sub(r"[^\w.=+-]+", "_", re.sub(r"\s+", "", text))
+    return re.sub(r"[^\w.=+-]+", "_", re.sub(r"[\s\[\]]+", "", text))
 
 
 def case_part(scene: Case) -> Part:

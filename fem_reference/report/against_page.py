@@ -35,7 +35,7 @@ def render(versions: Versions, setup: Setup) -> str:
         current=versions.current,
         headline=headline(versions),
         order=ORDER,
-        sentences=[sentence(one) for word in ("worse", "better") for one in versions.of(word)[:3]],
+        sentences=[sentence(one) for word in ORDER[:3] for one in versions.of(word)[:3]],
         curves=[_curve(one, i) for i, one in enumerate(_shown(versions))],
         moved=_moved(versions),
         place=place(versions),
@@ -57,8 +57,8 @@ def headline(versions: Versions) -> str:
 
 
 def word(versions: Versions) -> str:
-    """The verdict of the headline: worse where anything is, else better where anything is."""
-    return next((one for one in ("worse", "better") if versions.count(one)), "as it was")
+    """The verdict of the headline: worse where anything is, else mixed, else better."""
+    return next((one for one in ORDER[:3] if versions.count(one)), "as it was")
 
 
 def title_of(name: str) -> str:
@@ -74,11 +74,16 @@ def sentence(one: Change) -> str:
     """What became of a statistic."""
     if math.isinf(one.by):
         return f"{title_of(one.name)} {'has no number any more' if one.by > 0 else 'has a number now'} in frame {one.frame}"
-    where = (
-        f"in frame {one.frame}: {number(abs(one.was[one.at]))} before, {number(abs(one.now[one.at]))} {one.unit} now"
-    )
+    then, now = number(abs(one.was[one.at])), number(abs(one.now[one.at]))
     bars = "" if math.isnan(one.in_bars) else f", {number(abs(one.in_bars))} times the error bar"
-    return f"{title_of(one.name)} is {number(abs(one.by))} {one.unit} {'further' if one.by > 0 else 'nearer'} {where}{bars}"
+    other = "" if one.other is None else f", and {_by(one, one.other)}"
+    return f"{title_of(one.name)} is {_by(one, one.at)}: {then} before, {now} {one.unit} now{bars}{other}"
+
+
+def _by(one: Change, k: int) -> str:
+    """By how much a statistic is nearer or further away in the k-th frame."""
+    by = float(one.further[k])
+    return f"{number(abs(by))} {one.unit} {'further' if by > 0 else 'nearer'} in frame {one.numbers[k]}"
 
 
 def place(versions: Versions) -> str:
@@ -113,7 +118,7 @@ def facts(versions: Versions) -> dict[str, Any]:
 
 def text(versions: Versions) -> str:
     """What is printed."""
-    said = [f"{one.word}: {sentence(one)}" for kind in ("worse", "better") for one in versions.of(kind)]
+    said = [f"{one.word}: {sentence(one)}" for kind in ORDER[:3] for one in versions.of(kind)]
     moved = place(versions)
     last = f"{versions.current.candidate.name} on {versions.current.scene.name} against {versions.was}: {headline(versions)}"
     return "\n".join([*said, *([f"moved most: {moved}"] if moved else ["nothing moved"]), last])

@@ -130,9 +130,10 @@ def headlines(comparison: Comparison) -> list[tuple[str, str, str]]:
         found.append((run.name, overall(words) if words else "not judged", ended + _greatest(comparison, run)))
     words = [one.word for one in comparison.verdicts if one.expectation.of == "reference"]
     checks = f"{words.count('pass')} of {len(words)} of its own checks met" if words else "nothing is expected of it"
-    found.append(
-        ("reference", overall(words) if words else "not judged", "; ".join([checks, *_doubts(comparison.reference)]))
-    )
+    word = overall(words) if words else "not judged"
+    if comparison.reference.outcome.status != "converged":  # whatever of it was met
+        word = "fail"
+    found.append(("reference", word, "; ".join([checks, *_doubts(comparison.reference)])))
     return found
 
 
