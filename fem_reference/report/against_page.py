@@ -77,13 +77,18 @@ def sentence(one: Change) -> str:
     then, now = number(abs(one.was[one.at])), number(abs(one.now[one.at]))
     bars = "" if math.isnan(one.in_bars) else f", {number(abs(one.in_bars))} times the error bar"
     other = "" if one.other is None else f", and {_by(one, one.other)}"
-    return f"{title_of(one.name)} is {_by(one, one.at)}: {then} before, {now} {one.unit} now{bars}{other}"
+    return f"{title_of(one.name)} is {_by(one, one.at)}: {then} before, {now} {_unit(one)} now{bars}{other}"
 
 
 def _by(one: Change, k: int) -> str:
     """By how much a statistic is nearer or further away in the k-th frame."""
     by = float(one.further[k])
-    return f"{number(abs(by))} {one.unit} {'further' if by > 0 else 'nearer'} in frame {one.numbers[k]}"
+    return f"{number(abs(by))} {_unit(one)} {'further' if by > 0 else 'nearer'} in frame {one.numbers[k]}"
+
+
+def _unit(one: Change) -> str:
+    """The unit of a statistic in a sentence."""
+    return one.unit.replace("mm3", "mm³").replace("deg", "°")
 
 
 def place(versions: Versions) -> str:
