@@ -11,6 +11,7 @@ import stand_ins
 import test_headline
 
 from fem_reference import cli
+from fem_reference.cli import demo
 from fem_reference.cli._pages import LONGEST, Asked, Part, written
 from fem_reference.report import index_page, pages
 from fem_reference.report.pages import About
@@ -162,6 +163,9 @@ def test_runs_that_differ_leave_pages_beside_each_other(tmp_path: Path, monkeypa
     assert call("compare") == [page("bar")]
     assert call("compare", "--limit", "volume.deviation=1 %")[0] == page("bar")
     assert call("run") == [page("bar-reference")]
+    monkeypatch.setattr(demo, "MAIN_JOB", str(case))
+    assert cli.main(["demo", "--out", str(out), "--quiet"]) == cli.DONE  # it is the same as to compare
+    assert "written anew" in capsys.readouterr().out
     assert call("compare", "--set", "frames.every=10") == [page("bar-frames.every=10")]
     assert call("run", "--negative-control") == [page("bar-negative_control-reference")]
     assert call("compare", "--name", "mine") == [page("mine")]

@@ -63,7 +63,7 @@ def case_part(scene: Case) -> Part:
 def changes(options: argparse.Namespace) -> tuple[Part, ...]:
     """What ``--set`` and ``--negative-control`` change of a case."""
     control = (Part(("--negative-control",), "negative_control"),) if options.negative_control is True else ()
-    return (*(Part(("--set", text), text) for text in options.set), *control)
+    return (*(Part(("--set", text), text) for text in getattr(options, "set", ())), *control)
 
 
 def candidates(scene: Case, chosen: Iterable[Candidate]) -> tuple[Part, ...]:
