@@ -85,6 +85,13 @@ class Browser:
         self.events.clear()
         self.call("Page.navigate", url=path.resolve().as_uri() + fragment)
 
+    def screen(self, width: int, scheme: str = "light", media: str = "") -> None:
+        """Be ``width`` pixels wide, as a screen in a colour ``scheme`` or, as ``media`` "print", as paper."""
+        size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+        self.call("Emulation.setDeviceMetricsOverride", **size)
+        features = [{"name": "prefers-color-scheme", "value": scheme}]
+        self.call("Emulation.setEmulatedMedia", media=media, features=features)
+
     def ask(self, expression: str) -> Any:
         """The value of an expression in the page."""
         answer = self.call("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
@@ -100,9 +107,10 @@ class Browser:
 
     def press(self, key: str) -> None:
         """Press and release a key by its name."""
-        codes = {"ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40, "Home": 36, "End": 35}
+        codes = {"ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40, "Home": 36, "End": 35, "Enter": 13}
         for kind in ("keyDown", "keyUp"):
-            self.call("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=codes.get(key, 0))
+            typed = {"text": "\r"} if key == "Enter" and kind == "keyDown" else {}
+            self.call("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=codes[key], **typed)
 
     def picture(self, element: str) -> np.ndarray[Any, Any]:
         """The pixels (height, width, 3) of the element that a selector names, once two frames were drawn."""

@@ -91,9 +91,9 @@ def test_a_point_is_the_same_alone_with_workers_and_after_a_kill(tmp_path) -> No
             assert cut_off.poll() is None
             time.sleep(0.05)
         os.killpg(cut_off.pid, signal.SIGKILL)
-    assert not (tmp_path / "cut" / "bar" / "study.json").exists()
+    assert not (tmp_path / "cut" / "bar-pbd" / "study.json").exists()
     subprocess.run(line, check=True, stdout=sys.stderr)
-    points = json.loads((tmp_path / "cut" / "bar" / "study.json").read_text())["points"]
+    points = json.loads((tmp_path / "cut" / "bar-pbd" / "study.json").read_text())["points"]
     assert [point["errors"] for point in points] == [point.errors for point in alone.points]
 
 

@@ -131,7 +131,7 @@ def test_main_job(tmp_path) -> None:
     surface = {"dihedral_angle", "edge_extension", "inversion", "surface_deviation", "volume"}
     assert metrics == surface | {"fibre_length", "penetration"}
     page = (tmp_path / "hip_flexion" / "report.html").read_text()
-    assert page.count("data:image/webp") >= 4, "the pictures are missing"
+    assert page.count('src="data:image/webp') >= 4, "the pictures are missing"
 
 
 @pytest.mark.usefixtures("without_page")

@@ -83,7 +83,7 @@ def test_it_is_asked_for_by_the_command_line(tmp_path, monkeypatch) -> None:
     stand_ins.solve_by(monkeypatch, fenicsx, swell)
     case, out = small.write(tmp_path / "bar"), tmp_path / "out"
     assert cli.main(["page", "error-bars", "--case", str(case), "--out", str(out), "--quiet"]) == cli.DONE
-    numbers = json.loads((out / "error-bars.json").read_text())
+    numbers = json.loads((out / "error-bars-bar.json").read_text())
     # The finer one has a share of 1 - 0.8 of the error; meshes follow the size wanted to some 15 %.
     assert numbers["covered"] == 1.0
     assert 2 < numbers["median_ratio"] < 12

@@ -219,7 +219,7 @@ def test_a_foreign_solver_is_judged(
 
     drawn = []
     monkeypatch.setattr(Bench, "obtain", obtain)
-    monkeypatch.setattr(report, "write", lambda result, folder: drawn.append(result) or folder / "report.html")
+    monkeypatch.setattr(report, "write", lambda result, folder, _: drawn.append(result) or folder / "report.html")
     words = ["compare", scene.place, "--candidate", str(foreign), "--out", str(tmp_path), "--quiet"]
     assert cli.main([*words, "--json", str(tmp_path / "facts.json")]) == cli.DONE
     facts = json.loads((tmp_path / "facts.json").read_text())

@@ -134,8 +134,8 @@ def test_the_verb_and_its_page(tmp_path, capsys) -> None:
     words = ["stress", "at_rest.millimetres", "--solver", "pbd", "--solver", "xpbd", "--out", str(tmp_path)]
     assert cli.main([*words, "--json", str(tmp_path / "facts.json"), "--quiet"]) == cli.DONE
     assert "1 hard cases by 2 solvers: 2 ok, 0 degraded, 0 failed, 0 refused" in capsys.readouterr().out
-    page = (tmp_path / "stress.html").read_text(encoding="utf-8")
+    page = (tmp_path / "stress-at_rest.millimetres-pbd-xpbd.html").read_text(encoding="utf-8")
     assert page.count('class="cell"') == 2
-    assert page.count("data:image/webp") == 2
+    assert page.count('src="data:image/webp') == 2
     facts = json.loads((tmp_path / "facts.json").read_text())
     assert [entry["verdict"] for entry in facts["cells"]] == ["ok", "ok"]

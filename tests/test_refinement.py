@@ -50,7 +50,7 @@ def swell(problem, _settings, sink) -> Outcome:
 def case(tmp_path, monkeypatch) -> Path:
     """The small scene, solved by ``swell``, without its page."""
     stand_ins.solve_by(monkeypatch, fenicsx, swell)
-    monkeypatch.setattr(report, "write", lambda _, folder: folder)
+    monkeypatch.setattr(report, "write", lambda _, folder, __: folder)
     return small.write(tmp_path / "bar")
 
 
@@ -82,7 +82,7 @@ def test_the_bar_covers_an_error_that_is_known(case, capsys, monkeypatch) -> Non
     path.write_text(path.read_text() + CONTACT)
     status, facts = call(case, "run")
     assert (status, facts["error_bars"], facts["verdicts"][0]["error_bar"]) == (cli.VERDICT_FAIL, [], None)  # it swells
-    page = case.parent / "out" / "bar" / "report.html"
+    page = case.parent / "out" / "bar-reference" / "report.html"
     assert "With <code>--error-bar</code> the reference is solved" in page.read_text()
     status, facts = call(case, "run", "--error-bar")
     assert (status, facts["verdict"]) == (cli.DONE, "inconclusive")

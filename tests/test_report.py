@@ -17,13 +17,15 @@ from fem_reference.assessment.error_bars import ErrorBar, ErrorBars
 from fem_reference.assessment.judge import Verdict
 from fem_reference.foundations.errors import MissingSoftware
 from fem_reference.foundations.mesh import Polylines, Surface
+from fem_reference.foundations.motion import Translation
 from fem_reference.geometry.rigid_bodies import HalfSpace
 from fem_reference.geometry.tessellation import tessellated
 from fem_reference.metrics import Measure, MeasurementContext
 from fem_reference.problems.muscle import RigidBody, Setup
 from fem_reference.report import gallery, page
 from fem_reference.report import sections as folder_of_sections
-from fem_reference.report.curves import curves
+from fem_reference.report.at_frames import label
+from fem_reference.report.curves import _surface_limits, curves
 from fem_reference.report.sections import sections
 from fem_reference.report.sections.reference import least
 from fem_reference.report.tables import COLUMNS
@@ -124,6 +126,11 @@ def a_run(name: str, solver: str, positions: np.ndarray, status: str = "converge
 
 @pytest.fixture
 def comparison(tmp_path, monkeypatch) -> Comparison:
+    """What most tests here are about."""
+    return small_comparison(tmp_path, monkeypatch)
+
+
+def small_comparison(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Comparison:
     """A reference that moves along x, ``quick`` 1 mm a frame beside it, ``torn`` whose last frame is not a number."""
     monkeypatch.setattr(gallery, "_command", lambda _job, _folder: [sys.executable, "-c", "raise SystemExit(3)"])
     (tmp_path / "press").mkdir()
@@ -232,8 +239,10 @@ def test_page_names_everything_and_needs_no_network(comparison, tmp_path):
     assert '<span class="bad">not a number</span>' in text
     assert all(f"<td>{frame}</td>" in text for frame in NUMBERS)
     assert re.findall(r"<script.*?>", text) == [
+        '<script type="application/json" id="page-facts">',
         '<script type="application/json" id="viewer-data">',
         '<script type="module">',
+        "<script>",
     ]
     bare = re.sub(r"<script.*?</script>", "", text, flags=re.DOTALL)
     links = re.findall(r'\b(?:src|href|action|data|srcset)\s*=\s*["\']?([^"\'\s>]*)', bare)
@@ -520,3 +529,64 @@ def test_worst_of_a_measure_with_a_frame_that_is_not_a_number(comparison):
     it = page.worst(torn, Measure("volume", "deviation", "%", np.array([0, -3.0, 2, NAN, 1]), tuple("abcde")))
     assert np.isnan(it["value"])
     assert (it["frame"], it["where"], it["finite"]) == (30, "d", (-3.0, 10))
+
+
+def test_candidates_share_one_colour_scale_and_one_axis(comparison):
+    # quick is 4 mm away at its worst, torn 1.5 mm.
+    wanted = gallery.shots(comparison)
+    assert gallery.top(wanted) == pytest.approx(4.0)
+    assert gallery.top(wanted[:1]) == 0
+    assert _surface_limits(comparison) == (0.0, pytest.approx(1.04 * 4), False)
+    far = comparison.deviations | {
+        "torn": tuple(
+            replace(one, values=1e4 * one.values)
+            for one in measured(comparison.candidates[1], comparison.reference.positions)
+        )
+    }
+    low, high, logarithmic = _surface_limits(replace(comparison, deviations=far))
+    assert logarithmic
+    assert (low, high) == (pytest.approx(4e-3), pytest.approx(1.3 * 1.5e4))
+    assert _surface_limits(alone(comparison)) == (0.0, 1.04, False)
+
+
+def test_a_frame_is_its_number_with_what_is_known_there(comparison):
+    assert label(comparison.scene, comparison.setup, 20) == "frame 20 (plate 28.6°)"  # half of 1 rad
+    text = page.render(comparison)
+    assert "from frame 0 (plate 0°) to frame 40 (plate 57.3°)" in text
+    assert '<th>Frame</th><th>plate <span class="unit">°</span></th>' in text
+    frames = comparison.scene.frames.model_copy(update={"interval": 0.05})
+    timed = comparison.scene.model_copy(update={"frames": frames})
+    assert label(timed, comparison.setup, 20) == "frame 20 (time 1 s, plate 28.6°)"
+    slid = replace(comparison.setup.bones[0], motion=Translation((1, 0, 0), (0, 40), (0.0, 8.0)))
+    assert label(comparison.scene, replace(comparison.setup, bones=(slid,)), 10) == "frame 10 (plate 2 mm)"
+
+
+def test_of_a_reference_that_failed_the_frames_that_it_reached_are_shown(comparison):
+    positions = np.array(comparison.reference.positions)
+    positions[3:] = NAN
+    lost = Outcome("diverged", "no equilibrium near the foot; try smaller steps", {"seconds": 1.0})
+    failed = replace(comparison.reference, positions=positions, outcome=lost)
+    quick = replace(comparison.candidates[0], name="quick")
+    deviations, changes = (
+        {"quick": measured(quick, positions)},
+        {"reference": measured(failed, ball().points), "quick": measured(quick, ball().points)},
+    )
+    one = replace(comparison, reference=failed, candidates=(quick,), deviations=deviations, changes=changes)
+    assert "3 of 5 frames were reached, up to frame 20" in page.render(with_bars(one))
+    text = re.sub(r"<script.*?</script>", "", page.render(one), flags=re.DOTALL)
+    assert "The reference (fenicsx): diverged.</b> no equilibrium near the foot; try smaller steps. 3 of 5 " in text
+    assert '<span class="badge fail">fail</span> <b>reference</b>: 1 of 1 of its own checks met; diverged' in text
+    assert "not a number" not in text
+    assert "frame 40" not in text.replace("from frame 0", "")
+    unmet = replace(one.verdicts[0], word="fail", value=NAN, frame=30)
+    text = re.sub(r"<script.*?</script>", "", page.render(replace(one, verdicts=(unmet,))), flags=re.DOTALL)
+    assert "not a number" not in text
+    assert "<td>not reached" in text
+    nowhere = replace(failed, positions=np.full_like(positions, NAN))
+    apart = {"quick": measured(quick, nowhere.positions)}
+    text = page.render(replace(one, reference=nowhere, deviations=apart))
+    assert "No frame was reached, so that nothing could be measured against it." in text
+    assert "How far from the reference" not in text
+    assert "not a number" not in re.sub(r"<script.*?</script>", "", text, flags=re.DOTALL)
+    assert "What it cost" in text
+    assert 'type="module"' not in text

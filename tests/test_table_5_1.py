@@ -60,7 +60,8 @@ def case(tmp_path, monkeypatch):
 def page(case, *words: str) -> tuple[int, dict, str]:
     out = case.parent / "out"
     status = cli.main(["page", "table-5-1", "--case", str(case), *words, "--out", str(out), "--quiet"])
-    return status, json.loads((out / "table-5-1.json").read_text()), (out / "table-5-1.html").read_text()
+    (written,) = out.glob("table-5-1*.json")
+    return status, json.loads(written.read_text()), written.with_suffix(".html").read_text()
 
 
 def test_the_rows_are_those_of_the_report() -> None:
@@ -190,6 +191,16 @@ def test_what_is_not_a_number_stands_on_the_page_and_not_in_the_drawing() -> Non
     assert "not a number" in html
     assert "lost at &lt;frame&gt; 3" in html
     json.dumps(ranking_page.facts(made), allow_nan=False)
+
+
+def test_of_a_reference_that_failed_one_sentence_stands_there_and_no_table() -> None:
+    made = table(solver_result("case0", math.nan), solver_result("case1", 2.0))
+    lost = replace(made.scenarios[0], reference=Outcome("diverged", "No equilibrium; try smaller steps."))
+    html = ranking_page.render(replace(made, scenarios=(lost, made.scenarios[1])))
+    part = html[html.index('<h2 id="case0">') : html.index('<h2 id="case1">')]
+    assert "<b>The reference: diverged.</b> No equilibrium; try smaller steps. Nothing could be measured" in part
+    assert "<table" not in part
+    assert "<table" in html[html.index('<h2 id="case1">') :]
 
 
 def test_the_page_is_whole_or_not_there(tmp_path) -> None:

@@ -3,6 +3,7 @@
 import argparse
 import logging
 import os
+import re
 import signal
 import sys
 import traceback
@@ -14,6 +15,7 @@ from fem_reference.cli._printing import (
     BROKEN,
     DONE,
     INTERRUPTED,
+    LONGEST,
     SOLVER_FAILED,
     TERMINATED,
     VERDICT_FAIL,
@@ -40,6 +42,7 @@ def main(arguments: list[str]) -> int:
         options = parser(words[0] if words else "").parse_args(arguments)
         _show_progress(on=not options.quiet)
         _check_outputs(options)
+        _check_name(options.page_name)
         status: int = options.verb(options)
     except (InputError, OSError) as error:
         print(f"fem-reference: {error}", file=sys.stderr)
@@ -88,6 +91,15 @@ def _check_outputs(options: argparse.Namespace) -> None:
             raise InputError(f"--{name}", f'"{path}", a folder', "a file")
         if path is not None and not path.exists():
             _check_folder(f"--{name}", path.parent, written=True)
+
+
+def _check_name(name: str | None) -> None:
+    """InputError where ``--name`` is none that a page can have: what else lies beside pages has its own."""
+    if name is not None and (
+        name in ("runs", "docs", "index") or not re.fullmatch(rf"\w[\w.=+-]{{0,{LONGEST - 1}}}", name)
+    ):
+        want = f"at most {LONGEST} letters, digits and . _ = + -, and not runs, docs or index"
+        raise InputError("--name", f'"{name}"', want)
 
 
 def _check_folder(place: str, folder: Path, *, written: bool) -> None:

@@ -4,7 +4,8 @@ import argparse
 
 from fem_reference import report
 from fem_reference.cli._choosing import check_names, checked_bench, refuse_error_bar
-from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
+from fem_reference.cli._pages import Asked, Part, candidates, case_part, changes, written
+from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, write_output
 from fem_reference.report.overview import comparison_text
 from fem_reference.scenes.case import Candidate, Case
 from fem_reference.studies import judging, refinement
@@ -22,8 +23,16 @@ def judge(scene: Case, options: argparse.Namespace, chosen: list[tuple[Candidate
     }
     bars = refinement.obtain(bench, reference) if options.error_bar else refinement.offered(bench, reference)
     result = judging.compare(bench, reference, [(read | solved)[entry.name] for entry, _ in chosen], bars)
-    page = report.write(result, out(options) / scene.name)
-    write_output(report.summary(result), comparison_text(result, page), options)
+    asked = _asked(scene, options, [entry for entry, _ in chosen])
+    _, lines = written(options, asked, lambda folder, _, command: report.write(result, folder, command))
+    write_output(report.summary(result), "\n".join([comparison_text(result), *lines]), options)
     if any(run.outcome.status != "converged" for run in result.runs):
         return SOLVER_FAILED
     return VERDICT_FAIL if result.word == "fail" else DONE
+
+
+def _asked(scene: Case, options: argparse.Namespace, chosen: list[Candidate]) -> Asked:
+    """The page of the case; where it has candidates and none is wanted, that of the reference alone."""
+    alone = bool(scene.candidate) and not chosen
+    who = (Part((), "reference"),) if alone else candidates(scene, chosen)
+    return Asked("run" if alone else "compare", scene.name, (case_part(scene), *changes(options), *who), "report")

@@ -64,7 +64,7 @@ def _help(name: str) -> str:
 
 def _add(verb: Verb, sub: argparse.ArgumentParser) -> None:
     """The options of a verb."""
-    sub.set_defaults(verb=verb.run, ranks=None, error_bar=False, negative_control=False, writes=True)
+    sub.set_defaults(verb=verb.run, ranks=None, error_bar=False, negative_control=False, writes=True, page_name=None)
     verb.add_options(sub)
     sub.add_argument("--out", type=Path, metavar="DIR", help="where pages and stored runs go (default: reports)")
     sub.add_argument("--json", type=Path, metavar="FILE", help="write what is printed as JSON")
@@ -88,6 +88,12 @@ def add_negative_control(parser: argparse.ArgumentParser) -> None:
     """Whether the case is wrong on purpose."""
     control = "with the one change of the case that must turn its verdict to fail"
     parser.add_argument("--negative-control", action="store_true", help=control)
+
+
+def add_name(parser: argparse.ArgumentParser) -> None:
+    """What the page is called."""
+    name = "name of the page (default: the case with what makes the page different, such as CASE-KEY=VALUE)"
+    parser.add_argument("--name", dest="page_name", metavar="NAME", help=name)
 
 
 def add_ranks(parser: argparse.ArgumentParser) -> None:

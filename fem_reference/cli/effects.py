@@ -1,10 +1,12 @@
 """The verb ``effects``: what each effect of a case changes, and what it costs."""
 
 import argparse
+from functools import partial
 
 from fem_reference import report
 from fem_reference.assessment.omissions import facts
-from fem_reference.cli._parser import add_case
+from fem_reference.cli._pages import Asked, case_part, changes, written
+from fem_reference.cli._parser import add_case, add_name
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, out, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import effects_page
@@ -19,6 +21,7 @@ HELP = "what leaving out each effect of a case changes and saves, for its refere
 def add_options(parser: argparse.ArgumentParser) -> None:
     """The options that this verb has."""
     add_case(parser)
+    add_name(parser)
     parser.add_argument(
         "--workers", type=int, default=1, metavar="N", help="how many runs are made at once (default: 1)"
     )
@@ -31,6 +34,7 @@ def run(options: argparse.Namespace) -> int:
     scene = casefile.read_muscle(options.case, dict(map(casefile.setting, options.set)))
     scene = scene.model_copy(update={"choice": "listed"})  # what it would leave out is measured too
     found = omissions.study(scene, out(options) / "runs", Workers(options.workers))
-    path = report.write_effects(found, out(options) / scene.name, PAGE)
-    write_output(facts(found), f"{effects_page.text(found)}\npage: {path}", options)
+    asked = Asked("effects", scene.name, (case_part(scene), *changes(options)), PAGE)
+    _, lines = written(options, asked, partial(report.write_effects, found))
+    write_output(facts(found), "\n".join([effects_page.text(found), *lines]), options)
     return DONE if found.ablations[0].whole.status == "converged" else SOLVER_FAILED

@@ -1,6 +1,7 @@
 """The verb ``page``: a page over several cases."""
 
 import argparse
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,8 @@ from fem_reference import report
 from fem_reference.assessment.claims import Cover
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.cli._choosing import check_names, checked_bench, own_candidates
-from fem_reference.cli._parser import UNIT
+from fem_reference.cli._pages import Asked, Part, case_part, written
+from fem_reference.cli._parser import UNIT, add_name
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.report.claims_page import facts as claims_facts
@@ -16,6 +18,7 @@ from fem_reference.report.overview import comparison_text, ranking_text
 from fem_reference.report.ranking_page import facts as ranking_facts
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Candidate
+from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import recorded
 from fem_reference.studies import judging, table_5_1, true_errors
 from fem_reference.studies.execution import Bench
@@ -40,6 +43,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     foreign = f"for {TABLE}: frames that your solver made of a case; may be repeated"
     parser.add_argument("--candidate", action="append", default=[], metavar="CASE=DIR", help=foreign)
     parser.add_argument("--unit", help=UNIT)
+    add_name(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -57,13 +61,14 @@ def run(options: argparse.Namespace) -> int:
 def _examples(options: argparse.Namespace) -> int:
     """Cases with all their candidates, one after the other."""
     title, names = PAGES[options.name]
-    cases, path = [casefile.read(name) for name in names], out(options) / f"{options.name}.html"
+    cases = [casefile.read(name) for name in names]
     benches = [checked_bench(case, options, own_candidates(case)) for case in cases]
     results = tuple(_compared(bench) for bench in benches)
-    report.write_examples(title, results, path, differences=True)
+    write = partial(report.write_examples, title, results)
+    path, lines = written(options, Asked("page", options.name, (Part((options.name,)),)), write)
     facts = {"page": str(path), "cases": [report.summary(result) for result in results]}
     texts = [f"{result.scene.title}:\n{comparison_text(result)}" for result in results]
-    write_output(facts, "\n\n".join([*texts, f"page: {path}"]), options)
+    write_output(facts, "\n\n".join([*texts, "\n".join(lines)]), options)
     if any(run.outcome.status != "converged" for result in results for run in result.runs):
         return SOLVER_FAILED
     return VERDICT_FAIL if any(result.word == "fail" for result in results) else DONE
@@ -84,8 +89,8 @@ def _table(options: argparse.Namespace) -> int:
     for name in scenes if options.case else foreign:
         Bench(scenes[name], out(options)).setup()  # only what nobody asked for by name may be missing
     table = table_5_1.stand(scenes.values(), out(options) / "runs", foreign)
-    path = report.write_ranking(table, out(options), TABLE)
-    write_output(ranking_facts(table), f"{ranking_text(table)}\npage: {path}", options)
+    _, lines = written(options, _asked(TABLE, scenes, foreign, options), partial(report.write_ranking, table))
+    write_output(ranking_facts(table), "\n".join([ranking_text(table), *lines]), options)
     return DONE if all(one.reference.status == "converged" for one in table.scenarios) else SOLVER_FAILED
 
 
@@ -93,13 +98,31 @@ def _claims(options: argparse.Namespace) -> int:
     """Error bars beside errors."""
     scenes = [casefile.read_muscle(case) for case in options.case or true_errors.CASES]
     found = true_errors.stake(scenes, out(options) / "runs")
-    path = report.write_claims(found, out(options), CLAIMS)
+    _, lines = written(
+        options,
+        _asked(CLAIMS, {scene.name: scene for scene in scenes}, {}, options),
+        partial(report.write_claims, found),
+    )
     whole = Cover.of(found.claims)
     covered = f"{100 * whole.share:.1f} % cover the difference from a finer solution, median ratio {whole.median:.2f}"
     printed = [f"{whole.count} error bars: {covered}"]
     printed += [f"left out: {case}: {why}" for case, why in found.missing.items()]
-    write_output(claims_facts(found), "\n".join([*printed, f"page: {path}"]), options)
+    write_output(claims_facts(found), "\n".join([*printed, *lines]), options)
     return SOLVER_FAILED if found.missing else DONE
+
+
+def _asked(
+    page: str, scenes: dict[str, MuscleCase], foreign: dict[str, list[Candidate]], options: argparse.Namespace
+) -> Asked:
+    """The page over the cases that were asked for, with frames of other solvers."""
+    words = {name: case_part(scene).words[0] for name, scene in scenes.items() if options.case}
+    parts = [Part((page,)), *(Part(("--case", word), name) for name, word in words.items())]
+    parts += [
+        Part(("--candidate", f"{case}={one.settings['folder']}"), f"{case}={one.name}")
+        for case, found in foreign.items()
+        for one in found
+    ]
+    return Asked("page", page, tuple(parts))
 
 
 def _foreign(options: argparse.Namespace, cases: list[str]) -> dict[str, list[Candidate]]:

@@ -48,13 +48,15 @@ def run(options: argparse.Namespace) -> int:
 
 
 def read(folder: Path) -> list[CaseStudy]:
-    """The studies below ``folder``; InputError where there is none."""
-    found = [load(path) for path in sorted(folder.glob(f"*/{PAGE}.json"))]
+    """The studies below ``folder``, of a case that of its own name before those with another; InputError where there is none."""
+    paths = sorted(folder.glob(f"*/{PAGE}.json"))
+    studies = [(load(path), path.parent.name) for path in paths]
+    found = {study.case: study for study, name in sorted(studies, key=lambda one: one[0].case == one[1])}
     if not found:
         raise InputError(
             "--out", f'"{folder}", where no study is', "a folder with studies: fem-reference study CASE makes one"
         )
-    return found
+    return list(found.values())
 
 
 def _limits(options: argparse.Namespace, unit: str) -> list[tuple[str, float]]:

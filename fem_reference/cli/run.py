@@ -7,7 +7,7 @@ from fem_reference.assessment.comparison import alone
 from fem_reference.assessment.judge import check
 from fem_reference.cli._choosing import refuse_error_bar, scene_of
 from fem_reference.cli._judging import judge
-from fem_reference.cli._parser import add_case, add_error_bar, add_negative_control, add_ranks
+from fem_reference.cli._parser import add_case, add_error_bar, add_name, add_negative_control, add_ranks
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.problems import of_case
@@ -25,6 +25,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_error_bar(parser)
     add_ranks(parser)
     add_negative_control(parser)
+    add_name(parser)
     explain = "say of each effect whether the case needs it and why, and solve nothing"
     parser.add_argument("--explain", action="store_true", help=explain)
 

@@ -1,10 +1,13 @@
 """The verb ``stress``: every solver on hard cases, and whether it stays stable."""
 
 import argparse
+from functools import partial
 
 from fem_reference import report
 from fem_reference.assessment.stress import facts
-from fem_reference.cli._printing import DONE, out, write_output
+from fem_reference.cli._pages import Asked, Part, written
+from fem_reference.cli._parser import add_name
+from fem_reference.cli._printing import DONE, write_output
 from fem_reference.report import stress_page
 from fem_reference.studies.hard import records, running
 
@@ -20,11 +23,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--solver", action="append", default=[], choices=list(running.choices()), metavar="NAME", help=only
     )
+    add_name(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run them all and write the page: whatever becomes of a run is a result, and not a failure of this."""
     found = running.run(records.read_all(tuple(options.names)), options.solver)
-    path = report.write_stress(found, out(options), PAGE)
-    write_output(facts(found), f"{stress_page.text(found)}\npage: {path}", options)
+    parts = [Part((name,), name) for name in options.names]
+    parts += [Part(("--solver", name), name) for name in options.solver]
+    _, lines = written(options, Asked("stress", PAGE, tuple(parts)), partial(report.write_stress, found))
+    write_output(facts(found), "\n".join([stress_page.text(found), *lines]), options)
     return DONE

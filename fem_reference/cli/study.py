@@ -3,13 +3,17 @@
 import argparse
 import logging
 from dataclasses import replace
+from functools import partial
 
 from fem_reference import report, solvers
-from fem_reference.assessment.cost_study import facts
+from fem_reference.assessment.cost_study import Study, facts
+from fem_reference.cli._pages import Asked, Part, case_part, changes, written
+from fem_reference.cli._parser import add_name
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, out, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import study_page
 from fem_reference.scenes import casefile
+from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import cost, growth
 from fem_reference.studies.campaign import Workers
 
@@ -39,6 +43,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     grown = "measure too how costs grow with the size of the problem, on bodies of our own making (about 5 minutes)"
     parser.add_argument("--growth", action="store_true", help=grown)
+    add_name(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -51,10 +56,22 @@ def run(options: argparse.Namespace) -> int:
     found = cost.study(scenes, out(options) / "runs", workers, options.solver)
     if options.growth:
         found = replace(found, growth=growth.measure(log.info))
-    for case in found.cases:
-        path = report.write_study(cost.alone(found, case), out(options) / case.case, PAGE)
-    if len(found.cases) != 1:
-        path = report.write_study(found, out(options), PAGE)
     printed = {"cases": [facts(case, found.origin) for case in found.cases], "missing": found.missing}
-    write_output(printed, f"{study_page.text(found)}\npage: {path}", options)
+    write_output(printed, "\n".join([study_page.text(found), *_written(found, scenes, options)]), options)
     return SOLVER_FAILED if found.missing else DONE
+
+
+def _written(found: Study, scenes: list[MuscleCase], options: argparse.Namespace) -> list[str]:
+    """Write the pages, that of all cases last where there are several, which then has the name that was given."""
+    more = [*changes(options), *(Part(("--solver", name), name) for name in options.solver)]
+    more += [Part(("--growth",), "growth")] if options.growth else []
+    parts, several = {scene.name: case_part(scene) for scene in scenes}, len(found.cases) != 1
+    lines = list[str]()
+    for case in found.cases:
+        asked = Asked("study", case.case, (parts[case.case], *more), PAGE)
+        own = argparse.Namespace(**vars(options) | ({"page_name": None} if several else {}))
+        lines = written(own, asked, partial(report.write_study, cost.alone(found, case)))[1]
+    if several:
+        named = [Part(part.words, name) for name, part in parts.items()]
+        lines = written(options, Asked("study", PAGE, (*named, *more)), partial(report.write_study, found))[1]
+    return lines

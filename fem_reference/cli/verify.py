@@ -2,10 +2,13 @@
 
 import argparse
 import time
+from functools import partial
 
 from fem_reference import __version__, report
 from fem_reference.assessment.catalogue import Result
-from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
+from fem_reference.cli._pages import Asked, Part, written
+from fem_reference.cli._parser import add_name
+from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, write_output
 from fem_reference.report.verify_page import Verification, facts
 from fem_reference.runs.key import versions
 from fem_reference.verification import runner
@@ -22,6 +25,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("names", metavar="NAME", nargs="*", help=known)
     control = "measure this entry with its one thing wrong, named or not: it must fail; may be repeated"
     parser.add_argument("--negative-control", action="append", default=[], metavar="NAME", help=control)
+    add_name(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -29,9 +33,12 @@ def run(options: argparse.Namespace) -> int:
     measured = _verify(options.names, options.negative_control)
     # Measurements are printed even if the page fails.
     write_output(facts(measured), "\n".join([*_lines(measured.results), measured.summary]), options)
-    part = options.names or options.negative_control
-    name = "verify_part" if part else "verify"  # a part does not replace the whole
-    print(f"page: {report.write_verification(measured, out(options), name)}")
+    parts = [Part((name,), name) for name in options.names]
+    parts += [Part(("--negative-control", name), f"negative_control={name}") for name in options.negative_control]
+    print(
+        *written(options, Asked("verify", "verify", tuple(parts)), partial(report.write_verification, measured))[1],
+        sep="\n",
+    )
     return {"failed": SOLVER_FAILED, "fail": VERDICT_FAIL}.get(measured.word, DONE)
 
 

@@ -25,8 +25,9 @@ REFERENCE = "#222222"
 # Okabe and Ito's palette for all kinds of colour vision, without its black and yellow.
 PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 _NOT_A_NUMBER = "not a number"
-BAND = "#00000018"
+BAND = "#01010120"  # a black that the drawing names: pure black is left out of SVG
 _KNOWN = "error bar"
+_FAR = 50.0  # of two candidates' greatest distances, beyond which they share a logarithmic axis
 LOOK: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "fem_reference",
@@ -41,6 +42,21 @@ LOOK: Any = {
     "xtick.color": "#444444",
     "ytick.color": "#444444",
     "legend.frameon": False,
+}
+# What a page in dark colours draws otherwise: what style.css has by these names there, and what is black here.
+_NAMED = {
+    "#e8e8e8": "grid",
+    "#888888": "axis",
+    "#444444": "soft",
+    "#dddddd": "line",
+    "#bbbbbb": "axis",
+    "#555555": "soft",
+} | {
+    "#1d1d1f": "ink",
+    "#010101": "band",
+    "#ffffff": "paper",
+    "#14713a": "good",
+    "#b3261e": "bad",
 }
 _STATISTICS = (
     ("max", "worst vertex", "-"),
@@ -89,13 +105,22 @@ def label_of(inverted: Measure) -> str:
     return words(inverted.statistic.removeprefix("min_det_F").lstrip("_"))
 
 
+def colour_of(i: int) -> str:
+    """The colour of the i-th run, the reference first.
+
+    >>> colour_of(0), colour_of(1)
+    ('#222222', '#0072b2')
+    """
+    return REFERENCE if i == 0 else PALETTE[(i - 1) % len(PALETTE)]
+
+
 def _of_runs(comparison: Comparison, name: str, title: str, measures: dict[str, Measure | None]) -> Curve | None:
     found = {run: measure for run, measure in measures.items() if measure is not None}
 
     def draw(axes: Axes) -> None:
         for i, run in enumerate(runs(comparison)):
             if run.name in found:
-                colour = REFERENCE if i == 0 else PALETTE[(i - 1) % len(PALETTE)]
+                colour = colour_of(i)
                 if i == 0:
                     _band(axes, comparison, "change", found[run.name], found[run.name].values)
                 _line(axes, run.numbers, found[run.name], run.name, color=colour, linewidth=2.4 if i == 0 else 1.5)
@@ -103,18 +128,38 @@ def _of_runs(comparison: Comparison, name: str, title: str, measures: dict[str, 
     return _drawing(name, title, next(iter(found.values())).unit, draw) if found else None
 
 
+def _surface_limits(comparison: Comparison) -> tuple[float, float, bool]:
+    """What the drawings of all candidates' surfaces share: the ends of the axis [mm], and whether it is logarithmic, as it is where
+    one is so much further away than another that its curve would lie on the frame.
+    """
+    wanted = {("surface_deviation", statistic) for statistic, _, _ in _STATISTICS}
+    each = [
+        np.concatenate([one.values for one in measures if (one.metric, one.statistic) in wanted] or [np.zeros(0)])
+        for measures in comparison.deviations.values()
+    ]
+    tops = [float(values[np.isfinite(values)].max()) for values in each if np.isfinite(values).any()]
+    top, apart = max(tops, default=0.0), [one for one in tops if one > 0]
+    far = bool(apart) and top > _FAR * min(apart)
+    return (min(apart) / 1e3 if far else 0.0), (1.3 if far else 1.04) * (top or 1.0), far
+
+
 def _surface(comparison: Comparison, i: int, title: str) -> Curve | None:
     run = comparison.candidates[i]
+    low, high, far = _surface_limits(comparison)
     measures = comparison.deviations[run.name]
     found = [(find(measures, "surface_deviation", statistic), label, style) for statistic, label, style in _STATISTICS]
 
     def draw(axes: Axes) -> None:
         for measure, label, style in found:
             if measure is not None:
-                colour = PALETTE[i % len(PALETTE)]
+                colour = colour_of(i + 1)
                 _band(axes, comparison, "deviation", measure, np.zeros(len(run.numbers)), style)
                 _line(axes, run.numbers, measure, label, color=colour, linestyle=style)
-        axes.set_ylim(bottom=0)
+        if far:
+            axes.set_yscale("log")
+            axes.yaxis.set_major_formatter(lambda value, _: number(value))
+            axes.yaxis.set_minor_formatter(NullFormatter())
+        axes.set_ylim(low, high)
 
     return _drawing(f"surface-{i}", title, "mm", draw) if any(measure for measure, _, _ in found) else None
 
@@ -203,11 +248,24 @@ def logarithmic(axes: Axes) -> None:
 
 
 def inline(svg: str, name: str, title: str) -> str:
-    """The ``<svg>`` alone, as wide as its place, with ``name`` before every id, which has letters and digits only."""
+    """The ``<svg>`` alone, as wide as its place, with ``name`` before every id, which has letters and digits only, and colours that
+    the page may set by their names.
+    """
     name = re.sub(r"[^\w.-]", "_", name)
     svg = re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)
     svg = re.sub(r' xmlns(:\w+)?="[^"]*"', "", svg).replace("xlink:href", "href")
     svg = re.sub(r'(id="|href="#|url\(#)', rf"\g<1>{name}-", svg)
+    svg = re.sub(r"(?<=: )#[0-9a-f]{6}\b", lambda found: _named(found[0]), svg)
     box = re.search(r'viewBox="[^"]*"', svg)
     assert box is not None  # matplotlib writes one in every drawing
-    return f'<svg {box[0]} role="img" aria-label="{escape(title)}">{svg[svg.index(">") + 1 :]}'
+    wide = f' style="--wide: {float(box[0].split()[2]):.0f}px"'
+    return f'<svg {box[0]}{wide} role="img" aria-label="{escape(title)}">{svg[svg.index(">") + 1 :]}'
+
+
+def _named(colour: str) -> str:
+    """A colour as a page may change it, which stays what it is where the page says nothing.
+
+    >>> _named("#e8e8e8"), _named("#d55e00")
+    ('var(--grid, #e8e8e8)', 'var(--c-d55e00, #d55e00)')
+    """
+    return f"var(--{_NAMED.get(colour, f'c-{colour[1:]}')}, {colour})"

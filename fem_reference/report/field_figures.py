@@ -144,17 +144,28 @@ def _svg(name: str, title: str, draw: Callable[[Axes], None]) -> Drawing:
     return Drawing(title, inline(text.getvalue(), name, title))
 
 
-def _panels(example: Comparison, draw: Callable[[Figure, Comparison, Floats, str], None]) -> Iterator[Drawing]:
+@dataclass(frozen=True, eq=False)
+class _Shown:
+    """Values (n,) at the vertices, the ``colours`` they are drawn in, and all values (k, n) that share their scale."""
+
+    values: Floats
+    colours: str
+    scale_of: Floats
+
+
+def _panels(example: Comparison, draw: Callable[[Figure, Comparison, _Shown], None]) -> Iterator[Drawing]:
     """The rival, the reference and their difference, each drawn by ``draw``."""
     reference, other = example.reference, rival(example)
-    wanted = [(_called(reference), reference.vertex_values[-1], VALUES)]
+    solutions = [run.vertex_values[-1] for run in (reference, other) if run is not None]
+    both = np.stack([values for values in solutions if np.isfinite(values).all()] or solutions)
+    wanted = [(_called(reference), _Shown(reference.vertex_values[-1], VALUES, both))]
     if other is not None:
-        wanted.insert(0, (_called(other), other.vertex_values[-1], VALUES))
+        wanted.insert(0, (_called(other), _Shown(other.vertex_values[-1], VALUES, both)))
         apart = other.vertex_values[-1] - reference.vertex_values[-1]
-        wanted.append((f"Difference: {other.name} minus reference", apart, DIFFERENCES))
-    for title, values, colours in wanted:
-        if np.isfinite(values).all():
-            yield _webp(title, lambda figure, v=values, c=colours: draw(figure, example, v, c))  # type: ignore[misc]
+        wanted.append((f"Difference: {other.name} minus reference", _Shown(apart, DIFFERENCES, apart[None])))
+    for title, shown in wanted:
+        if np.isfinite(shown.values).all():
+            yield _webp(title, lambda figure, it=shown: draw(figure, example, it))  # type: ignore[misc]
         else:
             yield Drawing(title, missing="its values are not a number, so that there is nothing to draw")
 
@@ -177,9 +188,10 @@ def _webp(title: str, draw: Callable[[Figure], None]) -> Drawing:
     return Drawing(title, f'<img src="{source}" width="{width}" height="{height}" alt="">')
 
 
-def _plate(figure: Figure, example: Comparison, values: Floats, colours: str) -> None:
+def _plate(figure: Figure, example: Comparison, wanted: _Shown) -> None:
     """A map with the triangles on it, and the values as heights above the plate."""
-    mesh, scale = example.setup.mesh, _scale(values, colours)
+    mesh, values, colours = example.setup.mesh, wanted.values, wanted.colours
+    scale = _scale(wanted.scale_of, colours)
     x, y = mesh.points.T
     axes: Any = figure.add_subplot(1, 2, 1)
     shown = axes.tripcolor(x, y, mesh.cells, values, shading="gouraud", cmap=colours, norm=scale)
@@ -239,7 +251,7 @@ def _windows(points: Floats, anchors: Floats) -> list[_Window]:
     return windows
 
 
-def _body(figure: Figure, example: Comparison, values: Floats, colours: str) -> None:
+def _body(figure: Figure, example: Comparison, wanted: _Shown) -> None:
     """A surface in space seen along z from the side of its anchors, y up, every window with its own colours."""
     mesh = example.setup.mesh
     anchors = mesh.points[~np.isnan(example.setup.fixed[: len(mesh.points)])]
@@ -253,8 +265,8 @@ def _body(figure: Figure, example: Comparison, values: Floats, colours: str) -> 
     for window, place in zip(windows, grid, strict=True):
         axes = figure.add_subplot(place)
         inside = ((turned.points >= window.low) & (turned.points <= window.high)).all(axis=1)
-        scale = ScalarMappable(_scale(values[inside], colours), colours)
-        axes.add_collection(_front(turned, values, scale, window.line))
+        scale = ScalarMappable(_scale(wanted.scale_of[:, inside], wanted.colours), wanted.colours)
+        axes.add_collection(_front(turned, wanted.values, scale, window.line))
         (x, y, _), (width, height) = (window.low + window.high) / 2, window.half
         axes.set(xlim=(x - width, x + width), ylim=(y - height, y + height), aspect="equal")
         axes.set_axis_off()

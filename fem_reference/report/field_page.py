@@ -94,9 +94,16 @@ def apart(example: Comparison) -> str:
     )
 
 
-def bounds(run: Run) -> tuple[float, float]:
-    """The least and the greatest value at a vertex, NaN where one is not a number."""
+def bounds(run: Run) -> tuple[float, float] | tuple[None, None]:
+    """The least and the greatest value at a vertex, NaN where one is not a number, None where the run failed and says why."""
+    if _lost(run):
+        return None, None
     return float(run.vertex_values[-1].min()), float(run.vertex_values[-1].max())
+
+
+def _lost(run: Run) -> bool:
+    """Whether a run failed and has no values that are numbers."""
+    return run.outcome.status != "converged" and not np.isfinite(run.vertex_values[-1]).all()
 
 
 def seconds(run: Run) -> float | None:
@@ -112,7 +119,9 @@ def form(example: Comparison, run: Run) -> str:
 
 
 def pivot(example: Comparison) -> dict[str, list[float | None]]:
-    """By metric, its value for every run, None where there is none of that run."""
+    """By metric, its value for every run, None where there is none of that run; nothing where the reference failed."""
+    if _lost(example.reference):
+        return {}
     measured = {"reference": example.changes["reference"]} | example.deviations
     found = {(one.metric, name): float(one.values[-1]) for name, measures in measured.items() for one in measures}
     names = dict.fromkeys(metric for metric, _ in found)

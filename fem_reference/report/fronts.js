@@ -8,7 +8,10 @@
 
   function element(name, attributes, inside = "") {
     const made = document.createElementNS("http://www.w3.org/2000/svg", name);
-    for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+    for (const [key, value] of Object.entries(attributes)) {
+      if (/^#[0-9a-f]{6}$/.test(value)) made.style[key] = `var(--c-${value.slice(1)}, ${value})`; // as the page has it
+      else made.setAttribute(key, value);
+    }
     if (inside) made.textContent = inside;
     return made;
   }

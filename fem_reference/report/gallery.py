@@ -57,12 +57,17 @@ def draw(setup: Setup, surface: Surface, wanted: list[Shot]) -> list[tuple[bytes
     """Two WebP pictures of each shot; MissingSoftware where the program that draws them did not get to its end."""
     with scratch.folder() as folder:
         job = folder / "job.npz"
-        np.savez(job, **_job(setup, surface, wanted))
+        np.savez(job, top=top(wanted), **_job(setup, surface, wanted))
         _run(_command(job, folder))
         names = [[folder / f"{shot}_{view}.webp" for view in (0, 1)] for shot in range(len(wanted))]
         if not all(path.is_file() for pair in names for path in pair):
             raise _missing("it left no pictures")
         return [(first.read_bytes(), second.read_bytes()) for first, second in names]
+
+
+def top(wanted: list[Shot]) -> float:
+    """The end of the colour scale of all pictures [mm]: the greatest distance in one of them."""
+    return max((float(shot.distances.max()) for shot in wanted if shot.distances is not None), default=0.0)
 
 
 def directions(surface: Surface, bones: tuple[RigidBody, ...]) -> Floats:

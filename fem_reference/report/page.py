@@ -4,17 +4,18 @@ import math
 from functools import partial
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.colors import to_hex
 
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import Of
 from fem_reference.assessment.judge import overall
 from fem_reference.metrics import Measure, find
-from fem_reference.report import pictures
-from fem_reference.report.curves import label_of
+from fem_reference.report import reached
+from fem_reference.report.at_frames import columns, label
+from fem_reference.report.curves import colour_of, label_of
 from fem_reference.report.sections import sections
+from fem_reference.report.sections.origin import changes
+from fem_reference.report.sections.pictures import ramp
 from fem_reference.report.tables import DEVIATIONS, known, runs
 from fem_reference.report.templates import template
 from fem_reference.report.viewer import view
@@ -34,16 +35,40 @@ _LOW = 0.1  # det F, below which a state is hardly valid
 
 
 def render(comparison: Comparison) -> str:
-    """The whole page as text."""
+    """The whole page as text; of a reference that failed, over the frames that it reached."""
+    nothing = not len(reached.frames(comparison.reference))
+    failed, comparison = _failed(comparison), reached.cut(comparison)
     shared = _shared(comparison)
     shown = [
         template(f"sections/{name}.html").render(shared | section.facts(comparison))
         for name, section in sections().items()
-        if section.has_numbers(comparison)
+        if section.has_numbers(comparison) and not (nothing and section.of_reference)
     ]
+    head = {"sentence": _sentence(comparison), "headlines": headlines(comparison), "failed": failed}
     return template("page.html").render(
-        shared | {"sentence": _sentence(comparison), "headlines": headlines(comparison), "sections": shown}
+        shared | head | {"key": _key(comparison), "sections": shown, "nothing": nothing}
     )
+
+
+def _failed(comparison: Comparison) -> str:
+    """Why the reference did not reach all frames, and what the page shows then; empty where it did."""
+    reference, wanted = comparison.reference, len(comparison.reference.numbers)
+    if reference.outcome.status == "converged":
+        return ""
+    kept = reached.frames(reference)
+    why = f"{reference.outcome.message.rstrip('.')}."
+    if not len(kept):
+        return f"{why} No frame was reached, so that nothing could be measured against it."
+    last = label(comparison.scene, comparison.setup, reference.numbers[kept[-1]])
+    return f"{why} {len(kept)} of {wanted} frames were reached, up to {last}: what follows is about these."
+
+
+def _key(comparison: Comparison) -> dict[str, Any]:
+    """How to read the page: colours of the curves, frames, and what was set otherwise than in the file of the case."""
+    names = [run.name for run in comparison.runs]
+    numbers = comparison.reference.numbers
+    ends = [label(comparison.scene, comparison.setup, number) for number in (numbers[0], numbers[-1])]
+    return {"colours": list(zip(names, map(colour_of, range(len(names))), strict=True)), "ends": ends}
 
 
 def _shared(comparison: Comparison) -> dict[str, Any]:
@@ -60,11 +85,14 @@ def _shared(comparison: Comparison) -> dict[str, Any]:
         if comparison.extension_error is None
         else worst(comparison.reference, comparison.extension_error),
         "viewer": view(comparison),
-        "colours": _colours(),
+        "colours": ramp(),
         "worst": worst,
         "find": find,
         "ratio": ratio,
         "label_of": label_of,
+        "label": partial(label, comparison.scene, comparison.setup),
+        "frame_columns": columns(comparison.scene, comparison.setup),
+        "changes": changes(comparison.scene),
         "seconds_per_frame": seconds_per_frame,
     }
 
@@ -102,9 +130,10 @@ def headlines(comparison: Comparison) -> list[tuple[str, str, str]]:
         found.append((run.name, overall(words) if words else "not judged", ended + _greatest(comparison, run)))
     words = [one.word for one in comparison.verdicts if one.expectation.of == "reference"]
     checks = f"{words.count('pass')} of {len(words)} of its own checks met" if words else "nothing is expected of it"
-    found.append(
-        ("reference", overall(words) if words else "not judged", "; ".join([checks, *_doubts(comparison.reference)]))
-    )
+    word = overall(words) if words else "not judged"
+    if comparison.reference.outcome.status != "converged":  # whatever of it was met
+        word = "fail"
+    found.append(("reference", word, "; ".join([checks, *_doubts(comparison.reference)])))
     return found
 
 
@@ -116,9 +145,13 @@ def _greatest(comparison: Comparison, run: Run) -> str:
         if one is None:
             continue
         at = worst(run, one)
-        bar = _bar_at(comparison, "deviation", metric, statistic, at["frame"]) if math.isfinite(at["value"]) else None
-        value = f"{number(at['value'])}{f' ± {number(bar)}' if bar is not None else ''} {one.unit}".strip()
-        said.append(words.format(value))
+        lost = "" if at["finite"] is None else f", and not a number in frame {at['frame']}"
+        value, frame = at["finite"] or (at["value"], at["frame"])
+        if not math.isfinite(value):
+            continue
+        bar = _bar_at(comparison, "deviation", metric, statistic, frame)
+        value = f"{number(value)}{f' ± {number(bar)}' if bar is not None else ''} {one.unit}".strip()
+        said.append(words.format(value) + lost)
     return "; ".join(said) or "nothing of it can be measured"
 
 
@@ -151,8 +184,3 @@ def _sentence(comparison: Comparison) -> str:
     if not names:
         return f"The reference computed by {solver}, {over}, without a candidate: {judged}"
     return f"{listed(names)} compared with the reference computed by {solver}, {over}: {judged}"
-
-
-def _colours() -> str:
-    """The colour map of the pictures as the stops of a CSS gradient."""
-    return ", ".join(to_hex(colour) for colour in mpl.colormaps[pictures.COLOURS](np.linspace(0, 1, 17)))

@@ -2,7 +2,8 @@
 
 Without an OpenGL library VTK ends the process that draws, with no exception, hence the process of its own.
 
-The job has ``triangles`` (m, 3), ``directions`` (2, 3) towards the two cameras, ``bones`` and ``shots`` (how many),
+The job has ``top``, the end of the colour scale [mm];
+``triangles`` (m, 3), ``directions`` (2, 3) towards the two cameras, ``bones`` and ``shots`` (how many),
 bone i as ``bone_i_points`` and ``bone_i_triangles``, and shot i as ``shot_i_points`` (n, 3), ``shot_i_poses``
 (bones, 4, 4), and where it has them ``shot_i_distances`` (n,) [mm] to colour by and ``shot_i_outline`` (n, 3), the body
 whose outline is drawn over it. View k of shot i becomes ``i_k.webp`` in the folder.
@@ -51,7 +52,7 @@ def _view(arrays: dict[str, NDArray[Any]], shot: int, bones: list[Any], directio
     muscle = _surface(points, arrays["triangles"])
     coloured: dict[str, Any] = {"color": _MUSCLE}
     if distances is not None:
-        coloured = {"scalars": distances, "cmap": COLOURS, "clim": (0.0, max(float(distances.max()), 1e-12))}
+        coloured = {"scalars": distances, "cmap": COLOURS, "clim": (0.0, max(float(arrays["top"]), 1e-12))}
     looks: dict[str, Any] = {"smooth_shading": True, "ambient": 0.35, "diffuse": 0.7, "show_scalar_bar": False}
     picture = _render([(bone, looks | {"color": _BONE}) for bone in bones] + [(muscle, looks | coloured)], camera)
     if outline is not None:

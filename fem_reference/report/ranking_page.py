@@ -90,7 +90,7 @@ def _row(one: SolverResult) -> dict[str, Any]:
 
 def _drawing(table: Table) -> Curve:
     """Deviation of the surface against the time of a frame, everybody on every scene."""
-    title = "Surface deviation (rms, worst frame) against the time of a frame"
+    title = "Surface deviation (rms, worst frame) against the time for a frame number"
     with mpl.rc_context(LOOK):
         figure = Figure(figsize=(9.6, 4.6), layout="constrained")
         FigureCanvasSVG(figure)
@@ -135,7 +135,7 @@ def _label(figure: Figure, axes: Axes, table: Table, names: list[str]) -> None:
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
         axis.set_minor_formatter(NullFormatter())
-    axes.set_xlabel("time for a frame, ms")
+    axes.set_xlabel("time for a frame number, ms")
     axes.set_ylabel("% of the greatest displacement")
     colours = _colours(table)
     hues = [axes.plot([], [], "o", color=colours[name], label=name)[0] for name in names]

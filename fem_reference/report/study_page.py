@@ -42,7 +42,7 @@ def render(study: Study) -> str:
     """The whole page as text."""
     return template("study_page.html").render(
         study=study,
-        title="What accuracy costs" + (f": {study.cases[0].title}" if len(study.cases) == 1 else ""),
+        title=title(study),
         shown=SHOWN,
         main=MAIN,
         time=TIME,
@@ -59,6 +59,11 @@ def render(study: Study) -> str:
         growth_drawing=_growth(study) if study.growth else None,
         transfers=transfers(study.points, MAIN) if len(study.cases) > 1 else (),
     )
+
+
+def title(study: Study) -> str:
+    """The title of the page."""
+    return "What accuracy costs" + (f": {study.cases[0].title}" if len(study.cases) == 1 else "")
 
 
 def title_of(name: str) -> str:

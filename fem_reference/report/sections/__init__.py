@@ -18,12 +18,14 @@ class Section:
     """A section of the page, the smaller its ``order`` the higher it stands.
 
     ``facts`` of a comparison are what its template is filled with, beside what all templates are filled with (``page``).
-    ``needs``: those of the comparison's attributes without which it has nothing to show.
+    ``needs``: those of the comparison's attributes without which it has nothing to show. ``of_reference``: whether it shows numbers
+    of the reference or against it, which are none where that reached no frame.
     """
 
     order: int
     facts: Callable[[Comparison], dict[str, Any]]
     needs: tuple[str, ...] = ()
+    of_reference: bool = True
 
     def has_numbers(self, comparison: Comparison) -> bool:
         """Whether there is something to show."""

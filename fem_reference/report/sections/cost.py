@@ -22,4 +22,4 @@ def _costs(comparison: Comparison) -> list[tuple[str, str, list[float | None]]]:
     return [(name, unit, [run.outcome.cost.get(key) for run in runs(comparison)]) for name, unit, key in rows]
 
 
-SECTION = Section(80, _facts)
+SECTION = Section(80, _facts, of_reference=False)

@@ -16,7 +16,7 @@ def _facts(comparison: Comparison) -> dict[str, Any]:
     """Origins as one table each, and the scene."""
     scene = comparison.scene
     origins = [(run, _flat(run.origin)) for run in runs(comparison)]
-    return {"origins": origins, "changes": _changes(scene), "scene_text": _scene_text(scene)}
+    return {"origins": origins, "scene_text": _scene_text(scene)}
 
 
 def _flat(table: Any, key: str = "") -> list[tuple[str, Any]]:
@@ -26,7 +26,7 @@ def _flat(table: Any, key: str = "") -> list[tuple[str, Any]]:
     return [(key, table if isinstance(table, str | float | int | None) else json.dumps(table, default=str))]
 
 
-def _changes(scene: Case) -> list[tuple[str, Any, Any]]:
+def changes(scene: Case) -> list[tuple[str, Any, Any]]:
     """Where the scene differs from its file: key, value in the file, value here."""
     if not scene.place.endswith(".toml"):  # made without a file
         return []
@@ -59,4 +59,4 @@ def _scene_text(scene: Case) -> str:
     return path.read_text(encoding="utf-8") if path.is_file() else ""
 
 
-SECTION = Section(90, _facts)
+SECTION = Section(90, _facts, of_reference=False)

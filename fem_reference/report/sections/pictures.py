@@ -5,9 +5,13 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+import matplotlib as mpl
+import numpy as np
+from matplotlib.colors import to_hex
+
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.errors import MissingSoftware
-from fem_reference.report import gallery
+from fem_reference.report import gallery, pictures
 from fem_reference.report.sections import Section
 
 
@@ -41,6 +45,11 @@ def ticks(top: float) -> list[tuple[float, float]]:
     return [(round(value / top, 3), value) for value in values] + [(1.0, top)]
 
 
+def ramp() -> str:
+    """The colour map of the pictures as the stops of a CSS gradient."""
+    return ", ".join(to_hex(colour) for colour in mpl.colormaps[pictures.COLOURS](np.linspace(0, 1, 17)))
+
+
 def _figures(comparison: Comparison) -> tuple[list[Figure], str]:
     """The pictures, or none and what is missing."""
     wanted = gallery.shots(comparison)
@@ -50,12 +59,13 @@ def _figures(comparison: Comparison) -> tuple[list[Figure], str]:
         return [], str(error)
     figures = []
     for shot, (first, second) in zip(wanted, drawn, strict=True):
-        top = None if shot.distances is None else float(shot.distances.max())
-        figures.append(Figure(shot.name, shot.number, (_source(first), _source(second)), top))
+        top = None if shot.distances is None else gallery.top(wanted)
+        figures.append(Figure(shot.name, shot.number, (picture_source(first), picture_source(second)), top))
     return figures, ""
 
 
-def _source(picture: bytes) -> str:
+def picture_source(picture: bytes) -> str:
+    """A picture as what stands in ``src``."""
     return f"data:image/webp;base64,{base64.b64encode(picture).decode()}"
 
 

@@ -1,0 +1,184 @@
+"""Two versions of one solver beside each other: what came nearer to the reference, what went further away, and where."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from fem_reference.assessment.baseline import PLACES, POSITION_ROUNDING, Baseline
+from fem_reference.assessment.measured import CurrentMeasures
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, Ints
+
+Word = Literal["worse", "mixed", "better", "within the error bar", "as it was", "no number"]
+SHARE = 0.1
+ORDER: tuple[Word, ...] = ("worse", "mixed", "better", "within the error bar", "as it was", "no number")
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """How far a statistic ``was`` from the reference and is ``now`` (f,), in ``unit``, of frame ``numbers``; ``bars`` (f,): how
+    well the reference is known, NaN where nobody knows.
+    """
+
+    name: str
+    unit: str
+    numbers: tuple[int, ...]
+    was: Floats
+    now: Floats
+    bars: Floats
+
+    @property
+    def further(self) -> Floats:
+        """By how much further away it is (f,), below 0 where it is nearer; infinite where a number was lost or found."""
+        lost, found = np.isnan(self.now) & ~np.isnan(self.was), np.isnan(self.was) & ~np.isnan(self.now)
+        further = np.abs(self.now) - np.abs(self.was)
+        return np.where(lost, np.inf, np.where(found, -np.inf, further))
+
+    @property
+    def at(self) -> int:
+        """The index of the frame that changed most."""
+        return int(np.argmax(np.nan_to_num(np.abs(self.further), nan=-1.0, posinf=np.inf)))
+
+    @property
+    def frame(self) -> int:
+        """The number of that frame."""
+        return self.numbers[self.at]
+
+    @property
+    def by(self) -> float:
+        """The change there, above 0 where it is further away; NaN where there is no number and was none."""
+        return float(self.further[self.at])
+
+    @property
+    def bar(self) -> float:
+        """The error bar of the reference there."""
+        return float(self.bars[self.at])
+
+    @property
+    def greatest(self) -> tuple[float, float]:
+        """How far it was and is from the reference at the most, NaN where it has no number."""
+        was, now = (np.abs(values[np.isfinite(values)]) for values in (self.was, self.now))
+        return float(was.max()) if len(was) else math.nan, float(now.max()) if len(now) else math.nan
+
+    @property
+    def in_bars(self) -> float:
+        """The change there in error bars, NaN where these are not known."""
+        return self.by / self.bar if self.bar > 0 else math.nan
+
+    @property
+    def size(self) -> float:
+        """What changes are sorted by: the change in error bars, without these as a share of what it was and is."""
+        whole = np.nanmax([*self.greatest, 1e-300])
+        return abs(self.by / whole) if math.isnan(self.in_bars) else abs(self.in_bars)
+
+    @property
+    def word(self) -> Word:
+        """Whether that is better; what is less than rounding or than the error bar is neither, and "mixed" what is nearer in some
+        frames and further away in others.
+        """
+        if math.isnan(self.by):
+            return "no number"
+        if abs(self.by) <= 10.0 ** -PLACES[self.unit]:
+            return "as it was"
+        nearer, further = bool((self._counted < 0).any()), bool((self._counted > 0).any())
+        if nearer and further:
+            return "mixed"
+        return "worse" if further else "better" if nearer else "within the error bar"
+
+    @property
+    def _counted(self) -> Floats:
+        """The changes (f,) that are more than rounding, their error bar and ``SHARE`` of the greatest; 0 for the others."""
+        change = np.nan_to_num(self.further, nan=0.0, posinf=np.inf, neginf=-np.inf)
+        finite = np.abs(change[np.isfinite(change)])
+        least = max(10.0 ** -PLACES[self.unit], SHARE * float(finite.max(initial=0.0)))
+        return np.where(np.abs(change) > np.fmax(self.bars, least), change, 0.0)
+
+    @property
+    def other(self) -> int | None:
+        """Of what is mixed, the index of the frame that changed most the other way; None of all else."""
+        if self.word != "mixed":
+            return None
+        return int(np.argmin(self._counted) if self.by > 0 else np.argmax(self._counted))
+
+
+@dataclass(frozen=True, eq=False)
+class Versions:
+    """``current`` against what it ``was``, in words: ``changes``, the worst first; how far each of the ``vertices`` (k,) is from
+    where it was, ``moved`` (f, k) [mm]; and the positions (f, n, 3) [mm] then, None where only some vertices are known.
+    """
+
+    current: CurrentMeasures
+    was: str
+    changes: tuple[Change, ...]
+    vertices: Ints
+    moved: Floats
+    before: Floats | None
+    differences: tuple[tuple[str, str, str], ...] = ()
+
+    def count(self, word: Word) -> int:
+        """How many statistics changed so."""
+        return sum(one.word == word for one in self.changes)
+
+    def of(self, word: Word) -> list[Change]:
+        """The statistics that changed so, the greatest change first."""
+        return [one for one in self.changes if one.word == word]
+
+    @property
+    def place(self) -> tuple[int, int, float] | None:
+        """Frame index, vertex and distance [mm] of what moved most; None where nothing did."""
+        known = np.nan_to_num(self.moved, nan=-1.0)
+        i, k = np.unravel_index(int(np.argmax(known)), known.shape)
+        if known[i, k] <= POSITION_ROUNDING:
+            return None
+        return int(i), int(self.vertices[k]), float(known[i, k])
+
+
+def of_runs(current: CurrentMeasures, before: CurrentMeasures, was: str) -> Versions:
+    """Against another run of the same frames."""
+    if current.points.shape != before.points.shape:
+        raise InputError(
+            "--against", f"{before.points.shape[1]} vertices", f"{current.points.shape[1]}, those of the candidate"
+        )
+    names = {name: one.unit for name, one in before.by_name.items() if name in current.by_name}
+    known = {name: before.values(*name.split(".")) for name in names}
+    with np.errstate(invalid="ignore", over="ignore"):
+        moved = np.linalg.norm(current.points - before.points, axis=2)
+    differences = tuple(_differences(before.candidate.origin, current.candidate.origin))
+    vertices = np.arange(moved.shape[1])
+    return Versions(current, was, _changes(current, names, known), vertices, moved, before.points, differences)
+
+
+def of_baseline(current: CurrentMeasures, baseline: Baseline, was: str) -> Versions:
+    """Against the measures and the sampled vertices of a baseline, rounded as they are there."""
+    names = {name: stored.unit for name, stored in baseline.measures.items()}
+    known = {
+        name: np.array([math.nan if value is None else value for value in stored.values])
+        for name, stored in baseline.measures.items()
+    }
+    vertices = np.array(baseline.positions.vertices)
+    if vertices.max() >= len(current.rest):
+        raise InputError("--against: positions.vertices", vertices.max(), f"0 to {len(current.rest) - 1}")
+    then = np.array([[(math.nan,) * 3 if one is None else one for one in frame] for frame in baseline.positions.values])
+    moved = np.linalg.norm(current.points[:, vertices] - then, axis=2)
+    return Versions(current, was, _changes(current, names, known), vertices, moved, None)
+
+
+def _changes(current: CurrentMeasures, units: dict[str, str], was: dict[str, Floats]) -> tuple[Change, ...]:
+    numbers = current.candidate.numbers
+    found = [
+        Change(name, unit, numbers, was[name], current.values(*name.split(".")), current.bars(*name.split(".")))
+        for name, unit in units.items()
+    ]
+    return tuple(sorted(found, key=lambda one: (ORDER.index(one.word), -np.nan_to_num(one.size), one.name)))
+
+
+def _differences(one: object, other: object, key: str = "") -> Iterator[tuple[str, str, str]]:
+    """Where two nested tables differ: key, value in one, value in the other."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        for name in dict.fromkeys([*one, *other]):
+            yield from _differences(one.get(name), other.get(name), f"{key}.{name}".lstrip("."))
+    elif one != other:
+        yield key, str(one), str(other)

@@ -1,0 +1,46 @@
+"""What a frame is: a frame number of the case, with the time and the bones' angles there, where these are known."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fem_reference.foundations.motion import Rotation, Translation
+from fem_reference.report.words import number
+from fem_reference.scenes.case import Case
+
+
+@dataclass(frozen=True)
+class Column:
+    """A quantity that belongs to a frame: its ``name``, ``unit``, and its value ``at`` a frame number."""
+
+    name: str
+    unit: str
+    at: Callable[[int], float]
+
+
+def columns(scene: Case, setup: Any) -> list[Column]:
+    """Time [s], where the case has any, and how far each bone that moves is turned [°] or shifted [mm]."""
+    interval = getattr(getattr(scene, "frames", None), "interval", None)
+    found = [] if interval is None else [Column("time", "s", lambda frame: frame * float(interval))]
+    for bone in getattr(setup, "bones", ()):
+        motion = bone.motion
+        if isinstance(motion, Rotation):
+            found.append(Column(bone.name, "°", _at(motion.frames, [math.degrees(angle) for angle in motion.angles])))
+        elif isinstance(motion, Translation):
+            found.append(Column(bone.name, "mm", _at(motion.frames, list(motion.distances))))
+    return found
+
+
+def label(scene: Case, setup: Any, frame: int) -> str:
+    """A frame in words: its number, and in brackets what is known of it."""
+    known = [
+        f"{one.name} {number(one.at(frame))}{'' if one.unit == '°' else ' '}{one.unit}" for one in columns(scene, setup)
+    ]
+    return f"frame {frame}" + (f" ({', '.join(known)})" if known else "")
+
+
+def _at(frames: tuple[float, ...], values: list[float]) -> Callable[[int], float]:
+    return lambda frame: float(np.interp(frame, frames, values))

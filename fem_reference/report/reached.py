@@ -1,0 +1,60 @@
+"""A comparison over the frames that its reference reached: of the others nothing can be said."""
+
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from fem_reference.assessment.comparison import Comparison
+from fem_reference.foundations.mesh import Ints
+from fem_reference.metrics import Measure
+from fem_reference.runs.store import Run
+
+
+def frames(run: Run) -> Ints:
+    """Indices of the frames in which every coordinate of a run is a number."""
+    return np.flatnonzero(np.isfinite(run.positions).all(axis=(1, 2)))
+
+
+def cut(comparison: Comparison) -> Comparison:
+    """The comparison without the frames that a reference which failed did not reach; itself where it reached all, or none."""
+    kept = frames(comparison.reference)
+    if comparison.reference.outcome.status == "converged" or len(kept) in (0, len(comparison.reference.numbers)):
+        return comparison
+    pick, measures = partial(_pick, kept), partial(_measures, kept)
+    error, bars = comparison.extension_error, comparison.error_bars
+    if bars is not None:
+        shorter = tuple(replace(bar, values=bar.values[kept], model=pick(bar.model)) for bar in bars.bars)
+        bars = replace(bars, numbers=tuple(np.array(bars.numbers)[kept].tolist()), bars=shorter)
+    return replace(
+        comparison,
+        reference=_run(kept, comparison.reference),
+        candidates=tuple(_run(kept, run) for run in comparison.candidates),
+        deviations={name: measures(found) for name, found in comparison.deviations.items()},
+        changes={name: measures(found) for name, found in comparison.changes.items()},
+        extension_error=None if error is None else measures((error,))[0],
+        error_bars=bars,
+    )
+
+
+def _pick(kept: Ints, values: Any) -> Any:
+    return None if values is None else values[kept]
+
+
+def _run(kept: Ints, run: Run) -> Run:
+    return replace(
+        run,
+        numbers=tuple(run.numbers[i] for i in kept),
+        positions=run.positions[kept],
+        fibre_positions=_pick(kept, run.fibre_positions),
+        scalars={name: values[kept] for name, values in run.scalars.items()},
+        fields={name: values[kept] for name, values in run.fields.items()},
+    )
+
+
+def _measures(kept: Ints, measures: tuple[Measure, ...]) -> tuple[Measure, ...]:
+    return tuple(
+        replace(one, values=one.values[kept], where=tuple(one.where[i] for i in kept) if one.where else ())
+        for one in measures
+    )
