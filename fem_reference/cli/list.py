@@ -87,7 +87,11 @@ def _plain(value: Any) -> Any:
 
 def _in_words(settings: dict[str, Any]) -> str:
     needed = [key for key, value in settings.items() if value == REQUIRED]
-    given = [f"{key} = {'none' if value is None else json.dumps(value)}" for key, value in settings.items() if value != REQUIRED]
+    given = [
+        f"{key} = {'none' if value is None else json.dumps(value)}"
+        for key, value in settings.items()
+        if value != REQUIRED
+    ]
     return "; ".join(filter(None, [f"{', '.join(needed)} (required)" if needed else "", ", ".join(given)])) or "none"
 
 
