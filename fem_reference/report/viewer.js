@@ -189,7 +189,8 @@ function arrange() {
   view.runs.forEach((run) => { run.label.hidden = true; });
   view.layout.forEach(({ run, left, top }) => {
     run.label.hidden = false;
-    Object.assign(run.label.style, { left: `${left}px`, top: `${top}px`, width: `${width / columns}px`, height: `${height}px` });
+    const share = { left: left / width, top: top / (rows * height), width: 1 / columns, height: 1 / rows }; // on paper the picture has another size
+    Object.entries(share).forEach(([name, value]) => { run.label.style[name] = `${100 * value}%`; });
   });
   show(view.frame);
 }
