@@ -136,14 +136,18 @@ def test_vertices_that_scatter_are_counted_and_leave_the_others_their_digits(com
 
 
 def with_bars(comparison, bar: float):
-    known = ErrorBar("deviation", "surface_deviation", "max", "mm", np.array([0.0, bar, bar, bar, NAN]), {})
-    return replace(comparison, error_bars=ErrorBars(test_report.NUMBERS, (1.0, 2.0), 1.0, (known,)))
+    values = np.array([0.0, bar, bar, bar, NAN])
+    known = [
+        ErrorBar("deviation", "surface_deviation", statistic, "mm", share * values, {})
+        for statistic, share in (("max", 1.0), ("hausdorff", 0.5))
+    ]
+    return replace(comparison, error_bars=ErrorBars(test_report.NUMBERS, (1.0, 2.0), 1.0, tuple(known)))
 
 
 def test_signed_distances_and_depths_are_those_of_the_runs(comparison):
     data = json.loads(viewer.view(with_bars(comparison, 0.75)).data)
     assert [one["name"] for one in data["quantities"]] == ["distance", "surface", "depth"]
-    assert data["bars"] == [0.0, 0.75, 0.75, 0.75, None]
+    assert data["bars"] == {"distance": [0, 0.75, 0.75, 0.75, None], "surface": [0, 0.375, 0.375, 0.375, None]}
     reference, quick = comparison.reference, comparison.candidates[0]
     expected = local_fields.to_surface(quick, reference)
     found = levels(data, 1, "surface", 5)

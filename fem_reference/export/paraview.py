@@ -35,6 +35,8 @@ INDEX = "runs.pvd"
 # What is evaluated of states; displacement apart.
 _EVALUATED = ("det_F", "pressure", "fibre_stretch", "fibre_stress", "von_mises")
 _CORNERS = np.eye(4)
+# The greatest of each distance to the reference, by what its error bar is called.
+_BARS = {"error_bar": "max", "error_bar_of_surface": "hausdorff"}
 
 
 def write(comparison: Comparison, folder: Path) -> list[str]:
@@ -84,9 +86,10 @@ class _Frames:
         yield "distance_to_reference", local_fields.to_same_vertex(run, self.reference)
         yield "distance_to_reference_surface", local_fields.to_surface(run, self.reference)
         bars = self.comparison.error_bars
-        bar = None if bars is None else bars.find("deviation", "surface_deviation", "max")
-        if bar is not None:
-            yield "error_bar", np.repeat(bar.values[:, None], len(run.surface.points), axis=1)
+        for name, statistic in _BARS.items():
+            bar = None if bars is None else bars.find("deviation", "surface_deviation", statistic)
+            if bar is not None:
+                yield name, np.repeat(bar.values[:, None], len(run.surface.points), axis=1)
 
     def _contact_pressure(self) -> Floats:
         """The sum over the bones (f, n) [MPa] of the law of contact at the vertices; 0 where these are not free."""

@@ -3,7 +3,7 @@
 quantities  name, signed, and the top [mm] of the greatest magnitude: value = sign * top * (level / 127)^2
 runs        levels by quantity: (f, n) of one byte, as differences from the frame before; most, by quantity and frame the greatest
             magnitude; points: of the fibres, as positions
-bars        by frame, how far [mm] a vertex of the reference may be from the truth; null where nobody knows; absent without any
+bars        by quantity and frame, how far [mm] the reference may be from the truth; null where nobody knows, nothing without any
 fibres      lines (k,): how many points each has; rest: the length [mm] of each piece, line by line; low, high: of all stretches
 joints      of each bone that moves its name, unit, and by frame the angle or the distance
 """
@@ -26,6 +26,8 @@ from fem_reference.runs.store import Run
 
 FIBRES, POINTS = 30, 12  # the most that are drawn: fibres, and points of each
 _LEVELS = 127
+# The statistic of the surface's deviation that is the greatest of a quantity.
+_BARS = {"distance": "max", "surface": "hausdorff"}
 _FAR = 1e6  # [mm]: beyond, a fibre is nowhere
 
 
@@ -101,14 +103,18 @@ class Fields:
         own = {name: values[run.name] for name, values in self.surfaces.items() if run.name in values}
         return {name: [float(f"{_top([frame]):.4g}") for frame in values] for name, values in own.items()}
 
-    def bars(self) -> list[float | None]:
-        """By frame, the error bar of the greatest distance; nothing without any."""
+    def bars(self) -> dict[str, list[float | None]]:
+        """By distance and frame, the error bar of the greatest one; nothing without any."""
         known = self.comparison.error_bars
-        bar = None if known is None else known.find("deviation", "surface_deviation", "max")
-        if known is None or bar is None:
-            return []
-        values = dict(zip(known.numbers, bar.values.tolist(), strict=True))
-        return [_finite(values.get(number, math.nan)) for number in self.numbers]
+        found: dict[str, list[float | None]] = {}
+        if known is None:
+            return found
+        for name, statistic in _BARS.items():
+            bar = known.find("deviation", "surface_deviation", statistic)
+            if bar is not None:
+                values = dict(zip(known.numbers, bar.values.tolist(), strict=True))
+                found[name] = [_finite(values.get(number, math.nan)) for number in self.numbers]
+        return found
 
     def fibres(self, points: list[Floats]) -> dict[str, Any]:
         """The lines, and the least and greatest stretch of a piece of these at ``points`` (f, m, 3) [mm] of each run."""

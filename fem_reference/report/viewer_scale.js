@@ -29,7 +29,7 @@ function values(run, { name, top }) {
 
 // Below this [mm] nothing is known of a distance to the reference.
 function unknown({ name }) {
-  return name === "depth" ? 0 : data.bars?.[view.frame] ?? 0;
+  return data.bars[name]?.[view.frame] ?? 0;
 }
 
 function shades(run, chosen) {
@@ -75,7 +75,7 @@ function legend() {
   histogram(part("bins"), shown.map((run) => run.bins));
   const inside = shown.reduce((sum, run) => sum + run.bins.reduce((one, other) => one + other, 0), 0) / (shown.length || 1);
   const notes = { depth: `${number(100 * inside)} % of the vertices are in bones; the others have the muscle's own colour.` };
-  const without = data.bars?.length ? "No error bar is known for this frame." : "The reference has no error bars.";
+  const without = data.bars[chosen.name] ? "No error bar is known for this frame." : "The reference has no error bars.";
   part("known").textContent = notes[chosen.name] ?? (bar > 0 ? `Grey: below the reference's error bar of ${number(bar)} mm nothing is known.` : without);
 }
 
