@@ -86,7 +86,7 @@ def commands() -> list[tuple[str, str]]:
 def test_commands_can_be_given() -> None:
     reader = parser()
     for page, line in commands():
-        words = shlex.split(line, comments=True)[1:]
+        words = shlex.split(line.split(" > ")[0], comments=True)[1:]
         try:
             if words[0] not in ("test", "docs"):
                 reader.parse_args(words)

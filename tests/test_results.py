@@ -82,6 +82,8 @@ def test_a_block_stretched_along_one_axis(stretch: float, degree: int) -> None:
     assert found["cauchy_stress"] == pytest.approx(np.tile(np.diag([pull, 0, 0]), (40, 1, 1)), abs=1e-15)
     assert found["von_mises"] == pytest.approx(np.full(40, abs(pull)), abs=1e-15)
     assert found["fibre_stretch"] == pytest.approx(np.full(40, np.linalg.norm(gradient @ FIBRE)), rel=1e-13)
+    now = gradient @ FIBRE
+    assert found["fibre_stress"] == pytest.approx(np.full(40, pull * now[0] ** 2 / (now @ now)), abs=1e-15)
     assert found["det_F"] == pytest.approx(np.ones(40), rel=1e-13)
 
 

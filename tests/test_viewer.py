@@ -15,8 +15,11 @@ import shapes
 import test_report
 from browser import PROGRAM, Browser
 
+from fem_reference.assessment import local_fields
+from fem_reference.assessment.error_bars import ErrorBar, ErrorBars
+from fem_reference.foundations.mesh import Polylines
 from fem_reference.problems.muscle import RigidBody
-from fem_reference.report import page, viewer
+from fem_reference.report import page, viewer, viewer_fields
 from fem_reference.report.sections import frames
 
 pytestmark = pytest.mark.slow
@@ -36,6 +39,19 @@ def positions(printed: dict, box: dict, frames: int) -> np.ndarray:
     zigzag = low + 256 * high
     steps = np.where(zigzag % 2, -(zigzag + 1) // 2, zigzag // 2).reshape(frames, -1, 3)
     return box["low"] + box["step"] * (np.cumsum(steps, axis=0) % 65536)
+
+
+def top(data: dict) -> float:
+    """The greatest distance [mm] to the same vertex."""
+    return next(one["top"] for one in data["quantities"] if one["name"] == "distance")
+
+
+def levels(data: dict, run: int, name: str, frames: int) -> np.ndarray:
+    """The values (frames, n) [mm] of a quantity, unpacked as ``viewer_fields`` says."""
+    (scale,) = (one["top"] for one in data["quantities"] if one["name"] == name)
+    steps = unpacked(data["runs"][run]["levels"][name], "u1").reshape(frames, -1)
+    level = np.cumsum(steps, axis=0).astype(np.uint8).view(np.int8) / 127.0
+    return np.sign(level) * scale * level**2
 
 
 def test_the_library_is_as_it_was_published():
@@ -68,7 +84,7 @@ def test_what_is_packed_is_every_frame_of_every_run(comparison):
 def test_the_scale_ends_at_the_greatest_distance_and_each_run_names_its_worst_frame(comparison):
     data = json.loads(viewer.view(comparison).data)
     # quick is 1 mm a frame away; torn half of that, and its last frame is not a number.
-    assert data["top"] == pytest.approx(4.0, rel=1e-12)
+    assert top(data) == pytest.approx(4.0, rel=1e-12)
     assert [run["worst"] for run in data["runs"]] == [[0, 0], [pytest.approx(4), 4], [pytest.approx(1.5), 3]]
 
 
@@ -95,14 +111,14 @@ def test_a_run_of_lines_alone_is_left_out(comparison):
 def test_a_run_without_any_number_shows_nothing(comparison):
     lost = replace(comparison.candidates[1], positions=np.full_like(comparison.reference.positions, np.inf))
     data = json.loads(viewer.view(replace(comparison, candidates=(lost,))).data)
-    assert (data["runs"][1]["reached"], data["top"]) == ([False] * 5, 0.0)
+    assert (data["runs"][1]["reached"], top(data)) == ([False] * 5, 0.0)
 
 
 def test_a_reference_without_any_number_leaves_the_candidates(comparison):
     lost = replace(comparison.reference, positions=np.full_like(comparison.reference.positions, NAN))
     data = json.loads(viewer.view(replace(comparison, reference=lost)).data)
     assert [run["reached"][0] for run in data["runs"]] == [False, True, True]
-    assert data["top"] == 0
+    assert top(data) == 0
 
 
 def test_vertices_that_scatter_are_counted_and_leave_the_others_their_digits(comparison):
@@ -115,12 +131,68 @@ def test_vertices_that_scatter_are_counted_and_leave_the_others_their_digits(com
     # The reference's box is 68 x 40 x 20, so that none is greater than three times its diagonal.
     assert seen.error < 3 * np.hypot(68, np.hypot(40, 20)) / 65535 / 2
     # 1e6 is drawn at the edge of the box and sets no scale, nor does what else is in such a frame: 2 mm off are those before.
-    assert data["top"] == pytest.approx(2.0, rel=1e-12)
+    assert top(data) == pytest.approx(2.0, rel=1e-12)
     assert data["runs"][1]["worst"] == [pytest.approx(4.0), 4]
 
 
-# A frame of three runs of 66 vertices, three coordinates of two bytes each.
-FRAME = 3 * 66 * 3 * 2
+def with_bars(comparison, bar: float):
+    values = np.array([0.0, bar, bar, bar, NAN])
+    known = [
+        ErrorBar("deviation", "surface_deviation", statistic, "mm", share * values, {})
+        for statistic, share in (("max", 1.0), ("hausdorff", 0.5))
+    ]
+    return replace(comparison, error_bars=ErrorBars(test_report.NUMBERS, (1.0, 2.0), 1.0, tuple(known)))
+
+
+def test_signed_distances_and_depths_are_those_of_the_runs(comparison):
+    data = json.loads(viewer.view(with_bars(comparison, 0.75)).data)
+    assert [one["name"] for one in data["quantities"]] == ["distance", "surface", "depth"]
+    assert data["bars"] == {"distance": [0, 0.75, 0.75, 0.75, None], "surface": [0, 0.375, 0.375, 0.375, None]}
+    reference, quick = comparison.reference, comparison.candidates[0]
+    expected = local_fields.to_surface(quick, reference)
+    found = levels(data, 1, "surface", 5)
+    (scale,) = (one["top"] for one in data["quantities"] if one["name"] == "surface")
+    assert scale == pytest.approx(np.abs(expected).max())
+    # Half a level of 127, at its root: value = top s^2, so that it is off by at most 2 sqrt(value top) / 254 and a square of that.
+    assert (np.abs(found - expected) <= np.sqrt(np.abs(expected) * scale) / 127 + scale / 254**2 + 1e-9).all()
+    across = quick.positions[4][:, 2]
+    # It is 4 mm off along z: outside there, inside here.
+    assert found[4, np.argmax(across)] > 2
+    assert found[4, np.argmin(across)] < -2
+    assert data["runs"][1]["most"]["surface"] == pytest.approx(np.abs(expected).max(axis=1), rel=1e-3)
+    context, body = comparison.context, comparison.setup.bones[0]
+    for i, run in enumerate((reference, quick)):
+        frames = zip(run.numbers, run.positions, strict=True)
+        deep = np.stack([-local_fields.to_bone(body, number, points) for number, points in frames])
+        deep = np.where(context.free, np.maximum(deep, 0), 0)
+        assert (np.abs(levels(data, i, "depth", 5) - deep) <= 0.02 * deep.max() + 1e-9).all()
+        assert data["runs"][i]["most"]["depth"] == pytest.approx(deep.max(axis=1), rel=1e-3)
+
+
+def test_fibres_and_joints_are_those_of_the_case(comparison):
+    lines = Polylines(np.array([[0.0, 0, 0], [0, 0, 2], [0, 0, 4], [1, 0, 0], [1, 0, 1]]), [0, 3, 5])
+    steps = 1 + 0.1 * np.arange(5)[:, None, None] * [0, 0, 1]
+    inside = replace(comparison.reference, fibres=lines, fibre_positions=lines.points * steps)
+    changed = replace(comparison, reference=inside, context=replace(comparison.context, fibres=lines))
+    seen = viewer.view(replace(changed, candidates=()))
+    data = json.loads(seen.data)
+    assert data["fibres"] == {"lines": [3, 2], "rest": [2, 2, 1], "low": 1.0, "high": pytest.approx(1.4)}
+    assert seen.stretches[0] == (0.0, 1.0)
+    points = positions({"positions": data["runs"][0]["points"]}, data, 5)
+    assert points == pytest.approx(inside.fibre_positions, abs=seen.error + 1e-12)
+    (joint,) = data["joints"]
+    assert (joint["name"], joint["unit"]) == ("plate", "°")
+    assert joint["values"] == pytest.approx(np.degrees([0, 0.25, 0.5, 0.75, 1]), abs=0.01)
+    many = Polylines(np.random.default_rng(1).normal(size=(80 * 40, 3)), np.arange(0, 80 * 40 + 1, 40))
+    crowded = replace(changed, context=replace(comparison.context, fibres=many))
+    drawn, indices = viewer_fields.Fields(crowded, [inside], (0,)).lines
+    assert len(drawn) == viewer_fields.FIBRES
+    assert len(indices) == viewer_fields.FIBRES * viewer_fields.POINTS
+    assert {0, 39, 79 * 40, 80 * 40 - 1} <= set(indices.tolist())  # the first and the last, from end to end
+
+
+# A frame of three runs of 66 vertices, three coordinates of two bytes each and two levels of one.
+FRAME = 3 * 66 * 8
 
 
 @pytest.mark.parametrize(
@@ -137,7 +209,7 @@ def test_beyond_its_budget_the_page_has_fewer_frames(comparison, budget, every, 
     assert off <= seen.error + 1e-12
 
 
-def test_a_muscle_of_the_report_fits_into_the_page_whatever_it_does(comparison):
+def test_a_muscle_of_the_report_fits_into_the_page_whatever_it_does(comparison, monkeypatch):
     # 10242 vertices over 31 frames and three candidates, in noise, which nothing compresses: base64 takes 4 bytes for 3.
     ball, noise = shapes.sphere(5, 40.0), np.random.default_rng(6).normal(size=(31, 10242, 3))
     numbers, runs = tuple(range(31)), [comparison.reference, *[comparison.candidates[0]] * 3]
@@ -146,12 +218,17 @@ def test_a_muscle_of_the_report_fits_into_the_page_whatever_it_does(comparison):
         for i, run in enumerate(runs)
     ]
     changed = replace(comparison, setup=replace(comparison.setup, surface=ball), reference=given[0])
+    monkeypatch.setattr(viewer_fields.local_fields, "to_surface", lambda run, _: run.positions[:, :, 0])
+    monkeypatch.setattr(viewer_fields.local_fields, "to_bones", lambda run, _: run.positions[:, :, 1])
+    monkeypatch.setattr(
+        viewer_fields.local_fields, "fibre_points", lambda run, _: np.zeros((len(run.numbers), 1000, 3))
+    )
     seen = viewer.view(replace(changed, candidates=tuple(given[1:])))
-    positions_alone = 4 * 31 * 10242 * 3 * 2
+    packed = 4 * 31 * 10242 * (3 * 2 + 2)
     assert seen.every == 1
-    assert positions_alone < viewer.BUDGET
-    # Library, triangles and bones are what is left; 15 MB are the whole page's.
-    assert len(seen.data) < 4 / 3 * positions_alone + 1e6 < 4 / 3 * viewer.BUDGET + 1e6 < 15e6
+    assert packed < viewer.BUDGET
+    # Library, triangles, bones and fibres are what is left; 15 MB are the whole page's.
+    assert len(seen.data) < 4 / 3 * packed + 1e6 < 4 / 3 * viewer.BUDGET + 1e6 < 15e6
 
 
 def test_fewer_frames_are_reported(comparison, monkeypatch):
@@ -254,6 +331,13 @@ def test_the_slider_moves_the_mesh(opened, comparison):
     assert opened.complaints() == []
 
 
+def choose(browser: Browser, quantity: str) -> None:
+    browser.ask(
+        f"(({{it}}) => {{ it.value = {json.dumps(quantity)}; it.dispatchEvent(new Event('change')); }})"
+        "({it: document.getElementById('viewer-quantity')})"
+    )
+
+
 def yellow(browser: Browser) -> float:
     """Which share of the right half of the picture is yellow."""
     picture = browser.picture("#viewer-stage")
@@ -273,8 +357,54 @@ def test_the_worst_vertex_is_reported_and_has_the_colour_at_the_end_of_the_bar(o
     assert yellow(opened) == 0
     click(opened, "worst")
     assert yellow(opened) > 0.1
-    click(opened, "coloured")
+    choose(opened, "")
     assert yellow(opened) == 0
+    assert opened.ask("document.getElementById('viewer-legend').hidden")
+
+
+def test_what_the_reference_does_not_know_is_grey_and_said(browser, comparison, tmp_path):
+    show(browser, with_bars(comparison, 2.5), tmp_path, "#frame=20")
+    known = "document.getElementById('viewer-known').textContent"
+    assert browser.ask(known) == "Grey: below the reference's error bar of 2.5 mm nothing is known."
+    assert browser.ask("document.getElementById('viewer-joint').textContent") == "plate 28.6°"
+    below = browser.picture("#viewer-stage")  # quick is 2 mm off in this frame
+    browser.ask("location.hash = '#frame=30'")
+    browser.wait("document.getElementById('viewer-number').textContent === '30'")
+    above = browser.picture("#viewer-stage")  # and 3 mm here
+    width = below.shape[1] // 3
+    assert grey(below[60:, width : 2 * width]) > grey(above[60:, width : 2 * width]) + 1000
+    assert "62.5%" in browser.ask("document.getElementById('viewer-ramp').style.background")  # 2.5 of 4 mm
+    assert browser.ask("document.querySelector('#viewer-bins path').getAttribute('d')").count("M") >= 2  # 3 and 1.5 mm
+    browser.ask("location.hash = '#frame=40'")
+    browser.wait(f"{known} === 'No error bar is known for this frame.'")
+    choose(browser, "surface")
+    assert browser.ask("document.getElementById('viewer-half').textContent") == "0"
+    assert browser.ask("document.getElementById('viewer-zero').textContent").startswith("\N{MINUS SIGN}")
+    assert labels(browser)["quick"][0].startswith("farthest from the surface")
+    choose(browser, "depth")
+    assert "of the vertices are in bones" in browser.ask(known)
+    assert browser.complaints() == []
+
+
+def test_fibres_show_through_and_paper_and_dark_are_followed(opened):
+    before = opened.picture("#viewer-stage")
+    assert before[-3, -3].tolist() == [255, 255, 255]
+    click(opened, "fibres")
+    assert (np.abs(opened.picture("#viewer-stage") - before).max(axis=2) > 30).sum() > 1000
+    assert not opened.ask("document.getElementById('viewer-stretch').hidden")
+    opened.ask("document.documentElement.style.setProperty('--paper', '#17181b')")
+    try:
+        opened.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "dark"}])
+        assert opened.picture("#viewer-stage")[-3, -3].max() < 40
+        opened.ask("window.dispatchEvent(new Event('beforeprint'))")
+        opened.call("Emulation.setEmulatedMedia", media="print", features=[])
+        opened.wait("document.getElementById('viewer-print').complete")
+        printed = opened.picture("#viewer-print")
+    finally:
+        opened.call("Emulation.setEmulatedMedia", media="", features=[])
+    assert printed[-5, -5].tolist() == [255, 255, 255]
+    assert (np.ptp(printed, axis=2) > 40).sum() > 1000
+    assert opened.complaints() == []
 
 
 def grey(picture: np.ndarray) -> int:

@@ -1,16 +1,23 @@
-"""The verb ``export``: a case for a solver that is not ours."""
+"""The verb ``export``: a case for a solver that is not ours, or its runs for ParaView."""
 
 import argparse
 from pathlib import Path
 
-from fem_reference.cli._choosing import scene_of
-from fem_reference.cli._parser import add_case
-from fem_reference.cli._printing import DONE, lines, out, write_output
-from fem_reference.export import FORMATS, export
+from fem_reference import export
+from fem_reference.cli._choosing import check_names, checked_bench, choose, scene_of
+from fem_reference.cli._parser import UNIT, add_case, add_ranks
+from fem_reference.cli._printing import DONE, SOLVER_FAILED, lines, out, write_output
+from fem_reference.export import paraview
+from fem_reference.export.folders import check
+from fem_reference.foundations.errors import InputError
+from fem_reference.runs import store
 from fem_reference.scenes import casefile
+from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.studies import judging, refinement
 from fem_reference.studies.execution import Bench
 
-HELP = "write all that a solver needs which is not ours, in open formats"
+HELP = "write all that a solver needs which is not ours, in open formats; or runs for ParaView"
+PARAVIEW = "paraview"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -19,15 +26,45 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--to", type=Path, required=True, metavar="DIR", help="a folder that is not there yet, or empty"
     )
-    forms = "open formats alone (default), or FEBio's own besides"
-    parser.add_argument("--format", choices=FORMATS, default="open", help=forms)
+    forms = "open formats alone (default); FEBio's own besides; or the reference, solved, and candidates for ParaView"
+    parser.add_argument("--format", choices=(*export.FORMATS, PARAVIEW), default="open", help=forms)
+    either = f"for {PARAVIEW}: a candidate of the case, a folder of frames or a solver; may be repeated"
+    parser.add_argument("--candidate", action="append", default=[], metavar="NAME|DIR", help=either)
+    parser.add_argument("--unit", help=UNIT)
+    add_ranks(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write a case for a solver that is not ours."""
+    """Write a case for a solver that is not ours, or its runs for ParaView."""
     scene = casefile.muscle(scene_of(options))
+    if options.format == PARAVIEW:
+        return _runs(scene, options)
+    if options.candidate or options.unit:
+        raise InputError("export", f"--candidate or --unit for {options.format}", f"them for {PARAVIEW} only")
     bench = Bench(scene, out(options) / "runs")
-    written = export(scene, bench.problem, options.to, options.format)
+    written = export.export(scene, bench.problem, options.to, options.format)
     facts = {"case": scene.name, "folder": str(options.to), "files": written}
     write_output(facts, "\n".join(lines(facts)), options)
     return DONE
+
+
+def _runs(scene: MuscleCase, options: argparse.Namespace) -> int:
+    """The reference, with its states where it can keep them, and candidates."""
+    check(options.to)
+    chosen = [choose(scene, text, options.unit) for text in options.candidate]
+    check_names([entry.name for entry, _ in chosen])
+    bench = checked_bench(scene, options, chosen)
+    with_states = scene.reference
+    if hasattr(bench.settings(scene.reference, "reference"), "store_state"):
+        with_states = scene.reference.model_copy(update={"store_state": True})
+    reference = bench.obtain("reference", with_states, "reference")
+    runs = [bench.obtain(entry.name, entry, place) for entry, place in chosen]
+    plain = store.finished(
+        bench.folder(scene.reference, "reference")
+    )  # the same frames, beside which error bars may be
+    bars = refinement.stored(reference) or (None if plain is None else refinement.stored(plain))
+    result = judging.compare(bench, reference, runs, bars)
+    written = paraview.write(result, options.to)
+    facts = {"case": scene.name, "index": str(options.to / paraview.INDEX), "files": len(written)}
+    write_output(facts, "\n".join(lines(facts)), options)
+    return DONE if all(one.outcome.status == "converged" for one in result.runs) else SOLVER_FAILED

@@ -1,14 +1,21 @@
 """The verb ``list``: what there is."""
 
 import argparse
+import json
+import os
+import re
 from pathlib import Path
+from typing import Any
 
 from fem_reference import metrics, solvers
 from fem_reference.cli._printing import DONE, out, write_output
+from fem_reference.foundations.records import Record
 from fem_reference.runs import store
 from fem_reference.scenes import casefile
+from fem_reference.scenes.case import DATA_SETTING, Case
 
-HELP = "what there is: cases, solvers, metrics, stored runs"
+HELP = "what there is: cases and whether their data is here, solvers with their settings, metrics, stored runs"
+REQUIRED = "required"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -18,15 +25,74 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Say what there is."""
-    scenes = {name: casefile.read(name).title for name in casefile.cases()}
+    scenes = [casefile.read(name) for name in casefile.cases()]
+    data = {scene.name: missing for scene in scenes if (missing := _data(scene)) is not None}
+    known = {name: _settings(name) for name in solvers.names()}
     stored = [_stored(path.parent) for path in sorted((out(options) / "runs").rglob("run.json"))]
-    facts = {"cases": scenes, "solvers": solvers.names(), "metrics": metrics.names(), "runs": stored}
-    width = max(map(len, scenes))
-    lines = ["cases:", *(f"  {name:{width}}  {title}" for name, title in scenes.items())]
-    lines += [f"solvers: {', '.join(facts['solvers'])}", f"metrics: {', '.join(facts['metrics'])}"]
+    facts: dict[str, Any] = {"cases": {scene.name: scene.title for scene in scenes}, "data": data}
+    facts |= {"solvers": solvers.names(), "settings": known, "metrics": metrics.names(), "runs": stored}
+    width = max(len(scene.name) for scene in scenes)
+    lines = ["cases:", *(f"  {scene.name:{width}}  {scene.title}{_mark(data.get(scene.name))}" for scene in scenes)]
+    lines += ["solvers, with their settings and defaults:"]
+    lines += [f"  {name:{width}}  {_in_words(settings)}" for name, settings in known.items()]
+    lines += [f"metrics: {', '.join(facts['metrics'])}"]
     lines += ["stored runs:", *(f"  {path}" for path in stored)] if stored else []
     write_output(facts, "\n".join(lines), options)
     return DONE
+
+
+def _data(scene: Case) -> str | None:
+    """Why the data of a case is not here, nothing where it is; None of a case that needs none."""
+    needed = re.findall(r'"data:([^"]+)"', json.dumps(scene.model_dump(mode="json", include=set(scene.determined_by))))
+    root = os.environ.get(DATA_SETTING)
+    if not needed:
+        return None
+    if not root:
+        return f"{DATA_SETTING} is not set"
+    lacking = sorted({name for name in needed if not (Path(root) / name).exists()})
+    return f"{DATA_SETTING} has no {lacking[0]}" if lacking else ""
+
+
+def _mark(missing: str | None) -> str:
+    """What stands behind the title of a case that needs data."""
+    if missing is None:
+        return ""
+    return f" [needs data: {missing}]" if missing else " [needs data, which is here]"
+
+
+def _settings(name: str) -> dict[str, Any]:
+    """The settings of a solver with their defaults, of all that it solves."""
+    found: dict[str, Any] = {}
+    for offer in solvers.offers(name):
+        found |= _defaults(offer.settings)
+    return found
+
+
+def _defaults(record: type[Record]) -> dict[str, Any]:
+    needed = {key: REQUIRED for key, field in record.model_fields.items() if field.is_required()}
+    optional = {key: field for key, field in record.model_fields.items() if not field.is_required()}
+    return needed | {key: _plain(field.get_default(call_default_factory=True)) for key, field in optional.items()}
+
+
+def _plain(value: Any) -> Any:
+    """A default as JSON has it."""
+    return (
+        value.model_dump(mode="json")
+        if isinstance(value, Record)
+        else list(value)
+        if isinstance(value, tuple)
+        else value
+    )
+
+
+def _in_words(settings: dict[str, Any]) -> str:
+    needed = [key for key, value in settings.items() if value == REQUIRED]
+    given = [
+        f"{key} = {'none' if value is None else json.dumps(value)}"
+        for key, value in settings.items()
+        if value != REQUIRED
+    ]
+    return "; ".join(filter(None, [f"{', '.join(needed)} (required)" if needed else "", ", ".join(given)])) or "none"
 
 
 def _stored(folder: Path) -> str:

@@ -10,6 +10,9 @@ _FEBIO_FILES = """\
 | `scene.feb` | the same for FEBio (format 4.0); `FEBIO.md` says what is the same and what is not |
 | `tet10.csv` | the ten nodes of each of its elements, in the order of FEBio |
 """
+_NO_STATES = """
+The reference was solved without `reference.store_state = true`: the arrays that follow from its states are not here.
+"""
 
 
 def readme(scene: MuscleCase, *, febio: bool) -> str:
@@ -21,6 +24,12 @@ def readme(scene: MuscleCase, *, febio: bool) -> str:
 def febio_readme(scene: MuscleCase) -> str:
     """What of a scene is the same in FEBio and what is not."""
     return _filled("FEBIO.md", title=scene.title, first=str(scene.frames.first))
+
+
+def paraview_readme(scene: MuscleCase, unit: str, *, states: bool) -> str:
+    """What is in a collection for ParaView, whose times are in ``unit``; with ``states`` of the reference or without."""
+    lacking = "" if states else _NO_STATES
+    return _filled("PARAVIEW.md", title=scene.title, name=scene.name, version=__version__, unit=unit, lacking=lacking)
 
 
 def candidate() -> str:

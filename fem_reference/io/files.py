@@ -19,6 +19,7 @@ from fem_reference.foundations.errors import NO_ROOM, InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh
 from fem_reference.foundations.subprocesses import lives
 from fem_reference.io import soup, xdmf
+from fem_reference.io.blocks import Tree
 from fem_reference.io.formats import Format, formats, vtk
 from fem_reference.io.references import beside, parsed_xml
 from fem_reference.io.soup import Lines
@@ -152,6 +153,11 @@ def write_tets(path: Path, mesh: TetMesh, positions: Floats) -> None:
         vtk.write_tets(part, TetMesh(positions, mesh.tets, mesh.facets), positions - mesh.points)
 
 
+def write_blocks(path: Path, blocks: Tree) -> None:
+    """VTM of ``blocks`` by name, with a folder of their files beside it; not whole or not at all, as it is more than one file."""
+    vtk.write_blocks(path, blocks)
+
+
 def write_field(
     path: Path, points: Floats, cells: Ints, data: dict[str, Floats], cell_data: dict[str, Floats] | None = None
 ) -> None:
@@ -165,9 +171,9 @@ def write_field(
         meshio.Mesh(space, [(kind, cells)], data, of_cells).write(part, "gmsh" if path.suffix == ".msh" else None)
 
 
-def write_pvd(path: Path, frames: Sequence[tuple[int, str]]) -> None:
-    """PVD index: the frame number is the time of each file, which is named relative to the index."""
-    entries = "".join(f'<DataSet timestep="{number}" file={quoteattr(name)}/>\n' for number, name in frames)
+def write_pvd(path: Path, frames: Sequence[tuple[float, str]]) -> None:
+    """PVD index: the time of each file (of frames their number), which is named relative to the index."""
+    entries = "".join(f'<DataSet timestep="{time}" file={quoteattr(name)}/>\n' for time, name in frames)
     write_text(
         path, f'<?xml version="1.0"?>\n<VTKFile type="Collection"><Collection>\n{entries}</Collection></VTKFile>\n'
     )

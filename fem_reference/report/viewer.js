@@ -4,7 +4,10 @@ const part = (name) => document.getElementById(`viewer-${name}`);
 const FIELD = 18; // degrees the camera sees from top to bottom: little, so that nothing is far from parallel
 const PLAY_RATE = 8; // frames a second
 const KEY_TURN = Math.PI / 24, KEY_MOVE = 20, KEY_ZOOM = 0.9;
-const PAPER = "#ffffff", MUSCLE = "#b4574e", BONE = "#dedbd4", GHOST = "#20242c";
+const MUSCLE = "#b4574e", BONE = "#dedbd4", UNKNOWN = "#85878d", SEEN_THROUGH = 0.28;
+const dark = window.matchMedia("(prefers-color-scheme: dark)");
+
+{% include "viewer_scale.js" %}
 
 async function unpacked(text) {
   const bytes = Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
@@ -44,7 +47,6 @@ function sorry(error) {
 async function assembled() {
   const renderer = new three.WebGLRenderer({ canvas: part("canvas"), antialias: true });
   renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
-  renderer.setClearColor(PAPER);
   renderer.setScissorTest(true);
   const scene = new three.Scene(), camera = new three.PerspectiveCamera(FIELD);
   camera.up.set(0, 0, 1);
@@ -55,13 +57,13 @@ async function assembled() {
   const faces = new three.BufferAttribute(new Uint32Array(await unpacked(data.triangles)), 1);
   const runs = await Promise.all(data.runs.map((run) => muscle(run, faces)));
   const bones = await Promise.all(data.bones.map(bone));
-  const ghost = new three.Mesh(runs[0].mesh.geometry, look(GHOST, { transparent: true, opacity: 0.25, depthWrite: false }));
+  const ghost = new three.Mesh(runs[0].mesh.geometry, look("#000000", { transparent: true, opacity: 0.25, depthWrite: false }));
   ghost.renderOrder = 1;
-  scene.add(...runs.map((run) => run.mesh), ...bones.map((each) => each.mesh), ghost);
+  scene.add(...runs.flatMap((run) => [run.mesh, run.strands.mesh]), ...bones.map((each) => each.mesh), ghost);
   const controls = new three.OrbitControls(camera, renderer.domElement);
   controls.enableZoom = false; // until the picture has the focus: else nobody could scroll past it
   renderer.domElement.style.touchAction = "pan-y";
-  return { renderer, scene, camera, controls, runs, bones, ghost, frame: 0, top: data.top, radius: reach(runs, bones), drawing: 0, playing: 0 };
+  return { renderer, scene, camera, controls, runs, bones, ghost, frame: 0, top: data.quantities[0]?.top ?? 0, radius: reach(runs, bones), drawing: 0, playing: 0 };
 }
 
 function look(colour, more = {}) {
@@ -76,7 +78,9 @@ async function muscle(run, faces) {
   for (const name of ["position", "color"]) geometry.setAttribute(name, new three.BufferAttribute(new Float32Array(stride), 3));
   const mesh = new three.Mesh(geometry, look(MUSCLE));
   mesh.frustumCulled = false;
-  return { ...run, whole, stride, mesh, plain: mesh.material, coloured: look("#ffffff", { vertexColors: true }), greatest: 0, label: label(run.name) };
+  const packed = await Promise.all(Object.entries(run.levels).map(async ([name, text]) => [name, await levels(text)]));
+  const own = { levels: Object.fromEntries(packed), strands: await fibres(run), bins: new Float32Array(BINS), greatest: 0, label: label(run.name) };
+  return { ...run, whole, stride, mesh, plain: mesh.material, coloured: look("#ffffff", { vertexColors: true }), ...own };
 }
 
 async function bone(data) {
@@ -134,8 +138,11 @@ function show(frame) {
   part("slider").value = frame;
   part("slider").setAttribute("aria-valuetext", `frame ${data.frames[frame]}`);
   part("number").textContent = data.frames[frame];
+  part("joint").textContent = data.joints.map(({ name, unit, values }) => `${name} ${number(values[frame])}${unit}`).join(", ");
   view.bones.forEach(({ mesh, poses }) => mesh.matrix.set(...poses[frame]));
   new Set([view.runs[0], ...panes()]).forEach(place);
+  legend();
+  fibreLegend();
   draw();
 }
 
@@ -145,45 +152,26 @@ function place(run) {
   for (let i = 0; i < run.stride; i++) position.array[i] = data.low[i % 3] + data.step * run.whole[start + i];
   position.needsUpdate = true;
   run.mesh.geometry.computeVertexNormals();
-  if (run !== view.runs[0]) {
-    colour(run, color.array, start);
+  const chosen = quantity() ?? data.quantities[0];
+  if (shades(run, chosen)) {
+    colour(run, chosen, color.array);
     color.needsUpdate = true;
   }
-  describe(run);
+  if (isOn("fibres")) lay(run);
+  describe(run, chosen);
 }
 
-function colour(run, colours, start) {
-  const reference = view.runs[0].whole;
-  run.greatest = 0;
-  for (let i = 0; i < run.stride; i += 3) {
-    const at = start + i, { whole } = run;
-    const distance = data.step * Math.hypot(whole[at] - reference[at], whole[at + 1] - reference[at + 1], whole[at + 2] - reference[at + 2]);
-    run.greatest = Math.max(run.greatest, distance);
-    ramp(view.top > 0 ? distance / view.top : 0, colours, i);
-  }
-}
-
-function ramp(share, colours, at) {
-  const along = Math.min(share, 1) * (stops.length - 1), below = Math.min(Math.floor(along), stops.length - 2);
-  ["r", "g", "b"].forEach((channel, k) => {
-    colours[at + k] = stops[below][channel] + (along - below) * (stops[below + 1][channel] - stops[below][channel]);
-  });
-}
-
-function describe(run) {
+function describe(run, chosen) {
   const { frame, runs } = view, label = run.label.lastChild, off = run.off[frame];
   const known = run.reached[frame] && runs[0].reached[frame];
   label.className = run.reached[frame] && !off ? "" : "bad";
-  label.textContent = run === runs[0] ? "" : `worst vertex ${off ? "more than " : ""}${number(run.greatest)} mm`;
+  label.textContent = shades(run, chosen) ? `${WORDS[chosen.name]} ${off ? "more than " : ""}${number(run.greatest)} mm` : "";
   if (off) label.textContent += `; ${off} vertices are farther off than is drawn`;
-  if (!known) label.textContent = run.reached[frame] ? "no frame of the reference" : "no frame";
+  if (!known && chosen?.name !== "depth") label.textContent = run.reached[frame] ? "no frame of the reference" : "no frame";
+  if (!run.reached[frame]) label.textContent = "no frame";
   const drawn = run.mesh.geometry.attributes.position.array;
   const mean = [0, 1, 2].map((k) => (3 * drawn.reduce((sum, value, i) => sum + (i % 3 === k ? value : 0), 0)) / drawn.length);
   run.label.dataset.mean = run.reached[frame] ? mean.join(" ") : "";
-}
-
-function number(value) {
-  return value >= 1000 ? value.toFixed(0) : String(Number(value.toPrecision(3)));
 }
 
 // ---- The picture
@@ -201,7 +189,8 @@ function arrange() {
   view.runs.forEach((run) => { run.label.hidden = true; });
   view.layout.forEach(({ run, left, top }) => {
     run.label.hidden = false;
-    Object.assign(run.label.style, { left: `${left}px`, top: `${top}px`, width: `${width / columns}px`, height: `${height}px` });
+    const share = { left: left / width, top: top / (rows * height), width: 1 / columns, height: 1 / rows }; // on paper the picture has another size
+    Object.entries(share).forEach(([name, value]) => { run.label.style[name] = `${100 * value}%`; });
   });
   show(view.frame);
 }
@@ -209,23 +198,48 @@ function arrange() {
 function draw() {
   view.drawing ||= requestAnimationFrame(() => {
     view.drawing = 0;
-    const { camera, controls, radius, width, height } = view, away = controls.getDistance();
-    const aside = controls.target.distanceTo(new three.Vector3(...data.camera.middle));
-    camera.far = away + aside + radius;
-    camera.near = Math.max(away - aside - radius, away / 50);
-    camera.aspect = width / height;
-    camera.updateProjectionMatrix();
-    view.layout.forEach(pane);
+    drawNow(dark.matches);
   });
+}
+
+// On the paper that the page has, dark or not.
+function drawNow(night) {
+  const { camera, controls, radius, width, height, renderer, ghost } = view, away = controls.getDistance();
+  const aside = controls.target.distanceTo(new three.Vector3(...data.camera.middle));
+  renderer.setClearColor(night ? style("--paper", "#ffffff") : "#ffffff");
+  ghost.material.color.set(night ? style("--ink", "#20242c") : "#20242c");
+  camera.far = away + aside + radius;
+  camera.near = Math.max(away - aside - radius, away / 50);
+  camera.aspect = width / height;
+  camera.updateProjectionMatrix();
+  view.layout.forEach(pane);
+}
+
+function style(name, otherwise) {
+  return getComputedStyle(part("stage")).getPropertyValue(name).trim() || otherwise;
+}
+
+// What is on paper is a picture of it: a browser keeps no canvas for the printer.
+function print() {
+  drawNow(false);
+  part("print").src = part("canvas").toDataURL();
 }
 
 function pane({ run, left, top }) {
   const { renderer, scene, camera, ghost, frame, runs, width, height, rows } = view;
   const bottom = rows * height - top - height, compared = run !== runs[0] && runs[0].reached[frame];
-  runs.forEach((each) => { each.mesh.visible = each === run && run.reached[frame]; });
-  view.bones.forEach(({ mesh }) => { mesh.visible = isOn("bones"); });
+  runs.forEach((each) => {
+    each.mesh.visible = each === run && run.reached[frame];
+    each.strands.mesh.visible = each.mesh.visible && isOn("fibres");
+  });
+  const within = quantity()?.name === "depth"; // what is in a bone is seen through it
+  view.bones.forEach(({ mesh }) => {
+    mesh.visible = isOn("bones");
+    Object.assign(mesh.material, { transparent: within, opacity: within ? SEEN_THROUGH : 1, depthWrite: !within });
+  });
   ghost.visible = isOn("laid") && compared;
-  run.mesh.material = compared && isOn("coloured") ? run.coloured : run.plain;
+  run.mesh.material = shades(run, quantity()) ? run.coloured : run.plain;
+  Object.assign(run.mesh.material, { transparent: isOn("fibres"), opacity: isOn("fibres") ? SEEN_THROUGH : 1, depthWrite: !isOn("fibres") });
   renderer.setViewport(left, bottom, width, height);
   renderer.setScissor(left, bottom, width, height);
   renderer.render(scene, camera);
@@ -256,16 +270,18 @@ function listen() {
   part("front").addEventListener("click", () => lookFrom(data.camera.directions[0]));
   part("side").addEventListener("click", () => lookFrom(data.camera.directions[1]));
   part("bones").addEventListener("change", draw);
+  part("fibres").addEventListener("change", () => show(view.frame));
   part("laid")?.addEventListener("change", arrange);
-  part("coloured")?.addEventListener("change", () => { part("legend").hidden = !isOn("coloured"); draw(); });
+  part("quantity")?.addEventListener("change", choose);
   part("top")?.addEventListener("input", (event) => scale(Number(event.target.value)));
+  dark.addEventListener("change", draw);
+  window.addEventListener("beforeprint", print);
   boxes.forEach((box) => box.addEventListener("change", arrange));
   window.addEventListener("hashchange", follow);
   new ResizeObserver(arrange).observe(part("stage"));
-  if (part("top")) part("top").value = Number(data.top.toPrecision(3));
   view.frame = worst(chosen());
   arrange();
-  scale(data.top);
+  if (part("quantity")) choose();
   lookFrom(data.camera.directions[0]);
   follow();
 }
@@ -296,14 +312,6 @@ function play() {
   part("play").setAttribute("aria-pressed", Boolean(view.playing));
 }
 
-function scale(top) {
-  if (!(top >= 0) || !part("legend")) return;
-  view.top = top;
-  part("half").textContent = number(top / 2);
-  part("full").textContent = `${number(top)} mm`;
-  show(view.frame);
-}
-
 // The address of the page may name a frame: report.html#frame=110.
 function follow() {
   const frame = data.frames.indexOf(Number(location.hash.match(/^#frame=(\d+)$/)?.[1] ?? NaN));
@@ -311,6 +319,7 @@ function follow() {
 }
 
 const three = await library(data.library).catch(sorry);
-const stops = three && data.colours.map((text) => new three.Color(text));
+const [stops, both, warm] = [data.colours, data.both, data.warm].map((palette) => three && palette.map((text) => new three.Color(text)));
+const [flesh, lost] = [MUSCLE, UNKNOWN].map((text) => three && new three.Color(text));
 const view = three && (await assembled().catch(sorry));
 if (view) listen();

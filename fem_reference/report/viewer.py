@@ -3,13 +3,15 @@
 What ``viewer.js`` unpacks is one JSON object. Arrays in it are little-endian, compressed (gzip) and in base64:
 
     library    text of each file of three.js
-    frames     numbers (f,) of the frames drawn;  colours  stops of the colour bar;  top  its greatest distance [mm]
+    frames     numbers (f,) of the frames drawn;  colours, both, warm  stops of the colour bars: of magnitudes, of what has a sign,
+               and of fibres
     low, step  position = low + step * whole number from 0 to 65535 [mm]
     triangles  whole numbers (m, 3), of 4 bytes, the same for every run
     runs       name, worst (greatest distance to the reference [mm] and its frame's index), reached (f,), off (f,): how many
                vertices are outside of the box, and positions: whole numbers (f, n, 3) of 2 bytes as differences from the
                frame before, zigzag (0, -1, 1, -2, ... as 0, 1, 2, 3, ...), all low bytes before all high bytes
     bones      name, triangles, positions (1, n, 3) in the same form with its own low and step, poses (f, 16) by rows
+    and what ``viewer_fields`` says: quantities, levels and fibre points of the runs, bars, fibres, joints
     camera     middle (3,), half height of the picture [mm], directions (2, 3) towards the camera
 """
 
@@ -32,26 +34,32 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.thinning import thin
 from fem_reference.problems.muscle import RigidBody
 from fem_reference.report import gallery, pictures
+from fem_reference.report.viewer_fields import Fields, joints
 from fem_reference.runs.store import Run
 
 THREE = Path(__file__).parent / "three"
-# How many bytes the positions of all frames may have before they are compressed: about as many as base64 needs for what is left.
-BUDGET = 10_000_000
+# How many bytes the positions and levels of all frames may have before they are compressed: about as many as base64 needs for what
+# is left.
+BUDGET = 10_400_000
 BONE_TRIANGLES = 8000
 _LEVELS = 65535
 
 
 @dataclass(frozen=True)
 class Viewer:
-    """What the template needs: the ``data`` for the script, the names of the ``candidates`` drawn, the frame numbers, one frame
-    in how many is drawn, the greatest error of a coordinate [mm], and the library's version and licence.
+    """What the template needs: the ``data`` for the script, the names of the ``candidates`` drawn and of the ``quantities`` to
+    colour by, the frame numbers, one frame in how many is drawn, the greatest error of a coordinate [mm], the colours of
+    fibres, where on their scale [%] which stretches are, and the library's version and licence.
     """
 
     data: str
     candidates: tuple[str, ...]
+    quantities: tuple[str, ...]
     numbers: tuple[int, ...]
     every: int
     error: float
+    warm: tuple[str, ...]
+    stretches: tuple[tuple[float, float], ...]
     version: str
     licence: str
 
@@ -86,25 +94,48 @@ def view(comparison: Comparison, budget: int = BUDGET) -> Viewer:
     frames = {run.name: _frames(run, numbers) for run in shown}
     own = np.concatenate([reference.surface.points[None], frames[reference.name]])  # even where it reached no frame
     box = _box(own, list(frames.values()))
+    fields = Fields(comparison, shown, numbers)
+    runs, top = _runs(frames, reference.name, box)
+    points = [fields.points(run) for run in shown]
+    for run, row, own_points in zip(shown, runs, points, strict=True):
+        row["levels"] = {name: _packed(levels) for name, levels in fields.levels(run).items()}
+        row["most"] = fields.most(run)
+        row["points"] = _positions(_last_finite(own_points), box)
+    distance = [{"name": "distance", "signed": False, "top": top}] if len(shown) > 1 else []
     version, licence = _library_facts()
     data = {
         "library": _library(),
         "frames": numbers,
-        "colours": [to_hex(colour) for colour in mpl.colormaps[pictures.COLOURS](np.linspace(0, 1, 33))],
+        "colours": _stops(pictures.COLOURS),
+        "both": _stops("coolwarm"),
+        "warm": _stops("plasma"),
+        "quantities": distance + fields.quantities(),
+        "bars": fields.bars(),
+        "fibres": fields.fibres(points),
+        "joints": joints(comparison.setup.bones, numbers),
         "triangles": _packed(reference.surface.triangles.astype("<u4").tobytes()),
         "bones": [_bone(bone, numbers) for bone in comparison.setup.bones],
         "camera": _camera(comparison, own),
         **box.facts(),
-        **_runs(frames, reference.name, box),
+        "runs": runs,
     }
-    names = tuple(run.name for run in shown[1:])
-    return Viewer(_json(data), names, numbers, every, box.step / 2, version, licence)
+    names, chosen = tuple(run.name for run in shown[1:]), tuple(one["name"] for one in data["quantities"])
+    warm, ends = tuple(data["warm"]), _ends(data["fibres"])
+    return Viewer(_json(data), names, chosen, numbers, every, box.step / 2, warm, ends, version, licence)
+
+
+def _ends(fibres: dict[str, Any]) -> tuple[tuple[float, float], ...]:
+    """Where on a scale [%] its ends are, and rest where it is not near one of them."""
+    low, high = fibres["low"], fibres["high"]
+    rest = 100 * (1 - low) / ((high - low) or 1.0)
+    middle = ((rest, 1.0),) if 12 < rest < 88 else ()
+    return ((0.0, low), *middle, (100.0, high))
 
 
 def _every(shown: list[Run], budget: int) -> int:
     """One frame in how many keeps the positions of all runs within ``budget`` bytes, as far as two frames are left."""
     count, vertices = len(shown[0].numbers), len(shown[0].surface.points)
-    frame = len(shown) * vertices * 3 * 2
+    frame = len(shown) * vertices * (3 * 2 + 2)  # positions of two bytes, and two quantities of one
     strides = range(1, max(count, 2))
     return next((every for every in strides if -(-count // every) * frame <= budget), strides[-1])
 
@@ -129,7 +160,11 @@ def _bounds(frames: Floats) -> tuple[Floats, Floats]:
     return np.nanmin(frames, axis=(0, 1)), np.nanmax(frames, axis=(0, 1))
 
 
-def _runs(frames: dict[str, Floats], reference: str, box: _Box) -> dict[str, Any]:
+def _stops(name: str) -> list[str]:
+    return [to_hex(colour) for colour in mpl.colormaps[name](np.linspace(0, 1, 33))]
+
+
+def _runs(frames: dict[str, Floats], reference: str, box: _Box) -> tuple[list[dict[str, Any]], float]:
     """Every run, and the ``top`` of the colours: the greatest distance to the reference in a frame that is wholly in the box."""
     rows, top = [], 0.0
     for name, positions in frames.items():
@@ -148,7 +183,7 @@ def _runs(frames: dict[str, Floats], reference: str, box: _Box) -> dict[str, Any
             }
         )
         top = max(top, float(known[inside.all(axis=1)].max(initial=0.0)))
-    return {"runs": rows, "top": top}
+    return rows, top
 
 
 def _last_finite(frames: Floats) -> Floats:

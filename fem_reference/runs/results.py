@@ -1,4 +1,4 @@
-"""Results of a reference run in full: displacement, stress, pressure, det F and fibre stretch at any points inside the muscle.
+"""Results of a reference run in full: displacement, stress, pressure, det F, fibre stretch and stress at any points in the muscle.
 
 A run that was solved with ``store_state = true`` keeps its unknowns. Everything else follows from them: the deformation gradient
 from the functions of the element, the stress from the energies of the effects, differentiated by ``jets``. FEniCSx is not needed.
@@ -31,6 +31,7 @@ NAMES = (
     "fibre_stretch",
     "cauchy_stress",
     "von_mises",
+    "fibre_stress",
 )
 # A point that is further outside the tets than this share of the mesh's diagonal is outside; nearer, it is rounding.
 ROUNDING = 1e-9
@@ -66,7 +67,8 @@ class Results:
         names
             What is wanted, by default all that there is: ``displacement`` (n, 3) [mm]; ``deformation_gradient`` F (n, 3, 3),
             ``F[i, k] = dx_i / dX_k``; ``det_F`` (n,); ``pressure`` (n,) [MPa], that of the mixed form, above 0 where the volume
-            grows; ``fibre_stretch`` (n,), ``|F fibre|``; ``cauchy_stress`` (n, 3, 3) [MPa]; ``von_mises`` (n,) [MPa].
+            grows; ``fibre_stretch`` (n,), ``|F fibre|``; ``cauchy_stress`` (n, 3, 3) [MPa]; ``von_mises`` (n,) [MPa];
+            ``fibre_stress`` (n,) [MPa], the stress along the fibres as they are now.
 
         Returns
         -------
@@ -119,7 +121,7 @@ class Results:
     def names(self, state: NodalState) -> tuple[str, ...]:
         """What can be evaluated of a state."""
         lacking = {"pressure"} if state.pressure.shape[1] == 0 else set()
-        lacking |= {"fibre_stretch"} if self.fibre is None else set()
+        lacking |= {"fibre_stretch", "fibre_stress"} if self.fibre is None else set()
         return tuple(name for name in NAMES if name not in lacking)
 
     @cached_property
@@ -203,12 +205,15 @@ class _Places:
         }
         if "pressure" in names:
             values["pressure"] = self.pressure
-        if "fibre_stretch" in names and self.results.fibre is not None:
-            fibre = self.results.fibre[self.tets]
-            values["fibre_stretch"] = np.linalg.norm(np.einsum("nik,nk->ni", self.F, fibre), axis=1)
-        if {"cauchy_stress", "von_mises"} & set(names):
+        if {"cauchy_stress", "von_mises", "fibre_stress"} & set(names):
             stress = self.cauchy_stress(acting)
             values |= {"cauchy_stress": stress, "von_mises": von_mises(stress)}
+        if self.results.fibre is not None and {"fibre_stretch", "fibre_stress"} & set(names):
+            along = np.einsum("nik,nk->ni", self.F, self.results.fibre[self.tets])
+            stretch = values["fibre_stretch"] = np.linalg.norm(along, axis=1)
+            if "fibre_stress" in names:
+                along /= stretch[:, None]
+                values["fibre_stress"] = np.einsum("ni,nij,nj->n", along, values["cauchy_stress"], along)
         return {name: values[name] for name in names}
 
     def cauchy_stress(self, acting: Sequence[tuple[Effect, float]]) -> Floats:

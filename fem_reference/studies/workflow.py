@@ -12,6 +12,7 @@ from fem_reference import export, report
 from fem_reference.assessment import judge, solver_table
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import ErrorBars
+from fem_reference.export import paraview
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import parse
 from fem_reference.problems import of_case
@@ -202,6 +203,30 @@ def export_case(case: Case, folder: str | Path, form: export.Format = "open") ->
     """
     muscle = casefile.muscle(case)
     return export.export(muscle, Bench(muscle, STORE).problem, Path(folder), form)
+
+
+def export_runs(comparison: Comparison, folder: str | Path) -> list[str]:
+    """Write the runs of a muscle for ParaView: ``runs.pvd`` opens all frames, with named blocks and arrays on them.
+
+    Parameters
+    ----------
+    comparison
+        From :func:`compare`. Stress, pressure and det F are there if its reference was solved with ``store_state = true``.
+    folder
+        A new or empty folder.
+
+    Returns
+    -------
+    list of str
+        The names of the files; the README.md among them says what each array is.
+
+    Raises
+    ------
+    InputError
+        Where ``folder`` is not empty.
+
+    """
+    return paraview.write(comparison, Path(folder))
 
 
 def write_report(comparison: Comparison, folder: str | Path) -> Path:

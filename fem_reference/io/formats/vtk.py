@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh
+from fem_reference.io.blocks import Block, Tree
 from fem_reference.io.formats import Format, _vtk_legacy, _vtk_xml
 from fem_reference.io.formats._vtk_cells import DataSet
 from fem_reference.io.soup import Lines, Soup, check_lines, joined, only_triangles
@@ -102,10 +103,53 @@ def _save(path: Path, data: Any, displacement: Floats) -> None:
             writer.writer.SetFileTypeToBinary()
         else:  # in the other modes a displacement that is not finite cannot be read again
             writer.writer.SetDataModeToAppended()
-        writer.write()
-        if code := writer.writer.GetErrorCode():
-            number = errno.ENOSPC if code == _NO_ROOM else int(code)
-            raise OSError(number, os.strerror(number) if number in errno.errorcode else f"error {code} of VTK")
+        _finish(writer)
+
+
+def _finish(writer: Any) -> None:
+    """Write; OSError where that fails."""
+    writer.write()
+    if code := writer.writer.GetErrorCode():
+        number = errno.ENOSPC if code == _NO_ROOM else int(code)
+        raise OSError(number, os.strerror(number) if number in errno.errorcode else f"error {code} of VTK")
+
+
+def write_blocks(path: Path, blocks: Tree) -> None:
+    """VTM of ``blocks`` by name, with their own files in a folder beside it of the same name; OSError where that fails."""
+    import pyvista
+
+    with _errors():
+        writer = pyvista.XMLMultiBlockDataWriter(path, _collection(blocks))
+        writer.writer.SetDataModeToAppended()
+        _finish(writer)
+
+
+def _collection(blocks: Tree) -> Any:
+    import pyvista
+
+    made = {name: _data_set(one) if isinstance(one, Block) else _collection(one) for name, one in blocks.items()}
+    return pyvista.MultiBlock(made)
+
+
+def _data_set(block: Block) -> Any:
+    """The points and cells of a block as VTK has them, with its arrays."""
+    import pyvista
+
+    points = np.array(block.points, np.float64)
+    if isinstance(block.cells, Polylines):
+        cells = pyvista.CellArray.from_arrays(block.cells.offsets, np.arange(len(points)), deep=True)
+        data: Any = pyvista.PolyData(points, lines=cells)
+    elif block.cells.shape[1] == 4:
+        data = pyvista.UnstructuredGrid({pyvista.CellType.TETRA: block.cells}, points)
+    else:
+        data = pyvista.PolyData.from_regular_faces(points, block.cells, deep=True)
+    for name, values in block.of_points.items():
+        data.point_data[name] = values
+    for name, values in block.of_cells.items():
+        data.cell_data[name] = values
+    for name, value in block.numbers.items():
+        data.field_data[name] = [value]
+    return data
 
 
 FORMAT = Format((".vtk", ".vtp", ".vtu"), _read, _write, _read_lines, _write_lines, lines=(".vtk", ".vtp"))

@@ -1,0 +1,36 @@
+"""The folder that an export is written into: one that was not there, whole or not at all."""
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.io import files
+
+
+def check(folder: Path) -> None:
+    """InputError unless ``folder`` is free to be written: not there, or empty."""
+    if folder.is_file():
+        raise InputError("--to", f'"{folder}", a file', "a folder that is not there yet, or empty")
+    if folder.is_dir() and any(folder.iterdir()):
+        raise InputError("--to", f'"{folder}", which is not empty', "a folder that is not there yet, or empty")
+
+
+@contextmanager
+def new_folder(folder: Path) -> Iterator[Path]:
+    """A folder beside ``folder`` to write into, which takes its place when all went well and is gone otherwise; InputError where it
+    is not free.
+    """
+    folder = folder.resolve()
+    check(folder)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    files.clear(folder)
+    part = folder.with_name(f".{folder.name}-{os.getpid()}")
+    part.mkdir()
+    try:
+        yield part
+        part.replace(folder)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)

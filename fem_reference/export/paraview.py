@@ -1,0 +1,192 @@
+"""Runs of a case as one collection for ParaView: named blocks in the rest state, which the array ``displacement`` moves.
+
+runs.pvd                 the time of each frame [s], its number where the case has no time
+frames/frame_0010.vtm    reference and candidates (muscle, fibres; of the reference interior), bones, attachments
+"""
+
+import logging
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fem_reference.assessment import local_fields
+from fem_reference.assessment.comparison import Comparison
+from fem_reference.effects.contact import among
+from fem_reference.export import texts
+from fem_reference.export.folders import new_folder
+from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh
+from fem_reference.foundations.motion import apply
+from fem_reference.geometry.embedding import embed
+from fem_reference.io import files
+from fem_reference.io.blocks import Block, Tree
+from fem_reference.metrics import MeasurementContext
+from fem_reference.problems.contact import Contact
+from fem_reference.runs import results
+from fem_reference.runs.results import Results
+from fem_reference.runs.states import FOLDER as STATES
+from fem_reference.runs.store import Run
+from fem_reference.scenes import casefile
+
+log = logging.getLogger(__name__)
+
+INDEX = "runs.pvd"
+# What is evaluated of states; displacement apart.
+_EVALUATED = ("det_F", "pressure", "fibre_stretch", "fibre_stress", "von_mises")
+_CORNERS = np.eye(4)
+# The greatest of each distance to the reference, by what its error bar is called.
+_BARS = {"error_bar": "max", "error_bar_of_surface": "hausdorff"}
+
+
+def write(comparison: Comparison, folder: Path) -> list[str]:
+    """Write the runs of a muscle into ``folder``, whole or not at all; the names of its files. InputError where it is not free."""
+    scene = casefile.muscle(comparison.scene)
+    with new_folder(folder) as part:
+        frames = _Frames(comparison)
+        entries = []
+        for i, number in enumerate(comparison.reference.numbers):
+            name = f"frames/frame_{number:04d}.vtm"
+            (part / "frames").mkdir(exist_ok=True)
+            files.write_blocks(part / name, frames.blocks(i))
+            entries.append((number if scene.frames.interval is None else number * scene.frames.interval, name))
+            log.info("%s: frame %d written", scene.name, number)
+        files.write_pvd(part / INDEX, entries)
+        unit = "frame numbers" if scene.frames.interval is None else "seconds"
+        files.write_text(part / "README.md", texts.paraview_readme(scene, unit, states=frames.results is not None))
+        return sorted(str(path.relative_to(part)) for path in part.rglob("*") if path.is_file())
+
+
+class _Frames:
+    """The blocks of every frame of a comparison, with what they have in common."""
+
+    def __init__(self, comparison: Comparison) -> None:
+        assert isinstance(comparison.context, MeasurementContext)  # of a muscle
+        self.comparison, self.setup, self.context = comparison, comparison.setup, comparison.context
+        self.scene, self.reference = casefile.muscle(comparison.scene), comparison.reference
+        self.results, self.within = _states(comparison), None
+        if self.results is not None:
+            found = embed(self.results.mesh, self.setup.surface.points)
+            inside = np.clip(found.barycentric, 0, None)  # a vertex outside of the tetrahedra has what is at their skin
+            self.within = found.tets, inside / inside.sum(axis=1, keepdims=True)
+        self.arrays = {run.name: dict(self._of_surface(run)) for run in comparison.runs}
+        self.fibres = {run.name: local_fields.fibre_points(run, self.context) for run in comparison.runs}
+
+    def _of_surface(self, run: Run) -> Iterator[tuple[str, Floats]]:
+        """By name, arrays (f, n) at the vertices of a run."""
+        if not run.has_surface:
+            return
+        gaps = local_fields.to_bones(run, self.context)
+        if gaps is not None:
+            yield "distance_to_bones", gaps
+        if run is self.reference:
+            if gaps is not None and among(self.scene.effects) is not None:
+                yield "contact_pressure", self._contact_pressure()
+            return
+        yield "distance_to_reference", local_fields.to_same_vertex(run, self.reference)
+        yield "distance_to_reference_surface", local_fields.to_surface(run, self.reference)
+        bars = self.comparison.error_bars
+        for name, statistic in _BARS.items():
+            bar = None if bars is None else bars.find("deviation", "surface_deviation", statistic)
+            if bar is not None:
+                yield name, np.repeat(bar.values[:, None], len(run.surface.points), axis=1)
+
+    def _contact_pressure(self) -> Floats:
+        """The sum over the bones (f, n) [MPa] of the law of contact at the vertices; 0 where these are not free."""
+        effect = among(self.scene.effects)
+        assert effect is not None  # the caller asked
+        law, run = Contact("free", effect.stiffness, effect.smoothing), self.reference
+        bones = [bone for bone in self.setup.bones if effect.is_by(bone.name)]
+        pressures = np.zeros(run.positions.shape[:2])
+        for i, (number, points) in enumerate(zip(run.numbers, run.positions, strict=True)):
+            if not np.isfinite(points).all():
+                pressures[i] = np.nan
+                continue
+            for bone in bones:
+                pressures[i] += law.pressure(local_fields.to_bone(bone, number, points))[0]
+        return np.where(self.setup.free, pressures, 0.0)
+
+    def blocks(self, i: int) -> Tree:
+        """Those of the frame of index ``i``."""
+        number, rest = self.reference.numbers[i], self.setup.surface
+        moved = {bone.name: apply(bone.pose(number), bone.surface.points) for bone in self.setup.bones}
+        bones = {
+            bone.name: Block(bone.surface.points, bone.surface.triangles, _moved(bone.surface.points, moved[bone.name]))
+            for bone in self.setup.bones
+        }
+        attachments = {
+            one.attachment: _part(rest, one.vertices, self.reference.positions[i]) for one in self.setup.attached
+        }
+        runs = {run.name: self._run(run, i) for run in self.comparison.candidates}
+        return {
+            "reference": self._run(self.reference, i),
+            "candidates": runs,
+            "bones": bones,
+            "attachments": attachments,
+        }
+
+    def _run(self, run: Run, i: int) -> dict[str, Block]:
+        """The blocks of a ``run`` at a frame."""
+        blocks = {}
+        known = {name: float(values[i]) for name, values in run.scalars.items() if np.isfinite(values[i])}
+        numbers = {"frame": float(run.numbers[i])} | known
+        if run.has_surface:
+            rest = self.setup.surface
+            arrays = _moved(rest.points, run.positions[i]) | {k: v[i] for k, v in self.arrays[run.name].items()}
+            arrays |= self._at_surface(run, i)
+            blocks["muscle"] = Block(rest.points, rest.triangles, arrays, numbers=numbers)
+        lines, points = self.context.fibres, self.fibres[run.name][i]
+        stretch = {"fibre_stretch": local_fields.stretch_along(lines, points[None])[0]}
+        whole = {"stretch_of_fibre": lines.lengths(points) / lines.lengths()}
+        blocks["fibres"] = Block(lines.points, lines, _moved(lines.points, points) | stretch, whole)
+        if run is self.reference and self.results is not None and run.numbers[i] in self.results.frames:
+            blocks["interior"] = _interior(self.results, run.numbers[i])
+        return blocks
+
+    def _at_surface(self, run: Run, i: int) -> dict[str, Any]:
+        """What follows from the state of the reference, at its vertices."""
+        if run is not self.reference or self.results is None or self.within is None:
+            return {}
+        frame, tets = run.numbers[i], self.within[0]
+        if frame not in self.results.frames:
+            return {}
+        names = [name for name in self.results.names(self.results.states[frame]) if name in _EVALUATED]
+        return self.results.evaluate_in(tets, self.within[1], frame, names)
+
+
+def _interior(made: Results, frame: float) -> Block:
+    """The tetrahedra of a reference; what jumps between them as it is in the middle of each, det F also at its least corner."""
+    mesh, count = made.mesh, len(made.mesh.tets)
+    names = [name for name in made.names(made.states[frame]) if name in _EVALUATED]
+    cells = made.evaluate_in(np.arange(count), np.full((count, 4), 0.25), frame, names)
+    ends = made.evaluate_in(np.repeat(np.arange(count), 4), np.tile(_CORNERS, (count, 1)), frame, ("det_F",))
+    cells["det_F_at_worst_corner"] = ends["det_F"].reshape(count, 4).min(axis=1)
+    return Block(mesh.points, mesh.tets, {"displacement": _at_nodes(mesh, made.states[frame].displacement)}, cells)
+
+
+def _at_nodes(mesh: TetMesh, displacement: Floats) -> Floats:
+    """The displacement (n, 3) of the points of a mesh, from that at the nodes of its tetrahedra, the corners first."""
+    found = np.zeros_like(mesh.points)
+    found[mesh.tets] = displacement[:, :4]
+    return found
+
+
+def _states(comparison: Comparison) -> Results | None:
+    """The results of the reference, None where it keeps no states."""
+    folder = comparison.reference.folder
+    if folder is None or not (folder / STATES).is_dir():
+        return None
+    return results.of_run(folder, comparison.scene)
+
+
+def _moved(rest: Floats, now: Floats) -> dict[str, Floats]:
+    """The displacement of points at ``rest``; of points that are nowhere none, so that there is something to see."""
+    known = np.isfinite(now)
+    return {"displacement": np.where(known, now - np.where(known, rest, 0.0), 0.0)}
+
+
+def _part(rest: Surface, vertices: Ints, now: Floats) -> Block:
+    """The triangles of a surface with all corners among ``vertices``, and these alone; there may be no triangle."""
+    chosen = rest.triangles[np.isin(rest.triangles, vertices).all(axis=1)]
+    own = np.unique(vertices)
+    return Block(rest.points[own], np.searchsorted(own, chosen), _moved(rest.points[own], now[own]))

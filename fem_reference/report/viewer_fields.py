@@ -1,0 +1,166 @@
+"""What the 3D view is coloured by beside the distance to the same vertex, packed into few bytes: of surfaces and of fibres.
+
+quantities  name, signed, and the top [mm] of the greatest magnitude: value = sign * top * (level / 127)^2
+runs        levels by quantity: (f, n) of one byte, as differences from the frame before; most, by quantity and frame the greatest
+            magnitude; points: of the fibres, as positions
+bars        by quantity and frame, how far [mm] the reference may be from the truth; null where nobody knows, nothing without any
+fibres      lines (k,): how many points each has; rest: the length [mm] of each piece, line by line; low, high: of all stretches
+joints      of each bone that moves its name, unit, and by frame the angle or the distance
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_reference.assessment import local_fields
+from fem_reference.assessment.comparison import Comparison
+from fem_reference.foundations.mesh import Floats, Polylines
+from fem_reference.foundations.motion import Rotation
+from fem_reference.metrics import MeasurementContext
+from fem_reference.problems.muscle import RigidBody
+from fem_reference.runs.store import Run
+
+FIBRES, POINTS = 30, 12  # the most that are drawn: fibres, and points of each
+_LEVELS = 127
+# The statistic of the surface's deviation that is the greatest of a quantity.
+_BARS = {"distance": "max", "surface": "hausdorff"}
+_FAR = 1e6  # [mm]: beyond, a fibre is nowhere
+
+
+@dataclass(frozen=True, eq=False)
+class Fields:
+    """The quantities of the ``runs`` drawn, the reference first, at frame ``numbers``."""
+
+    comparison: Comparison
+    runs: list[Run]
+    numbers: tuple[int, ...]
+
+    @property
+    def context(self) -> MeasurementContext:
+        """What all runs are measured with."""
+        assert isinstance(self.comparison.context, MeasurementContext)  # of a muscle
+        return self.comparison.context
+
+    @cached_property
+    def lines(self) -> tuple[Polylines, NDArray[np.int64]]:
+        """The fibres that are drawn, and the indices of their points."""
+        offsets = self.context.fibres.offsets
+        chosen = np.unique(np.linspace(0, len(offsets) - 2, min(FIBRES, len(offsets) - 1)).round().astype(int)).tolist()
+        points = [_spread(offsets[i], offsets[i + 1]) for i in chosen]
+        ends = np.cumsum([0, *(len(own) for own in points)])
+        indices = np.concatenate([np.zeros(0, np.int64), *points])
+        return Polylines(self.context.fibres.points[indices], ends), indices
+
+    @np.errstate(over="ignore", invalid="ignore")
+    def points(self, run: Run) -> Floats:
+        """Where the fibre points drawn are (f, m, 3) [mm] in a run, NaN in a frame that is not known."""
+        found = np.array(local_fields.fibre_points(run, self.context)[:, self.lines[1]])
+        found[~(np.abs(found) < _FAR).all(axis=(1, 2))] = np.nan
+        return self._at_numbers(run, found)
+
+    @cached_property
+    def surfaces(self) -> dict[str, dict[str, Floats]]:
+        """By quantity and name of the run, values (f, n) [mm]."""
+        reference = self.runs[0]
+        found: dict[str, dict[str, Floats]] = {"surface": {}, "depth": {}}
+        for run in self.runs:
+            if run is not reference:
+                found["surface"][run.name] = self._at_numbers(run, local_fields.to_surface(run, reference))
+            if (gaps := local_fields.to_bones(run, self.context)) is not None:
+                found["depth"][run.name] = self._at_numbers(run, np.fmax(-gaps, 0))
+        return {name: values for name, values in found.items() if values}
+
+    def _at_numbers(self, run: Run, values: Floats) -> Floats:
+        rows = dict(zip(run.numbers, values, strict=True))
+        lost = np.full(values.shape[1:], np.nan)
+        return np.stack([rows.get(number, lost) for number in self.numbers])
+
+    def quantities(self) -> list[dict[str, Any]]:
+        """What can be chosen, without what only the positions say."""
+        return [
+            {"name": name, "signed": name == "surface", "top": _top(list(values.values()))}
+            for name, values in self.surfaces.items()
+        ]
+
+    def levels(self, run: Run) -> dict[str, bytes]:
+        """By quantity, the bytes of a run; 0 where it is not known."""
+        found = {}
+        for name, values in self.surfaces.items():
+            if run.name in values:
+                share = np.nan_to_num(values[run.name]) / (_top(list(values.values())) or 1.0)
+                level = np.round(np.sign(share) * np.sqrt(np.minimum(np.abs(share), 1)) * _LEVELS).astype(np.int8)
+                found[name] = np.diff(
+                    level.view(np.uint8), axis=0, prepend=np.zeros_like(level[:1]).view(np.uint8)
+                ).tobytes()
+        return found
+
+    def most(self, run: Run) -> dict[str, list[float]]:
+        """By quantity, the greatest magnitude [mm] in each frame of a run."""
+        own = {name: values[run.name] for name, values in self.surfaces.items() if run.name in values}
+        return {name: [float(f"{_top([frame]):.4g}") for frame in values] for name, values in own.items()}
+
+    def bars(self) -> dict[str, list[float | None]]:
+        """By distance and frame, the error bar of the greatest one; nothing without any."""
+        known = self.comparison.error_bars
+        found: dict[str, list[float | None]] = {}
+        if known is None:
+            return found
+        for name, statistic in _BARS.items():
+            bar = known.find("deviation", "surface_deviation", statistic)
+            if bar is not None:
+                values = dict(zip(known.numbers, bar.values.tolist(), strict=True))
+                found[name] = [_finite(values.get(number, math.nan)) for number in self.numbers]
+        return found
+
+    def fibres(self, points: list[Floats]) -> dict[str, Any]:
+        """The lines, and the least and greatest stretch of a piece of these at ``points`` (f, m, 3) [mm] of each run."""
+        lines, ends = self.lines[0], self.lines[0].offsets
+        inside = np.delete(
+            np.arange(max(len(lines.points) - 1, 0)), ends[1:-1] - 1
+        )  # pieces: from each point to the next
+
+        def lengths(places: Floats) -> Floats:
+            return np.asarray(np.linalg.norm(np.diff(places, axis=-2), axis=-1)[..., inside])
+
+        rest = lengths(lines.points)
+        stretches = np.concatenate([np.ones(1), *((lengths(own) / rest).ravel() for own in points)])
+        known = stretches[np.isfinite(stretches)]
+        low, high = (float(np.percentile(known, share)) for share in (0.1, 99.9))  # one piece does not set the scale
+        return {
+            "lines": np.diff(ends).tolist(),
+            "rest": np.round(rest, 5).tolist(),
+            "low": min(low, 1.0),
+            "high": max(high, 1.0),
+        }
+
+
+def joints(bones: tuple[RigidBody, ...], numbers: tuple[int, ...]) -> list[dict[str, Any]]:
+    """How far each bone that moves has moved: the angle [degrees] or the distance [mm]."""
+    found = []
+    for bone in bones:
+        if bone.motion is None:
+            continue
+        turns = isinstance(bone.motion, Rotation)
+        along = np.degrees(bone.motion.angles) if isinstance(bone.motion, Rotation) else np.array(bone.motion.distances)
+        values = np.interp(numbers, bone.motion.frames, along)
+        found.append({"name": bone.name, "unit": "°" if turns else " mm", "values": np.round(values, 2).tolist()})
+    return found
+
+
+def _spread(first: int, end: int) -> NDArray[np.int64]:
+    """At most ``POINTS`` indices from ``first`` up to ``end``, both ends among them."""
+    return np.unique(np.linspace(first, end - 1, min(POINTS, end - first)).round().astype(np.int64))
+
+
+@np.errstate(invalid="ignore")
+def _top(values: list[Floats]) -> float:
+    """The greatest magnitude that is finite."""
+    return max((float(np.abs(one[np.isfinite(one)]).max(initial=0.0)) for one in values), default=0.0)
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

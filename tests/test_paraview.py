@@ -1,0 +1,245 @@
+"""Runs for ParaView: read back by VTK, every array compared with the run, stress with a closed form of a stretched block."""
+
+import shutil
+import struct
+import subprocess
+import sys
+from pathlib import Path
+from unittest import mock
+
+import numpy as np
+import pages
+import pytest
+import pyvista
+import shapes
+import small
+
+from fem_reference import cli
+from fem_reference.assessment import comparison as comparing
+from fem_reference.assessment import local_fields
+from fem_reference.assessment.error_bars import ErrorBar, ErrorBars
+from fem_reference.export import paraview
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Polylines, TetMesh
+from fem_reference.foundations.motion import apply
+from fem_reference.io import files
+from fem_reference.problems import muscle
+from fem_reference.problems.body import reference_nodes
+from fem_reference.runs import store
+from fem_reference.runs.states import NodalState
+from fem_reference.runs.store import Frame, Outcome
+from fem_reference.scenes import casefile
+from validation import homogeneous, laws
+
+MU, BULK, STRETCH = 0.01, 10.0, 1.25
+STIFFNESS = 3.0  # of contact [MPa/mm]
+WALL = 'name = "wall"\nhalf_space = { point = "5, 0, 0 mm", normal = [-1, 0, 0] }\n'
+CONTACT = '[[effect]]\nname = "contact"\nstiffness = "3 MPa/mm"\nbones = ["wall"]\n'
+FRAMES = (0, 5, 10, 15, 20)
+
+
+def stretched(points: np.ndarray, number: int) -> np.ndarray:
+    """The points of a bar pulled along z as a block of its material is, most at frame 10."""
+    share = 1 - abs(number - 10) / 10
+    truth = homogeneous.uniaxial(laws.neo_hooke(MU), BULK, 1 + share * (STRETCH - 1))
+    return points @ truth.F[::-1, ::-1].T  # the closed form pulls along x
+
+
+@pytest.fixture(scope="module")
+def compared(tmp_path_factory: pytest.TempPathFactory):
+    """The small scene with a run of closed form, with states, and a candidate that is 1 mm beside it and stops early."""
+    folder = small.write(tmp_path_factory.mktemp("case") / "bar")
+    text = (folder / "case.toml").read_text()
+    text = text.replace("[[attachment]]", f"[[bone]]\n{WALL}\n[[attachment]]", 1).replace(
+        "[fibres]", f"{CONTACT}\n[fibres]"
+    )
+    (folder / "case.toml").write_text(text.replace("every = 5", 'every = 5\ninterval = "20 ms"'))
+    scene = casefile.read(folder)
+    setup = muscle.setup(scene)
+    mesh = shapes.box((2, 2, 4), (10, 10, 40))
+    tets = TetMesh(mesh.points, mesh.tets)
+    fibres = Polylines(np.column_stack([np.full((8, 2), 5.0), [1, 5, 10, 20, 2, 3, 4, 8]]), [0, 4, 8])
+    run = written(folder / "run", scene, setup, tets, fibres)
+    beside = np.array(run.positions) + [1.0, 0, 0]
+    beside[-1] = np.nan
+    candidate = store.Run("mine", "recorded", Outcome("converged", ""), run.numbers, setup.surface, beside)
+    bars = ErrorBar("deviation", "surface_deviation", "max", "mm", np.arange(5.0), {})
+    known = ErrorBars(run.numbers, (1.0, 2.0), 1.0, (bars,))
+    return comparing.compare(scene, setup, run, (candidate,), known), tets
+
+
+def written(folder, scene, setup, tets: TetMesh, fibres: Polylines) -> store.Run:
+    """The run of closed form as a solver would have stored it."""
+    along = np.tile([0.0, 0, 1], (len(tets.tets), 1))
+    identity = {"name": "reference", "solver": "fenicsx", "frames": FRAMES, "origin": {"scene": scene.key}}
+    writer = store.Writer(folder, identity, setup.surface, fibres, tets, along)
+    weights = reference_nodes("tetrahedron", 2)
+    nodes = np.einsum("kc,mcx->mkx", np.column_stack([1 - weights.sum(axis=1), weights]), tets.points[tets.tets])
+    for number in FRAMES:
+        moved = stretched(nodes.reshape(-1, 3), number).reshape(nodes.shape)
+        J = np.linalg.det(stretched(np.eye(3), number))
+        state = NodalState(moved - nodes, np.full((len(nodes), 4), BULK * (J - 1)), np.zeros((0, 0, 3)))
+        inside = {"fibres": stretched(fibres.points, number), "tets": stretched(tets.points, number)}
+        scalars = {"min_det_F_vertices": J}
+        writer.add(Frame(number, stretched(setup.surface.points, number), state=state, scalars=scalars, **inside))
+    writer.close(Outcome("converged", ""))
+    return store.load(folder)
+
+
+@pytest.fixture(scope="module")
+def exported(compared, tmp_path_factory: pytest.TempPathFactory):
+    folder = tmp_path_factory.mktemp("paraview") / "bar"
+    assert "README.md" in paraview.write(compared[0], folder)
+    return folder
+
+
+def frame(folder, i: int) -> pyvista.MultiBlock:
+    """What VTK reads of a frame."""
+    reader = pyvista.PVDReader(folder / paraview.INDEX)
+    reader.set_active_time_point(i)
+    return reader.read()[0]
+
+
+def test_frames_have_their_times_and_blocks_their_names(compared, exported) -> None:
+    reader = pyvista.PVDReader(exported / paraview.INDEX)
+    assert reader.time_values == pytest.approx([0, 0.1, 0.2, 0.3, 0.4])  # 20 ms from a frame number to the next
+    for i in range(len(FRAMES)):
+        blocks = frame(exported, i)
+        assert blocks.keys() == ["reference", "candidates", "bones", "attachments"]
+        assert blocks["reference"].keys() == ["muscle", "fibres", "interior"]
+        assert blocks["candidates"].keys() == ["mine"]
+        assert blocks["candidates"]["mine"].keys() == ["muscle", "fibres"]
+        assert blocks["bones"].keys() == ["floor", "lid", "wall"]
+        assert blocks["attachments"].keys() == ["origin", "insertion"]
+        assert blocks["reference"]["muscle"].field_data["frame"] == FRAMES[i]
+    assert frame(exported, 0)["attachments"]["origin"].n_cells == 32  # 4 x 4 squares
+    assert compared[0].scene.frames.interval == pytest.approx(0.02)
+
+
+def test_warping_by_the_displacement_gives_the_run(compared, exported) -> None:
+    result, tets = compared
+    blocks = frame(exported, 2)
+    for name, run in (("reference", result.reference), ("mine", result.candidates[0])):
+        own = blocks["reference"] if name == "reference" else blocks["candidates"][name]
+        assert np.abs(own["muscle"].points - result.setup.surface.points).max() == 0
+        assert np.array_equal(own["muscle"].regular_faces, result.setup.surface.triangles)
+        moved = own["muscle"].warp_by_vector("displacement").points
+        assert moved == pytest.approx(run.positions[2], abs=1e-12)
+    interior = blocks["reference"]["interior"].warp_by_vector("displacement")
+    assert interior.points == pytest.approx(stretched(tets.points, 10), abs=1e-12)
+    for bone in result.setup.bones:
+        moved = blocks["bones"][bone.name].warp_by_vector("displacement").points
+        assert moved == pytest.approx(apply(bone.pose(10), bone.surface.points), abs=1e-9)
+    top = blocks["attachments"]["insertion"].warp_by_vector("displacement").points
+    assert top[:, 2] == pytest.approx(np.full(25, 40 * STRETCH))
+
+
+def test_stress_and_what_else_follows_from_the_state_is_that_of_the_closed_form(exported) -> None:
+    truth = homogeneous.uniaxial(laws.neo_hooke(MU), BULK, STRETCH)
+    J = np.linalg.det(truth.F)
+    pull = truth.P[0, 0] * STRETCH / J
+    expected = {
+        "det_F": J,
+        "pressure": BULK * (J - 1),
+        "fibre_stretch": STRETCH,
+        "fibre_stress": pull,
+        "von_mises": pull,
+    }
+    own = frame(exported, 2)["reference"]
+    for arrays in (own["interior"].cell_data, own["muscle"].point_data):
+        for name, value in expected.items():
+            assert np.asarray(arrays[name]) == pytest.approx(np.full(len(arrays[name]), value), rel=1e-7), name
+    assert own["interior"].cell_data["det_F_at_worst_corner"].min() == pytest.approx(
+        own["muscle"].field_data["min_det_F_vertices"][0]
+    )
+    assert frame(exported, 0)["reference"]["interior"].cell_data["von_mises"].max() < 1e-12
+
+
+def test_contact_pressure_is_the_law_at_the_depth_in_a_wall(compared, exported) -> None:
+    result, _ = compared
+    muscle_block = frame(exported, 2)["reference"]["muscle"]
+    depth = result.reference.positions[2][:, 0] - 5.0
+    free = result.setup.free
+    deep, outside = free & (depth > 0.1), free & (depth < -0.1)
+    pressure = np.asarray(muscle_block.point_data["contact_pressure"])
+    assert deep.sum() > 20
+    assert outside.sum() > 20
+    assert pressure[deep] == pytest.approx(STIFFNESS * depth[deep])
+    assert not pressure[outside | ~free].any()
+    gaps = np.asarray(muscle_block.point_data["distance_to_bones"])
+    assert np.isnan(gaps[~free]).all()
+    near = free & (np.abs(result.setup.surface.points[:, 2] - 20) < 5)  # of the wall alone
+    assert gaps[near] == pytest.approx(-depth[near])
+
+
+def test_distances_to_the_reference_and_its_error_bar(compared, exported) -> None:
+    result, _ = compared
+    arrays = frame(exported, 3)["candidates"]["mine"]["muscle"].point_data
+    assert np.asarray(arrays["distance_to_reference"]) == pytest.approx(np.ones(len(result.setup.surface.points)))
+    assert np.asarray(arrays["error_bar"]) == pytest.approx(np.full(len(result.setup.surface.points), 3.0))
+    surface = frame(exported, 3)["reference"]["muscle"].warp_by_vector("displacement")
+    moved = frame(exported, 3)["candidates"]["mine"]["muscle"].warp_by_vector("displacement")
+    expected = moved.compute_implicit_distance(surface)["implicit_distance"]
+    assert np.asarray(arrays["distance_to_reference_surface"]) == pytest.approx(np.asarray(expected), abs=1e-6)
+
+
+def test_a_frame_that_a_run_did_not_reach_is_there_and_not_a_number(exported) -> None:
+    own = frame(exported, 4)["candidates"]["mine"]["muscle"]
+    assert not np.asarray(own.point_data["displacement"]).any()
+    assert np.isnan(np.asarray(own.point_data["distance_to_reference"])).all()
+
+
+def test_fibres_are_stretched_piece_by_piece(exported) -> None:
+    lines = frame(exported, 2)["reference"]["fibres"]
+    assert lines.n_lines == 2
+    for values in (lines.point_data["fibre_stretch"], lines.cell_data["stretch_of_fibre"]):
+        assert np.asarray(values) == pytest.approx(np.full(len(values), STRETCH))
+    bent = Polylines(np.array([[0.0, 0, 0], [1, 0, 0], [3, 0, 0], [0, 5, 0], [0, 6, 0]]), [0, 3, 5])
+    moved = bent.points * [2.0, 1, 1] + np.array([[0.0] * 3] * 2 + [[2.0, 0, 0]] + [[0.0] * 3] * 2)
+    assert local_fields.stretch_along(bent, moved[None])[0] == pytest.approx([2, 8 / 3, 3, 1, 1])
+
+
+def test_the_folder_must_be_free_and_options_fit_the_format(compared, tmp_path, capsys) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="which is not empty"):
+        paraview.write(compared[0], tmp_path)
+    assert cli.main(["export", "box_squeeze", "--to", str(tmp_path / "to"), "--candidate", "pbd"]) == cli.BAD_INPUT
+    assert "them for paraview only" in capsys.readouterr().err
+
+
+def test_blender_is_given_every_vertex_in_every_frame(compared, exported, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "paraview").symlink_to(exported)
+    text = pages.snippet("docs/paraview.md", "POINTCACHE2").replace('"pelvis"', '"floor"').replace('"femur"', '"lid"')
+    exec(compile(text, "docs/paraview.md", "exec"), {})
+    result, rest = compared[0], compared[0].setup.surface
+    data = (tmp_path / "blender" / "muscle.pc2").read_bytes()
+    # https://docs.blender.org: modifier Mesh Cache; its reader expects these fields
+    assert struct.unpack("<12siiffi", data[:32]) == (b"POINTCACHE2\0", 1, len(rest.points), 0.0, 1.0, len(FRAMES))
+    positions = np.frombuffer(data[32:], "<f4").reshape(len(FRAMES), -1, 3)
+    assert positions == pytest.approx(result.reference.positions, abs=1e-5)
+    mesh = files.read_surface(tmp_path / "blender" / "muscle.ply", 1.0)
+    assert np.array_equal(mesh.triangles, rest.triangles)
+    assert mesh.points == pytest.approx(positions[0])
+    blender = mock.MagicMock()
+    monkeypatch.setitem(sys.modules, "bpy", blender)
+    shown = pages.snippet("docs/paraview.md", "MESH_CACHE").replace("/path/to/blender", str(tmp_path / "blender"))
+    exec(compile(shown, "docs/paraview.md", "exec"), {})
+    imported = [Path(call.kwargs["filepath"]).name for call in blender.ops.wm.ply_import.call_args_list]
+    assert imported == ["floor.ply", "lid.ply", "muscle.ply"]
+    cache = blender.context.object.modifiers.new.return_value
+    assert (cache.cache_format, cache.filepath) == ("PC2", str(tmp_path / "blender" / "muscle.pc2"))
+
+
+@pytest.mark.skipif(not shutil.which("pvpython"), reason="ParaView is not installed")
+def test_paraview_itself_opens_the_collection(exported) -> None:
+    code = (
+        "from paraview.simple import *\n"
+        f"runs = OpenDataFile({str(exported / paraview.INDEX)!r})\n"
+        "runs.UpdatePipeline(0.2)\n"
+        "moved = WarpByVector(Input=runs, Vectors=['POINTS', 'displacement'])\n"
+        "moved.UpdatePipeline(0.2)\n"
+        "print(list(runs.TimestepValues), moved.GetDataInformation().GetNumberOfPoints() > 0)"
+    )
+    done = subprocess.run(["pvpython", "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split()[-1] == "True"
