@@ -520,3 +520,13 @@ def test_worst_of_a_measure_with_a_frame_that_is_not_a_number(comparison):
     it = page.worst(torn, Measure("volume", "deviation", "%", np.array([0, -3.0, 2, NAN, 1]), tuple("abcde")))
     assert np.isnan(it["value"])
     assert (it["frame"], it["where"], it["finite"]) == (30, "d", (-3.0, 10))
+
+
+def test_what_each_frame_of_the_reference_took_is_shown_where_it_is_known(comparison):
+    seconds = {"seconds_processor": np.arange(5.0), "contact_points": np.array([0.0, 0, 17, 0, NAN])}
+    known = replace(alone(comparison), reference=replace(comparison.reference, scalars=seconds))
+    text = page.render(known)
+    assert "Processor time of the reference to each frame" in text
+    assert re.search(r"<th>Frame</th><th>processor time \[s\]</th><th>points in contact</th>", text)
+    assert "<td>17</td>" in text
+    assert "Processor time of the reference" not in page.render(alone(comparison))
