@@ -45,7 +45,11 @@ def differences(one: Run, other: Run) -> list[str]:
         found.append(f"{one.numbers} {one.outcome.message} / {other.numbers} {other.outcome.message}")
         return found
     pairs = {"positions": (one.positions, other.positions), "fibres": (one.fibre_positions, other.fibre_positions)}
-    pairs |= {name: (one.scalars.get(name), other.scalars.get(name)) for name in {*one.scalars, *other.scalars}}
+    pairs |= {
+        name: (one.scalars.get(name), other.scalars.get(name))
+        for name in {*one.scalars, *other.scalars}
+        if not name.startswith("seconds")
+    }
     for name, (left, right) in pairs.items():
         if (left is None) != (right is None):
             found.append(f"{name}: in one only")

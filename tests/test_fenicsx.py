@@ -108,6 +108,7 @@ def test_cost_says_where_the_time_went(bent) -> None:
     _, outcome, frames = bent
     cost = outcome.cost
     assert cost["newton_iterations"] == sum(frame.scalars["newton_iterations"] for frame in frames)
+    assert cost["seconds_processor_solve"] == pytest.approx(sum(frame.scalars["seconds_processor"] for frame in frames))
     # Of a body so small one for each iteration, and one for the stability of each frame but the last, which is rest again.
     assert cost["factorisations"] == cost["newton_iterations"] + len(frames) - 1
     assert cost["krylov_iterations"] >= cost["newton_iterations"]

@@ -40,6 +40,7 @@ def test_forces_and_moments_balance(fem_lab) -> None:
     assert state.moments["ball"] - np.cross(centre, state.forces["ball"]) == pytest.approx([0, 0, 0], abs=1e-12)
     assert 0 < state.scalars["contact_depth"] < 0.1
     assert 0 < state.scalars["contact_area"] < 1
+    assert 0 < state.scalars["contact_points"] <= state.scalars["contact_points_near"]
     assert state.scalars["contact_pressure"] == pytest.approx(
         state.scalars["contact_depth"], rel=1e-9
     )  # 1 MPa/mm, deep
@@ -60,6 +61,7 @@ def test_what_is_far_away_does_nothing(fem_lab) -> None:
     state = solved(fem_lab, Obstruction("moon", Sphere((0.0, 0.0, 9.0), 1.0), Slide((0.0, 0.0, -1.0))))
     assert not state.forces["moon"].any()
     assert [state.scalars[name] for name in ("contact_depth", "contact_pressure", "contact_area")] == [0, 0, 0]
+    assert [state.scalars[name] for name in ("contact_points", "contact_points_near")] == [0, 0]
 
 
 def test_the_second_opinion_knows_no_contact() -> None:

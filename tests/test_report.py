@@ -590,3 +590,13 @@ def test_of_a_reference_that_failed_the_frames_that_it_reached_are_shown(compari
     assert "not a number" not in re.sub(r"<script.*?</script>", "", text, flags=re.DOTALL)
     assert "What it cost" in text
     assert 'type="module"' not in text
+
+
+def test_what_each_frame_of_the_reference_took_is_shown_where_it_is_known(comparison):
+    seconds = {"seconds_processor": np.arange(5.0), "contact_points": np.array([0.0, 0, 17, 0, NAN])}
+    known = replace(alone(comparison), reference=replace(comparison.reference, scalars=seconds))
+    text = page.render(known)
+    assert "Processor time of the reference to each frame" in text
+    assert re.search(r"<th>Frame</th><th>processor time \[s\]</th><th>points in contact</th>", text)
+    assert "<td>17</td>" in text
+    assert "Processor time of the reference" not in page.render(alone(comparison))

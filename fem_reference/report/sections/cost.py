@@ -1,16 +1,47 @@
-"""What every run cost."""
+"""What every run cost, and the reference frame by frame."""
 
 from typing import Any
 
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
 from fem_reference.assessment.comparison import Comparison
+from fem_reference.report.curves import REFERENCE, Curve, drawn
 from fem_reference.report.sections import Section
 from fem_reference.report.tables import runs
 from fem_reference.report.words import words
+from fem_reference.runs.store import Run
+
+# Scalars of a run that say what a frame took.
+_BY_FRAME = {
+    "seconds_processor": "processor time [s]",
+    "newton_iterations": "Newton iterations",
+    "cut_backs": "cut-backs",
+    "contact_points_near": "points asked for their distance to bones",
+    "contact_points": "points in contact",
+}
 
 
 def _facts(comparison: Comparison) -> dict[str, Any]:
-    """The kinds of cost."""
-    return {"costs": _costs(comparison)}
+    """The kinds of cost, and what each frame of the reference took."""
+    reference = comparison.reference
+    by_frame = {title: reference.scalars[name] for name, title in _BY_FRAME.items() if name in reference.scalars}
+    return {"costs": _costs(comparison), "by_frame": by_frame, "frame_costs": _drawn(reference)}
+
+
+def _drawn(reference: Run) -> Curve | None:
+    """The processor time of each frame as bars, None where it is not known."""
+    seconds = reference.scalars.get("seconds_processor")
+    if seconds is None:
+        return None
+    width = 0.8 * min(np.diff(reference.numbers), default=1)
+
+    def draw(_: Figure, axes: Axes) -> None:
+        axes.bar(reference.numbers, seconds, width, color=REFERENCE)
+        axes.set(xlabel="frame", ylabel="s")
+
+    return drawn("frame-costs", "Processor time of the reference to each frame", (5.4, 2.4), draw)
 
 
 def _costs(comparison: Comparison) -> list[tuple[str, str, list[float | None]]]:

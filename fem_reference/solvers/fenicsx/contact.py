@@ -135,7 +135,8 @@ class ContactForces:
 
     def scalars(self, comm: MPI.Comm) -> dict[str, float]:
         """The greatest ``contact_depth`` [mm] and largest ``contact_pressure`` [MPa] at a point, the rest area in contact,
-        ``contact_area`` [mm2], and how deep the deepest point in contact was at rest, ``overlap_at_rest`` [mm].
+        ``contact_area`` [mm2], how many ``contact_points`` that is and how many were asked for their distance,
+        ``contact_points_near``, and how deep the deepest point in contact was at rest, ``overlap_at_rest`` [mm].
         """
         touched = np.zeros(len(self.points.areas), bool)
         depth = pressure = overlap = 0.0
@@ -148,6 +149,8 @@ class ContactForces:
             "contact_depth": comm.allreduce(depth, MPI.MAX),
             "contact_pressure": comm.allreduce(pressure, MPI.MAX),
             "contact_area": comm.allreduce(float(self.points.areas[touched].sum()), MPI.SUM),
+            "contact_points": comm.allreduce(float(touched.sum()), MPI.SUM),
+            "contact_points_near": comm.allreduce(float(sum(len(one.near) for one in self.now)), MPI.SUM),
         }
         return found | ({"overlap_at_rest": comm.allreduce(max(overlap, 0.0), MPI.MAX)} if self.law.relaxed else {})
 

@@ -41,6 +41,7 @@ class Worker:
             self.body.start(job.body.start)
         self.set_up = time.perf_counter() - begin
         self.solving = self.solving_processor = self.checking = 0.0
+        self.reported = 0.0  # of solving_processor, up to the last frame that was reported
         self.counts = {"newton_iterations": 0, "load_steps": 0, "cut_backs": 0}
         self.unstable: dict[float, float] = {}  # negative modes by frame
         self.left: dict[float, float] = {}  # perturbation [mm] by frame
@@ -155,6 +156,8 @@ class Worker:
         arrays |= {f"moment {name}": moment for name, moment in moments.items()}
         arrays |= {f"state {name}": array for name, array in self.body.state().items()}
         counts = {"newton_iterations": float(reached.iterations), "cut_backs": float(reached.cutbacks)}
+        counts["seconds_processor"] = self.body.comm.allreduce(self.solving_processor - self.reported)
+        self.reported = self.solving_processor
         path = self.folder / f"frame_{reached.frame}.npz"
         measured, outside = self.body.validity.examine(reached.frame)
         scalars = self.body.scalars() | measured | counts | self.negative_modes(reached.frame)
