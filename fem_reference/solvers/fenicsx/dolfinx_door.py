@@ -10,25 +10,29 @@ __all__ = ["PETSc", "dolfinx"]
 
 
 @contextlib.contextmanager
-def _without(name: str) -> Iterator[None]:
-    """Meanwhile a module that was not loaded yet is as if it were not installed."""
+def _without(name: str) -> Iterator[bool]:
+    """Meanwhile a module that was not loaded yet is as if it were not installed; whether it was not."""
     hidden = name not in sys.modules
     if hidden:
         sys.modules[name] = None  # type: ignore[assignment]
     try:
-        yield
+        yield hidden
     finally:
         if hidden:
             del sys.modules[name]
 
 
 # FFCx loads numba where it is installed, for kernels that nothing here has: a quarter of the time in which a process starts.
-with _without("numba"):
+with _without("numba") as nowhere:
     with contextlib.suppress(ImportError):
         import dolfinx_solver  # noqa: F401 - makes the wheel's own dolfinx importable
     import dolfinx
-    import dolfinx.fem.petsc
     from petsc4py import PETSc
+
+    if (
+        nowhere
+    ):  # where numba is loaded, this would make libraries of the wheel global, and h5py take its HDF5 for its own
+        import dolfinx.fem.petsc
 
 _VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
 if _VERSION < (0, 10):
