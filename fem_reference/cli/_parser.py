@@ -99,3 +99,9 @@ def add_name(parser: argparse.ArgumentParser) -> None:
 def add_ranks(parser: argparse.ArgumentParser) -> None:
     """On how many processes the reference is solved."""
     parser.add_argument("--ranks", type=int, metavar="N", help=RANKS)
+
+
+def add_workers(parser: argparse.ArgumentParser) -> None:
+    """How many runs are made at once."""
+    count = "how many runs are made at once (default: 1)"
+    parser.add_argument("--workers", type=int, default=1, metavar="N", help=count)

@@ -6,9 +6,8 @@ from functools import partial
 from fem_reference import report
 from fem_reference.assessment.omissions import facts
 from fem_reference.cli._pages import Asked, case_part, changes, written
-from fem_reference.cli._parser import add_case, add_name
+from fem_reference.cli._parser import add_case, add_name, add_workers
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, out, write_output
-from fem_reference.foundations.errors import InputError
 from fem_reference.report import effects_page
 from fem_reference.scenes import casefile
 from fem_reference.studies import omissions
@@ -22,15 +21,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """The options that this verb has."""
     add_case(parser)
     add_name(parser)
-    parser.add_argument(
-        "--workers", type=int, default=1, metavar="N", help="how many runs are made at once (default: 1)"
-    )
+    add_workers(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Solve a case with each thing left out that can be, and write the page."""
-    if options.workers < 1:
-        raise InputError("--workers", options.workers, "1 or more")
     scene = casefile.read_muscle(options.case, dict(map(casefile.setting, options.set)))
     scene = scene.model_copy(update={"choice": "listed"})  # what it would leave out is measured too
     found = omissions.study(scene, out(options) / "runs", Workers(options.workers))

@@ -8,9 +8,8 @@ from functools import partial
 from fem_reference import report, solvers
 from fem_reference.assessment.cost_study import Study, facts
 from fem_reference.cli._pages import Asked, Part, case_part, changes, written
-from fem_reference.cli._parser import add_name
+from fem_reference.cli._parser import add_name, add_workers
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, out, write_output
-from fem_reference.foundations.errors import InputError
 from fem_reference.report import study_page
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
@@ -30,9 +29,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     change = "change a key of every case, such as muscle.tet_size='8 mm'; may be repeated"
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help=change)
-    parser.add_argument(
-        "--workers", type=int, default=1, metavar="N", help="how many runs are made at once (default: 1)"
-    )
+    add_workers(parser)
     cluster = (
         "address of a Dask scheduler (such as dask-jobqueue starts) whose workers make the runs; they see --out too"
     )
@@ -48,8 +45,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Measure what accuracy costs on cases, and write the page; one on each case, and one on all where there are several."""
-    if options.workers < 1:
-        raise InputError("--workers", options.workers, "1 or more")
     changes = dict(map(casefile.setting, options.set))
     scenes = [casefile.read_muscle(case, changes) for case in options.cases]
     workers = Workers(options.workers, options.scheduler)

@@ -1,8 +1,6 @@
 """Tetrahedra that were made before, on disk: gmsh takes seconds to a minute for what takes a hundredth of that to read."""
 
 import importlib.metadata
-import logging
-import tempfile
 from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
@@ -11,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Surface, TetMesh, fingerprint
-
-log = logging.getLogger(__name__)
+from fem_reference.geometry import kept_arrays
 
 Mesher = Callable[[Surface, float, Mapping[str, Floats]], TetMesh]
 _MADE_WITH = ("gmsh", "pytetwild", "libigl", "numpy", "scipy")
@@ -35,13 +32,10 @@ def cached(mesher: Mesher, surface: Surface, size: float, shares: Mapping[str, F
     names = np.frombuffer("\0".join([*shares, _code()]).encode(), np.uint8)
     key = fingerprint(surface.points, surface.triangles, *shares.values(), np.array([size]), names)
     path = folder / f"tetrahedra_{key[:32]}.npz"
-    mesh = _read(path)
+    mesh = kept_arrays.read(path, _mesh)
     if mesh is None:
         mesh = mesher(surface, size, shares)
-        try:
-            _write(path, mesh)
-        except OSError as why:
-            log.warning("%s: not kept: %s", path, why)
+        kept_arrays.write(path, _arrays(mesh))
     return mesh
 
 
@@ -59,25 +53,11 @@ def _code() -> str:
     return f"{fingerprint(*sources)} {versions}"
 
 
-def _read(path: Path) -> TetMesh | None:
-    """The mesh of a file, None where there is none that can be read whole."""
-    if not path.is_file():
-        return None
-    try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as kept:
-            facets = {name.removeprefix(_FACETS): kept[name] for name in kept.files if name.startswith(_FACETS)}
-            return TetMesh(kept["points"], kept["tets"], facets, str(kept["maker"]))
-    except Exception as error:  # zipfile and numpy raise whatever occurs to them over a damaged file
-        log.warning("%s: damaged, made anew: %s", path, error)
-        return None
+def _mesh(kept: dict[str, Any]) -> TetMesh:
+    facets = {name.removeprefix(_FACETS): array for name, array in kept.items() if name.startswith(_FACETS)}
+    return TetMesh(kept["points"], kept["tets"], facets, str(kept["maker"]))
 
 
-def _write(path: Path, mesh: TetMesh) -> None:
-    """The file whole or not at all, also where several processes write it."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    arrays: dict[str, Any] = {"points": mesh.points, "tets": mesh.tets, "maker": np.array(mesh.maker)}
-    arrays |= {f"{_FACETS}{name}": facets for name, facets in mesh.facets.items()}
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".") as folder:
-        part = Path(folder) / path.name
-        np.savez_compressed(part, allow_pickle=False, **arrays)
-        part.replace(path)
+def _arrays(mesh: TetMesh) -> dict[str, Any]:
+    facets = {f"{_FACETS}{name}": facets for name, facets in mesh.facets.items()}
+    return {"points": mesh.points, "tets": mesh.tets, "maker": np.array(mesh.maker)} | facets

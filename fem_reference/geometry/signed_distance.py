@@ -5,10 +5,10 @@ Between the nodes stand tricubic B-splines, so that gradient and curvature are c
 
 import logging
 import math
-import tempfile
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import igl
 import numpy as np
@@ -23,6 +23,7 @@ from fem_reference.foundations.mesh import (
     read_only,
     triangle_areas,
 )
+from fem_reference.geometry import kept_arrays
 from fem_reference.geometry.clearance import Clearance, of_spline
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.rigid_bodies import Sampled, Vector
@@ -186,38 +187,18 @@ def cached(surface: Surface, error: float, margin: float, rounding: float, folde
     code = np.frombuffer(Path(__file__).read_bytes(), np.uint8)
     name = fingerprint(surface.points, surface.triangles, np.array([error, margin, rounding]), code)
     path = folder / f"distance_{name[:32]}.npz"
-    grid = _read(path)
+    grid = kept_arrays.read(path, _grid)
     if grid is None:
         grid = resolve(surface, error, margin)
         if rounding > 0:
             grid = build(surface, grid.spacing, margin, rounding)
-        try:
-            _write(path, grid)
-        except OSError as why:
-            logger.warning("%s: not kept: %s", path, why)
+        kept_arrays.write(path, {entry.name: getattr(grid, entry.name) for entry in fields(grid)})
     return grid
 
 
-def _read(path: Path) -> Grid | None:
-    """The grid of a file, None where there is none that can be read whole."""
-    if not path.is_file():
-        return None
-    try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as kept:
-            numbers = (float(kept[name]) for name in ("spacing", "margin", "error", "mean_error"))
-            return Grid(kept["coefficients"], tuple(kept["origin"].tolist()), *numbers)
-    except Exception as error:  # zipfile and numpy raise whatever occurs to them over a damaged file
-        logger.warning("%s: damaged, made anew: %s", path, error)
-        return None
-
-
-def _write(path: Path, grid: Grid) -> None:
-    """The file whole or not at all, also where several processes write it."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".") as folder:
-        part = Path(folder) / path.name
-        np.savez(part, allow_pickle=False, **{entry.name: getattr(grid, entry.name) for entry in fields(grid)})
-        part.replace(path)
+def _grid(kept: dict[str, Any]) -> Grid:
+    numbers = (float(kept[name]) for name in ("spacing", "margin", "error", "mean_error"))
+    return Grid(kept["coefficients"], tuple(kept["origin"].tolist()), *numbers)
 
 
 def _oriented(surface: Surface) -> Surface:

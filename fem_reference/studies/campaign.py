@@ -33,11 +33,15 @@ _LASTING = ("diverged", "inverted", "collapsed", "out of steps")
 @dataclass(frozen=True)
 class Workers:
     """Who solves: so many processes of this machine (``count``), or the workers of the Dask scheduler at ``address``, such as one
-    that dask-jobqueue started on a cluster; these see the same store.
+    that dask-jobqueue started on a cluster; these see the same store. InputError where it is fewer than one.
     """
 
     count: int = 1
     address: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.count < 1:
+            raise InputError("--workers", self.count, "1 or more")
 
 
 @dataclass(frozen=True, eq=False)

@@ -194,8 +194,8 @@ def _solved(posed: Posed, choice: SolverChoice) -> Cell:
         ends = steps.compare(built, choice, hard.steps)
         found = replace(found, sentence=f"{found.sentence}; {ends.sentence}")
         found = found if ends.same else replace(found, verdict="failed")
-    if found.verdict == "ok" and (told := health.unstable(followed)):
-        found = replace(found, verdict="degraded", sentence=f"{told}; {found.sentence}")
+    if found.verdict == "ok" and (doubt := health.unstable(followed)):
+        found = replace(found, verdict="degraded", sentence=f"{doubt}; {found.sentence}")
     return replace(found, scene=_scene(found, followed))
 
 
