@@ -4,6 +4,7 @@
 """
 
 import argparse
+import base64
 import inspect
 import re
 from collections.abc import Callable, Iterator
@@ -20,6 +21,8 @@ from fem_reference.assessment.baseline import Baseline
 from fem_reference.cli._parser import parser
 from fem_reference.foundations.records import Record, keys
 from fem_reference.foundations.units import length_unit, unit_of
+from fem_reference.problems import of_case
+from fem_reference.report import gallery as gallery_of_runs
 from fem_reference.runs.contents import Contents
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
@@ -133,7 +136,20 @@ def _shown(case: Any) -> str:
     candidates = ", ".join(f"`{one.name}`" for one in case.candidate) or "none"
     rows = [*case.facts.items(), ("effects", ", ".join(case.acting)), ("reference", f"`{case.reference.solver}`")]
     table = "".join(f"| {name} | {_cell(text)} |\n" for name, text in [*rows, ("candidates", candidates)])
-    return f"## {case.name}\n\n{case.title}. {case.proves}\n\n| | |\n|---|---|\n{table}"
+    return f"## {case.name}\n\n{case.title}. {case.proves}\n\n{_pictures(case)}| | |\n|---|---|\n{table}"
+
+
+def _pictures(case: Any) -> str:
+    """Two views of a muscle and its bones at rest; none of what needs data that is licensed apart, or where nothing can draw."""
+    if not isinstance(case, MuscleCase) or case.needed_data:
+        return ""
+    rest = of_case.setup(case)
+    try:
+        views = gallery_of_runs.draw(rest, rest.surface, [gallery_of_runs.Shot("rest", 0, rest.surface.points)])[0]
+    except fr.MissingSoftware:
+        return ""
+    kept = (f"data:image/webp;base64,{base64.b64encode(view).decode()}" for view in views)
+    return "".join(f'<img src="{one}" alt="{case.name} at rest" width="48%">\n' for one in kept) + "\n"
 
 
 def _sections(records: dict[str, list[type[Record]]]) -> str:

@@ -11,7 +11,7 @@ from fem_reference.cli.page import PAGES
 from fem_reference.geometry import skins
 from fem_reference.report import page
 from fem_reference.scenes import casefile
-from fem_reference.scenes.case import DATA_SETTING, HOME
+from fem_reference.scenes.case import DATA_SETTING
 from fem_reference.scenes.scalar import ScalarCase
 from fem_reference.studies import convergence
 
@@ -32,8 +32,7 @@ CONTROLS = list(
 
 def quickly(name: str) -> dict[str, object]:
     """Changes with which a case is solved in test time, if its data is here."""
-    text = (HOME / "cases" / name / "case.toml").read_text(encoding="utf-8")
-    if '"data:' in text and DATA_SETTING not in os.environ:
+    if CASES[name].needed_data and DATA_SETTING not in os.environ:
         pytest.skip(f"its anatomy is in {DATA_SETTING}, which is not set")
     return FEW | CASES[name].quick
 

@@ -3,7 +3,6 @@
 import argparse
 import json
 import os
-import re
 from pathlib import Path
 from typing import Any
 
@@ -43,13 +42,12 @@ def run(options: argparse.Namespace) -> int:
 
 def _data(scene: Case) -> str | None:
     """Why the data of a case is not here, nothing where it is; None of a case that needs none."""
-    needed = re.findall(r'"data:([^"]+)"', json.dumps(scene.model_dump(mode="json", include=set(scene.determined_by))))
     root = os.environ.get(DATA_SETTING)
-    if not needed:
+    if not scene.needed_data:
         return None
     if not root:
         return f"{DATA_SETTING} is not set"
-    lacking = sorted({name for name in needed if not (Path(root) / name).exists()})
+    lacking = [name for name in scene.needed_data if not (Path(root) / name).exists()]
     return f"{DATA_SETTING} has no {lacking[0]}" if lacking else ""
 
 

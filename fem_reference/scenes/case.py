@@ -6,6 +6,7 @@
 import hashlib
 import json
 import os
+import re
 import sys
 from collections.abc import Collection, Iterable
 from pathlib import Path
@@ -142,6 +143,12 @@ class Case(Record):
             "candidates": ", ".join(candidate.name for candidate in self.candidate) or "none",
         }
         return fact_table(f"{self.name}: {self.title}", facts)
+
+    @property
+    def needed_data(self) -> list[str]:
+        """The files below the data folder that its solution is determined by."""
+        known = json.dumps(self.model_dump(mode="json", include=set(self.determined_by)))
+        return sorted(set(re.findall(r'"data:([^"]+)"', known)))
 
     def file(self, text: str, key: str) -> Path:
         """The file that a ``key`` names: below the data folder (``data:``), below meshes (``mesh:``), or relative to the folder of
