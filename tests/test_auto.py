@@ -153,3 +153,39 @@ def test_the_estimates_of_a_bar_are_what_is_known_of_it(tmp_path) -> None:
     assert low < 1 < high
     assert known.acceleration >= 0
     assert known.jump > 0  # keyframes are joined by straight lines
+
+
+FIBRES = """
+[[effect]]
+name = "fibre_passive"
+stress = "300 kPa"
+p1 = 0.05
+p2 = 6.6
+optimal_stretch = {slack}
+linear_from = 1.4
+"""
+
+
+def test_the_stretch_of_what_was_solved_is_that_of_the_surface_along_the_fibres(tmp_path) -> None:
+    """The bar, made longer by a fifth along its axis, thinner, and turned."""
+    scene = scene_of(tmp_path, "")
+    rest = muscle.setup(scene)
+    first, last = (rest.surface.points[entry.vertices].mean(axis=0) for entry in rest.attached)
+    axis = (last - first) / np.linalg.norm(last - first)
+    stretched = np.outer(axis, axis) * 1.2 + (np.eye(3) - np.outer(axis, axis)) * 1.2**-0.5
+    turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    known = estimates.estimates(scene, rest, {0: rest.surface.points, 10: rest.surface.points @ (turn @ stretched).T})
+    # Triangles whose plane is off the axis by the slope of the bar, up to a few per cent, mix in what is thinner, to second order.
+    assert known.stretch[1] == pytest.approx(1.2, abs=1e-3)
+    assert known.stretch[0] == pytest.approx(1.0, abs=0.05)
+
+
+def test_fibres_that_were_stretched_after_all_are_added(tmp_path) -> None:
+    """They are slack up to more than is guessed of the turn, and the run stretched them by more than that."""
+    scene = of_case.chosen(scene_of(tmp_path, FIBRES.format(slack=1.3)))
+    rest = muscle.setup(scene)
+    assert ["FibrePassive: left out" in str(one) for one in scene.decisions] == [False, False, True]
+    still, longer = rest.surface.points, rest.surface.points * 1.6
+    assert estimates.missed(scene, rest, (0, 10), np.stack([still, still])) == ()
+    (late,) = estimates.missed(scene, rest, (0, 10), np.stack([still, longer]))
+    assert "FibrePassive: needed" in str(late)

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from fem_reference.effects import Effect, Energy, Ramped, State, total_energy
 from fem_reference.foundations.indicators import Estimates, Indicator, Near
-from fem_reference.foundations.mesh import Floats, enclosed_volume, vertex_areas
+from fem_reference.foundations.mesh import Floats, Ints, enclosed_volume, vertex_areas
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.signed_distance import signed_distances
 from fem_reference.problems.muscle import RigidBody, Setup
@@ -25,6 +25,7 @@ TOLERANCE = 0.01
 _DOUBT = 1.0
 # So many frames, evenly spread, and so many vertices are looked at.
 _FRAMES, _VERTICES = 9, 1500
+_ALONG = 0.7  # of a direction lies in triangles that are asked for the stretch along it
 _FELT = 1.0  # [mm] from a bone, more than any smoothing of contact
 
 
@@ -86,7 +87,7 @@ def estimates(scene: MuscleCase, rest: Setup, solved: dict[int, Floats] | None =
         thickness=_thickness(rest),
         shear=_shear(scene),
         travel=max(float(np.linalg.norm(at - points, axis=1).max()) for at in moved.values()),
-        stretch=_stretch(rest, frames),
+        stretch=_stretch(rest, frames) if solved is None else _stretched(rest, [solved[frame] for frame in frames]),
         interval=scene.frames.interval,
         speed=speed,
         jump=jump,
@@ -193,6 +194,36 @@ def _stretch(rest: Setup, frames: list[int]) -> tuple[float, float]:
         line = float(np.linalg.norm(middles[0] - middles[-1])) / length
         found += [line - bent, line + bent]
     return max(min(found), 0.2), max(found)
+
+
+def _stretched(rest: Setup, positions: list[Floats]) -> tuple[float, float]:
+    """The smallest and the greatest stretch of the surface, at ``positions`` (n, 3), along the line between its attachments;
+    without the hundredths of its area where it is least and most, which single triangles at a rim may be.
+    """
+    if len(rest.attached) < 2:
+        return 1.0, 1.0
+    triangles, middles = rest.surface.triangles, _centres(rest)
+    axis = (middles[-1] - middles[0]) / np.linalg.norm(middles[-1] - middles[0])
+    edges = _edges(rest.surface.points, triangles)
+    parts = np.linalg.pinv(edges) @ axis
+    along = np.linalg.norm(_combined(edges, parts), axis=1)
+    areas = np.linalg.norm(np.cross(edges[:, :, 0], edges[:, :, 1]), axis=1) / 2
+    some = along > _ALONG
+    moved = [_combined(_edges(at, triangles[some]), parts[some]) for at in positions]
+    found = [np.linalg.norm(one, axis=1) / along[some] for one in moved]
+    ends = [np.quantile(one, (0.01, 0.99), weights=areas[some], method="inverted_cdf") for one in found]
+    return float(min(low for low, _ in ends)), float(max(high for _, high in ends))
+
+
+def _edges(points: Floats, triangles: Ints) -> Floats:
+    """Two edges (t, 3, 2) of each triangle, as columns."""
+    corners = points[triangles]
+    return np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
+
+
+def _combined(edges: Floats, parts: Floats) -> Floats:
+    """The sums (t, 3) of ``edges`` (t, 3, 2) by their ``parts`` (t, 2)."""
+    return np.asarray(np.einsum("tij,tj->ti", edges, parts))
 
 
 def _near(bone: RigidBody, points: Floats, moved: dict[int, Floats], free: NDArray[np.bool_], doubt: float) -> Near:
