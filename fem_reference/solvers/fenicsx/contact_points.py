@@ -12,6 +12,7 @@ from scipy.sparse import csr_array
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import Cells
+from fem_reference.solvers.fenicsx.tabulated import geometry
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +78,7 @@ def on_facets(space: fem.FunctionSpace, parents: Ints, mesh: Cells, facets: Ints
         first, *others = corners[vertices[:3]]
         edges = np.stack([other - first for other in others])  # along the two coordinates of the side
         within = first + points @ edges
-        places, slopes = _geometry(space, mesh, cells, within)
+        places, slopes = geometry(space.mesh, within, cells)
         across = np.cross(slopes @ edges[0], slopes @ edges[1])
         areas = np.linalg.norm(across, axis=2) * weights
         repeated = np.repeat(cells, len(points))
@@ -118,18 +119,6 @@ def _empty(space: fem.FunctionSpace) -> ContactPoints:
 
 def _element(space: fem.FunctionSpace) -> Any:
     return space.element.basix_element
-
-
-def _geometry(space: fem.FunctionSpace, mesh: Cells, cells: Ints, within: Floats) -> tuple[Floats, Floats]:
-    """Of ``cells`` (m,), the rest positions (m, q, 3) of points ``within`` (q, 3) the reference cell, and their slopes there
-    (m, q, 3, 3).
-    """
-    element = basix.create_element(
-        basix.ElementFamily.P, basix.CellType[mesh.kind], mesh.degree, basix.LagrangeVariant.gll_warped
-    )
-    values = element.tabulate(1, within)[:, :, :, 0]
-    nodes = space.mesh.geometry.x[space.mesh.geometry.dofmap[cells]]
-    return np.einsum("qk,mki->mqi", values[0], nodes), np.einsum("jqk,mki->mqij", values[1:], nodes)
 
 
 def _sides(topology: Any, facets: Ints) -> Ints:
