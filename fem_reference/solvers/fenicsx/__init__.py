@@ -95,7 +95,7 @@ def go_on(problem: Problem, settings: Settings, sink: Sink, cut_off: CutOff) -> 
 
 def _solve(problem: Problem, body: Body, settings: Settings, sink: Sink, folder: Path, kept: Kept | None) -> Outcome:
     settings = _planned(settings, body)
-    job = folder / "job.pickle"
+    job = folder.resolve() / "job.pickle"  # a process that is shared may have been started elsewhere
     job.write_bytes(pickle.dumps(Job(body, settings, _samples(problem), kept)))
     passed: list[int] = list(kept.frames) if kept else []
     outcome = _solved(job, settings, lambda frame: _pass_on(problem, frame, sink, passed))
