@@ -13,6 +13,7 @@ from fem_reference import cli, effects
 from fem_reference.effects import make
 from fem_reference.foundations.indicators import Estimates, Near
 from fem_reference.problems import estimates, muscle, of_case
+from fem_reference.report.sections import origin
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
 from fem_reference.solvers import fenicsx
@@ -95,6 +96,7 @@ def test_a_scene_keeps_what_it_needs_and_has_the_key_of_that(tmp_path) -> None:
     assert kept[0].key == listed.key
     assert of_case.chosen(kept[0]) is kept[0]
     assert of_case.chosen(listed) is listed
+    assert origin.changes(kept[0]) == [], "what it chose is no change of its file"
     assert "Gravity: left out" in str(kept[0].decisions[2])
     assert "Gravity: needed" in str(kept[1].decisions[2])
     assert "NeoHooke: kept, part of the material" in str(kept[0].decisions[0])

@@ -17,7 +17,11 @@ pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("without_pictures")]
 def still(problem, _settings, sink) -> Outcome:
     """In place of the reference: nothing moves, and its equilibrium is unstable at the end."""
     for number in problem.frames:
-        unstable = {"negative_modes": float(number == problem.frames[-1]), "min_det_F_quadrature": 0.05}
+        unstable = {
+            "negative_modes": float(number == problem.frames[-1]),
+            "min_det_F_quadrature": 0.05,
+            "outside_law": float(number >= 15),
+        }
         sink(Frame(number, problem.surface.points, problem.fibres.points, scalars=unstable))
     return Outcome("converged", "done", {"seconds": 1.0})
 
@@ -46,8 +50,11 @@ def test_a_candidate_that_nobody_judged_says_so_and_its_numbers(words, tmp_path:
     found = head(tmp_path)
     assert '<span class="badge not">not judged</span> <b>pbd</b>: ' in found
     assert "surface off by up to 2 mm rms; " in found  # 0.1 mm times frame 20, everywhere
-    assert '<span class="badge pass">pass</span> <b>reference</b>: 1 of 1 of its own checks met; ' in found
-    assert "unstable equilibrium in 1 of 5 frames; det F falls to 0.05" in found
+    assert '<span class="badge doubtful">doubtful pass</span> <b>reference</b>: 1 of 1 of its own checks met; ' in found
+    assert (
+        "unstable equilibrium in 1 of 5 frames; det F falls to 0.05; cells are outside the range that a law " in found
+    )
+    assert "is meant for in 2 of 5 frames, first in 15" in found
 
 
 def test_limits_judge_candidates_without_a_change_of_the_case(words, tmp_path: Path, capsys) -> None:

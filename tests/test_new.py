@@ -1,5 +1,6 @@
 """The verbs ``new`` and ``validate``: a scene to begin with, and what is known of it before it is solved."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -90,6 +91,10 @@ def test_validate_says_what_a_scene_is_and_costs(stl: Path, capsys) -> None:
     assert cli.main(["validate", str(stl / "mine"), "--quiet"]) == cli.DONE
     printed = capsys.readouterr().out
     assert "mine can be solved" in printed
+    assert re.search(
+        r"motion: from \w+ to \w+ it is \d+(\.\d+)? mm at rest, and at most \d+ % (longer|shorter), in frame 20",
+        printed,
+    )
     assert "of processor time, within a factor of three, for 11 frames" in printed
     assert cli.main(["validate", str(stl / "mine"), "--quiet", "--set", "reference.element=P9"]) == cli.BAD_INPUT
     assert 'element: got "P9"' in capsys.readouterr().err

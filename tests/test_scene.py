@@ -540,6 +540,16 @@ def test_change_of_a_key_that_is_not_there(bar: Path, key: str) -> None:
         casefile.read(bar, changes={key: 1})
 
 
+def test_a_change_that_leads_nowhere_says_what_there_is(bar: Path) -> None:
+    for key, wanted in {
+        "bone.lid.unit": r"; there are bone\[0\] \(\w+\), bone\[1\] \(\w+\)$",
+        "muscle.size.more": r"; there are surface, unit, tet_size",
+        "frames.last.more": r"a table that it has$",
+    }.items():
+        with pytest.raises(InputError, match=wanted):
+            casefile.read(bar, changes={key: 1})
+
+
 def test_negative_control_changes_one_key(bar: Path) -> None:
     assert casefile.read(bar, with_negative_control=True) == casefile.read(bar, changes={"effect[1].bulk": "40 kPa"})
 

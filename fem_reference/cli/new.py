@@ -1,6 +1,7 @@
 """The verb ``new``: a scene to begin with."""
 
 import argparse
+import os
 from pathlib import Path
 
 from fem_reference.cli._printing import DONE, write_output
@@ -35,6 +36,7 @@ def run(options: argparse.Namespace) -> int:
     else:
         folder = new_scene.of_surfaces(options.name, options.muscle, options.bone, options.unit)
     place = folder if len(folder.parts) > 1 else f"./{folder}"
-    text = f"{folder / 'case.toml'}: edit it, then\n  fem-reference validate {place}\n  fem-reference run {place}"
+    call = os.environ.get("FEM_REFERENCE_COMMAND", "fem-reference")  # as it was called
+    text = f"{folder / 'case.toml'}: edit it, then\n  {call} validate {place}\n  {call} run {place}"
     write_output({"folder": str(folder), "scene": str(folder / "case.toml")}, text, options)
     return DONE

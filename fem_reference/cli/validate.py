@@ -3,11 +3,13 @@
 import argparse
 from typing import Any
 
+import numpy as np
+
 from fem_reference import solvers
 from fem_reference.cli._choosing import checked_bench, own_candidates, scene_of
 from fem_reference.cli._parser import add_case
 from fem_reference.cli._printing import DONE, lines, write_output
-from fem_reference.problems import of_case
+from fem_reference.problems import estimates, of_case
 from fem_reference.problems.muscle import Problem
 from fem_reference.problems.muscle_body import as_body
 from fem_reference.report.words import duration
@@ -46,7 +48,10 @@ def _facts(scene: Case, built: Any, bench: Any) -> dict[str, Any]:
     if not isinstance(built, Problem):
         return {}
     found = scene.decisions or of_case.explained(scene)
-    known: dict[str, Any] = {"effects": {one.effect.title: str(one).partition(": ")[2] for one in found}}
+    known: dict[str, Any] = {}
+    if motion := _motion(scene, built):
+        known["motion"] = motion
+    known["effects"] = {one.effect.title: str(one).partition(": ")[2] for one in found}
     settings: Any = bench.settings(scene.reference, "reference")
     if scene.reference.solver == "fenicsx":
         count = resources.unknowns(as_body(built).mesh, settings.element)
@@ -57,3 +62,15 @@ def _facts(scene: Case, built: Any, bench: Any) -> dict[str, Any]:
             f"about {duration(seconds)} of processor time, within a factor of three, for {len(scene.numbers)} frames"
         )
     return known
+
+
+def _motion(scene: Case, built: Problem) -> str:
+    """What the motion of the bones does to the muscle, in a sentence."""
+    lengths = estimates.spans(built, scene.numbers)
+    if not len(lengths):
+        return ""
+    most = int(np.abs(lengths - lengths[0]).argmax())
+    how = "longer" if lengths[most] > lengths[0] else "shorter"
+    change = f"{100 * abs(lengths[most] / lengths[0] - 1):.0f} % {how}, in frame {scene.numbers[most]}"
+    names = f"{built.attached[0].attachment} to {built.attached[-1].attachment}"
+    return f"from {names} it is {lengths[0]:.4g} mm at rest, and at most {change}"

@@ -153,6 +153,14 @@ def _centres(rest: Setup, frame: float | None = None) -> list[Floats]:
     return [apply(entry.bone.pose(frame), middle)[0] for entry, middle in zip(rest.attached, middles, strict=True)]
 
 
+def spans(rest: Setup, numbers: tuple[int, ...]) -> Floats:
+    """The distance (f,) [mm] between the middles of the first attachment and of the last, by frame; nothing without two."""
+    if len(rest.attached) < 2:
+        return np.zeros(0)
+    ends = [_centres(rest, number) for number in numbers]
+    return np.array([float(np.linalg.norm(middles[0] - middles[-1])) for middles in ends])
+
+
 def _length(rest: Setup) -> float:
     """From the first attachment to the last, or all of the muscle where it has not two."""
     middles = _centres(rest)

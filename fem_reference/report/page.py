@@ -130,10 +130,13 @@ def headlines(comparison: Comparison) -> list[tuple[str, str, str]]:
         found.append((run.name, overall(words) if words else "not judged", ended + _greatest(comparison, run)))
     words = [one.word for one in comparison.verdicts if one.expectation.of == "reference"]
     checks = f"{words.count('pass')} of {len(words)} of its own checks met" if words else "nothing is expected of it"
-    word = overall(words) if words else "not judged"
+    word: str = overall(words) if words else "not judged"
     if comparison.reference.outcome.status != "converged":  # whatever of it was met
         word = "fail"
-    found.append(("reference", word, "; ".join([checks, *_doubts(comparison.reference)])))
+    doubts = _doubts(comparison.reference)
+    if word == "pass" and doubts:
+        word = "doubtful pass"
+    found.append(("reference", word, "; ".join([checks, *doubts])))
     return found
 
 
@@ -156,7 +159,9 @@ def _greatest(comparison: Comparison, run: Run) -> str:
 
 
 def _doubts(reference: Run) -> list[str]:
-    """What makes a reference doubtful: that it did not reach all frames, is unstable, or nearly turned inside out."""
+    """What makes a reference doubtful: that it did not reach all frames, is unstable, nearly turned inside out, or left the
+    range of its laws.
+    """
     said = list[str]() if reference.outcome.status == "converged" else [str(reference.outcome.status)]
     modes = reference.scalars.get("negative_modes")
     unstable = 0 if modes is None else int((np.nan_to_num(modes) > 0).sum())
@@ -165,6 +170,10 @@ def _doubts(reference: Run) -> list[str]:
     smallest = [np.nanmin(values) for name, values in reference.scalars.items() if name.startswith("min_det_F")]
     if smallest and min(smallest) < _LOW:
         said.append(f"det F falls to {number(float(min(smallest)))}")
+    outside = np.nan_to_num(reference.scalars.get("outside_law", np.zeros(0))) > 0
+    if outside.any():
+        where = f"in {int(outside.sum())} of {len(outside)} frames, first in {reference.numbers[int(outside.argmax())]}"
+        said.append(f"cells are outside the range that a law is meant for {where}: see Where it comes from")
     return said
 
 

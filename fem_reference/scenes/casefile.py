@@ -82,8 +82,28 @@ def _change(table: dict[str, Any], key: str, value: Any, place: str, *, add: boo
         inside[last] = value
     except (KeyError, IndexError, TypeError) as error:
         raise InputError(
-            join(place, key), "nothing", "a key that this scene has, or a key of a table that it has"
+            join(place, key),
+            "nothing",
+            f"a key that this scene has, or a key of a table that it has{_near(table, [*parents, last])}",
         ) from error
+
+
+def _near(table: dict[str, Any], parts: list[str | int]) -> str:
+    """What there is where ``parts`` of a key lead nowhere, as the end of a sentence."""
+    inside: Any = table
+    part: Any
+    for i, part in enumerate(parts):
+        if isinstance(inside, list) and not (isinstance(part, int) and part < len(inside)):
+            names = [f" ({one['name']})" if isinstance(one, dict) and "name" in one else "" for one in inside]
+            return "; there are " + ", ".join(
+                f"{'.'.join(map(str, parts[:i]))}[{k}]{name}" for k, name in enumerate(names)
+            )
+        if isinstance(inside, dict) and part not in inside:
+            return f"; there are {', '.join(inside)}"
+        if not isinstance(inside, list | dict):
+            return ""
+        inside = inside[part]
+    return ""
 
 
 def setting(text: str) -> tuple[str, Any]:

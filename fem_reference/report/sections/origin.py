@@ -41,9 +41,11 @@ def changes(scene: Case) -> list[tuple[str, Any, Any]]:
 
 
 def _table(scene: Case) -> dict[str, Any]:
-    """The scene as nested tables, entries of a list by their number."""
-    listed_effects = {"effect": [effect.model_dump(mode="json") for effect in scene.effects]}
-    return dict(_numbered(scene.model_dump(mode="json", exclude={"folder", "effect"}) | listed_effects))
+    """The scene as nested tables, entries of a list by their number; with all effects of its file where it chose among them."""
+    effects = [one.effect for one in scene.decisions] or scene.effects
+    listed: dict[str, Any] = {"effect": [effect.model_dump(mode="json") for effect in effects]}
+    listed |= {"choice": "auto"} if scene.decisions else {}
+    return dict(_numbered(scene.model_dump(mode="json", exclude={"folder", "effect"}) | listed))
 
 
 def _numbered(value: Any) -> Any:
