@@ -52,7 +52,7 @@ def test_a_candidate_that_nobody_judged_says_so_and_its_numbers(words, tmp_path:
     assert "surface off by up to 2 mm rms; " in found  # 0.1 mm times frame 20, everywhere
     assert '<span class="badge doubtful">doubtful pass</span> <b>reference</b>: 1 of 1 of its own checks met; ' in found
     assert (
-        "unstable equilibrium in 1 of 5 frames; det F falls to 0.05; cells are outside the range that a law " in found
+        "unstable equilibrium in 1 of 5 frames; det F falls to 0.0500; cells are outside the range that a law " in found
     )
     assert "is meant for in 2 of 5 frames, first in 15" in found
 
