@@ -63,7 +63,15 @@ class Judgement:
             return self._why_silent
         much = f"{self.away:.4g} {self.unit}"
         text = f"{much} from what it was" if self.question == "unchanged" else f"{much} from the reference"
-        return f"{text}, {self.allowed:.4g} {self.unit} allowed"
+        return f"{text}, {self.allowed:.4g} {self.unit} allowed{self._direction}"
+
+    @property
+    def _direction(self) -> str:
+        """Whether what changed is nearer to the reference or further away."""
+        if self.question == "within" or self.name == MOVED or abs(self.current) == abs(self.was):
+            return ""
+        where = "nearer to" if abs(self.current) < abs(self.was) else "further from"
+        return f": was {self.was:.4g}, now {self.current:.4g} {self.unit}, {where} the reference"
 
     @property
     def _why_silent(self) -> str:
@@ -105,7 +113,15 @@ def check(baseline: Baseline, current: CurrentMeasures) -> Check:
     for name, stored in baseline.measures.items():
         now = current.values(*name.split("."))
         found += [_unchanged(name, stored, now, current), _within(name, stored, now, current)]
-    found.sort(key=lambda one: (WORST_FIRST.index(one.word), one.name != MOVED, -one.used, one.name, one.question))
+    found.sort(
+        key=lambda one: (
+            WORST_FIRST.index(one.word),
+            one.question != "within",  # what is worse comes before what is other
+            one.name != MOVED,
+            -one.used,
+            one.name,
+        )
+    )
     return Check(current.scene.name, current.candidate.name, tuple(found), tuple(_notes(baseline, current, found)))
 
 

@@ -39,8 +39,9 @@ class Change:
 
     @property
     def at(self) -> int:
-        """The index of the frame that changed most."""
-        return int(np.argmax(np.nan_to_num(np.abs(self.further), nan=-1.0, posinf=np.inf)))
+        """The index of the frame that changed most, among those that changed by more than their error bar where there are such."""
+        change = self._counted if self._counted.any() else self.further
+        return int(np.argmax(np.nan_to_num(np.abs(change), nan=-1.0, posinf=np.inf)))
 
     @property
     def frame(self) -> int:

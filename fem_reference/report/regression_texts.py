@@ -47,6 +47,10 @@ def text(check: Check) -> str:
         silent.setdefault(one.why, []).append(_named(one))
     lines += _most([f"inconclusive: {why} ({_few(names)})" for why, names in silent.items()])
     lines += [f"note: {note}" for note in check.notes]
+    if _of(check, "fail"):
+        lines.append(
+            f"what is nearer to the reference and what is further: compare {check.case} --candidate ... --against the baseline"
+        )
     lines += [f"{check.candidate} on {check.case}:", *(f"  {line}" for line in _answers(check))]
     return "\n".join([*lines, f"verdict: {check.word}"])
 
@@ -63,7 +67,9 @@ def markdown(check: Check) -> str:
     lines += [f"| {' | '.join(_COLUMNS)} |", f"|{'---|' * len(_COLUMNS)}"]
     lines += [f"| {' | '.join(map(_escaped, _cells(one)))} |" for one in shown]
     more = len(check.judgements) - len(shown)
-    return "\n".join([*lines, *(["", f"and {more} more, none of them worse."] if more else [])]) + "\n"
+    failed = sum(one.word == "fail" for one in check.judgements[MOST_ROWS:])
+    rest = f"{failed} of them fail" if failed else "none of them fails"
+    return "\n".join([*lines, *(["", f"and {more} more, {rest}."] if more else [])]) + "\n"
 
 
 def junit(check: Check, seconds: float) -> str:
