@@ -177,18 +177,24 @@ def test_a_formula_without_a_value_is_a_status(tmp_path) -> None:
     assert np.isnan(solution.values).all()
 
 
-def test_a_process_that_dies_is_a_status() -> None:
-    dying = [sys.executable, "-c", "import sys; sys.exit('no memory')"]
-    solution = field._run(dying, FieldSettings(), 3)
+def solved_by(program: str, settings: FieldSettings, tmp_path, monkeypatch):
+    """What becomes of three nodes where the process that solves runs another ``program``."""
+    monkeypatch.setattr(field, "present", lambda: None)
+    monkeypatch.setattr("fem_reference.solvers.fenicsx.session.command", lambda *_: [sys.executable, "-c", program])
+    return fenicsx.solve_field(resonant(tmp_path), settings)
+
+
+def test_a_process_that_dies_is_a_status(tmp_path, monkeypatch) -> None:
+    solution = solved_by("import sys; sys.exit('no memory')", FieldSettings(), tmp_path, monkeypatch)
     assert solution.outcome.status == "crashed"
-    assert "exit status 1 (no memory); there are no values" in solution.outcome.message
+    assert "exit status 1 (no memory); 0 fields are kept" in solution.outcome.message
     assert solution.values.shape == (3,)
     assert np.isnan(solution.values).all()
 
 
-def test_a_time_limit_is_a_status() -> None:
-    waiting = [sys.executable, "-c", "import time; time.sleep(60)"]
-    solution = field._run(waiting, FieldSettings.model_validate({"time_limit": "0.5 s"}), 3)
+def test_a_time_limit_is_a_status(tmp_path, monkeypatch) -> None:
+    limit = FieldSettings.model_validate({"time_limit": "0.5 s"})
+    solution = solved_by("import time; time.sleep(60)", limit, tmp_path, monkeypatch)
     assert solution.outcome.status == "timed out"
     assert np.isnan(solution.values).all()
 

@@ -8,11 +8,17 @@ from fem_reference.cli._pages import Asked, Part, candidates, case_part, changes
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, write_output
 from fem_reference.report.overview import comparison_text
 from fem_reference.scenes.case import Candidate, Case
+from fem_reference.solvers import fenicsx
 from fem_reference.studies import judging, refinement
 
 
 def judge(scene: Case, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
     """Measure and judge the ``chosen`` candidates. What is bad in the input shows before anything is solved."""
+    with fenicsx.shared():
+        return _judge(scene, options, chosen)
+
+
+def _judge(scene: Case, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
     refuse_error_bar(scene, options)
     check_names([entry.name for entry, _ in chosen])
     bench = checked_bench(scene, options, chosen)

@@ -19,7 +19,7 @@ from fem_reference.report.ranking_page import facts as ranking_facts
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Candidate
 from fem_reference.scenes.muscle import MuscleCase
-from fem_reference.solvers import recorded
+from fem_reference.solvers import fenicsx, recorded
 from fem_reference.studies import judging, table_5_1, true_errors
 from fem_reference.studies.execution import Bench
 
@@ -63,9 +63,10 @@ def _examples(options: argparse.Namespace) -> int:
     title, names = PAGES[options.name]
     cases = [casefile.read(name) for name in names]
     benches = [checked_bench(case, options, own_candidates(case)) for case in cases]
-    results = tuple(_compared(bench) for bench in benches)
-    write = partial(report.write_examples, title, results)
-    path, lines = written(options, Asked("page", options.name, (Part((options.name,)),)), write)
+    with fenicsx.shared():
+        results = tuple(_compared(bench) for bench in benches)
+        write = partial(report.write_examples, title, results)
+        path, lines = written(options, Asked("page", options.name, (Part((options.name,)),)), write)
     facts = {"page": str(path), "cases": [report.summary(result) for result in results]}
     texts = [f"{result.scene.title}:\n{comparison_text(result)}" for result in results]
     write_output(facts, "\n\n".join([*texts, "\n".join(lines)]), options)

@@ -1,4 +1,4 @@
-"""The process that solves: reads pickled jobs, marches each through its frames, and reports every frame as a line of JSON."""
+"""The process that solves: reads pickled jobs, marches each body through its frames, and reports every frame as a line of JSON."""
 
 import gc
 import json
@@ -12,11 +12,12 @@ import numpy as np
 
 from fem_reference.foundations.subprocesses import end_with_starter
 from fem_reference.foundations.usage import forget_peak_memory, peak_memory
+from fem_reference.problems.scalar import FieldProblem
 from fem_reference.solvers.fenicsx import dolfinx_door  # noqa: F401 - first
 from fem_reference.solvers.fenicsx.jobs import Job
 from fem_reference.solvers.fenicsx.processes import MARK
 
-from fem_reference.solvers.fenicsx import compiling  # isort: skip - after the door
+from fem_reference.solvers.fenicsx import compiling, assembled_field  # isort: skip - after the door
 from fem_reference.solvers.fenicsx.body import AssembledBody  # isort: skip
 from fem_reference.solvers.fenicsx.branching import leave  # isort: skip
 from fem_reference.solvers.fenicsx.restart import Restart  # isort: skip
@@ -175,8 +176,7 @@ class Worker:
     def report(self, **event: Any) -> None:
         """A line for the parent process."""
         if self.body.comm.rank == 0:
-            sys.stdout.write(f"{MARK}{json.dumps(event)}\n")
-            sys.stdout.flush()
+            report(**event)
 
     def cost(self) -> dict[str, float]:
         """Seconds by phase as the first rank sees them, counts, and processor time and memory over all ranks; with what processes
@@ -205,13 +205,32 @@ class Worker:
         }
 
 
+def solve_field(problem: FieldProblem, folder: Path) -> None:
+    """Solve for a scalar field, whose values are a frame; there is one rank."""
+    values, outcome = assembled_field.solve(problem)
+    path = folder / "field.npz"
+    np.savez(path, allow_pickle=False, values=values)
+    report(frame=0, file=str(path))
+    report(**outcome)
+
+
+def report(**event: Any) -> None:
+    """A line for the process that started this one."""
+    sys.stdout.write(f"{MARK}{json.dumps(event)}\n")
+    sys.stdout.flush()
+
+
 def main(argument: str) -> None:
     """Solve the job in a file; or, for ``-``, one after the other those whose files standard input names."""
     end_with_starter()
     compiling.prepare()
     for line in sys.stdin if argument == "-" else [argument]:
         path = Path(line.strip())
-        Worker(pickle.loads(path.read_bytes()), path.parent).run()
+        job = pickle.loads(path.read_bytes())
+        if isinstance(job, FieldProblem):
+            solve_field(job, path.parent)
+        else:
+            Worker(job, path.parent).run()
         gc.collect()
 
 

@@ -1,11 +1,6 @@
-"""The process that solves for a scalar field: reads a pickled problem, writes the values and reports how it went."""
+"""Scalar fields, solved in the process of FEniCSx."""
 
-import json
-import pickle
-import resource
-import sys
 import time
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,9 +8,9 @@ import numpy as np
 from fem_reference.effects import FieldState, Place
 from fem_reference.foundations.formula import FUNCTIONS, evaluate
 from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.foundations.usage import forget_peak_memory, peak_memory
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.solvers.fenicsx.dolfinx_door import PETSc
-from fem_reference.solvers.fenicsx.processes import MARK
 
 import basix  # isort: skip - after the door
 import basix.ufl  # isort: skip
@@ -75,6 +70,7 @@ def nodes(space: Any, problem: FieldProblem) -> Ints:
 def solve(problem: FieldProblem) -> tuple[Floats, dict[str, Any]]:
     """The values (N,) in the order of the problem, not-a-number after a failure, and what to report."""
     begin = time.perf_counter()
+    forget_peak_memory()
     left, right, space, node = equations(problem)
     set_up = time.perf_counter()
     A, b = _assembled(left, right, space, problem.fixed[node])
@@ -85,7 +81,7 @@ def solve(problem: FieldProblem) -> tuple[Floats, dict[str, Any]]:
         "seconds_assembly": assembled - set_up,
         "seconds_solve": time.perf_counter() - assembled,
         "unknowns": float(np.isnan(problem.fixed).sum()),
-        "peak_memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+        "peak_memory_mb": peak_memory(),
     }
     values = np.full(len(node), np.nan)
     if failure is not None:
@@ -158,18 +154,3 @@ def _solved(A: Any, b: Any) -> tuple[Floats, str | None]:
     if error < 0 or not np.isfinite(x.array).all():
         return x.array, f"the factorisation failed (INFOG(1) of MUMPS is {error})"
     return np.array(x.array), None
-
-
-def main(job: Path) -> None:
-    """Solve the problem in the file ``job``; the values go beside it."""
-    compiling.prepare()
-    problem: FieldProblem = pickle.loads(job.read_bytes())
-    values, report = solve(problem)
-    path = job.with_name("values.npz")
-    np.savez(path, allow_pickle=False, values=values)
-    sys.stdout.write(f"{MARK}{json.dumps(report | {'file': str(path)})}\n")
-    sys.stdout.flush()
-
-
-if __name__ == "__main__":
-    main(Path(sys.argv[1]))
