@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 from fem_reference.scenes import casefile
+from fem_reference.studies import judging
 from fem_reference.studies.execution import Bench
 
 pytestmark = pytest.mark.slow
@@ -27,11 +28,22 @@ def homogeneous(height: float) -> tuple[float, float]:
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory):
+def bench(tmp_path_factory):
     if not any(importlib.util.find_spec(name) for name in ("dolfinx_solver", "dolfinx")):
         pytest.skip("FEniCSx is not installed")
     scene = casefile.read("box_squeeze", changes={"frames.every": 50})
-    return Bench(scene, tmp_path_factory.mktemp("box")).obtain("reference", scene.reference, "reference")
+    return Bench(scene, tmp_path_factory.mktemp("box"))
+
+
+@pytest.fixture(scope="module")
+def run(bench):
+    return bench.obtain("reference", bench.scene.reference, "reference")
+
+
+def test_its_expectations_are_met(bench, run) -> None:
+    result = judging.compare(bench, run, [])
+    assert result.word == "pass"
+    assert len([verdict for verdict in result.verdicts if verdict.word == "pass"]) >= len(bench.scene.expect)
 
 
 def test_it_is_squeezed_homogeneously(run) -> None:

@@ -49,6 +49,8 @@ def _both_directions(run: Run, reference: Run, frame: int) -> Floats:
     NaN where a position of the frame is not finite.
     """
     here, there = (each.surface.moved_to(each.positions[frame]) for each in (run, reference))
+    if np.array_equal(here.points, there.points):
+        return np.zeros(len(here.points) + len(there.points))
     if not (np.isfinite(here.points).all() and np.isfinite(there.points).all()):
         return np.full(len(here.points) + len(there.points), np.nan)
     return np.concatenate([distances(here.points, there).distance, distances(there.points, here).distance])
