@@ -1,5 +1,6 @@
 """The reference's scalar fields: as the independent assembly has them, and a status where there are none."""
 
+import importlib
 import importlib.util
 import sys
 from dataclasses import replace
@@ -180,7 +181,10 @@ def test_a_formula_without_a_value_is_a_status(tmp_path) -> None:
 def solved_by(program: str, settings: FieldSettings, tmp_path, monkeypatch):
     """What becomes of three nodes where the process that solves runs another ``program``."""
     monkeypatch.setattr(field, "present", lambda: None)
-    monkeypatch.setattr("fem_reference.solvers.fenicsx.session.command", lambda *_: [sys.executable, "-c", program])
+    session = importlib.import_module(
+        "fem_reference.solvers.fenicsx.session"
+    )  # the package has a function of this name
+    monkeypatch.setattr(session, "command", lambda *_: [sys.executable, "-c", program])
     return fenicsx.solve_field(resonant(tmp_path), settings)
 
 

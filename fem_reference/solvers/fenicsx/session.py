@@ -107,10 +107,10 @@ _shared: ContextVar[Session | None] = ContextVar("shared", default=None)
 
 @contextmanager
 def shared() -> Iterator[None]:
-    """Meanwhile all solutions on one rank are found in one process: what it has loaded and compiled serves the next. Without
-    FEniCSx nothing is solved, and nothing shared.
+    """Meanwhile all solutions on one rank are found in one process, that which is shared already if there is one: what it has
+    loaded and compiled serves the next. Without FEniCSx nothing is solved, and nothing shared.
     """
-    with session() if installed() else nullcontext() as own:
+    with session() if installed() and present() is None else nullcontext(present()) as own:
         before = _shared.set(own)
         try:
             yield
