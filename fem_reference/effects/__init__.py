@@ -262,13 +262,18 @@ class FieldEffect(Record):
 
 def names(kind: type[Record] = Effect) -> list[str]:
     """The effects of a ``kind`` that there are, as scene files name them."""
-    return sorted(name for _, name, _ in pkgutil.iter_modules(__path__) if issubclass(find(name), kind))
+    return sorted(module.name for module in pkgutil.iter_modules(__path__) if issubclass(_record(module.name), kind))
 
 
 def find(name: str) -> type[Record]:
     """The record of the effect ``name``; KeyError where there is none."""
     if name not in {module.name for module in pkgutil.iter_modules(__path__)}:
         raise KeyError(name)
+    return _record(name)
+
+
+def _record(name: str) -> type[Record]:
+    """The record in the file of the effect ``name``, which is there."""
     return outside.only_record(importlib.import_module(f"{__name__}.{name}"), __path__, (Effect, FieldEffect))
 
 
