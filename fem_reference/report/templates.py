@@ -1,5 +1,6 @@
 """The templates beside this file, with the words that they share."""
 
+from functools import cache
 from pathlib import Path
 
 import jinja2
@@ -9,6 +10,12 @@ from fem_reference.report.words import duration, exact, number, words
 
 def template(name: str) -> jinja2.Template:
     """The template in the file ``name``: what it is filled with is escaped, and a name that it lacks is an error."""
+    return _environment().get_template(name)
+
+
+@cache
+def _environment() -> jinja2.Environment:
+    """Where a template is compiled when it is first asked for."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
         autoescape=True,
@@ -17,4 +24,4 @@ def template(name: str) -> jinja2.Template:
         lstrip_blocks=True,
     )
     environment.filters |= {"number": number, "duration": duration, "exact": exact, "words": words}
-    return environment.get_template(name)
+    return environment
