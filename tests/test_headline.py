@@ -64,7 +64,9 @@ def test_limits_judge_candidates_without_a_change_of_the_case(words, tmp_path: P
     assert '<span class="badge fail">fail</span> <b>pbd</b>' in head(tmp_path)
     for limit, want in (
         ("surface_deviation.max", '--limit: got "surface_deviation.max", want METRIC.STATISTIC=VALUE'),
-        ("surface_deviation.max=2 kPa", "want a length with its unit"),
+        ("surface_deviation.max=2 kPa", '--limit: got "surface_deviation.max=2 kPa", want a value in mm: '),
+        ("volume.deviation=x", '--limit: got "volume.deviation=x", want a value in %: '),
+        ("surface_deviation.mx=2 mm", "want a statistic such as surface_deviation.max"),
         ("beauty.max=2 mm", "beauty"),
     ):
         assert cli.main([*words, "--limit", limit]) == cli.BAD_INPUT

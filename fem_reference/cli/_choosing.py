@@ -1,10 +1,11 @@
 """Choices of the command line: a scene, candidates of it, and the bench that they are solved on."""
 
 import argparse
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from fem_reference import solvers
+from fem_reference import metrics, solvers
 from fem_reference.assessment import judge, solver_table
 from fem_reference.cli._printing import out
 from fem_reference.foundations.errors import InputError
@@ -33,11 +34,24 @@ def with_limits(scene: Case, limits: list[str]) -> Case:
         if not equals or not dot or not value.strip():
             raise InputError("--limit", f'"{text}"', "METRIC.STATISTIC=VALUE, such as surface_deviation.max='5 mm'")
         within = value.strip()
+        _check_limit(name.strip(), within, scene)
         unit = within.lstrip("+-.0123456789eE ")
         table = {"of": "candidates", "metric": metric, "statistic": statistic, "truth": f"0 {unit}" if unit else 0.0}
         table |= {"within": within if unit else float(within), "kind": "property", "because": "asked for by --limit"}
         asked.append(parse(Expectation, table, "--limit"))
     return scene.model_copy(update={"expect": (*scene.expect, *asked)})
+
+
+def _check_limit(name: str, within: str, scene: Case) -> None:
+    """InputError unless cases like ``scene`` have a statistic of this ``name`` and it can be ``within`` that."""
+    known = metrics.units(against=scene.standards("candidates"))
+    if name not in known:
+        near = get_close_matches(name, known, n=5) or sorted(known)
+        raise InputError("--limit", f'"{name}"', f"a statistic such as {', '.join(near)}")
+    try:
+        judge.in_unit(within if within.lstrip("+-.0123456789eE ") else float(within), known[name])
+    except ValueError as error:
+        raise InputError("--limit", f'"{name}={within}"', f"a value in {known[name]}: {error}") from error
 
 
 def own_candidates(scene: Case) -> list[tuple[Candidate, str]]:
