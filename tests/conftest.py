@@ -44,6 +44,15 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     return ByFile(config, log)
 
 
+@pytest.fixture(scope="module")
+def all_cores() -> Iterator[None]:
+    """Of this process and what it starts: MPI processes that share a core wait for each other by keeping it busy."""
+    own = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, range(os.cpu_count() or 1))
+    yield
+    os.sched_setaffinity(0, own)
+
+
 @pytest.fixture(scope="session", autouse=True)
 def _one_process_of_fenicsx() -> Iterator[None]:
     """What is solved on one rank is solved in one process, started when the first test needs it: as error bars are."""

@@ -65,6 +65,7 @@ def test_contact_displaces_the_muscle(tmp_path) -> None:
 
 
 @pytest.mark.usefixtures("needs_fenicsx")
+@pytest.mark.usefixtures("all_cores")
 def test_ranks_change_nothing(tmp_path) -> None:
     # Newton's residual is 1e-9 N on a body of 10 kPa and 10 mm: 1e-8 mm.
     case = scene(tmp_path / "bar", -5.5)

@@ -86,6 +86,7 @@ def test_there_and_back_ends_at_rest(bent) -> None:
     assert all(frame.scalars["volume_ratio"] == pytest.approx(1, abs=5e-3) for frame in frames)
 
 
+@pytest.mark.usefixtures("all_cores")
 def test_ranks_change_the_time_and_not_the_answer(bent) -> None:
     problem, alone, frames = bent
     outcome, shared = solved(problem, ranks=2)
@@ -147,6 +148,7 @@ def test_what_cannot_be_reached_is_a_status_that_keeps_the_frames_before() -> No
     assert [frame.number for frame in frames] == [0, 1]
 
 
+@pytest.mark.usefixtures("all_cores")
 def test_more_ranks_than_tets_still_solve() -> None:
     # Of the six tets of a cube, one that is attached below and one above.
     cube = shapes.bar((1, 1, 1), (10, 10, 10), {"bottom": None, "top": turning(0.1)}, MUSCLE, (0, 10))
@@ -193,6 +195,7 @@ def test_a_time_limit_is_a_status() -> None:
     assert outcome.status == "timed out"
 
 
+@pytest.mark.usefixtures("all_cores")
 def test_an_interrupt_right_after_the_start_ends_all_ranks(tmp_path) -> None:
     (tmp_path / "sleep.py").write_text("import time; time.sleep(60)")
     (*start, _) = fenicsx._command(Settings(ranks=2), tmp_path)

@@ -137,6 +137,7 @@ def test_nobody_counts_where_a_load_may_have_no_energy(session) -> None:
     assert not any("negative_modes" in state.scalars for state in solved.states)
 
 
+@pytest.mark.usefixtures("all_cores")
 def test_ranks_count_alike() -> None:
     # A bar of 2 x 2 x 20 mm, shortened by 2 per cent between clamped ends, against Euler's 4 pi^2 / 12 / 100 = 3.3 per cent.
     found = {}

@@ -228,6 +228,7 @@ def test_fibres_are_as_long_as_their_prestretch_has_them(session) -> None:
     assert "fibre_passive is outside the range" in solved.outcome.message
 
 
+@pytest.mark.usefixtures("all_cores")
 def test_ranks_agree_on_what_is_outside(session) -> None:  # noqa: ARG001 - it skips where there is no FEniCSx
     flesh = (effect("neo_hooke", mu="10 kPa"), effect("incompressible", bulk="1 MPa"), ACTIVE)
     pull = Translation((0.0, 0.0, 1.0), (0.0, 1.0), (0.0, 17.0))
