@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 from fem_reference.solvers import fenicsx
 from fem_reference.studies.benchmark.peer_problem import QUADRATURE, RESIDUAL, Muscle
@@ -9,8 +10,8 @@ from fem_reference.studies.benchmark.peers import Solve, Solved
 
 PACKAGES = ("dolfinx-solver-real",)
 TUNED = (
-    "as it comes: factorisations lagged and in single precision, Newton's method inexact; it also checks det F and counts "
-    "the negative modes of each state"
+    "as it comes: factorisations lagged and in single precision, Newton's method inexact; it also checks det F, and counts "
+    "the negative modes at rest and at the end, the one state that is asked of all"
 )
 OMITTED: dict[str, str] = {}
 
@@ -24,10 +25,12 @@ def opened() -> Iterator[Solve]:
             settings = fenicsx.BodySettings(
                 element=muscle.element,
                 first_step=1.0,
+                largest_step=1.0,
                 residual=RESIDUAL,
                 quadrature_degree=QUADRATURE[muscle.element],
             )
-            found = own.solve(muscle.body, settings)
+            first, *_, last = muscle.body.frames
+            found = own.solve(replace(muscle.body, frames=(first, last)), settings)
             cost, outcome = found.outcome.cost, found.outcome
             points = found.states[-1].points if found.states else muscle.mesh.points
             iterations, unknowns = (int(cost.get(name, 0)) for name in ("newton_iterations", "unknowns"))
