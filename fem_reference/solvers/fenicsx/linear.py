@@ -39,8 +39,8 @@ class LinearSolver(Protocol):
 
 
 class Factorised:
-    """Solves with the ``matrix`` as it is now. With ``lagged`` by FGMRES with a factorisation of it as it was: where that takes
-    longer than a new factorisation, there is one. LDL^T of a symmetric matrix, else LU.
+    """Solves with the ``matrix`` as it is now. With ``lagged`` by FGMRES with a factorisation of it as it was: where that took
+    longer than a new factorisation, in one system or in all since, there is one. LDL^T of a symmetric matrix, else LU.
     """
 
     def __init__(self, matrix: PETSc.Mat, symmetric: bool, lagged: bool, precision: str, spent: Spent) -> None:
@@ -49,6 +49,7 @@ class Factorised:
         self._choose(precision)
         self.fresh = self.there = False
         self.limit = _LEAST
+        self.since = 0  # Krylov iterations since the last factorisation, with another matrix
 
     def _choose(self, precision: str) -> None:
         self.precision = precision
@@ -88,6 +89,7 @@ class Factorised:
             self.there = False
             raise LinearSolveError(f"MUMPS reports {self.factors.getMumpsInfog(_ERROR)}")
         self.fresh = self.there = True
+        self.since = 0
         operations = self.factors.getMumpsRinfog(_FLOPS)
         self.spent.counts["factorisation_flops"] += operations
         counted = self.factors.getMumpsInfog(_ENTRIES)
@@ -98,7 +100,9 @@ class Factorised:
         """Solve for ``x``, up to ``tolerance`` times the norm of ``b``, or exactly; ``LinearSolveError`` if that cannot be done."""
         if not self.lagged:
             tolerance = _EXACT
-        if self.there and (self.lagged or self.fresh) and self._iterate(b, x, tolerance, self.limit):
+        # One that took as long as a new one takes, in all, is given up: at most twice the time of whoever knew what comes.
+        serves = self.fresh or (self.lagged and self.since < self.limit)
+        if self.there and serves and self._iterate(b, x, tolerance, self.limit):
             return
         self.factorise()
         if not self._iterate(b, x, tolerance, _MOST):
@@ -108,7 +112,9 @@ class Factorised:
         with self.spent.on("krylov"):
             self.krylov.setTolerances(rtol=tolerance, atol=0.0, max_it=most)
             self.krylov.solve(b, x)
-        self.spent.counts["krylov_iterations"] += self.krylov.getIterationNumber()
+        taken = self.krylov.getIterationNumber()
+        self.spent.counts["krylov_iterations"] += taken
+        self.since += 0 if self.fresh else taken
         return bool(self.krylov.is_converged)
 
     def negative_pivots(self) -> int:
