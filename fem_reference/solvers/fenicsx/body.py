@@ -127,7 +127,7 @@ class AssembledBody:
         self.clock.start(frame, before)
         self._set(frame)
         self.recalled = None
-        failure, iterations = self.newton.solve(frame)
+        failure, iterations = self.newton.solve_among(self.contact, frame)
         smallest = self.determinants.smallest()
         with self.spent.on("contact"):
             through = self.contact.tunnelled(self.comm) if self.contact and failure is None else None
@@ -168,7 +168,7 @@ class AssembledBody:
         """
         if self.clock.matters or not self.reuse or self._comes_back(frame):
             return False
-        before = np.array(self.unknowns.x.array)
+        before, self.system.contact = np.array(self.unknowns.x.array), self.contact
         self._set(frame)
         self.recalled = self.known.find(self._acting(frame))
         if self.recalled is None:
