@@ -1,5 +1,6 @@
 """``effects = "auto"``: which effects a scene needs is found out before it is solved, and looked at again after."""
 
+import importlib.util
 from dataclasses import replace
 from pathlib import Path
 
@@ -36,6 +37,7 @@ SCENE = Estimates(
 # Of these a scene may do without; all others are the material.
 CHOSEN = [name for name in effects.names(effects.Effect) if make(name, **PARAMETERS[name]).indicator(SCENE)]
 CONTACT = '\n[[effect]]\nname = "contact"\nstiffness = "100 kPa/mm"\nsmoothing = "0.2 mm"\n'
+BACK = '{ frame = 0, angle = "0 rad" }, { frame = 5, angle = "-0.2 rad" }'
 WEIGHT = """
 [[effect]]
 name = "gravity"
@@ -122,11 +124,15 @@ def test_bones_that_come_nowhere_near_are_left_out_and_those_that_do_are_not(tmp
 
 def test_an_effect_that_turns_out_to_matter_is_added(tmp_path, monkeypatch, caplog) -> None:
     """The run goes into the ball that the guess, made blind here, did not see."""
-    solved = []
+    solved, reached = [], []
+
+    def blind(*_) -> Near:
+        return Near(1e9, 0.0, 0.0)
 
     def sink_in(problem, _settings, sink) -> Outcome:
         solved.append([effect.title for effect in problem.effects])
         for number in problem.frames:
+            reached.append(number)
             shift = np.array([number * 3.0, 0, 0])
             sink(Frame(number, problem.surface.points + shift, problem.fibres.points + shift))
         return Outcome("converged", "done", {"seconds": 1.0})
@@ -135,16 +141,21 @@ def test_an_effect_that_turns_out_to_matter_is_added(tmp_path, monkeypatch, capl
     ball = '\n[[bone]]\nname = "ball"\nsphere = { centre = "40, 0, 15 mm", radius = "20 mm" }\n'
     scene = scene_of(tmp_path, ball + CONTACT.replace("smoothing", 'bones = ["ball"]\nsmoothing'))
     with monkeypatch.context() as patch:
-        patch.setattr(estimates, "_near", lambda *_: Near(1e9, 0.0, 0.0))
+        patch.setattr(estimates, "_near", blind)
         bench = Bench(scene, tmp_path / "runs")
     assert [effect.title for effect in bench.scene.effects] == ["NeoHooke", "Incompressible"]
     with caplog.at_level("INFO"):
         run = bench.obtain("reference", scene.reference, "reference")
     assert solved == [["NeoHooke", "Incompressible"], ["NeoHooke", "Incompressible", "Contact"]]
-    assert "Contact: needed" in caplog.text
-    assert "as it turned out" in caplog.text
+    assert reached == [0, 5, *run.numbers]  # it was stopped where it met the ball
+    assert "Contact: needed as it turned out at frame 5" in caplog.text
     assert "Contact" in run.origin["effects"]
-    assert any(text.startswith("Contact: needed") for text in run.origin["effects_chosen"])
+    assert any(text.startswith("Contact: needed as it turned out") for text in run.origin["effects_chosen"])
+    with monkeypatch.context() as patch:
+        patch.setattr(estimates, "_near", blind)
+        again = Bench(scene, tmp_path / "runs")
+    assert again.obtain("reference", scene.reference, "reference").folder == run.folder
+    assert len(solved) == 2, "what was stopped is not solved again"
 
 
 def test_the_estimates_of_a_bar_are_what_is_known_of_it(tmp_path) -> None:
@@ -176,10 +187,11 @@ def test_the_stretch_of_what_was_solved_is_that_of_the_surface_along_the_fibres(
     axis = (last - first) / np.linalg.norm(last - first)
     stretched = np.outer(axis, axis) * 1.2 + (np.eye(3) - np.outer(axis, axis)) * 1.2**-0.5
     turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
-    known = estimates.estimates(scene, rest, {0: rest.surface.points, 10: rest.surface.points @ (turn @ stretched).T})
+    low, high = estimates.stretched(rest, rest.surface.points @ (turn @ stretched).T)
     # Triangles whose plane is off the axis by the slope of the bar, up to a few per cent, mix in what is thinner, to second order.
-    assert known.stretch[1] == pytest.approx(1.2, abs=1e-3)
-    assert known.stretch[0] == pytest.approx(1.0, abs=0.05)
+    assert high == pytest.approx(1.2, abs=1e-3)
+    assert low > 1.1
+    assert estimates.stretched(rest, rest.surface.points) == pytest.approx((1, 1))
 
 
 def test_fibres_that_were_stretched_after_all_are_added(tmp_path) -> None:
@@ -188,6 +200,39 @@ def test_fibres_that_were_stretched_after_all_are_added(tmp_path) -> None:
     rest = muscle.setup(scene)
     assert ["FibrePassive: left out" in str(one) for one in scene.decisions] == [False, False, True]
     still, longer = rest.surface.points, rest.surface.points * 1.6
-    assert estimates.missed(scene, rest, (0, 10), np.stack([still, still])) == ()
-    (late,) = estimates.missed(scene, rest, (0, 10), np.stack([still, longer]))
-    assert "FibrePassive: needed" in str(late)
+    missed = of_case.watch(scene, rest)
+    assert missed((0, 10), np.stack([still, still])) == ()
+    (late,) = missed((0, 10), np.stack([still, longer]))
+    assert "FibrePassive: needed as it turned out at frame 10" in str(late)
+
+
+@pytest.mark.slow
+def test_a_run_goes_on_with_what_turned_out_to_matter_from_the_last_good_frame(tmp_path, monkeypatch, caplog) -> None:
+    """The bar bends away from the ball, and back into it: what comes out is what is solved with contact from the start."""
+    if not importlib.util.find_spec("dolfinx"):
+        pytest.skip("FEniCSx is not installed")
+    ball = '\n[[bone]]\nname = "ball"\nsphere = { centre = "5, -5.5, 30 mm", radius = "4 mm" }\n'
+    text = ball + CONTACT.replace("smoothing", 'bones = ["ball"]\nsmoothing')
+    scenes = [scene_of(tmp_path / choice, text, choice) for choice in ("auto", "listed")]
+    for one in scenes:
+        path = one.folder / "case.toml"
+        path.write_text(
+            path.read_text().replace('{ frame = 0, angle = "0 rad" }', BACK).replace("every = 5", "every = 2")
+        )
+    auto, listed = (casefile.read_muscle(one.folder) for one in scenes)
+    with monkeypatch.context() as patch:
+        patch.setattr(estimates, "_near", lambda *_: Near(1e9, 0.0, 0.0))
+        bench = Bench(auto, tmp_path / "runs")
+    with caplog.at_level("INFO"):
+        run = bench.obtain("reference", auto.reference, "reference")
+    whole = Bench(listed, tmp_path / "whole").obtain("reference", listed.reference, "reference")
+    assert whole.outcome.status == run.outcome.status == "converged"
+    assert "effects were added, from frame" in run.outcome.message
+    assert run.folder.name == whole.folder.name, "a run with the effect, whenever it was added"
+    assert run.numbers == whole.numbers
+    assert run.positions == pytest.approx(whole.positions, abs=1e-6)
+    assert np.nanmax(run.scalars["contact_area"]) > 0
+    good = int(run.outcome.message.rpartition("from frame ")[2].split()[0])
+    turned_out = next(one for one in bench.scene.decisions if one.turned_out is not None).turned_out
+    assert 0 < good < turned_out
+    assert whole.scalars["contact_area"][list(run.numbers).index(good)] == 0

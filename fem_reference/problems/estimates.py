@@ -1,14 +1,15 @@
 """What is known of a muscle scene before it is solved, and the effects that it needs by that."""
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from fem_reference.effects import Effect, Energy, Ramped, State, total_energy
+from fem_reference.effects import Effect, Energy, Interaction, Ramped, State, total_energy
+from fem_reference.effects.contact import among
 from fem_reference.foundations.indicators import Estimates, Indicator, Near
 from fem_reference.foundations.mesh import Floats, Ints, enclosed_volume, vertex_areas
 from fem_reference.foundations.motion import apply
@@ -31,17 +32,24 @@ _FELT = 1.0  # [mm] from a bone, more than any smoothing of contact
 
 @dataclass(frozen=True)
 class Decision:
-    """Whether an effect is ``needed``: by its ``indicator`` (None: part of the material) and the ``bound`` [mm] of that."""
+    """Whether an effect is ``needed``: by its ``indicator`` (None: part of the material) and the ``bound`` [mm] of that;
+    ``turned_out``: the frame whose solution showed it, None where it was known before.
+    """
 
     effect: Effect
     needed: bool
     indicator: Indicator | None
     bound: float
+    turned_out: int | None = None
 
     def __str__(self) -> str:
         if self.indicator is None:
             return f"{self.effect.title}: kept, part of the material"
         word, one = ("needed" if self.needed else "left out"), self.indicator
+        if self.turned_out is not None:
+            word += f" as it turned out at frame {self.turned_out}"
+        elif self.needed and isinstance(self.effect, Interaction):
+            word = "watched for, and in the equations where something is pressed"
         because = f"about {one.estimate:.2g} mm of displacement, {self.bound:.2g} mm allowed"
         return f"{self.effect.title}: {word}, {because}; {one.rule}: {one.number:.2g}"
 
@@ -52,15 +60,20 @@ def decisions(scene: MuscleCase, rest: Setup) -> tuple[Decision, ...]:
     return tuple(_decision(effect, known) for effect in scene.effects)
 
 
-def missed(scene: MuscleCase, rest: Setup, numbers: tuple[int, ...], positions: Floats) -> tuple[Decision, ...]:
-    """The effects that a scene left out and should not have, by where its surface went: ``positions`` (f, n, 3) at frame
-    ``numbers``.
+def missed(
+    scene: MuscleCase, rest: Setup, known: Estimates, numbers: tuple[int, ...], positions: Floats
+) -> tuple[Decision, ...]:
+    """The effects that a scene left out and should not have, by what was ``known`` before and by where its surface went,
+    ``positions`` (f, n, 3) at frame ``numbers``: those of the first frame that shows one.
     """
     left = [one.effect for one in scene.decisions if not one.needed]
-    if not left:
-        return ()
-    known = estimates(scene, rest, dict(zip(numbers, positions, strict=True)))
-    return tuple(one for one in (_decision(effect, known) for effect in left) if one.needed)
+    bones = rest.bones if among(left) else ()
+    for number in _sampled(numbers):
+        now = _solved(known, rest, bones, number, positions[numbers.index(number)])
+        found = tuple(one for one in (_decision(effect, now) for effect in left) if one.needed)
+        if found:
+            return tuple(replace(one, turned_out=number) for one in found)
+    return ()
 
 
 def _decision(effect: Effect, known: Estimates) -> Decision:
@@ -69,32 +82,43 @@ def _decision(effect: Effect, known: Estimates) -> Decision:
     return Decision(effect, needed, found, known.tolerance)
 
 
-def estimates(scene: MuscleCase, rest: Setup, solved: dict[int, Floats] | None = None) -> Estimates:
-    """What effects ask of a scene: by a guess of where the surface goes, each point with the bones that it is nearest to; or by
-    where it went, positions (n, 3) by frame number that were ``solved``.
-    """
-    frames = _sampled(scene.numbers if solved is None else tuple(solved))
-    chosen = np.unique(np.linspace(0, len(rest.surface.points) - 1, _VERTICES).astype(int))
+def _solved(known: Estimates, rest: Setup, bones: tuple[RigidBody, ...], number: int, at: Floats) -> Estimates:
+    """What was ``known`` before, with where the surface is ``at`` (n, 3) in a frame that was solved, beside those ``bones``."""
+    chosen = _chosen(rest)
+    points, moved = rest.surface.points[chosen], at[chosen]
+    return replace(
+        known,
+        travel=float(np.linalg.norm(moved - points, axis=1).max()),
+        stretch=stretched(rest, at),
+        near={bone.name: _near(bone, points, {number: moved}, rest.free[chosen], 0.0) for bone in bones},
+    )
+
+
+def _chosen(rest: Setup) -> Ints:
+    """The vertices that are looked at."""
+    return np.unique(np.linspace(0, len(rest.surface.points) - 1, _VERTICES).astype(int))
+
+
+def estimates(scene: MuscleCase, rest: Setup) -> Estimates:
+    """What effects ask of a scene: by a guess of where the surface goes, each point with the bones that it is nearest to."""
+    frames, chosen = _sampled(scene.numbers), _chosen(rest)
     points = rest.surface.points[chosen]
     weights = _weights(points, rest)
-    moved = {
-        frame: _guess(points, weights, rest, frame) if solved is None else solved[frame][chosen] for frame in frames
-    }
-    doubt = _DOUBT if solved is None else 0.0
+    moved = {frame: _guess(points, weights, rest, frame) for frame in frames}
     speed, jump, acceleration = _motion(points, weights, rest, scene.numbers)
     return Estimates(
         length=_length(rest),
         thickness=_thickness(rest),
         shear=_shear(scene),
         travel=max(float(np.linalg.norm(at - points, axis=1).max()) for at in moved.values()),
-        stretch=_stretch(rest, frames) if solved is None else _stretched(rest, [solved[frame] for frame in frames]),
+        stretch=_stretch(rest, frames),
         interval=scene.frames.interval,
         speed=speed,
         jump=jump,
         acceleration=acceleration,
         frames=_instants(scene),
         tolerance=TOLERANCE * scene.muscle.tet_size / 2**scene.muscle.refinements,
-        near={bone.name: _near(bone, points, moved, rest.free[chosen], doubt) for bone in rest.bones},
+        near={bone.name: _near(bone, points, moved, rest.free[chosen], _DOUBT) for bone in rest.bones},
     )
 
 
@@ -204,7 +228,7 @@ def _stretch(rest: Setup, frames: list[int]) -> tuple[float, float]:
     return max(min(found), 0.2), max(found)
 
 
-def _stretched(rest: Setup, positions: list[Floats]) -> tuple[float, float]:
+def stretched(rest: Setup, positions: Floats) -> tuple[float, float]:
     """The smallest and the greatest stretch of the surface, at ``positions`` (n, 3), along the line between its attachments;
     without the hundredths of its area where it is least and most, which single triangles at a rim may be.
     """
@@ -217,10 +241,10 @@ def _stretched(rest: Setup, positions: list[Floats]) -> tuple[float, float]:
     along = np.linalg.norm(_combined(edges, parts), axis=1)
     areas = np.linalg.norm(np.cross(edges[:, :, 0], edges[:, :, 1]), axis=1) / 2
     some = along > _ALONG
-    moved = [_combined(_edges(at, triangles[some]), parts[some]) for at in positions]
-    found = [np.linalg.norm(one, axis=1) / along[some] for one in moved]
-    ends = [np.quantile(one, (0.01, 0.99), weights=areas[some], method="inverted_cdf") for one in found]
-    return float(min(low for low, _ in ends)), float(max(high for _, high in ends))
+    moved = _combined(_edges(positions, triangles[some]), parts[some])
+    found = np.linalg.norm(moved, axis=1) / along[some]
+    low, high = np.quantile(found, (0.01, 0.99), weights=areas[some], method="inverted_cdf")
+    return float(low), float(high)
 
 
 def _edges(points: Floats, triangles: Ints) -> Floats:

@@ -1,7 +1,7 @@
 """Contact of rigid bodies with material points of a body: pressure of the gap, with its tangent, added to what cells contribute.
 
-Only points that may be near a body are asked for their distance to it (``broad_phase``), and only those that it presses are summed. A load
-step that begins and ends where nothing presses is solved without it.
+Only points that may be near a body are asked for their distance to it (``broad_phase``), and only those that it presses are summed.
+A load step that begins and ends where nothing is pressed is solved without it.
 """
 
 from collections.abc import Iterator
