@@ -75,7 +75,7 @@ traced = {{ count = 4, start = "origin", end = "insertion" }}
 [frames]
 first = 0
 last = 4
-every = 2
+every = 4
 interval = "{interval:.4g} s"
 
 [reference]

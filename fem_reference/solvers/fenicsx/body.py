@@ -55,7 +55,7 @@ class AssembledBody:
         self.unknowns = _unknowns(self.mesh, settings.element)
         self.displacement = Displacement(self.unknowns)
         form = forms.Form(self.mesh, body, self.unknowns, settings, self.cells)
-        self.amounts = form.amounts
+        self.set_amounts = form.set_amounts
         self.clock = Clock(body, form.step)
         self.energy_form = compiling.form(form.energy)
         self.kinetic_form = compiling.form(form.kinetic) if form.kinetic else None
@@ -231,8 +231,7 @@ class AssembledBody:
 
     def _set(self, frame: float) -> None:
         """What acts and is prescribed at ``frame``."""
-        for effect, amount in zip(self.effects, self.amounts, strict=True):
-            amount.value = effect.amount(frame)
+        self.set_amounts(frame)
         for one in self.conditions:
             one.move_to(frame)
 
