@@ -204,15 +204,13 @@ def _combined(edges: Floats, parts: Floats) -> Floats:
 def _near(bone: RigidBody, points: Floats, moved: dict[int, Floats], free: NDArray[np.bool_], doubt: float) -> Near:
     """How near the free points come to a ``bone``, which may be wrong by ``doubt`` of the way that they go past it."""
     low, high = bone.surface.points.min(axis=0), bone.surface.points.max(axis=0)
-    nearest, deepest, when = np.inf, 0.0, 0.0
-    for frame, at in moved.items():
-        local = apply(np.linalg.inv(bone.pose(frame)), at)[free]
-        off = doubt * np.linalg.norm(local - points[free], axis=1)
-        gap = np.maximum(np.maximum(low - local, local - high), 0).max(axis=1, initial=0) - off  # to its box
-        some = gap < _FELT
-        if some.any():
-            gap[some] = distance(bone, local[some]) - off[some]
-        if gap.min(initial=np.inf) < nearest:
-            nearest, when = float(gap.min()), float(frame)
-        deepest = max(deepest, float(np.sqrt((np.minimum(gap, 0) ** 2).sum() / max(1, len(gap)))))
-    return Near(nearest, deepest, when)
+    local = np.stack([apply(np.linalg.inv(bone.pose(frame)), at)[free] for frame, at in moved.items()])
+    off = doubt * np.linalg.norm(local - points[free], axis=2)
+    gap = np.maximum(np.maximum(low - local, local - high), 0).max(axis=2) - off  # to its box
+    some = gap < _FELT
+    if some.any():
+        gap[some] = distance(bone, local[some]) - off[some]
+    nearest = gap.min(axis=1, initial=np.inf)
+    depths = np.sqrt((np.minimum(gap, 0) ** 2).sum(axis=1) / max(1, gap.shape[1]))
+    first = int(nearest.argmin())
+    return Near(float(nearest[first]), float(depths.max()), float(list(moved)[first]))

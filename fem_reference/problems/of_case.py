@@ -14,16 +14,22 @@ from fem_reference.scenes.scalar import ScalarCase
 log = logging.getLogger(__name__)
 
 
-def explained(case: Case) -> tuple[Decision, ...]:
-    """Of each effect of a case whether that needs it, and why; nothing of a scalar field, which needs all."""
-    return decisions(case, muscle.setup(case)) if isinstance(case, MuscleCase) else ()
+def explained(case: Case, rest: Callable[[], Any] | None = None) -> tuple[Decision, ...]:
+    """Of each effect of a case whether that needs it, and why, by its setup that ``rest`` gives, by default a new one; nothing of
+    a scalar field, which needs all.
+    """
+    if not isinstance(case, MuscleCase):
+        return ()
+    return decisions(case, muscle.setup(case) if rest is None else rest())
 
 
-def chosen[C: Case](case: C) -> C:
-    """The case with the effects that it needs, where it leaves that to be found out; with ``decisions`` that say why."""
+def chosen[C: Case](case: C, rest: Callable[[], Any] | None = None) -> C:
+    """The case with the effects that it needs, where it leaves that to be found out (as ``explained``); with ``decisions`` that
+    say why.
+    """
     if not isinstance(case, MuscleCase) or case.choice == "listed":
         return case
-    found = explained(case)
+    found = explained(case, rest)
     for one in found:
         log.info("%s: %s", case.name, one)
     kept = tuple(one.effect for one in found if one.needed)

@@ -47,8 +47,8 @@ class Bench[C: Case]:
     """A case with what is made from it once and only when needed: its setup, its problem, and where its runs are stored."""
 
     def __init__(self, scene: C, store: Path, ranks: int | None = None) -> None:
-        self.scene, self.store, self.ranks = of_case.chosen(scene), store, ranks
-        self.setup: Callable[[], Any] = cache(lambda: of_case.setup(self.scene))
+        self.setup: Callable[[], Any] = cache(lambda: of_case.setup(scene))
+        self.scene, self.store, self.ranks = of_case.chosen(scene, self.setup), store, ranks
         self.problem: Callable[[], Any] = cache(lambda: of_case.problem(self.scene, self.setup()))
         self.watch: Callable[[], Any] = cache(lambda: of_case.watch(self.scene, self.setup()))
 
