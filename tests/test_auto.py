@@ -86,6 +86,39 @@ def test_the_sag_of_a_beam_is_that_of_timoshenko() -> None:
     assert SCENE.bend(force) == pytest.approx(0.3 * by_hand)
 
 
+def test_tension_between_fixed_ends_straightens_and_makes_stiff() -> None:
+    assert SCENE.straighten(1e3) == pytest.approx(0.6 * SCENE.sag, rel=1e-3)
+    assert replace(SCENE, sag=0.0).straighten(1.0) == 0, "a straight muscle between fixed ends cannot shorten"
+    assert replace(SCENE, fixed=1).straighten(1e3) == pytest.approx(0.3 * SCENE.length, rel=1e-3)
+    assert replace(SCENE, tension=SCENE.shear).bend(1e-5) < SCENE.bend(1e-5) / 3
+
+
+def test_what_nothing_fixes_keeps_its_weight_and_its_drag() -> None:
+    loose = replace(SCENE, fixed=0)
+    for name, key in (("gravity", "density"), ("damping", "coefficient")):
+        little = make(name, **PARAMETERS[name]).model_copy(update={key: 1e-30})
+        assert little.indicator(SCENE).estimate < SCENE.tolerance < little.indicator(loose).estimate
+
+
+def test_a_body_that_is_attached_to_nothing_goes_with_the_bones_beside_it(tmp_path) -> None:
+    scene = scene_of(tmp_path, "")
+    loose = replace(muscle.setup(scene), attached=())
+    known = estimates.estimates(scene, loose)
+    assert known.fixed == 0
+    assert known.travel > 1
+    assert known.speed > 0
+
+
+def test_small_motions_are_asked_for_more_closely(tmp_path) -> None:
+    scene = scene_of(tmp_path, "")
+    rest = muscle.setup(scene)
+    known, slow = estimates.estimates(scene, rest), estimates.TOLERANCE * scene.muscle.tet_size
+    assert known.tolerance == pytest.approx(min(slow, estimates.TOLERANCE * known.travel))
+    bones = tuple(replace(bone, motion=None) for bone in rest.bones)
+    still = replace(rest, bones=bones, attached=tuple(replace(one, bone=bones[0]) for one in rest.attached))
+    assert estimates.estimates(scene, still).tolerance == pytest.approx(slow)
+
+
 def scene_of(folder: Path, more: str, choice: str = "auto"):
     case = small.write(folder / "bar")
     path = case / "case.toml"

@@ -26,6 +26,7 @@ _DOUBT = 1.0
 # So many frames, evenly spread, and so many vertices are looked at.
 _FRAMES, _VERTICES = 9, 1500
 _ALONG = 0.7  # of a direction lies in triangles that are asked for the stretch along it
+_STILL = 1e-6  # [mm], what rounding moves
 _FELT = 1.0  # [mm] from a bone, more than any smoothing of contact
 
 
@@ -122,7 +123,7 @@ def estimates(scene: MuscleCase, rest: Setup) -> Estimates:
         jump=jump,
         acceleration=acceleration,
         frames=_instants(scene),
-        tolerance=TOLERANCE * min(size, travel or size),
+        tolerance=TOLERANCE * (min(size, travel) if travel > _STILL else size),
         near={bone.name: _near(bone, points, moved, rest.free[chosen], _DOUBT) for bone in rest.bones},
     )
 
