@@ -81,7 +81,7 @@ interval = "{interval:.4g} s"
 [reference]
 solver = "fenicsx"
 element = "P2"
-first_step = 2
+first_step = 4
 
 [[expect]]
 of = "reference"
