@@ -9,7 +9,7 @@ from fem_reference import solvers
 from fem_reference.cli._choosing import checked_bench, own_candidates, scene_of
 from fem_reference.cli._parser import add_case
 from fem_reference.cli._printing import DONE, lines, write_output
-from fem_reference.problems import estimates, of_case
+from fem_reference.problems import guess, of_case
 from fem_reference.problems.muscle import Problem
 from fem_reference.problems.muscle_body import as_body
 from fem_reference.report.words import duration
@@ -66,7 +66,7 @@ def _facts(scene: Case, built: Any, bench: Any) -> dict[str, Any]:
 
 def _motion(scene: Case, built: Problem) -> str:
     """What the motion of the bones does to the muscle, in a sentence."""
-    lengths = estimates.spans(built, scene.numbers)
+    lengths = guess.spans(built, scene.numbers)
     if not len(lengths):
         return ""
     most = int(np.abs(lengths - lengths[0]).argmax())

@@ -18,9 +18,9 @@ class ActiveTension(Ramped, Energy):
     tension: PositivePressure
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """By how far fibres shorten that pull against the matrix."""
+        """By how far fibres that pull straighten the muscle, or shorten it where they can."""
         pull = scene.greatest(self) * self.tension
-        return Indicator("tension of the fibres over the shear modulus", pull / scene.shear, scene.shorten(pull, 0.3))
+        return Indicator("tension of the fibres over the shear modulus", pull / scene.shear, scene.straighten(pull))
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa]."""

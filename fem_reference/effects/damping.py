@@ -22,12 +22,12 @@ class Damping(Energy):
     coefficient: VolumeDamping
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """By the sag of a beam under the drag."""
-        force = self.coefficient * scene.in_time(scene.speed)
+        """By the sag of a beam under the drag, and the shift of a bar along it."""
+        force, sideways = (self.coefficient * scene.in_time(speed) for speed in (scene.speed, scene.sideways))
         return Indicator(
             "drag over the length against the shear modulus",
             force * scene.length / scene.shear,
-            scene.lag(scene.bend(force)),
+            scene.lag(scene.bend(sideways) + scene.draw(force)),
         )
 
     def energy(self, state: State) -> Any:

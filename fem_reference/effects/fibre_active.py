@@ -29,9 +29,9 @@ class FibreActive(Ramped, Energy):
         return (Limit("fibre stretch", 0.4 * self.optimal_stretch, 1.6 * self.optimal_stretch),)
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """By how far fibres shorten that pull against the matrix."""
+        """By how far fibres that pull straighten the muscle, or shorten it where they can."""
         pull = scene.greatest(self) * self.stress
-        return Indicator("tension of the fibres over the shear modulus", pull / scene.shear, scene.shorten(pull, 0.3))
+        return Indicator("tension of the fibres over the shear modulus", pull / scene.shear, scene.straighten(pull))
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa], zero at rest."""

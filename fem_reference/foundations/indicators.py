@@ -37,20 +37,27 @@ class Near:
 class Estimates:
     """What is known of a scene before it is solved. Lengths in mm, times in s, moduli in MPa, densities in tonne/mm^3.
 
-    ``length`` and ``thickness`` of the muscle, its ``shear`` modulus at rest; ``travel``: how far its surface goes at most, by the
-    motion of the bones; ``stretch``: of the line from one attachment to the other, the smallest and the greatest; ``interval``
-    from a frame number to the next, None where the scene does not say it; ``speed``, ``jump`` (of velocity from one instant to
-    the next) and ``acceleration``: the greatest, by frame numbers; ``frames``: all numbers, and knots of ramps; ``tolerance``:
+    ``length`` and ``thickness`` of the muscle, its ``shear`` modulus at rest, and the ``tension`` [MPa] of its
+    fibres at their length at rest, the mean over the frames; ``fixed``: to how many bones; ``sag``: how far its
+    axis gets from the straight line between two of them; ``travel``: how far its surface goes at most, by the motion of the bones;
+    ``stretch``: of the line from one attachment to the other, the smallest and the greatest; ``interval``
+    from a frame number to the next, None where the scene does not say it; ``speed``, its part
+    ``sideways`` of that line, ``jump`` (of velocity from one instant to the next) and ``acceleration``: the greatest, by frame
+    numbers; ``frames``: all numbers, and knots of ramps; ``tolerance``:
     what an effect may change without being needed; ``near``: by bone, how near the surface comes.
     """
 
     length: float
     thickness: float
     shear: float
+    tension: float
+    fixed: int
+    sag: float
     travel: float
     stretch: tuple[float, float]
     interval: float | None
     speed: float
+    sideways: float
     jump: float
     acceleration: float
     frames: tuple[float, ...]
@@ -60,11 +67,23 @@ class Estimates:
     def bend(self, force: float) -> float:
         """How far [mm], root mean square, a ``force`` per volume [N/mm3] bends and shears a beam with clamped ends of this length,
         thickness and shear modulus, three of which are Young's (Timoshenko): 0.6 of its middle, halved, as what bends
-        also stretches.
+        also stretches. What nothing fixes goes as far as it is long.
         """
+        if not self.fixed:
+            return self.length
         squared = self.length**2
         middle = force / self.shear * (squared / 8 * 1.2 + squared**2 / (32 * 3 * self.thickness**2))
-        return float(0.3 * middle)
+        return float(0.3 * middle) / (1 + self.taut(self.tension))
+
+    def taut(self, pull: float) -> float:
+        """By how many times its own stiffness such a beam is stiffer where its fibres ``pull`` [MPa]."""
+        return pull / self.shear * (self.length / self.thickness) ** 2 / 12
+
+    def draw(self, force: float) -> float:
+        """How far [mm], root mean square, a ``force`` per volume [N/mm3] along a bar with clamped ends shifts it: two thirds of its
+        middle.
+        """
+        return self.length**2 * force / (8 * 3 * self.shear) * 2 / 3 if self.fixed else self.length
 
     def lag(self, distance: float) -> float:
         """How far [mm] a body is behind that forces hold back by a ``distance``: no more than it travels."""
@@ -73,6 +92,14 @@ class Estimates:
     def greatest(self, effect: Any) -> float:
         """The greatest amount of an ``effect`` over the frames."""
         return max(abs(float(effect.amount(frame))) for frame in self.frames)
+
+    def straighten(self, pull: float) -> float:
+        """How far the surface moves, root mean square, where fibres ``pull`` [MPa] at a beam with clamped ends: 0.6 of its sag is
+        the most that they can take out, and its stiffness in bending resists. One that has not two ends is free to shorten.
+        """
+        if self.fixed < 2:
+            return self.shorten(pull, 0.3)
+        return 0.6 * self.sag * self.taut(pull) / (1 + self.taut(pull))
 
     def shorten(self, pull: float, share: float) -> float:
         """How far the surface moves, root mean square, where fibres ``pull`` [MPa] against the matrix: by a ``share`` of the length

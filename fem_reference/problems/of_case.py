@@ -1,11 +1,12 @@
 """Case -> problem, whatever is solved in it."""
 
 import logging
+from collections.abc import Callable
 from typing import Any
 
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import muscle, scalar
-from fem_reference.problems.estimates import Decision, decisions, missed
+from fem_reference.problems.estimates import Decision, decisions, estimates, missed
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.scenes.scalar import ScalarCase
@@ -13,31 +14,42 @@ from fem_reference.scenes.scalar import ScalarCase
 log = logging.getLogger(__name__)
 
 
-def explained(case: Case) -> tuple[Decision, ...]:
-    """Of each effect of a case whether that needs it, and why; nothing of a scalar field, which needs all."""
-    return decisions(case, muscle.setup(case)) if isinstance(case, MuscleCase) else ()
+def explained(case: Case, rest: Callable[[], Any] | None = None) -> tuple[Decision, ...]:
+    """Of each effect of a case whether that needs it, and why, by its setup that ``rest`` gives, by default a new one; nothing of
+    a scalar field, which needs all.
+    """
+    if not isinstance(case, MuscleCase):
+        return ()
+    return decisions(case, muscle.setup(case) if rest is None else rest())
 
 
-def chosen[C: Case](case: C) -> C:
-    """The case with the effects that it needs, where it leaves that to be found out; with ``decisions`` that say why."""
+def chosen[C: Case](case: C, rest: Callable[[], Any] | None = None) -> C:
+    """The case with the effects that it needs, where it leaves that to be found out (as ``explained``); with ``decisions`` that
+    say why.
+    """
     if not isinstance(case, MuscleCase) or case.choice == "listed":
         return case
-    found = explained(case)
+    found = explained(case, rest)
     for one in found:
         log.info("%s: %s", case.name, one)
     kept = tuple(one.effect for one in found if one.needed)
     return case.model_copy(update={"choice": "listed", "effect": kept, "decisions": found})
 
 
-def reconsidered[C: Case](case: C, rest: Any, numbers: tuple[int, ...], positions: Floats) -> C:
-    """The case with the effects that it left out and that turned out to matter, by the ``positions`` (f, n, 3) of its surface at
-    frame ``numbers``; the same case where none did.
+def watch(case: Case, rest: Any) -> Callable[[tuple[int, ...], Floats], tuple[Decision, ...]]:
+    """What says of ``positions`` (f, n, 3) of its surface at frame ``numbers`` which effects that the case left out matter, at
+    the first frame at which one does.
     """
-    found = missed(case, rest, numbers, positions) if isinstance(case, MuscleCase) else ()
-    if not found:
-        return case
+    if not isinstance(case, MuscleCase) or all(one.needed for one in case.decisions):
+        return lambda *_: ()
+    known = estimates(case, rest)
+    return lambda numbers, positions: missed(case, rest, known, numbers, positions)
+
+
+def with_effects[C: Case](case: C, found: tuple[Decision, ...]) -> C:
+    """The case with the effects that were ``found`` to matter."""
     for one in found:
-        log.info("%s: %s, as it turned out", case.name, one)
+        log.info("%s: %s", case.name, one)
     new = {id(one.effect): one for one in found}
     made = tuple(new.get(id(one.effect), one) for one in case.decisions)
     kept = tuple(one.effect for one in made if one.needed)

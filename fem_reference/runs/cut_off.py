@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import tempfile
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -51,6 +52,17 @@ def truncate(state: dict[str, Any], number: int) -> None:
     kept = sum(stored < number for stored in state["numbers"])
     state["numbers"] = state["numbers"][:kept]
     state["scalars"] = {name: values[:kept] for name, values in state["scalars"].items()} if kept else {}
+
+
+def pass_on(folder: Path, to: Path) -> None:
+    """Let the run of the folder ``to`` go on from what is kept of the stopped one in ``folder``, unless there is one already."""
+    if (folder / FOLDER).is_dir() and not to.exists():
+        with tempfile.TemporaryDirectory(dir=to.parent) as new:
+            copy = shutil.copytree(folder, Path(new) / to.name)
+            state = texts.read_json(copy / "run.json", "a run")
+            (copy / "run.json").write_text(json.dumps(state | {"status": "running"}), encoding="utf-8")
+            copy.rename(to)
+    clear(folder)
 
 
 def clear(folder: Path) -> None:

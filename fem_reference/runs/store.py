@@ -7,7 +7,6 @@
                           /tets.pvd        tetrahedra, where the solver has them
                           /field.pvd       a scalar field on its mesh, where that is what is solved (``fields``)
                           /state/          the unknowns of the tetrahedra, where they were asked for (``states``)
-
                           /restart/        of a run that is made or was cut off: what its solver goes on from (``cut_off``)
 
 A file appears whole or not at all; ``run.json`` after the frame files that it names. A run whose status is ``running`` was cut off;
@@ -164,7 +163,7 @@ class Writer:
         self.state |= {"scalars": {}, "cost": {}, "parts": []}
         self.begin, self.reported = time.perf_counter(), 0.0
         if (stored := cut_off.stored(folder, identity)) is not None:
-            self.state = stored | {"name": identity["name"]}
+            self.state = stored | {"name": identity["name"], "origin": identity["origin"]}
             return
         shutil.rmtree(folder) if folder.exists() else None
         folder.mkdir(parents=True)
@@ -206,7 +205,8 @@ class Writer:
             names = [(number, f"{part}/frame_{number:04d}{suffix}") for number in self.state["numbers"]]
             files.write_pvd(self.folder / f"{part}.pvd", names)
         for name, value in frame.scalars.items():
-            self.state["scalars"].setdefault(name, []).append(value if math.isfinite(value) else None)
+            unknown: list[float | None] = [None] * (len(self.state["numbers"]) - 1)  # of effects that were added since
+            self.state["scalars"].setdefault(name, unknown).append(value if math.isfinite(value) else None)
         self._write_state()
         self._log_progress(frame)
 
@@ -216,7 +216,7 @@ class Writer:
         cost = {"seconds": time.perf_counter() - self.begin} | outcome.cost
         self.state |= {"status": outcome.status, "message": outcome.message, "cost": cost}
         self._write_state()
-        if outcome.status not in cut_off.ENDED_EARLY:
+        if outcome.status not in (*cut_off.ENDED_EARLY, "stopped"):
             cut_off.clear(self.folder)
 
     def _write_unknowns(self, frame: Frame) -> bool:
@@ -301,10 +301,10 @@ def status(folder: Path) -> str:
         return "damaged"
 
 
-def finished(folder: Path) -> Run | None:
-    """The stored run in ``folder`` if it is there and converged, else None."""
+def finished(folder: Path, ended: Collection[str] = ("converged",)) -> Run | None:
+    """The stored run in ``folder`` if it is there and ``ended`` so, else None."""
     try:
         run = load(folder)
     except InputError:
         return None
-    return run if run.outcome.status == "converged" else None
+    return run if run.outcome.status in ended else None

@@ -21,10 +21,10 @@ from fem_reference.foundations.usage import forget_peak_memory, peak_memory
 from fem_reference.problems import of_case
 from fem_reference.problems.muscle import Problem, Setup
 from fem_reference.problems.scalar import FieldProblem
-from fem_reference.runs import store
+from fem_reference.runs import cut_off, store
 from fem_reference.runs.fields import VALUES, NodalField
 from fem_reference.runs.key import code_hash, key, versions
-from fem_reference.runs.store import Frame, Run
+from fem_reference.runs.store import Frame, Outcome, Run, Sink
 from fem_reference.scenes.case import Case, SolverChoice
 from fem_reference.solvers import recorded
 from fem_reference.solvers.common.protocol import MuscleSolver
@@ -39,13 +39,18 @@ MACHINE_ONLY = {
 }  # settings that change the time and not the answer
 
 
+class StoppedError(Exception):
+    """A run that goes on with other effects, and why."""
+
+
 class Bench[C: Case]:
     """A case with what is made from it once and only when needed: its setup, its problem, and where its runs are stored."""
 
     def __init__(self, scene: C, store: Path, ranks: int | None = None) -> None:
-        self.scene, self.store, self.ranks = of_case.chosen(scene), store, ranks
-        self.setup: Callable[[], Any] = cache(lambda: of_case.setup(self.scene))
+        self.setup: Callable[[], Any] = cache(lambda: of_case.setup(scene))
+        self.scene, self.store, self.ranks = of_case.chosen(scene, self.setup), store, ranks
         self.problem: Callable[[], Any] = cache(lambda: of_case.problem(self.scene, self.setup()))
+        self.watch: Callable[[], Any] = cache(lambda: of_case.watch(self.scene, self.setup()))
 
     def settings(self, choice: SolverChoice, place: str) -> Record:
         """The settings of ``choice``, checked; a folder that the scene names is found as its files are, and only there."""
@@ -64,24 +69,40 @@ class Bench[C: Case]:
         if choice.solver == "recorded":  # files may change behind a name; they are read anew each time
             return self.read(name, choice, place)
         settings, folder = self.settings(choice, place), self.folder(choice, place)
-        if (stored := _stored(folder, name)) is not None:
+        ended = ("converged", "stopped") if self._watches(choice.solver) else ("converged",)
+        if (stored := _stored(folder, name, ended)) is not None:
             return self._with_all_that_matters(stored, choice, place)
         solvers.require(choice.solver, settings, place, self.scene.task)
         self.made_for(choice.solver, settings)  # what is wrong with the input shows before anything is written
         with _alone(folder):
-            run = _stored(folder, name) or self._solve(name, choice.solver, settings, folder)
+            run = _stored(folder, name, ended) or self._solve(name, choice.solver, settings, folder)
         return self._with_all_that_matters(run, choice, place)
 
+    def _watches(self, solver: str) -> bool:
+        """Whether the case left effects out that may turn out to matter."""
+        return bool(self.scene.decisions) and solvers.takes_effects(solver)
+
     def _with_all_that_matters(self, run: Run, choice: SolverChoice, place: str) -> Run:
-        """The ``run``; where an effect that the case left out turns out to matter in it, one with that effect."""
-        if not self.scene.decisions or not solvers.takes_effects(choice.solver):
+        """The ``run``; where an effect that the case left out turns out to matter in it, one with that effect, which goes on from
+        what is kept of a run that was stopped for it.
+        """
+        found = self.watch()(run.numbers, run.positions) if self._watches(choice.solver) else ()
+        if not found:
             return run
-        scene = of_case.reconsidered(self.scene, self.setup(), run.numbers, run.positions)
-        if scene is self.scene:
-            return run
-        self.scene = scene
-        self.problem = cache(lambda: of_case.problem(scene, self.setup()))
+        self.scene = of_case.with_effects(self.scene, found)
+        self.problem.cache_clear()  # type: ignore[attr-defined]
+        self.watch.cache_clear()  # type: ignore[attr-defined]
+        assert run.folder is not None  # from the store
+        folder = self.folder(choice, place)
+        with _alone(folder):
+            cut_off.pass_on(run.folder, folder)
         return self.obtain(run.name, choice, place)
+
+    def _check(self, frame: Frame) -> None:
+        """StoppedError where an effect that the case left out matters in a ``frame`` that was solved."""
+        if frame.surface is not None and (found := self.watch()((frame.number,), frame.surface[None])):
+            titles = " and ".join(one.effect.title for one in found)
+            raise StoppedError(f"{titles}, left out, turned out to matter at frame {frame.number}")
 
     def folder(self, choice: SolverChoice, place: str) -> Path:
         """Where the run of a solver of our own is stored, once there is one."""
@@ -96,6 +117,7 @@ class Bench[C: Case]:
             settings,
             folder,
             identity,
+            self._check if self._watches(solver) else lambda _: None,
         )
         return store.load(folder)
 
@@ -137,30 +159,40 @@ class Bench[C: Case]:
 
 
 @singledispatch
-def _solved(built: object, solver: Any, settings: Record, folder: Path, identity: dict[str, Any]) -> None:  # noqa: ARG001
-    """Solve what was ``built`` of a case, and write the run into ``folder`` as it goes."""
+def _solved(built: object, solver: Any, settings: Record, folder: Path, identity: dict[str, Any], check: Sink) -> None:  # noqa: ARG001
+    """Solve what was ``built`` of a case, and write the run into ``folder`` as it goes; ``check`` sees each frame of a muscle, and
+    may stop it.
+    """
     raise TypeError(f"{type(built).__name__} is no problem of a case")
 
 
 @_solved.register
-def _(built: Problem, solver: Any, settings: Record, folder: Path, identity: dict[str, Any]) -> None:
+def _(built: Problem, solver: Any, settings: Record, folder: Path, identity: dict[str, Any], check: Sink) -> None:
     identity["origin"]["mesh"] = built.mesh_facts
     writer = store.Writer(folder, identity, built.surface, built.fibres, built.mesh, built.directions)
-    _write(writer, built, solver, settings, Frame(built.frames[0], built.surface.points, built.fibres.points))
+    _write(writer, built, solver, settings, Frame(built.frames[0], built.surface.points, built.fibres.points), check)
 
 
 @_solved.register
-def _(built: Setup, solver: Any, settings: Record, folder: Path, identity: dict[str, Any]) -> None:
+def _(built: Setup, solver: Any, settings: Record, folder: Path, identity: dict[str, Any], check: Sink) -> None:
     writer = store.Writer(folder, identity, built.surface)
-    _write(writer, built, solver, settings, Frame(built.frames[0], built.surface.points))
+    _write(writer, built, solver, settings, Frame(built.frames[0], built.surface.points), check)
 
 
-def _write(writer: store.Writer, built: Setup, solver: Any, settings: Record, rest: Frame) -> None:
+def _write(writer: store.Writer, built: Setup, solver: Any, settings: Record, rest: Frame, check: Sink) -> None:
     """The run of a muscle, with what it cost; of one that failed before its first frame that frame, which is ``rest``."""
+
+    def add(frame: Frame) -> None:
+        writer.add(frame)
+        check(frame)
+
     forget_peak_memory()
     began = time.process_time()
     go_on = solver.go_on
-    outcome = go_on(built, settings, writer.add, writer.cut_off) if go_on else solver.solve(built, settings, writer.add)
+    try:
+        outcome = go_on(built, settings, add, writer.cut_off) if go_on else solver.solve(built, settings, add)
+    except StoppedError as why:
+        outcome = Outcome("stopped", str(why))
     processor, cost = time.process_time() - began, outcome.cost
     if "seconds_compile" in cost:  # which does not count: what is left takes no more processor time than time
         processor = min(processor, cost.get("seconds_setup", 0.0) + cost.get("seconds_solve", math.inf))
@@ -168,11 +200,20 @@ def _write(writer: store.Writer, built: Setup, solver: Any, settings: Record, re
     outcome = replace(outcome, cost=used | outcome.cost)  # a solver with processes of its own says what those used
     if not writer.frames:
         writer.add(rest)
-    writer.close(outcome)
+    writer.close(outcome, **_contact(writer.state))
+
+
+def _contact(state: dict[str, Any]) -> dict[str, str]:
+    """Where contact was in the equations, of a run whose ``state`` says it."""
+    counts = state["scalars"].get("contact_points")
+    if counts is None:
+        return {}
+    pressed = [number for number, count in zip(state["numbers"], counts, strict=True) if count]
+    return {"contact": f"pressed first at frame {pressed[0]}" if pressed else "nothing was pressed at any frame"}
 
 
 @_solved.register
-def _(built: FieldProblem, solver: Any, settings: Record, folder: Path, identity: dict[str, Any]) -> None:
+def _(built: FieldProblem, solver: Any, settings: Record, folder: Path, identity: dict[str, Any], check: Sink) -> None:  # noqa: ARG001
     identity["origin"]["mesh"] = built.mesh_facts
     writer = store.Writer(folder, identity)
     solution = solver.solve_field(built, settings)
@@ -198,9 +239,11 @@ def _alone(folder: Path) -> Iterator[None]:
         lock.release()
 
 
-def _stored(folder: Path, name: str) -> Run | None:
-    """The finished run in ``folder`` under the name that it has here; None where there is none, or other packages made it."""
-    run = store.finished(folder)
+def _stored(folder: Path, name: str, ended: tuple[str, ...]) -> Run | None:
+    """The run in ``folder`` that ``ended`` so, under the name that it has here; None where there is none, or other packages made
+    it.
+    """
+    run = store.finished(folder, ended)
     if run is None:
         return None
     now, then = versions(), run.origin.get("versions", {})

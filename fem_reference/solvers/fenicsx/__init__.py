@@ -82,7 +82,7 @@ def go_on(problem: Problem, settings: Settings, sink: Sink, cut_off: CutOff) -> 
     there = kept(cut_off, body)
     again = settings.reuse and not any("interval" in effect.needs for effect in body.effects)  # states serve again
     if there.frames:
-        log.info("cut off before; going on from frame %d", there.frames[-1])
+        log.info("begun before; going on from what is kept up to frame %d", there.frames[-1])
 
     def pass_on(frame: Frame) -> None:
         sink(frame)

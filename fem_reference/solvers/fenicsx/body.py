@@ -55,7 +55,7 @@ class AssembledBody:
         self.unknowns = _unknowns(self.mesh, settings.element)
         self.displacement = Displacement(self.unknowns)
         form = forms.Form(self.mesh, body, self.unknowns, settings, self.cells)
-        self.amounts = form.amounts
+        self.set_amounts = form.set_amounts
         self.clock = Clock(body, form.step)
         self.energy_form = compiling.form(form.energy)
         self.kinetic_form = compiling.form(form.kinetic) if form.kinetic else None
@@ -127,7 +127,7 @@ class AssembledBody:
         self.clock.start(frame, before)
         self._set(frame)
         self.recalled = None
-        failure, iterations = self.newton.solve(frame)
+        failure, iterations = self.newton.solve_among(self.contact, frame)
         smallest = self.determinants.smallest()
         with self.spent.on("contact"):
             through = self.contact.tunnelled(self.comm) if self.contact and failure is None else None
@@ -168,7 +168,7 @@ class AssembledBody:
         """
         if self.clock.matters or not self.reuse or self._comes_back(frame):
             return False
-        before = np.array(self.unknowns.x.array)
+        before, self.system.contact = np.array(self.unknowns.x.array), self.contact
         self._set(frame)
         self.recalled = self.known.find(self._acting(frame))
         if self.recalled is None:
@@ -231,8 +231,7 @@ class AssembledBody:
 
     def _set(self, frame: float) -> None:
         """What acts and is prescribed at ``frame``."""
-        for effect, amount in zip(self.effects, self.amounts, strict=True):
-            amount.value = effect.amount(frame)
+        self.set_amounts(frame)
         for one in self.conditions:
             one.move_to(frame)
 

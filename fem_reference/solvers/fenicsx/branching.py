@@ -18,7 +18,7 @@ def leave(body: AssembledBody, frame: float, share: float) -> float | None:
     """
     if body.stability is None or not (modes := body.stability.negative_modes()) > 0:
         return None
-    before = np.array(body.unknowns.x.array)
+    before, body.system.contact = np.array(body.unknowns.x.array), body.contact
     direction, size = lowest(body), share * _size(body)
     for amount in (sign * larger * size for larger in _LARGER for sign in (1, -1)):
         body.unknowns.x.array[:] = before + amount * direction

@@ -99,14 +99,14 @@ class CellSums:
     def add_residual(self, residual: Floats) -> None:
         """Add what is out of balance to ``residual`` (n,), over this rank's unknowns, ghosts too."""
         for some in self._chunks():
-            self._add(self.form.first, some, residual)
+            self._add(self.form.derivatives.first, some, residual)
 
     def add_tangent(self, into: Tangent, residual: Floats, moves: Floats | None) -> None:
         """Add the tangent ``into`` its entries, and what is out of balance to ``residual``: where there are ``moves`` (n,) of the
         displacement, what they change it by as well, to first order.
         """
         for some in self._chunks():
-            self._add(self.form.second, some, residual, into, moves)
+            self._add(self.form.derivatives.second, some, residual, into, moves)
 
     def add_points(self, into: Tangent, cells: Ints, basis: Floats, slope: Floats) -> None:
         """Add the tangent of tractions at points of ``cells`` (n,) that are carried by their ``basis`` (n, k): the ``slope``
@@ -129,7 +129,7 @@ class CellSums:
         shape = self.kept[1]
         found = np.empty((self.count, pressures, pressures))
         for some in self._chunks():
-            given = self.form.second.eval(self.mesh, np.arange(some.start, some.stop, dtype=np.int32))
+            given = self.form.derivatives.second.eval(self.mesh, np.arange(some.start, some.stop, dtype=np.int32))
             soft = 0.5 / np.abs(given[..., stiff].mean(axis=-1)) - given[..., rows[-1]]
             volumes = np.abs(np.linalg.det(np.einsum("mgi,qgr->mqir", self.corners[some], shape)))
             found[some] = np.einsum("mq,qc,qd->mcd", soft * volumes * weights, basis, basis)

@@ -1,6 +1,7 @@
 """Contact of rigid bodies with material points of a body: pressure of the gap, with its tangent, added to what cells contribute.
 
 Only points that may be near a body are asked for their distance to it (``broad_phase``), and only those that it presses are summed.
+A load step that begins and ends where nothing is pressed is solved without it.
 """
 
 from collections.abc import Iterator
@@ -88,6 +89,10 @@ class ContactForces:
     def _places(self, moved: Floats, some: Ints) -> Floats:
         """Where ``some`` points (k,) are, with nodes ``moved`` (m, 3): (k, 3) [mm]."""
         return np.asarray(self.points.rest[some] + self.points.carried.shares[some] @ moved)
+
+    def presses(self, comm: MPI.Comm) -> bool:
+        """Whether an obstruction presses a point, of any rank."""
+        return bool(comm.allreduce(any(len(one.pressed) for one in self.now), MPI.LOR))
 
     def tractions(self) -> Tractions:
         """What all of them do."""

@@ -1,7 +1,8 @@
 """The weak form of a body, summed from its effects; symbols stand for their parameters, so that a compiled form serves many."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import basix.ufl
 import numpy as np
@@ -10,7 +11,7 @@ from dolfinx import fem, mesh
 from ufl.algorithms import expand_derivatives
 from ufl.constantvalue import Zero
 
-from fem_reference.effects import Effect, Energy, Load, State, elastic_state, total_energy
+from fem_reference.effects import Effect, Energy, Load, Ramped, State, elastic_state, total_energy
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import Body
 from fem_reference.solvers.fenicsx import compiling, meshes, quadrature
@@ -35,14 +36,22 @@ class UflFunctions:
         return ufl.conditional(ufl.gt(x, limit), then, otherwise)
 
 
+class Derivatives(NamedTuple):
+    """Of an energy, all its first derivatives at the quadrature points, and these with the upper triangle of the second ones:
+    compiled expressions of what ``cells.c`` names.
+    """
+
+    first: Any
+    second: Any
+
+
 class Form:
-    """What acts in a body. Of the energy, all its first derivatives at the quadrature points, ``first``, and these with the upper
-    triangle of the second ones, ``second``: compiled expressions of what ``cells.c`` names, with ``kinds`` variables a component
-    of the displacement. ``loads`` on the surface, a residual, 0 where there are none.
+    """What acts in a body. Of the energy its ``derivatives``, with ``kinds`` variables a component of the displacement; what has an
+    amount of zero over whole frames is not in these there. ``loads`` on the surface, a residual, 0 where there are none.
 
     ``energy`` that is stored as an integral, det F as ``determinant``, the ``fibre_stretch`` that energies see (None
-    without fibres); to be set: ``amounts`` by effect, and the ``step`` of time (None where nothing depends on it), with
-    ``kinetic`` energy of its velocity (0 without inertia); ``rule``: points (q, 3) and weights (q,) of the quadrature, of
+    without fibres); to be set: the amounts of effects (``set_amounts``), and the ``step`` of time (None where nothing depends on
+    it), with ``kinetic`` energy of its velocity (0 without inertia); ``rule``: points (q, 3) and weights (q,) of the quadrature, of
     ``degree``; ``regions``: by name, this rank's facets.
     """
 
@@ -52,7 +61,7 @@ class Form:
         self.rule = quadrature.rule(settings.element, settings.quadrature_degree)
         self.degree = settings.quadrature_degree or quadrature.DEGREE[settings.element]
         self.dx, self.ds = _measures(msh, self.regions, self.rule, self.degree)
-        self.amounts = [fem.Constant(msh, effect.amount(body.frames[0])) for effect in body.effects]
+        self.effects, self.amounts = body.effects, [fem.Constant(msh, 1.0) for _ in body.effects]
         effects = [_symbolic(effect, msh) for effect in body.effects]
         acting = list(zip(effects, self.amounts, strict=True))
         self.step = _step(effects, unknowns.function_space)
@@ -62,10 +71,30 @@ class Form:
         stored = [(effect, amount) for effect, amount in acting if not isinstance(effect, Energy) or effect.stored]
         self.energy = total_energy(stored, state) * self.dx
         self.kinetic = self._kinetic(effects)
-        self.kinds, first, second = _derivatives(total_energy(acting, state), variables)
-        self.first = compiling.expression(ufl.as_vector(first), self.rule[0])
-        self.second = compiling.expression(ufl.as_vector(first + second), self.rule[0])
+        placed = not _vanishes(ufl.diff(total_energy(acting, state), variables.displacement))
+        self.kinds = 3 + placed
+        self.silent = [_silent(effect, body.frames) for effect in body.effects]
+        self._made = {
+            quiet: self._derivatives([one for one, off in zip(acting, quiet, strict=True) if not off], state, variables)
+            for quiet in dict.fromkeys(map(self._quiet, _instants(body.frames)))
+        }
+        self.set_amounts(body.frames[0])
         self.loads = self._loads(acting, state, unknowns)
+
+    def set_amounts(self, frame: float) -> None:
+        """The amounts of effects at a frame, and the derivatives of those that are not zero over whole frames there."""
+        for effect, amount in zip(self.effects, self.amounts, strict=True):
+            amount.value = effect.amount(frame)
+        self.derivatives = self._made[self._quiet(frame)]
+
+    def _quiet(self, frame: float) -> tuple[bool, ...]:
+        """Of each effect whether it is left out at a frame."""
+        return tuple(any(a <= frame <= b for a, b in spans) for spans in self.silent)
+
+    def _derivatives(self, acting: list[tuple[Effect, Any]], state: State, by: "_Variables") -> Derivatives:
+        first, second = _differentiated(total_energy(acting, state), by, self.kinds)
+        vectors = ufl.as_vector(first), ufl.as_vector(first + second)
+        return Derivatives(*(compiling.expression(vector, self.rule[0]) for vector in vectors))
 
     def _kinetic(self, effects: list[Any]) -> Any:
         if self.step is None or self.step.velocity is None:
@@ -172,18 +201,34 @@ def _rows(F: Any) -> list[list[Any]]:
     return [[F[i, k] for k in range(3)] for i in range(3)]
 
 
-def _derivatives(energy: Any, by: _Variables) -> tuple[int, list[Any], list[Any]]:
-    """How many variables a component of the displacement has, the first derivatives of ``energy`` by all of them and the pressure,
-    and the upper triangle of the second ones: in the order of ``cells.c``.
+def _silent(effect: Effect, frames: tuple[float, ...]) -> list[tuple[float, float]]:
+    """From which of the ``frames`` to which next one an energy is zero."""
+    if not isinstance(effect, Energy) or not isinstance(effect, Ramped):
+        return []
+    knots = [knot.frame for knot in effect.ramp]
+    return [
+        (a, b)
+        for a, b in pairwise(frames)
+        if not any(map(effect.amount, (a, b, *(knot for knot in knots if a < knot < b))))
+    ]
+
+
+def _instants(frames: tuple[float, ...]) -> list[float]:
+    """The ``frames``, and between two of them each."""
+    return [*frames, *((a + b) / 2 for a, b in pairwise(frames))]
+
+
+def _differentiated(energy: Any, by: _Variables, kinds: int) -> tuple[list[Any], list[Any]]:
+    """The first derivatives of ``energy`` by all variables, of which each component of the displacement has so many ``kinds``, and
+    by the pressure; and the upper triangle of the second ones: in the order of ``cells.c``.
     """
-    placed = not _vanishes(ufl.diff(energy, by.displacement))
     variables: list[tuple[Any, tuple[int, ...]]] = [
-        (by.F, (i, k)) if k < 3 else (by.displacement, (i,)) for i in range(3) for k in range(3 + placed)
+        (by.F, (i, k)) if k < 3 else (by.displacement, (i,)) for i in range(3) for k in range(kinds)
     ]
     variables += [(by.pressure, ())] if by.pressure is not None else []
     first = [_part(ufl.diff(energy, symbol), where) for symbol, where in variables]
     second = [_part(ufl.diff(slope, symbol), where) for i, slope in enumerate(first) for symbol, where in variables[i:]]
-    return 3 + placed, first, second
+    return first, second
 
 
 def _part(derivative: Any, where: tuple[int, ...]) -> Any:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats
-from fem_reference.solvers.fenicsx.contact import Tractions
+from fem_reference.solvers.fenicsx.contact import ContactForces, Tractions
 from fem_reference.solvers.fenicsx.determinants import Determinants
 from fem_reference.solvers.fenicsx.linear import LinearSolveError, LinearSolver
 from fem_reference.solvers.fenicsx.settings import BodySettings
@@ -32,6 +32,26 @@ class Newton:
         self.system, self.linear, self.determinants, self.spent = system, linear, determinants, spent
         self.residual, self.most = settings.residual, settings.newton_iterations
         self.step = system.b.duplicate()
+
+    def solve_among(self, contact: ContactForces | None, frame: float) -> tuple[str | None, int]:
+        """As ``solve``; at first without ``contact`` where nothing is pressed in the state that is there. That stands where it
+        converged and nothing is pressed either: then it is what would have been found with contact.
+        """
+        system, comm = self.system, self.system.unknowns.function_space.mesh.comm
+        before = np.array(system.unknowns.x.array)
+        system.contact = contact if contact and contact.presses(comm) else None
+        failure, iterations = self.solve(frame)
+        if contact is None or system.contact is not None:
+            return failure, iterations
+        if failure is None:
+            with self.spent.on("contact"):
+                contact.update(frame)
+            if not contact.presses(comm):
+                return None, iterations
+        system.unknowns.x.array[:], system.contact = before, contact
+        contact.go_back()
+        failure, more = self.solve(frame)
+        return failure, iterations + more
 
     def solve(self, frame: float) -> tuple[str | None, int]:
         """Solve at ``frame``: why it did not succeed (None: it did), and the iterations. Where every step turns a cell inside out,

@@ -26,6 +26,7 @@ class Restart:
         self.dofs: Ints = names.reshape(len(names), -1)  # of this rank's cells, those that it shares too
         self.cells = np.asarray(body.mesh.topology.original_cell_index, np.int64)[: len(names)]
         self.layout = self._layout()
+        self.note = ""  # on a run that goes on with other effects
 
     def _layout(self) -> str:
         """The name of the file of how unknowns are distributed."""
@@ -41,26 +42,63 @@ class Restart:
         parts = self.body.comm.gather(mine) or []
         return {f"{rank} {name}": array for rank, part in enumerate(parts) for name, array in part.items()}
 
+    @property
+    def _acting(self) -> str:
+        """What acts in the body, in words."""
+        contact = self.body.contact
+        law = "no contact" if contact is None else f"contact {contact.law.stiffness:g} {contact.law.smoothing:g}"
+        return " ".join([*map(repr, self.body.effects), law])
+
     def write(self, frame: float, facts: dict[str, Any]) -> None:
         """Keep the present state, which is that of a ``frame``, with what is to be known of the run until then."""
         body = self.body
         arrays = self._gathered({"unknowns": body.unknowns.x.array} | body.clock.arrays())
         own = {"mesh": self.kept.mesh, "layout": self.layout, "recalled": body.recalled is not None}
-        own |= {"clock": body.clock.facts(), "modes": body.modes, "greatest_energy": body.path.greatest}
+        own |= {
+            "acting": self._acting,
+            "clock": body.clock.facts(),
+            "modes": body.modes,
+            "greatest_energy": body.path.greatest,
+        }
         if body.comm.rank == 0:
             arrays["facts"] = np.array(json.dumps(facts | own))
             write_arrays(self.kept.place(frame), arrays)
 
-    def go_on(self) -> dict[str, Any]:
-        """Take up the last of the states, and know the others again; the facts that were written with it."""
-        body, facts = self.body, dict[str, Any]()
+    def good(self) -> tuple[int, ...]:
+        """The frames of states to go on from: all; of states in which other effects acted, those up to the first that is not in
+        equilibrium with what acts now, and none where time matters. The body is afterwards as it was.
+        """
+        body, found = self.body, list[int]()
+        rest, at = np.array(body.unknowns.x.array), body.at
         for frame in self.kept.frames:
-            arrays = read_arrays(self.kept.place(frame))
-            facts = json.loads(str(arrays["facts"]))
-            layout = read_arrays(self.kept.folder / facts["layout"])
+            arrays, facts, layout = self._read(frame)
+            if facts["acting"] == self._acting:
+                return self.kept.frames
+            if body.clock.matters:
+                return ()
+            body.take_up(frame, self._spread("unknowns", arrays, layout), recalled=True)
+            if body.system.residual() > body.newton.residual:
+                break
+            found.append(frame)
+        body.take_up(at, rest, recalled=True)
+        body.path.greatest = 0.0
+        self.note = f"; effects were added, from frame {found[-1]} on" if found else ""
+        return tuple(found)
+
+    def _read(self, frame: int) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
+        """The arrays of a state, its facts, and its layout."""
+        arrays = read_arrays(self.kept.place(frame))
+        facts = json.loads(str(arrays["facts"]))
+        return arrays, facts, read_arrays(self.kept.folder / facts["layout"])
+
+    def go_on(self, frames: tuple[int, ...]) -> dict[str, Any]:
+        """Take up the state of the last of the ``frames``, and know the others again; the facts that were written with it."""
+        body, facts = self.body, dict[str, Any]()
+        for frame in frames:
+            arrays, facts, layout = self._read(frame)
             if not facts["recalled"]:
                 body.know(frame, self._spread("unknowns", arrays, layout), facts["modes"])
-            if frame == self.kept.frames[-1]:
+            if frame == frames[-1]:
                 names = {name.partition(" ")[2] for name in arrays} - {"", "unknowns"}
                 body.clock.take_up({name: self._spread(name, arrays, layout) for name in names}, facts["clock"])
                 body.take_up(frame, self._spread("unknowns", arrays, layout), recalled=facts["recalled"])

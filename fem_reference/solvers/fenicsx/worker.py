@@ -54,16 +54,15 @@ class Worker:
     def begin(self) -> tuple[tuple[float, ...], Steps]:
         """The frames to march through and the load steps: from rest, or from where a process before this one was cut off."""
         frames, settings = self.job.body.frames, self.settings
-        first = settings.first_step
-        if self.restart is None or not self.restart.kept.frames:
+        first, good = settings.first_step, () if self.restart is None else self.restart.good()
+        if self.restart is None or not good:
             self.report_frame(Step(frames[0], 0, 0, 0, size=first))
         else:
-            facts = self.restart.go_on()
+            facts = self.restart.go_on(good)
             first, self.earlier = facts["size"], facts["cost"]
             self.unstable = dict(facts["unstable"])
             self.ranges.know(facts["ranges"])
-            at = self.restart.kept.frames[-1]
-            frames = tuple(frame for frame in frames if frame >= at)
+            frames = tuple(frame for frame in frames if frame >= good[-1])
         return frames, Steps(first, settings.smallest_step, settings.largest_step)
 
     def run(self) -> None:
@@ -84,6 +83,7 @@ class Worker:
             self.report_frame(reached)
         wanted = sum(frame >= self.job.body.first for frame in self.job.body.frames)
         message = f"all {wanted} frames reached{self.departures()}{self.instability()}{self.ranges}"
+        message += self.restart.note if self.restart else ""
         self.report(status="converged", message=message, cost=self.cost())
 
     def attempt(self, frame: float) -> Attempt:

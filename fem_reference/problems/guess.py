@@ -1,0 +1,129 @@
+"""Where a muscle goes by the motion of its bones, guessed before it is solved, and its shape as a beam."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from fem_reference.foundations.mesh import Floats, enclosed_volume, vertex_areas
+from fem_reference.foundations.motion import apply
+from fem_reference.geometry.signed_distance import signed_distances
+from fem_reference.problems.muscle import RigidBody, Setup
+
+
+@dataclass(frozen=True, eq=False)
+class Guess:
+    """Where ``points`` (n, 3) go that follow ``bones`` by ``weights`` (n, b): as one over the distance to their attachments, so
+    that what is between two of them goes straight, as a muscle does that is pulled tight; to the bones, where nothing is attached.
+    """
+
+    points: Floats
+    bones: tuple[RigidBody, ...]
+    weights: Floats
+
+    @classmethod
+    def of(cls, points: Floats, rest: Setup) -> "Guess":
+        """The guess for a muscle."""
+        if rest.attached:
+            away = [cKDTree(rest.surface.points[entry.vertices]).query(points)[0] for entry in rest.attached]
+        else:
+            away = [np.abs(distance(bone, points)) for bone in rest.bones]
+        near = 1 / np.maximum(np.stack(away, axis=1), 1e-3)
+        bones = tuple(entry.bone for entry in rest.attached) or rest.bones
+        return cls(points, bones, near / near.sum(axis=1, keepdims=True))
+
+    def at(self, frame: float) -> Floats:
+        """Where they are at a frame."""
+        parts = zip(self.bones, self.weights.T, strict=True)
+        return np.sum([share[:, None] * apply(bone.pose(frame), self.points) for bone, share in parts], axis=0)
+
+    def some(self, count: int) -> "Guess":
+        """Of about so many of the points."""
+        every = slice(None, None, max(1, len(self.points) // count))
+        return replace(self, points=self.points[every], weights=self.weights[every])
+
+
+def distance(bone: RigidBody, points: Floats) -> Floats:
+    """The signed distance (n,) [mm] of ``points`` to a bone at rest."""
+    return bone.solid.sample(points).distance if bone.solid else signed_distances(points, bone.surface)
+
+
+def motion(guess: Guess, axis: Floats, numbers: tuple[int, ...]) -> tuple[float, float, float, float]:
+    """The greatest speed, speed sideways of an ``axis`` (3,), jump of velocity and acceleration of a guess, root mean square over
+    its points, by frame numbers: where the velocity changes more than it does before and after, it jumps.
+    """
+    guess, at = guess.some(100), np.linspace(numbers[0], numbers[-1], min(401, 4 * (numbers[-1] - numbers[0]) + 1))
+    velocity = np.diff(np.stack([guess.at(frame) for frame in at]), axis=0) / (at[1] - at[0])
+    first = np.concatenate([np.zeros_like(velocity[:1]), velocity])  # it starts from rest
+    change = _size(np.diff(first, axis=0))
+    typical = float(np.median(change))
+    jumps = change[change > 5 * typical + 1e-12]
+    smooth = change[change <= 5 * typical + 1e-12]
+    sideways = velocity - (velocity @ axis)[..., None] * axis
+    speeds = (float(_size(one).max()) for one in (velocity, sideways))
+    return *speeds, float(jumps.max(initial=0.0)), float(smooth.max(initial=0.0)) / (at[1] - at[0])
+
+
+def _size(vectors: Floats) -> Floats:
+    """The root mean square (f,) of ``vectors`` (f, n, 3) over n."""
+    return np.asarray(np.sqrt((vectors**2).sum(axis=2).mean(axis=1)))
+
+
+def centres(rest: Setup, frame: float | None = None) -> list[Floats]:
+    """The middle of each attachment, at rest or at a frame."""
+    middles = [rest.surface.points[entry.vertices].mean(axis=0, keepdims=True) for entry in rest.attached]
+    if frame is None:
+        return [middle[0] for middle in middles]
+    return [apply(entry.bone.pose(frame), middle)[0] for entry, middle in zip(rest.attached, middles, strict=True)]
+
+
+def spans(rest: Setup, numbers: tuple[int, ...]) -> Floats:
+    """The distance (f,) [mm] between the middles of the first attachment and of the last, by frame; nothing without two."""
+    if len(rest.attached) < 2:
+        return np.zeros(0)
+    ends = [centres(rest, number) for number in numbers]
+    return np.array([float(np.linalg.norm(middles[0] - middles[-1])) for middles in ends])
+
+
+def axis_of(rest: Setup) -> Floats:
+    """The direction (3,) from the first attachment to the last; 0 without two."""
+    if len(rest.attached) < 2:
+        return np.zeros(3)
+    middles = centres(rest)
+    return np.asarray((middles[-1] - middles[0]) / np.linalg.norm(middles[-1] - middles[0]))
+
+
+def sag(rest: Setup, frames: list[int], travel: float) -> float:
+    """How far the axis gets from the straight line between two attachments: as it does at rest in the middle third, and as it is
+    bent by bones that turn; what is only shifted sideways is off by a twentieth of that, in two waves, which are stiffer.
+    """
+    if len(rest.attached) < 2:
+        return 0.0
+    axis, away = axis_of(rest), rest.surface.points - centres(rest)[0]
+    along = away @ axis / length_of(rest)
+    middle = away[(along > 1 / 3) & (along < 2 / 3)]
+    off = middle - (middle @ axis)[:, None] * axis
+    at_rest = float(np.linalg.norm(off.mean(axis=0))) if len(off) else 0.0
+    return at_rest + max(turn(rest, frame) for frame in frames) * length_of(rest) / 8 + 0.05 * travel
+
+
+def turn(rest: Setup, frame: float) -> float:
+    """By how much the first and the last of the bones that are attached have turned against each other at a frame [rad]."""
+    first, last = (rest.attached[i].bone.pose(frame)[:3, :3] for i in (0, -1))
+    return float(Rotation.from_matrix(first.T @ last).magnitude())
+
+
+def length_of(rest: Setup) -> float:
+    """From the first attachment to the last, or all of the muscle where it has not two."""
+    middles = centres(rest)
+    extent = float(np.linalg.norm(np.ptp(rest.surface.points, axis=0)))
+    return float(np.linalg.norm(middles[0] - middles[-1])) or extent if len(middles) > 1 else extent
+
+
+def thickness_of(rest: Setup) -> float:
+    """Of a plate of its volume and area."""
+    surface = rest.surface
+    return (
+        2 * enclosed_volume(surface.points, surface.triangles) / vertex_areas(surface.points, surface.triangles).sum()
+    )

@@ -1,0 +1,90 @@
+"""What does not act yet is not in the equations, and what is solved is the same: contact without pressure, activation of zero."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("fem_reference.solvers.fenicsx.dolfinx_door", reason="FEniCSx is not installed")
+
+from fem_reference.effects import make
+from fem_reference.geometry.rigid_bodies import Box
+from fem_reference.problems import shapes
+from fem_reference.problems.body import Body, ByCell
+from fem_reference.problems.contact import Contact, Obstruction
+from fem_reference.solvers.fenicsx import BodySettings
+from fem_reference.solvers.fenicsx.body import AssembledBody
+from fem_reference.solvers.fenicsx.contact import ContactForces
+from fem_reference.verification import parts
+
+pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore:(cmap|dofmap) is deprecated")]
+
+FRAMES = (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+
+
+def down_and_up(frame: float) -> np.ndarray:
+    """0.1 mm a frame, there and back."""
+    pose = np.eye(4)
+    pose[2, 3] = -0.1 * min(frame, 6 - frame)
+    return pose
+
+
+def course() -> tuple[list[np.ndarray], list[bool]]:
+    """A plate comes down on a cube of 1 mm and leaves it: by frame the unknowns, and whether contact was in the equations."""
+    plate = Obstruction("plate", Box((0.5, 0.5, 1.25), (4.0, 4.0, 0.2), 0.0), down_and_up)
+    law = Contact("z1", 1.0, 0.01)
+    mesh = shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
+    body = Body(mesh, parts.neo_hooke(0.01, 10.0), parts.SYMMETRY, FRAMES, contact=law, obstructions=(plate,))
+    built = AssembledBody(body, BodySettings(element="P2/P1", first_step=1.0, residual=1e-12, reuse=False))
+    states, there = [], []
+    for frame in FRAMES[1:]:
+        assert built.attempt(frame).failure is None
+        states.append(np.array(built.unknowns.x.array))
+        there.append(built.system.contact is not None)
+    return states, there
+
+
+def test_until_something_is_pressed_contact_is_not_in_the_equations(monkeypatch: pytest.MonkeyPatch) -> None:
+    late, there = course()
+    monkeypatch.setattr(ContactForces, "presses", lambda *_: True)
+    always, everywhere = course()
+    assert there == [False, True, True, True, True, False]  # from 0.15 mm on; at frame 5 it still begins pressed
+    assert all(everywhere)
+    for one, other in zip(late, always, strict=True):
+        assert one == pytest.approx(other, abs=1e-9)
+    assert np.abs(late[2]).max() > 0.1
+    assert late[0] == pytest.approx(0, abs=1e-12)
+    assert late[-1] == pytest.approx(0, abs=1e-12)
+
+
+def activated(ramp: list[tuple[float, float]] | None) -> tuple[list[np.ndarray], list[object]]:
+    """A cube whose fibres pull along x by a ``ramp`` of (frame, amount), or that has no such effect: by frame the unknowns and the
+    expressions that were summed.
+    """
+    effects = parts.neo_hooke(0.01, 10.0)
+    if ramp is not None:
+        knots = [{"frame": frame, "amount": amount} for frame, amount in ramp]
+        effects += (make("active_tension", tension=0.002, ramp=knots),)
+    mesh = shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
+    fibre = ByCell(np.tile([1.0, 0.0, 0.0], (len(mesh.cells), 1)))
+    plate = Obstruction("plate", Box((0.5, 0.5, 1.05), (4.0, 4.0, 0.2), 0.0), down_and_up)
+    law = Contact("z1", 1.0, 0.01)
+    body = Body(mesh, effects, parts.SYMMETRY, FRAMES, fibre, contact=law, obstructions=(plate,))
+    built = AssembledBody(body, BodySettings(element="P2/P1", first_step=1.0, residual=1e-12, reuse=False))
+    states, summed = [], []
+    for frame in FRAMES[1:]:
+        assert built.attempt(frame).failure is None
+        states.append(np.array(built.unknowns.x.array))
+        summed.append(built.system.cells.form.derivatives)
+    return states, summed
+
+
+def test_an_activation_that_is_zero_over_frames_is_not_summed_there() -> None:
+    late, summed = activated([(0, 0.0), (2, 0.0), (3, 1.0), (4, 0.0)])
+    never, _ = activated(None)
+    assert summed[0] is summed[1] is summed[4] is summed[5]
+    assert summed[2] is not summed[0]
+    assert summed[3] is summed[0], "zero from here on"
+    for frame in (0, 1, 3, 4, 5):
+        assert late[frame] == pytest.approx(never[frame], abs=1e-9)
+    assert np.abs(late[2] - never[2]).max() > 1e-3
+    _, always = activated([(0, 0.0), (6, 1.0)])
+    assert len({id(one) for one in always}) == 1
