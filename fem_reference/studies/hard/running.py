@@ -228,6 +228,7 @@ def _followed(built: Problem, frames: list[Frame]) -> Followed:
         built.free,
         integrated=_all(frames, "volume_ratio"),
         negative_modes=_all(frames, "negative_modes"),
+        material_modes=_all(frames, "material_modes"),
         least_determinant=_least(frames),
     )
 
