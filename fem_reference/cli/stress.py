@@ -33,6 +33,7 @@ def run(options: argparse.Namespace) -> int:
     found = running.run(records.read_all(tuple(options.names)), options.solver, in_steps=options.steps)
     parts = [Part((name,), name) for name in options.names]
     parts += [Part(("--solver", name), name) for name in options.solver]
+    parts += [Part(("--steps",), "steps")] if options.steps else []
     _, lines = written(options, Asked("stress", PAGE, tuple(parts)), partial(report.write_stress, found))
     write_output(facts(found), "\n".join([stress_page.text(found), *lines]), options)
     return DONE
