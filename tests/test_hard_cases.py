@@ -67,7 +67,8 @@ def test_fibres_that_pull_with_many_shear_moduli_end_alike_whatever_the_steps() 
 def test_a_bone_that_contact_does_not_hold_is_no_success() -> None:
     found = cell("bones.erleben_spike", "fenicsx")
     assert found.verdict == "refused"
-    assert 'contact gives way: the surface is 0.4 mm deep in "spike", whose middle is at 0.5 mm' in found.sentence
+    assert "converged, but contact gives way: the surface is " in found.sentence
+    assert 'mm deep in "spike", whose middle is at 0.5 mm' in found.sentence
 
 
 @pytest.mark.parametrize(

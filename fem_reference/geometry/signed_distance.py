@@ -76,8 +76,11 @@ class Grid:
 
     @cached_property
     def half_thickness(self) -> float:
-        """How deep [mm] its deepest place is at most: a spline is nowhere below its coefficients."""
-        return float(-self.coefficients.min())
+        """How deep [mm] its deepest place is at most: a spline is nowhere below its coefficients; infinite where nodes are too far
+        apart to know it.
+        """
+        deepest = float(-self.coefficients.min())
+        return deepest if deepest > self.spacing else np.inf
 
     def clearance(self, within: float) -> Clearance:
         """How far points are at least from where the distance is at most ``within`` [mm]."""
