@@ -1,5 +1,6 @@
 """Files that anybody may have written, damaged at random: what reads them, and how they are damaged."""
 
+import copy
 import json
 import math
 import re
@@ -121,7 +122,7 @@ def _tree(draw: Any, tree: Any) -> Any:
 
 def _change(draw: Any, inside: Any, key: Any) -> None:
     what = draw(st.sampled_from(["set", "set", "set", "set", "scale", "delete", "add", "copy"]))
-    value = draw(st.sampled_from(NASTY))
+    value = copy.deepcopy(draw(st.sampled_from(NASTY)))  # which the next change may change
     if what == "delete":
         del inside[key]
     elif what == "add" and isinstance(inside, dict):

@@ -28,7 +28,7 @@ COMMANDS = {
     "run": ["run"],
     "error bar": ["run", "--error-bar"],
     "page": ["compare", "--candidate", "pbd"],
-    "study": ["study", "--solver", "fenicsx"],
+    "study": ["study", "--solver", "arap"],
 }
 # What is no answer: it takes another time each time.
 _TIMES = ("seconds", "cost", "machine", "peak_memory", "processor", "finished", "time", "folder", "unknowns_per")
@@ -97,39 +97,41 @@ class Subject:
     """A command on the small scene, and how it ends when nothing befalls it."""
 
     def __init__(self, name: str, place: Path, every: int) -> None:
-        self.words, self.place, self.every = COMMANDS[name], place, every
+        self.words, self.every = COMMANDS[name], every
         self.scene = small.write(place / "bar")
+        # The same each time: keys of runs may name files that lie there.
+        self.out, self.scratch = place / "out", place / "tmp"
+        self.scratch.mkdir()
         began = time.perf_counter()
-        self.whole = self.finish("whole")
-        self.seconds = time.perf_counter() - began
+        self.whole = self.finish()
+        self.seconds, self.frames = time.perf_counter() - began, self.stored()
+        shutil.rmtree(self.out)
 
-    def start(self, out: str) -> subprocess.Popen[str]:
+    def start(self) -> subprocess.Popen[str]:
         """The command, in a group of processes of its own."""
-        scratch = self.place / f"{out}-tmp"
-        scratch.mkdir(exist_ok=True)
         verb, *rest = self.words
-        words = [verb, str(self.scene), *rest, "--out", str(self.place / out), "--set", f"frames.every={self.every}"]
+        words = [verb, str(self.scene), *rest, "--out", str(self.out), "--set", f"frames.every={self.every}"]
         return subprocess.Popen(
             command("-m", "fem_reference", *words),
-            env=environment(OMP_NUM_THREADS="1", TMPDIR=str(scratch)),
+            env=environment(OMP_NUM_THREADS="1", TMPDIR=str(self.scratch)),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,
         )
 
-    def finish(self, out: str) -> dict[str, Any]:
+    def finish(self) -> dict[str, Any]:
         """How it ends; RuntimeError where it does not end well."""
-        process = self.start(out)
+        process = self.start()
         _, errors = process.communicate()
         if process.returncode not in (0, 1):
             raise RuntimeError(f"{self.words} ended with {process.returncode}: {errors[-1000:]}")
-        return _ended(self.place / out, self.place / f"{out}-tmp")
+        return _ended(self.out, self.scratch)
 
-    def kill(self, out: str, after: float, frames: int = 0) -> bool:
+    def kill(self, after: float, frames: int = 0) -> bool:
         """Start it, and kill it, and nobody else, so many seconds after so many more frames are stored; whether it still ran."""
-        process, stored = self.start(out), self.stored(out)
-        while process.poll() is None and self.stored(out) < stored + frames:
+        process, stored = self.start(), self.stored()
+        while process.poll() is None and self.stored() < stored + frames:
             time.sleep(0.01)
         try:
             process.communicate(timeout=after)
@@ -139,9 +141,9 @@ class Subject:
             return True
         return False
 
-    def stored(self, out: str) -> int:
+    def stored(self) -> int:
         """How many frames of its runs are stored."""
-        return len(list((self.place / out).glob("runs/*/surface/frame_*.vtp")))
+        return len(list(self.out.glob("runs/*/surface/frame_*.vtp")))
 
     def compare(self, end: dict[str, Any]) -> list[str]:
         """What is not as where nothing befell it."""
@@ -155,14 +157,14 @@ class Subject:
         return found
 
 
-def trial(subject: Subject, number: int, moments: random.Random) -> tuple[str, list[str]]:
+def trial(subject: Subject, moments: random.Random) -> tuple[str, list[str]]:
     """Kill a command once or twice, let it end, and compare."""
-    out, frames = f"out{number}", subject.stored("whole")
-    times = [(subject.seconds * moments.uniform(0.1, 0.95), 0), (moments.uniform(0, 0.3), moments.randrange(1, frames))]
+    times = [(subject.seconds * moments.uniform(0.1, 0.95), 0)]
+    times += [(moments.uniform(0, 0.3), moments.randrange(1, subject.frames))]
     chosen = moments.choice((times[:1], times[1:], times[1:], [times[1], times[1]]))
-    killed = [subject.kill(out, *one) for one in chosen]
-    found = subject.compare(subject.finish(out))
-    shutil.rmtree(subject.place / out)
+    killed = [subject.kill(*one) for one in chosen]
+    found = subject.compare(subject.finish())
+    shutil.rmtree(subject.out)
     said = [
         f"{after:.2f} s after {stored} frames{'' if dead else ' (it had ended)'}"
         for (after, stored), dead in zip(chosen, killed, strict=True)
@@ -185,8 +187,8 @@ def main() -> int:
             (Path(folder) / name).mkdir()
             subject = Subject(name, Path(folder) / name, options.every)
             sys.stdout.write(f"{name}: {subject.seconds:.1f} s, {len(subject.whole['runs'])} runs\n")
-            for number in range(i, options.kills, len(names)):
-                times, found = trial(subject, number, moments)
+            for _ in range(i, options.kills, len(names)):
+                times, found = trial(subject, moments)
                 bad += bool(found)
                 sys.stdout.write(f"  killed after {times}: {'; '.join(found[:5]) or 'the same end'}\n")
                 sys.stdout.flush()

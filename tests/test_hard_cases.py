@@ -11,8 +11,9 @@ from fem_reference.assessment import health, stress
 from fem_reference.assessment.stress import Bound, Cell, Course
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import tet_volumes
+from fem_reference.problems.muscle_body import as_body
 from fem_reference.scenes.case import SolverChoice
-from fem_reference.studies.hard import blocks, records, running
+from fem_reference.studies.hard import blocks, records, running, steps
 
 CASES = {hard.name: hard for hard in records.read_all()}
 FAST = [name for name in running.choices() if name not in ("fenicsx", "scikit_fem")]
@@ -53,6 +54,41 @@ def test_at_rest_stays_at_rest(solver) -> None:
 def test_the_reference_stays_at_rest_in_every_unit_and_place() -> None:
     for name in ("at_rest.millimetres", "at_rest.metres", "at_rest.kilometre_away"):
         assert cell(name, "fenicsx").verdict == "ok"
+
+
+@pytest.mark.slow
+def test_fibres_that_pull_with_many_shear_moduli_end_alike_whatever_the_steps() -> None:
+    found = cell("activation.both_ends_held", "fenicsx")
+    assert found.verdict == "ok"
+    assert float(found.sentence.split("steps: 1: ")[1].split(" %")[0]) < steps.SAME
+
+
+@pytest.mark.slow
+def test_a_bone_that_contact_does_not_hold_is_no_success() -> None:
+    found = cell("bones.erleben_spike", "fenicsx")
+    assert found.verdict == "refused"
+    assert "converged, but contact gives way: the surface is " in found.sentence
+    assert 'mm deep in "spike", whose middle is at 0.5 mm' in found.sentence
+
+
+@pytest.mark.parametrize(
+    ("name", "got", "want"),
+    [
+        ("bones.deep_overlap", "5.9 mm of overlap with the muscle at rest", "its middle is 6 mm deep"),
+        ("degenerate.coincident", r"2.8e\+07 times as long as thick", "double precision"),
+    ],
+)
+def test_what_no_mesh_and_no_direction_resolves_is_refused(name, got, want) -> None:
+    with pytest.raises(InputError, match=f"got {got}, want less.*{want}"):
+        as_body(blocks.problem(CASES[name]))
+
+
+def test_the_farthest_frame_is_where_load_steps_are_compared() -> None:
+    surface = blocks.problem(CASES["at_rest.millimetres"]).surface
+    moved = [surface.points + shift for shift in (0.0, 3.0, 1.0)]
+    assert steps.farthest(health.Followed((0, 5, 10), surface, np.array(moved))).until == 5
+    assert steps.farthest(health.Followed((0, 5), surface, np.array(moved[:1] * 2))) is None
+    assert steps.farthest(health.Followed((0,), surface, np.array(moved[:1]))) is None
 
 
 def test_what_explodes_with_finite_numbers_is_found_out() -> None:

@@ -220,6 +220,13 @@ def test_an_index_names_files_in_its_folder_only(tmp_path: Path) -> None:
             files.read_pvd(tmp_path / "below" / "a.pvd")
 
 
+def test_a_name_that_no_file_can_have_is_refused(tmp_path: Path) -> None:
+    files.write_pvd(tmp_path / "a.pvd", [(0, "b" * 5000 + ".vtp")])
+    (_, named), *_ = files.read_pvd(tmp_path / "a.pvd")
+    with pytest.raises(InputError, match="got no file, want a "):
+        files.read_surface(named, 1.0)
+
+
 def _series(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder.mkdir()
     monkeypatch.chdir(folder)  # where meshio puts its .h5

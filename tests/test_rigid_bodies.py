@@ -159,6 +159,13 @@ def test_centres_and_axes_have_some_normal_and_no_curvature(name: str, place: tu
 
 
 @any_body
+def test_nothing_is_deeper_than_half_the_thickness(body: Obstacle) -> None:
+    deepest = -body.sample(_points(3, 20000)).distance.min()
+    assert deepest <= body.half_thickness
+    assert deepest > 0.8 * body.half_thickness or not np.isfinite(body.half_thickness)
+
+
+@any_body
 def test_not_a_number_stays_so(body: Obstacle) -> None:
     assert np.isnan(body.sample(np.array([[0.0, np.nan, 0.0]])).distance).all()
     assert [len(part) for part in body.sample(np.zeros((0, 3)))] == [0, 0, 0]

@@ -171,6 +171,13 @@ def test_what_is_not_finite_has_no_distance(ball: Grid, bad: float) -> None:
     assert len(ball.sample(np.zeros((0, 3))).distance) == 0
 
 
+def test_nothing_is_deeper_than_half_the_thickness(ball: Grid) -> None:
+    inside = np.random.default_rng(1).uniform(-1, 1, (2000, 3))
+    deepest = -ball.sample(inside).distance.min()
+    assert 0 < deepest <= ball.half_thickness < 1.4 * deepest
+    assert build(shapes.sphere(3, 1.0), 3.0, 4.0).half_thickness == np.inf
+
+
 def test_place_of_the_body_does_not_matter(ball: Grid) -> None:
     moved = build(BALL.moved_to(BALL.points + SHIFT), 1.0, 4.0)
     points = _shell(7, 7.0, 13.0)

@@ -98,8 +98,8 @@ def test_a_command_that_is_killed_ends_as_if_it_had_not_been(tmp_path: Path) -> 
     """``tests/kills.py`` does so more often, with error bars, pages and studies too."""
     subject = kills.Subject("run", tmp_path, 5)
     for frames in (0, 3):
-        assert subject.kill("out", 0.1, frames)
-    assert subject.compare(subject.finish("out")) == []
+        assert subject.kill(0.1, frames)
+    assert subject.compare(subject.finish()) == []
 
 
 def begun(folder: Path, frames: int = 2, status: str | None = None) -> Writer:

@@ -20,8 +20,9 @@ class Followed:
     """A run as its health is measured: ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (at rest) at frame ``numbers``;
     of a solver with tetrahedra their ``mesh`` at rest and ``nodes`` (f, k, 3); the ``bones``, of which vertices that are ``free``
     (n,) may be in contact; ``truth`` (f, n, 3), where the reference has the vertices; ``integrated`` (f,), V/V0 as a solver has
-    that itself; ``negative_modes`` (f,) and ``least_determinant`` (f,), the least det F, where those are known; or a scalar
-    field's ``values`` (f, N) and the ``range`` that its boundary values span.
+    that itself; ``negative_modes`` (f,), ``material_modes`` (f,), those of them that the material has for certain, and
+    ``least_determinant`` (f,), the least det F, where those are known; or a scalar field's ``values`` (f, N) and the ``range`` that
+    its boundary values span.
     """
 
     numbers: tuple[int, ...]
@@ -34,6 +35,7 @@ class Followed:
     truth: Floats | None = None
     integrated: Floats | None = None
     negative_modes: Floats | None = None
+    material_modes: Floats | None = None
     least_determinant: Floats | None = None
     values: Floats | None = None
     range: tuple[float, float] = (0.0, 0.0)
@@ -196,34 +198,14 @@ QUANTITIES: dict[str, tuple[str, Callable[[Followed], Found]]] = {
 }
 
 
-# Beyond this squeeze mixed elements count negative modes that the material has not (docs/laws.md).
-_CERTAIN = 2 / 3
-
-
 def unstable(run: Followed) -> str:
     """Where a run is an unstable equilibrium, in words; empty where it is not, or nobody counted."""
     if run.negative_modes is None or not (run.negative_modes > 0).any():
         return ""
     first, most = int(np.argmax(run.negative_modes > 0)), run.negative_modes.max()
-    squeezed = least_stretch(run)
-    doubt = ""
-    if squeezed < _CERTAIN:
-        doubt = f", some of which may be the elements' alone: tetrahedra are squeezed to {squeezed:.2g}"
+    own = np.nan if run.material_modes is None else np.nanmax(run.material_modes)
+    doubt = "" if np.isnan(own) else f", of which the material has {own:.0f} for certain"
     return f"an unstable equilibrium from frame {run.numbers[first]} on, with up to {most:.0f} negative modes{doubt}"
-
-
-def least_stretch(run: Followed) -> float:
-    """The least principal stretch of any tetrahedron at any frame; 1 of what has none."""
-    if run.mesh is None or run.nodes is None:
-        return 1.0
-    corners = run.mesh.points[run.mesh.tets]
-    rest = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))
-    least = 1.0
-    for nodes in run.nodes:
-        corners = nodes[run.mesh.tets]
-        stretches = np.linalg.svd(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2) @ rest, compute_uv=False)
-        least = min(least, float(stretches.min()))
-    return least
 
 
 def course(run: Followed, quantity: str) -> Course:

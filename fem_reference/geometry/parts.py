@@ -232,7 +232,7 @@ def _outwards(parts: Parts, label: int) -> tuple[Floats, float]:
     ends = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     corners = parts.points[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals = np.repeat(normals / np.linalg.norm(normals, axis=1, keepdims=True), 3, axis=0)
+    normals = np.repeat(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _TINY), 3, axis=0)
     _, which, count = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
     alone = count[which.ravel()] == 1
     along = parts.points[ends[alone, 1]] - parts.points[ends[alone, 0]]

@@ -34,6 +34,11 @@ class Obstacle(Protocol):
         """A bound of the length of the gradient."""
         ...
 
+    @property
+    def half_thickness(self) -> float:
+        """How deep [mm] its deepest place is."""
+        ...
+
     def clearance(self, within: float) -> Callable[[Floats], Floats]:
         """What bounds from below how far (n,) [mm] each of points (n, 3) is from where the distance is at most ``within`` [mm]."""
         ...
@@ -64,6 +69,11 @@ class HalfSpace(Exact):
         if not np.linalg.norm(self.normal) > 0:
             raise InputError("half space: normal", self.normal, "a direction")
 
+    @property
+    def half_thickness(self) -> float:
+        """None: it goes on for ever."""
+        return np.inf
+
     def sample(self, points: Floats) -> Sampled:
         """``(x - point) . normal``."""
         normal = np.asarray(self.normal, float) / np.linalg.norm(self.normal)
@@ -79,6 +89,11 @@ class Sphere(Exact):
 
     def __post_init__(self) -> None:
         _check_length("sphere: radius", self.radius)
+
+    @property
+    def half_thickness(self) -> float:
+        """The radius [mm]."""
+        return self.radius
 
     def sample(self, points: Floats) -> Sampled:
         """``|x - centre| - radius``."""
@@ -97,6 +112,11 @@ class Capsule(Exact):
     def __post_init__(self) -> None:
         _check_length("capsule: radius", self.radius)
         _check_axis("capsule: end", self.start, self.end)
+
+    @property
+    def half_thickness(self) -> float:
+        """The radius [mm]."""
+        return self.radius
 
     def sample(self, points: Floats) -> Sampled:
         """The distance to the segment, less the radius."""
@@ -122,6 +142,11 @@ class Box(Exact):
         if not 0 <= self.rounding <= min(self.size) / 2:
             raise InputError("box: rounding", self.rounding, "from 0 to half of the shortest edge")
 
+    @property
+    def half_thickness(self) -> float:
+        """Half the shortest edge [mm]."""
+        return min(self.size) / 2
+
     def sample(self, points: Floats) -> Sampled:
         """The distance to a box smaller by the rounding on each side, less the rounding."""
         away = points - self.centre
@@ -143,6 +168,11 @@ class Cylinder(Exact):
     def __post_init__(self) -> None:
         _check_length("cylinder: radius", self.radius)
         _check_axis("cylinder: end", self.start, self.end)
+
+    @property
+    def half_thickness(self) -> float:
+        """The radius, or half the length [mm]."""
+        return float(min(self.radius, np.linalg.norm(np.subtract(self.end, self.start)) / 2))
 
     def sample(self, points: Floats) -> Sampled:
         """The distance to a rectangle, in the half-plane of the distances from the axis and from the middle."""

@@ -74,6 +74,14 @@ class Grid:
         steps = [np.abs(np.diff(self.coefficients, axis=axis)).max() for axis in range(3)]
         return float(np.linalg.norm(steps)) / self.spacing
 
+    @cached_property
+    def half_thickness(self) -> float:
+        """How deep [mm] its deepest place is at most: a spline is nowhere below its coefficients; infinite where nodes are too far
+        apart to know it.
+        """
+        deepest = float(-self.coefficients.min())
+        return deepest if deepest > self.spacing else np.inf
+
     def clearance(self, within: float) -> Clearance:
         """How far points are at least from where the distance is at most ``within`` [mm]."""
         return of_spline(self.coefficients, np.asarray(self.origin), self.spacing, within)

@@ -23,7 +23,7 @@ from fem_reference.io.blocks import Tree
 from fem_reference.io.formats import Format, formats, vtk
 from fem_reference.io.references import beside, parsed_xml
 from fem_reference.io.soup import Lines
-from fem_reference.io.texts import check_size
+from fem_reference.io.texts import check_size, is_file
 
 # The most bytes of a mesh, a table or an index: a million triangles, which no mesher and no solver of ours takes. What is read
 # of a text takes up to thirty times as much.
@@ -227,7 +227,7 @@ def clear(path: Path) -> None:
 
 def _attempt[T](read: Callable[[Path], T], path: Path, want: str) -> T:
     """What ``read`` makes of the file; whatever a reader raises over a damaged file becomes an InputError."""
-    if not path.is_file():
+    if not is_file(path):
         raise InputError(path, "no file", want)
     check_size(path, MOST_BYTES, want)
     try:

@@ -55,6 +55,14 @@ def read_json(path: Path, want: str) -> Any:
     return value
 
 
+def is_file(path: Path) -> bool:
+    """Whether it is one; not where a name is longer than names of files can be."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False
+
+
 def check_size(path: Path, most: int, want: str) -> None:
     """InputError where a file has more than ``most`` bytes."""
     if (size := path.stat().st_size) > most:
@@ -62,7 +70,7 @@ def check_size(path: Path, most: int, want: str) -> None:
 
 
 def _text(path: Path, most: int, want: str) -> str:
-    if not path.is_file():
+    if not is_file(path):
         raise InputError(path, "no file", want)
     try:
         check_size(path, most, want)

@@ -7,14 +7,19 @@ import numpy as np
 
 from fem_reference.effects import Interaction
 from fem_reference.effects.contact import Contact as ContactEffect
-from fem_reference.foundations.mesh import Floats, boundary
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, TetMesh, boundary, tet_volumes
 from fem_reference.foundations.motion import apply
 from fem_reference.problems.body import Body, Cells, Prescribed
 from fem_reference.problems.contact import Contact, Obstruction
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import Problem, RigidBody
 
 # Frame numbers before the first one over which an overlap at rest is removed.
 RELAXING = 10.0
+# Where a bone is overlapped at rest down to this share of its half thickness, no direction leads out.
+_MIDDLE = 0.95
+# Cells that are so many times longer than thick: stiffnesses are as the square of that, and 16 digits do not hold both.
+_THINNEST = 1e6
 
 
 @dataclass(frozen=True)
@@ -45,6 +50,7 @@ def as_body(problem: Problem) -> Body:
     the rest of its skin is ``"free"``.
     """
     mesh = problem.mesh
+    _check_thickness(mesh)
     attached = np.concatenate([np.zeros((0, 3), int), *(mesh.facets[entry.attachment] for entry in problem.attached)])
     skin, _ = boundary(mesh.tets)
     taken = {tuple(facet) for facet in np.sort(attached, axis=1).tolist()}
@@ -73,9 +79,34 @@ def _among_bones(body: Body, problem: Problem, effect: ContactEffect) -> Body:
     assert problem.skin is not None  # built with the effect
     bones = [bone for bone in problem.bones if effect.is_by(bone.name)]
     first, points = body.frames[0], problem.skin.points
-    nearest = min((bone.shape.sample(points).distance.min(initial=np.inf) for bone in bones), default=np.inf)
+    nearest = min((_nearest(bone, points) for bone in bones), default=np.inf)
     before = first - RELAXING if nearest < effect.smoothing else None
     law = Contact(problem.skin, effect.stiffness, effect.smoothing, None if before is None else (before, first))
     frames = body.frames if before is None else (before, *body.frames)
     obstructions = tuple(Obstruction(bone.name, bone.shape, From(first, bone.pose)) for bone in bones)
     return replace(body, frames=frames, contact=law, obstructions=obstructions)
+
+
+def _nearest(bone: RigidBody, points: Floats) -> float:
+    """The least distance [mm] to a bone; InputError where a point is in its middle."""
+    nearest, half = float(bone.shape.sample(points).distance.min(initial=np.inf)), bone.shape.half_thickness
+    if nearest < -_MIDDLE * half:
+        got = f"{-nearest:.3g} mm of overlap with the muscle at rest"
+        raise InputError(
+            f'bone "{bone.name}"', got, f"less: its middle is {half:.3g} mm deep, and from there no side is nearer"
+        )
+    return nearest
+
+
+def _check_thickness(mesh: TetMesh) -> None:
+    """InputError where a cell is too thin for double precision."""
+    corners = mesh.points[mesh.tets]
+    longest = np.linalg.norm(corners[:, [0, 0, 0, 1, 1, 2]] - corners[:, [1, 2, 3, 2, 3, 3]], axis=2).max(axis=1)
+    ratios = longest**3 / (6 * tet_volumes(mesh.points, mesh.tets))
+    worst = int(np.argmax(ratios))
+    if not ratios[worst] < _THINNEST:
+        x, y, z = corners[worst].mean(axis=0)
+        place = f"cell {worst} at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
+        raise InputError(
+            place, f"{ratios[worst]:.1e} times as long as thick", f"less than {_THINNEST:g}, for double precision"
+        )

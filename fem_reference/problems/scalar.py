@@ -155,10 +155,9 @@ def _numbers(path: Path) -> Floats:
 
 
 def _whole_numbers(path: Path, values: Floats) -> Ints:
-    if (values != np.round(values)).any():
-        raise InputError(
-            str(path), f"the vertex {values[values != np.round(values)][0]:g}", "vertices, numbered from 1"
-        )
+    wrong = (values != np.round(values)) | (np.abs(values) > np.iinfo(np.int32).max)
+    if wrong.any():
+        raise InputError(str(path), f"the vertex {values[wrong][0]:g}", "vertices, numbered from 1")
     return np.asarray(values.astype(np.int64))
 
 

@@ -14,13 +14,19 @@ from fem_reference.runs.store import Run
 
 def _facts(_: Comparison) -> dict[str, Any]:
     """What its alarms are made of."""
-    return {"inversion": inversion, "least": least, "greatest": greatest}
+    return {"inversion": inversion, "least": least, "greatest": greatest, "gap": gap}
 
 
 def greatest(run: Run, scalar: str) -> float:
     """The greatest value of a scalar over the frames that have one, NaN without any."""
     values = run.scalars[scalar]
     return float(np.nanmax(values)) if np.isfinite(values).any() else float("nan")
+
+
+def gap(run: Run) -> float:
+    """The energy gap that is farthest from 0 [%], NaN without any."""
+    values = run.scalars["energy_gap"]
+    return 100 * float(values[np.nanargmax(np.abs(values))]) if np.isfinite(values).any() else math.nan
 
 
 def least(measure: Measure) -> float:

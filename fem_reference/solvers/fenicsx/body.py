@@ -130,7 +130,7 @@ class AssembledBody:
         failure, iterations = self.newton.solve_among(self.contact, frame)
         smallest = self.determinants.smallest()
         with self.spent.on("contact"):
-            through = self.contact.tunnelled(self.comm) if self.contact and failure is None else None
+            through = self.contact.lost(self.comm) if self.contact and failure is None else None
         lost = self.validity.collapsed() if failure is None and smallest.value > 0 else None
         jump = self.path.jumped(before) if failure is None and smallest.value > 0 else None
         if failure is None and smallest.value > 0 and through is None and lost is None and jump is None:
@@ -240,17 +240,13 @@ class AssembledBody:
         contact = self.contact.scalars(self.comm) if self.contact else {}
         moving = {} if self.kinetic_form is None else {"kinetic_energy": self.integral(self.kinetic_form)}
         gap = {"energy_gap": self.path.take_gap()} if self.conserves else {}
-        return (
-            contact
-            | moving
-            | gap
-            | {
-                "min_det_F_quadrature": self.determinants.smallest("quadrature point").value,
-                "min_det_F_vertices": self.determinants.smallest("vertex").value,
-                "volume_ratio": self.validity.volume_ratio(),
-                "energy": self.integral(self.energy_form),
-            }
-        )
+        own = {
+            "min_det_F_quadrature": self.determinants.smallest("quadrature point").value,
+            "min_det_F_vertices": self.determinants.smallest("vertex").value,
+            "volume_ratio": self.validity.volume_ratio(),
+            "energy": self.integral(self.energy_form),
+        }
+        return contact | moving | gap | own
 
     def examine(self, frame: float) -> float | None:
         """In how many directions the energy falls from the present state, that of a ``frame`` which was reached; the state is kept
@@ -270,6 +266,12 @@ class AssembledBody:
             self.known.add(State(self._acting(frame), np.array(self.unknowns.x.array), modes))
         self.modes = modes
         return modes
+
+    def modes_of_material(self) -> float:
+        """Of the negative modes of the present state, those that the material has for certain."""
+        assert self.stability is not None  # it has counted some
+        with self.clock.slow(np.array(self.unknowns.x.array)):
+            return self.stability.of_material()
 
     def integral(self, form: Any) -> float:
         """A compiled form, summed over the ranks."""

@@ -101,12 +101,13 @@ class CellSums:
         for some in self._chunks():
             self._add(self.form.derivatives.first, some, residual)
 
-    def add_tangent(self, into: Tangent, residual: Floats, moves: Floats | None) -> None:
+    def add_tangent(self, into: Tangent, residual: Floats, moves: Floats | None, *, pointwise: bool = False) -> None:
         """Add the tangent ``into`` its entries, and what is out of balance to ``residual``: where there are ``moves`` (n,) of the
-        displacement, what they change it by as well, to first order.
+        displacement, what they change it by as well, to first order. ``pointwise``: as if the pressure followed the volume at
+        every point, and was no unknown of its own.
         """
         for some in self._chunks():
-            self._add(self.form.derivatives.second, some, residual, into, moves)
+            self._add(self.form.derivatives.second, some, residual, into, moves, pointwise=pointwise)
 
     def add_points(self, into: Tangent, cells: Ints, basis: Floats, slope: Floats) -> None:
         """Add the tangent of tractions at points of ``cells`` (n,) that are carried by their ``basis`` (n, k): the ``slope``
@@ -139,9 +140,17 @@ class CellSums:
         return [slice(first, min(first + _CHUNK, self.count)) for first in range(0, self.count, _CHUNK)]
 
     def _add(
-        self, given: Any, some: slice, residual: Floats, into: Tangent | None = None, moves: Floats | None = None
+        self,
+        given: Any,
+        some: slice,
+        residual: Floats,
+        into: Tangent | None = None,
+        moves: Floats | None = None,
+        *,
+        pointwise: bool = False,
     ) -> None:
         values = given.eval(self.mesh, np.arange(some.start, some.stop, dtype=np.int32))
+        values = _without_pressure(values, 3 * self.form.kinds) if pointwise else values
         self.code.add_cells(
             ctypes.byref(self.element),
             ctypes.c_long(some.stop - some.start),
@@ -155,6 +164,19 @@ class CellSums:
             ctypes.c_double(1.0 if into is None else into.unit),
             None if moves is None else _address(moves),
         )
+
+
+def _without_pressure(values: Floats, others: int) -> Floats:
+    """First derivatives by ``others`` and the pressure, and the upper triangle of the second ones, (..., v), with the stiffness
+    that the pressure gives the others, K cof F x cof F, in place of what couples them.
+    """
+    values, (rows, columns) = values.copy(), np.triu_indices(others + 1)
+    second, last = values[..., others + 1 :], columns == others
+    coupling, softness = second[..., last][..., :-1], second[..., -1:]
+    kept = np.flatnonzero(~last)
+    second[..., kept] -= coupling[..., rows[kept]] * coupling[..., columns[kept]] / softness
+    second[..., np.flatnonzero(last)[:-1]] = 0.0
+    return values
 
 
 def _address(array: NDArray[Any]) -> ctypes.c_void_p:

@@ -19,6 +19,9 @@ from fem_reference.problems.contact import Contact, Obstruction, nearest_on_path
 from fem_reference.solvers.fenicsx.broad_phase import Nearby, Patches
 from fem_reference.solvers.fenicsx.contact_points import ContactPoints
 
+# A point deeper in an obstruction than this share of its half thickness is as good as through.
+_GIVEN_WAY = 0.75
+
 
 @dataclass(frozen=True, eq=False)
 class Pressed:
@@ -181,6 +184,21 @@ class ContactForces:
     def go_back(self) -> None:
         """Take up the settled state again, as the unknowns have."""
         self.now, self.frame, self.moved = self.settled
+
+    def lost(self, comm: MPI.Comm) -> str | None:
+        """Why contact is not what it should be since the last settled state, None where it is."""
+        return self.tunnelled(comm) or self.yielded(comm)
+
+    def yielded(self, comm: MPI.Comm) -> str | None:
+        """Where a point that is pressed is near the middle of an obstruction, from where it would leave on any side."""
+        mine, allowed = list[tuple[float, str]](), self.law.allowance(self.frame)
+        for entry, one, before in zip(self.obstructions, self.now, self.overlaps, strict=True):
+            depth = float((-one.gap - allowed * before[one.near]).max(initial=0.0))
+            half = entry.shape.half_thickness
+            said = f'contact gives way: the surface is {depth:.2g} mm deep in "{entry.name}", whose middle is at {half:.2g} mm'
+            mine += [(depth / half, said)] if depth > _GIVEN_WAY * half else []
+        found = [one for rank in comm.allgather(mine) for one in rank]
+        return max(found)[1] if found else None
 
     def tunnelled(self, comm: MPI.Comm) -> str | None:
         """Where a point went through an obstruction since the last settled state: on its straight path through the obstruction's

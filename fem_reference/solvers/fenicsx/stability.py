@@ -27,9 +27,22 @@ class Stability:
         self.system, self.linear = system, linear
         self.pressures = space.sub(1).collapse()[0].dofmap.index_map.size_global if space.num_sub_spaces > 1 else 0
 
+    def of_material(self) -> float:
+        """Of the ``negative_modes``, those that the material has for certain: in which the energy falls as well where the pressure
+        follows the volume at every point. Pressures of an element meet the volume on average only: what shrinks here and swells
+        there costs nothing, and under a stress of several shear moduli the energy may fall that way, where that of the material
+        does not. The displacements of elements are a part of those that a body has: it has so many modes, or more.
+        """
+        found = self._counted(pointwise=self.pressures > 0)
+        self._counted()  # what solves next finds the tangent and its factors as they were
+        return found
+
     def negative_modes(self) -> float:
         """In how many directions the energy falls from the present state; NaN where the tangent is singular."""
-        self.system.linearise()
+        return self._counted()
+
+    def _counted(self, *, pointwise: bool = False) -> float:
+        self.system.linearise(pointwise=pointwise)
         self.linear.changed()
         try:
             return float(self.linear.negative_pivots() - self.pressures)

@@ -81,14 +81,16 @@ class System:
             self.cells.add_residual(self.work.array)
             return self._finish(tractions, None)
 
-    def linearise(self, moves: Floats | None = None, tractions: Tractions | None = None) -> float:
+    def linearise(
+        self, moves: Floats | None = None, tractions: Tractions | None = None, *, pointwise: bool = False
+    ) -> float:
         """As ``residual``, and sum the tangent into ``matrix``; what ``moves`` (n,) of prescribed unknowns change is added to first
-        order.
+        order. ``pointwise``: see ``cells``.
         """
         with self.spent.on("assembly"):
             entries = self.tangent.entries
             self.work.array[:], entries[:] = 0, 0
-            self.cells.add_tangent(self.tangent, self.work.array, moves)
+            self.cells.add_tangent(self.tangent, self.work.array, moves, pointwise=pointwise)
             for terms in self._on_surface:
                 terms.add_tangent(entries)
             ties = [tie.tangent() for tie in self.ties]

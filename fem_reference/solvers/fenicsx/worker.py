@@ -44,7 +44,7 @@ class Worker:
         self.solving = self.solving_processor = self.checking = 0.0
         self.reported = 0.0  # of solving_processor, up to the last frame that was reported
         self.counts = {"newton_iterations": 0, "load_steps": 0, "cut_backs": 0}
-        self.unstable: dict[float, float] = {}  # negative modes by frame
+        self.unstable: dict[float, tuple[float, float]] = {}  # by frame, negative modes, and those of the material
         self.left: dict[float, float] = {}  # perturbation [mm] by frame
         self.ranges = Ranges()
         self.collapse = ""  # to what attempts since the last good state led, where a body collapsed in one
@@ -60,7 +60,7 @@ class Worker:
         else:
             facts = self.restart.go_on(good)
             first, self.earlier = facts["size"], facts["cost"]
-            self.unstable = dict(facts["unstable"])
+            self.unstable = {frame: tuple(modes) for frame, modes in facts["unstable"]}
             self.ranges.know(facts["ranges"])
             frames = tuple(frame for frame in frames if frame >= good[-1])
         return frames, Steps(first, settings.smallest_step, settings.largest_step)
@@ -119,17 +119,18 @@ class Worker:
         """
         begin = time.perf_counter()
         modes = self.body.examine(frame)
+        own = self.body.modes_of_material() if modes is not None and modes > 0 else modes
         self.checking += time.perf_counter() - begin
-        return {} if modes is None else {"negative_modes": modes}
+        return {} if modes is None or own is None else {"negative_modes": modes, "material_modes": own}
 
     def instability(self) -> str:
         """The note on unstable states, nothing where there are none."""
         if not self.unstable:
             return ""
-        most, first = max(self.unstable.values()), min(self.unstable)
+        most, own = (max(modes) for modes in zip(*self.unstable.values(), strict=True))
         return (
-            f"; in {len(self.unstable)} of them the equilibrium is unstable, first at frame {first:g} "
-            f"(negative modes: up to {most:.0f})"
+            f"; in {len(self.unstable)} of them the equilibrium is unstable, first at frame {min(self.unstable):g} "
+            f"(negative modes: up to {most:.0f}, of which the material has {own:.0f} for certain)"
         )
 
     def sentence(self, reached: Step) -> str:
@@ -165,7 +166,7 @@ class Worker:
         if reached.frame >= self.job.body.first:
             self.ranges.add(reached.frame, outside)
         if scalars.get("negative_modes", 0) > 0 and reached.frame >= self.job.body.first:
-            self.unstable[reached.frame] = scalars["negative_modes"]
+            self.unstable[reached.frame] = scalars["negative_modes"], scalars["material_modes"]
         if self.body.comm.rank == 0:
             np.savez(path, allow_pickle=False, **arrays)
         if self.restart is not None and reached.frame >= self.job.body.first:

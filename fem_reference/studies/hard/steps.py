@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fem_reference.assessment.health import Followed
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.muscle import Problem
 from fem_reference.runs.store import Frame
@@ -21,6 +22,12 @@ class SameEnd:
 
     same: bool
     sentence: str
+
+
+def farthest(followed: Followed) -> Steps | None:
+    """To the frame at which a run is farthest from its first state; None of a run that did not leave it."""
+    moved = np.linalg.norm(followed.positions[1:] - followed.positions[0], axis=2).max(axis=1, initial=0.0)
+    return Steps(until=followed.numbers[1 + int(np.argmax(moved))]) if len(moved) and moved.max() > 0 else None
 
 
 def compare(built: Problem, choice: SolverChoice, steps: Steps) -> SameEnd:
