@@ -65,10 +65,10 @@ def test_fibres_that_pull_with_many_shear_moduli_end_alike_whatever_the_steps() 
 
 @pytest.mark.slow
 def test_a_bone_that_contact_does_not_hold_is_no_success() -> None:
-    found = cell("bones.erleben_spike", "fenicsx")
+    found = cell("bones.erleben_wedge", "fenicsx")
     assert found.verdict == "refused"
     assert "converged, but contact gives way: the surface is " in found.sentence
-    assert 'mm deep in "spike", whose middle is at 0.5 mm' in found.sentence
+    assert 'mm deep in "wedge", whose middle is at 0.5 mm' in found.sentence
 
 
 @pytest.mark.parametrize(
