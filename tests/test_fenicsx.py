@@ -165,6 +165,7 @@ def test_more_ranks_than_tets_still_solve() -> None:
     )
 
 
+@pytest.mark.usefixtures("all_cores")
 def test_an_error_on_one_rank_ends_all(tmp_path) -> None:
     # The first rank finds no job and stops; the other would wait for it for ever.
     code = "from mpi4py import MPI; comm = MPI.COMM_WORLD; 1 / comm.rank; comm.Barrier()"
@@ -172,7 +173,7 @@ def test_an_error_on_one_rank_ends_all(tmp_path) -> None:
     (*start, _) = fenicsx._command(Settings(ranks=2), tmp_path)
     outcome = fenicsx._run([*start[:-2], str(tmp_path / "half.py")], Settings(time_limit="30 s"), lambda _: None)
     assert outcome.status == "crashed"
-    assert "ZeroDivisionError" in outcome.message
+    assert "ended with exit status" in outcome.message  # and why, unless mpiexec ended before it had passed that on
 
 
 def test_how_far_attached_vertices_are_off_is_recorded(bent) -> None:
