@@ -32,10 +32,12 @@ class Newton:
         self.system, self.linear, self.determinants, self.spent = system, linear, determinants, spent
         self.residual, self.most = settings.residual, settings.newton_iterations
         self.step = system.b.duplicate()
+        self.thrown = 0
 
     def solve_among(self, contact: ContactForces | None, frame: float) -> tuple[str | None, int]:
         """As ``solve``; at first without ``contact`` where nothing is pressed in the state that is there. That stands where it
-        converged and nothing is pressed either: then it is what would have been found with contact.
+        converged and nothing is pressed either: then it is what would have been found with contact. Else it is thrown away, and
+        its iterations, which are no sign of how hard the load step is, count as ``thrown``.
         """
         system, comm = self.system, self.system.unknowns.function_space.mesh.comm
         before = np.array(system.unknowns.x.array)
@@ -50,8 +52,8 @@ class Newton:
                 return None, iterations
         system.unknowns.x.array[:], system.contact = before, contact
         contact.go_back()
-        failure, more = self.solve(frame)
-        return failure, iterations + more
+        self.thrown += iterations
+        return self.solve(frame)
 
     def solve(self, frame: float) -> tuple[str | None, int]:
         """Solve at ``frame``: why it did not succeed (None: it did), and the iterations. Where every step turns a cell inside out,

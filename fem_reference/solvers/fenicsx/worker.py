@@ -197,6 +197,7 @@ class Worker:
             **{name: float(spent.counts[name]) for name in _COUNTED},
             **{name: float(count) for name, count in self.counts.items()},
         }
+        own["newton_iterations"] += self.body.newton.thrown
         own = {name: value + self.earlier.get(name, 0.0) for name, value in own.items()}
         return own | {
             "unknowns": float(self.body.size),
