@@ -89,6 +89,17 @@ value = "10 kPa"
 because = "a body that yields loses volume"
 """
 
+# An effect more: fibres that are slack up to a stretch.
+FIBRES = """
+[[effect]]
+name = "fibre_passive"
+stress = "300 kPa"
+p1 = 0.05
+p2 = 6.6
+optimal_stretch = {slack}
+linear_from = 1.4
+"""
+
 
 def write(folder: Path, pose: Floats | None = None) -> Path:
     """The scene in ``folder``, as a whole moved by the 4 x 4 ``pose``; returns the folder."""

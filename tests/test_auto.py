@@ -205,17 +205,6 @@ def test_the_estimates_of_a_bar_are_what_is_known_of_it(tmp_path) -> None:
     assert known.jump > 0  # keyframes are joined by straight lines
 
 
-FIBRES = """
-[[effect]]
-name = "fibre_passive"
-stress = "300 kPa"
-p1 = 0.05
-p2 = 6.6
-optimal_stretch = {slack}
-linear_from = 1.4
-"""
-
-
 def test_the_stretch_of_what_was_solved_is_that_of_the_surface_along_the_fibres(tmp_path) -> None:
     """The bar, made longer by a fifth along its axis, thinner, and turned."""
     scene = scene_of(tmp_path, "")
@@ -233,7 +222,7 @@ def test_the_stretch_of_what_was_solved_is_that_of_the_surface_along_the_fibres(
 
 def test_fibres_that_were_stretched_after_all_are_added(tmp_path) -> None:
     """They are slack up to more than is guessed of the turn, and the run stretched them by more than that."""
-    scene = of_case.chosen(scene_of(tmp_path, FIBRES.format(slack=1.3)))
+    scene = of_case.chosen(scene_of(tmp_path, small.FIBRES.format(slack=1.3)))
     rest = muscle.setup(scene)
     assert ["FibrePassive: left out" in str(one) for one in scene.decisions] == [False, False, True]
     still, longer = rest.surface.points, rest.surface.points * 1.6
@@ -266,7 +255,7 @@ def added_later(folder: Path, monkeypatch: pytest.MonkeyPatch, text: str, blind:
 BALL = '\n[[bone]]\nname = "ball"\nsphere = { centre = "5, -5.5, 30 mm", radius = "4 mm" }\n'
 LATER = {
     "contact": (BALL + CONTACT.replace("smoothing", 'bones = ["ball"]\nsmoothing'), "_near", Near(1e9, 0.0, 0.0)),
-    "slack fibres": (FIBRES.format(slack=1.06), "_stretch", (1.0, 1.0)),
+    "slack fibres": (small.FIBRES.format(slack=1.06), "_stretch", (1.0, 1.0)),
 }
 
 

@@ -27,15 +27,7 @@ pytestmark = [
 # What the pages say, and what is said here: a case of seconds, its bones, and a frame that it has.
 SMALL = {"hip_flexion": "bar", '"pelvis"': '"floor"', '"femur"': '"lid"', "frame=100": "frame=10"}
 # The effect of fibres that hip_flexion has and the small case has not.
-FIBRES = """
-[[effect]]
-name = "fibre_passive"
-stress = "300 kPa"
-p1 = 0.05
-p2 = 6.6
-optimal_stretch = 1.0
-linear_from = 1.4
-"""
+FIBRES = small.FIBRES.format(slack=1.0)
 # Commands whose verdict is fail, as their page says.
 FAILS = ("./fem run rod --solver listing --set",)
 PIECE = re.compile(r"((?:^<!--.*?-->\n+)*)^```(sh|python)\n(.*?)^```", re.DOTALL | re.MULTILINE)

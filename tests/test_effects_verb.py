@@ -32,15 +32,7 @@ acceleration = "0, 0, {g} m/s2"
 ramp = [{{ frame = 0, amount = 0 }}, {{ frame = 5, amount = 1 }}]
 """
 CONTACT = '\n[[effect]]\nname = "contact"\nstiffness = "100 kPa/mm"\nsmoothing = "0.2 mm"\n'
-FIBRES = """
-[[effect]]
-name = "fibre_passive"
-stress = "300 kPa"
-p1 = 0.05
-p2 = 6.6
-optimal_stretch = 1.0
-linear_from = 1.4
-"""
+FIBRES = small.FIBRES.format(slack=1.0)
 XPBD = {"solver": "xpbd", "sub_steps": 2, "frame_time": "20 ms", "density": "1060 kg/m3"}
 
 

@@ -34,24 +34,28 @@ def with_limits(scene: Case, limits: list[str]) -> Case:
         if not equals or not dot or not value.strip():
             raise InputError("--limit", f'"{text}"', "METRIC.STATISTIC=VALUE, such as surface_deviation.max='5 mm'")
         within = value.strip()
-        _check_limit(name.strip(), within, scene)
         unit = within.lstrip("+-.0123456789eE ")
+        limit = _limit(name.strip(), within, bool(unit), scene)
         table = {"of": "candidates", "metric": metric, "statistic": statistic, "truth": f"0 {unit}" if unit else 0.0}
-        table |= {"within": within if unit else float(within), "kind": "property", "because": "asked for by --limit"}
+        table |= {"within": limit, "kind": "property", "because": "asked for by --limit"}
         asked.append(parse(Expectation, table, "--limit"))
     return scene.model_copy(update={"expect": (*scene.expect, *asked)})
 
 
-def _check_limit(name: str, within: str, scene: Case) -> None:
-    """InputError unless cases like ``scene`` have a statistic of this ``name`` and it can be ``within`` that."""
+def _limit(name: str, within: str, has_unit: bool, scene: Case) -> str | float:
+    """What a statistic is to be ``within``, a number where it has no unit; InputError unless cases like ``scene`` have one of this
+    ``name`` and it can be that.
+    """
     known = metrics.units(against=scene.standards("candidates"))
     if name not in known:
         near = get_close_matches(name, known, n=5) or sorted(known)
         raise InputError("--limit", f'"{name}"', f"a statistic such as {', '.join(near)}")
     try:
-        judge.in_unit(within if within.lstrip("+-.0123456789eE ") else float(within), known[name])
+        limit = within if has_unit else float(within)
+        judge.in_unit(limit, known[name])
     except ValueError as error:
         raise InputError("--limit", f'"{name}={within}"', f"a value in {known[name]}: {error}") from error
+    return limit
 
 
 def own_candidates(scene: Case) -> list[tuple[Candidate, str]]:

@@ -11,7 +11,7 @@ from fem_reference.effects.contact import among
 from fem_reference.foundations.indicators import Estimates, Indicator, Near
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.motion import apply
-from fem_reference.problems.guess import Guess, axis_of, centres, distance, length_of, motion, sag, thickness_of, turn
+from fem_reference.problems.guess import Guess, axis_of, distance, length_of, motion, sag, spans, thickness_of, turn
 from fem_reference.problems.muscle import RigidBody, Setup
 from fem_reference.scenes.muscle import MuscleCase
 
@@ -165,11 +165,9 @@ def _stretch(rest: Setup, frames: list[int]) -> tuple[float, float]:
         return 1.0, 1.0
     length, half = length_of(rest), thickness_of(rest) / 2
     found = []
-    for frame in frames:
-        middles = centres(rest, frame)
+    for frame, line in zip(frames, spans(rest, tuple(frames)) / length, strict=True):
         bent = half / length * turn(rest, frame)
-        line = float(np.linalg.norm(middles[0] - middles[-1])) / length
-        found += [line - bent, line + bent]
+        found += [float(line) - bent, float(line) + bent]
     return max(min(found), 0.2), max(found)
 
 
