@@ -23,8 +23,9 @@ from fem_reference.studies.benchmark.reference import FUSIFORM, Ratio, differenc
 
 log = logging.getLogger(__name__)
 
-# Element, rings and slices of the bodies, as large as those that the reference is timed on alone.
-BODIES = tuple(FUSIFORM[name] for name in ("fusiform_Q1/P0", "fusiform_P2/P0"))
+# Element, rings and slices of the bodies. On shorter quadratic tetrahedra det F falls to 0 where the clamped rim is pressed, before
+# the end: the reference ends there, and its peers do not look.
+BODIES = (FUSIFORM["fusiform_Q1/P0"], ("P2/P0", 2, 14))
 REPEATS = 3
 _PROGRAM = Path(__file__).with_name("peer_program.py")
 
