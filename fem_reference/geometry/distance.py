@@ -1,5 +1,6 @@
 """Exact unsigned distance from points to a triangle surface."""
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import igl
@@ -28,11 +29,28 @@ def distances(points: Floats, surface: Surface) -> Distances:
             raise ValueError(f"distances: {what} that are not finite")
     if len(points) == 0:
         return Distances(np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)))
-    squares, triangle, closest = igl.point_mesh_squared_distance(points, surface.points, surface.triangles)
+    vertices, triangles = (
+        np.ascontiguousarray(array, kind)
+        for array, kind in ((surface.points, np.float64), (surface.triangles, np.int64))
+    )
+    tree = _tree(vertices.tobytes(), triangles.tobytes())
+    squares, triangle, closest = tree.squared_distance(vertices, triangles, points)
     corners = surface.points[surface.triangles[triangle]]
     return Distances(
         np.sqrt(np.maximum(squares, 0)), np.asarray(triangle, np.int64), closest, _barycentric(closest, corners)
     )
+
+
+@lru_cache(
+    maxsize=8
+)  # one surface is asked for few points many times, and its tree takes as long as some thousand of them
+def _tree(points: bytes, triangles: bytes) -> igl.AABB:
+    """The boxes around parts of the surface with the arrays ``points``, 64 bit floats, and ``triangles``, 64 bit integers."""
+    tree = igl.AABB()
+    tree.init(
+        *(np.frombuffer(array, kind).reshape(-1, 3) for array, kind in ((points, np.float64), (triangles, np.int64)))
+    )
+    return tree
 
 
 def _barycentric(points: Floats, corners: Floats) -> Floats:
