@@ -37,7 +37,10 @@ class Determinants:
         # Compiled, since each iteration asks for it, and by all ranks together: one without cells evaluates it nowhere.
         self.inside = compiling.expression(determinant, rule)
         self.at_vertices = displacement.tabulated(self.points["vertex"], len(cells))
-        self.to_reference = np.linalg.inv(geometry(self.mesh, self.points["vertex"], slice(len(cells)))[1])
+        self.rest, slopes = {}, {}
+        for name, points in self.points.items():
+            self.rest[name], slopes[name] = geometry(self.mesh, points, slice(len(cells)))
+        self.to_reference = np.linalg.inv(slopes["vertex"])
 
     def smallest(self, where: str | None = None) -> Smallest:
         """The smallest det F at points of one kind, ``"quadrature point"`` or ``"vertex"``, or at both; NaN counts as smallest."""
@@ -74,5 +77,5 @@ class Determinants:
         if len(self.cells) == 0:  # a rank without cells
             return Smallest(float("inf"), where, -1, (0.0, 0.0, 0.0))
         cell, point = np.unravel_index(np.argmin(np.where(np.isnan(values), -np.inf, values)), values.shape)
-        x, y, z = geometry(self.mesh, self.points[where][[point]], np.array([cell]))[0].ravel()
+        x, y, z = self.rest[where][cell, point]
         return Smallest(float(values[cell, point]), where, int(self.cells[cell]), (float(x), float(y), float(z)))
