@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats, Surface
+from fem_reference.foundations.mesh import Floats, Ints, Surface
 from fem_reference.geometry.distance import distances
 
 # Closer to the surface than this share of its diagonal a point counts as on it.
@@ -34,8 +34,9 @@ class Extension:
         weights = np.zeros((len(points), len(rest.points)))
         nearest = distances(points, rest)
         on = nearest.distance <= _ON * np.linalg.norm(np.ptp(rest.points, axis=0))
+        edges = _Edges(rest.triangles)
         for i in np.flatnonzero(~on):
-            weights[i] = _mean_value_weights(points[i], rest)
+            weights[i] = _mean_value_weights(points[i], rest.points, edges)
         weights[np.flatnonzero(on)[:, None], rest.triangles[nearest.triangle[on]]] = nearest.barycentric[on]
         weights.setflags(write=False)
         return cls(points, rest.points, weights)
@@ -45,32 +46,38 @@ class Extension:
         return np.asarray(self.points + self.weights @ (positions - self.rest))
 
 
-def _mean_value_weights(point: Floats, rest: Surface) -> Floats:
-    """The weights (n,) of a point off the surface.
-
-    The unit vectors u_i to the corners of a triangle span a spherical triangle. With n_i the unit normal of the plane
-    through the point and the edge opposite corner i, and theta_i the angle that edge is seen under, its mean vector
-    is m = 1/2 sum theta_i n_i, and corner i at the distance d_i gets the weight n_i . m / (d_i n_i . u_i).
+class _Edges:
+    """The e edges of m ``triangles`` (m, 3), each met once: its ``ends`` (2, e); and for each corner of the triangles the edge
+    ``opposite`` to it (3, m), which they go along in the ``sense`` (3, m) of 1 or -1.
     """
-    rays = rest.points - point
-    lengths = np.sqrt(np.einsum("ij,ij->i", rays, rays))
-    corners = np.ascontiguousarray((rays / lengths[:, None])[rest.triangles].transpose(1, 2, 0))  # (corner, xyz, m)
-    normals, sines, cosines = _planes(corners)
-    mean = np.einsum("ik,ijk->jk", np.arctan2(sines, cosines), normals) / 2
-    heights = np.einsum("ijk,ijk->ik", normals, corners)
-    seen = (np.abs(heights) > _EDGE_ON * sines.max(axis=0)).all(axis=0)
-    weights = np.einsum("ijk,jk->ik", normals, mean) / np.where(seen, heights, np.inf) / lengths[rest.triangles.T]
-    total = np.bincount(rest.triangles.T.ravel(), weights=weights.ravel(), minlength=len(rest.points))
+
+    def __init__(self, triangles: Ints) -> None:
+        self.corners = np.ascontiguousarray(triangles.T)
+        both = self.corners[[[1, 2, 0], [2, 0, 1]]]  # (end, corner, m)
+        self.sense = np.where(both[0] < both[1], 1.0, -1.0)
+        ends, found = np.unique(np.sort(both, axis=0).reshape(2, -1), axis=1, return_inverse=True)
+        self.ends, self.opposite = ends, found.reshape(self.corners.shape)
+
+
+def _mean_value_weights(point: Floats, rest: Floats, edges: _Edges) -> Floats:
+    """The weights (n,) that a point off the surface has for the ``rest`` (n, 3) of its corners.
+
+    The unit vectors u_i to the corners of a triangle span a spherical triangle. With c_i the vector product of the other two, s_i
+    its length and theta_i the angle between them, its mean vector is m = 1/2 sum theta_i c_i / s_i, and corner i at the distance
+    d_i gets the weight c_i . m / (d_i c_i . u_i), where c_i . u_i is the same for all three.
+    """
+    rays = rest - point
+    lengths = np.sqrt(np.einsum("nk,nk->n", rays, rays))
+    units = np.ascontiguousarray((rays / lengths[:, None]).T)
+    first, second = units.take(edges.ends, axis=1).transpose(1, 0, 2)  # several times as fast as indices in brackets
+    products = np.cross(first, second, axis=0)
+    sines = np.sqrt(np.einsum("ke,ke->e", products, products))
+    angles = np.arctan2(sines, np.einsum("ke,ke->e", first, second))
+    turns = angles / (2 * np.maximum(sines, np.finfo(float).tiny)) * products
+    own = products.take(edges.opposite, axis=1) * edges.sense  # (xyz, corner, m)
+    mean = np.einsum("kim,im->km", turns.take(edges.opposite, axis=1), edges.sense)
+    volumes = np.einsum("km,km->m", own[:, 0], units.take(edges.corners[0], axis=1))
+    seen = np.abs(volumes) > _EDGE_ON * sines.take(edges.opposite).max(axis=0) ** 2
+    weights = np.einsum("kim,km->im", own, mean) / np.where(seen, volumes, np.inf)
+    total = np.bincount(edges.corners.ravel(), weights=weights.ravel(), minlength=len(rest)) / lengths
     return np.asarray(total / total.sum())
-
-
-def _planes(corners: Floats) -> tuple[Floats, Floats, Floats]:
-    """The plane that the other two unit vectors span, for each corner of m triangles, ``corners`` (3, xyz, m).
-
-    Its unit normal (3, xyz, m), and sine and cosine (3, m) of the angle between the two.
-    """
-    ahead, behind = corners[[1, 2, 0]], corners[[2, 0, 1]]
-    normals = np.cross(ahead, behind, axis=1)
-    sines = np.sqrt(np.einsum("ijk,ijk->ik", normals, normals))
-    normals /= np.maximum(sines, np.finfo(float).tiny)[:, None, :]
-    return normals, sines, np.einsum("ijk,ijk->ik", ahead, behind)
