@@ -22,7 +22,6 @@ from fem_reference.runs.store import Frame, Run
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx
 from fem_reference.studies.cost import known
-from fem_reference.studies.refinement import UNRELATED
 
 SEEDS = range(1, 11)
 SIZES = (5.0, 10.0)  # of tetrahedra [mm], of which the latter are for error bars
@@ -75,9 +74,7 @@ def test_what_is_left_out_does_not_matter_and_what_is_kept_does(seed: int, tmp_p
     built = problem(scene, SIZES[0])
     whole = solved(scene, built)
     context = MeasurementContext.of(whole, whole.fibres, built.bones, built.free)
-    bars = known(
-        error_bars.error_bars(Pair(whole, solved(scene, problem(scene, SIZES[1])), SIZES, UNRELATED, {}), context)
-    )
+    bars = known(error_bars.error_bars(Pair(whole, solved(scene, problem(scene, SIZES[1])), SIZES, {}), context))
     left = [one.effect for one in found if not acts(one, whole)]
     if any(not isinstance(one, Contact) for one in left):
         assert verdict(changes(solved(scene, built, left), whole, context), bars) != "matters", left
