@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from fem_reference.assessment.judge import judge
 from fem_reference.foundations.mesh import Polylines, Surface, check_closed
-from fem_reference.metrics import Measure, MeasurementContext, at_rest, measure
+from fem_reference.metrics import Measure, MeasurementContext, at_rest, change, measure
 from fem_reference.metrics.fibre_length import extension_error
 from fem_reference.runs.store import Outcome, Run
 
@@ -284,6 +284,18 @@ def test_rest_carries_the_fibres() -> None:
     assert_allclose(found["fibre_length.max_percent"], [0, 10], rtol=1e-10, atol=1e-12)
     bare = at_rest(_run([SPHERE.points]))
     assert bare.fibre_positions is None
+
+
+def test_a_change_is_that_of_the_fibres_inside_a_run_wherever_they_begin() -> None:
+    run = _run([SPHERE.points, SPHERE.points], [FIBRES.points, _scaled(FIBRES.points, 1.1)])
+    apart = np.array([0, 0, 0.1])  # [mm], as where overlaps with bones are removed first
+    elsewhere = replace(
+        run, fibres=Polylines(FIBRES.points + apart, FIBRES.offsets), fibre_positions=run.fibre_positions + apart
+    )
+    for one in (run, elsewhere):
+        assert_allclose(_find(change(one, CONTEXT), "fibre_length.max_percent").values, [0, 10], rtol=1e-10, atol=1e-10)
+    bare = replace(run, fibres=None, fibre_positions=None)
+    assert_allclose(_find(change(bare, CONTEXT), "fibre_length.max_percent").values, [0, 0], atol=1e-10)
 
 
 def test_where_names_the_worst() -> None:

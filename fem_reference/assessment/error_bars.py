@@ -1,8 +1,8 @@
 """Error bars: solved again with coarser numerics, the reference gives every statistic a bar, frame by frame.
 
-In the measures that runs are measured with, and of two things: of the reference's own change from rest, by how much the changes of
-its runs differ; and of a candidate's deviation from the reference, by how much the reference's runs deviate from each other: by the
-triangle inequality, replacing the reference by another changes a deviation by at most that.
+In the measures that runs are measured with, and of two things: of a candidate's deviation from the reference, by how much the
+reference's runs deviate from each other: by the triangle inequality, replacing the reference by another changes a deviation by at
+most that; and of the reference's own change from rest, by which share of these deviations the changes of its runs differ.
 """
 
 import json
@@ -18,7 +18,7 @@ import numpy as np
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.io import files, texts
-from fem_reference.metrics import Measure, MeasurementContext, at_rest, find, measure, names, of_itself
+from fem_reference.metrics import Measure, MeasurementContext, change, measure, names, of_itself
 from fem_reference.runs.store import Run
 
 Of = Literal["change", "deviation"]
@@ -28,9 +28,14 @@ FORMAT = 2
 SAFETY = 1.25
 # What is left of an error of first order, when halving its cause changes the result by 1.
 VARIATION = 2.0
+# Of which order in the size of tetrahedra an error is, on meshes graded towards the rims of attachments, where displacement goes
+# with the root of the distance: in general, and of the worst place or fibre alone. Of fibres, which end there, it is between.
+ORDER, ORDER_OF_FIBRES, ORDER_OF_WORST = 2.0, 1.5, 1.0
 TETRAHEDRA = "tetrahedra"
 # The measures of a run against another or (None) its rest.
 _Measured = Callable[[Run, Run | None], tuple[Measure, ...]]
+# By what a bar is of, by how much (f,) each statistic differs between two runs.
+_Differences = dict[Of, list[Floats]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,50 +86,24 @@ class ErrorBars:
         )
 
 
-@dataclass(frozen=True)
-class Orders:
-    """Of which order in the size of tetrahedra the error of a statistic is at least: in ``general``; of the ``volume``, which is
-    nearly kept; of lengths of ``fibres``, which end where attachments do; and of those of the ``worst`` place alone: next to the
-    rim of an attachment displacement converges more slowly than elsewhere.
-    """
-
-    general: float
-    volume: float
-    fibres: float
-    worst: float
-
-    def of(self, of: Of, metric: str, statistic: str) -> float:
-        """The order for a statistic of changes or of deviations. What fibres lengthen by on average, surfaces that are near each
-        other agree on as they do on all else.
-        """
-        if is_local(statistic):
-            return self.worst
-        if metric == "volume":
-            return self.volume
-        mean_of_surfaces = of == "deviation" and statistic.startswith("mean")
-        return self.fibres if metric == "fibre_length" and not mean_of_surfaces else self.general
-
-
 @dataclass(frozen=True, eq=False)
 class Pair:
     """Runs of the reference over the same frames: ``fine``, itself, and ``coarse`` on larger tetrahedra; by name the ``varied``
     ones, each as ``coarse`` with one cause of error halved; and one with ``exact`` attachments, where they are springs.
 
-    ``sizes`` [mm] are those of the tetrahedra, and the error is of the ``orders`` in them, with a ``safety``.
+    ``sizes`` [mm] are those of the tetrahedra; ``safety`` is the factor that bars are longer by than the error expected.
     """
 
     fine: Run
     coarse: Run
     sizes: tuple[float, float]
-    orders: Orders
     varied: dict[str, Run]
     exact: Run | None = None
     safety: float = SAFETY
 
     def share(self, of: Of, metric: str, statistic: str) -> float:
         """The error of the fine run over what the two differ by, with the safety of a grid convergence index."""
-        order = self.orders.of(of, metric, statistic)
-        return float(self.safety / ((self.sizes[1] / self.sizes[0]) ** order - 1))
+        return float(self.safety / ((self.sizes[1] / self.sizes[0]) ** _order(of, metric, statistic) - 1))
 
 
 def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
@@ -132,47 +111,31 @@ def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
     is said of a run itself has none: it is known.
     """
     comparing = [name for name in names() if not of_itself(name)]
+    surface = cache(_surface)
 
     @cache
     def measured(run: Run, other: Run | None) -> tuple[Measure, ...]:
-        return measure(run, at_rest(run) if other is None else other, context, comparing)
+        return change(run, context, comparing) if other is None else measure(run, other, context, comparing)
 
-    def apart(run: Run, other: Run) -> Floats:
-        found = find(measured(run, other), "surface_deviation", "rms")
-        assert found is not None  # both have surfaces
-        return found.values
+    def differences(run: Run, other: Run) -> _Differences:
+        """The reference's own change sees its fibres inside, candidates are surfaces."""
+        changes = _of_changes(run, other, measured)
+        return {"change": changes, "deviation": _of_deviations(surface(run), surface(other), measured)}
 
+    statistics = measured(surface(pair.fine), surface(pair.fine))
+    sizes = {TETRAHEDRA: _sizes(differences(pair.coarse, pair.fine), statistics)}
+    sizes |= {name: _sizes(differences(run, pair.coarse), statistics) for name, run in pair.varied.items()}
+    exact = None if pair.exact is None else differences(pair.exact, pair.coarse)
     bars = []
-    fine, coarse, *others = (_surface(run) for run in (pair.fine, pair.coarse, *pair.varied.values()))
-    gaps = {name: apart(run, coarse) for name, run in zip(pair.varied, others, strict=True)}
-    # By what a bar is of, what the runs differ by: the reference's own change sees its fibres inside, candidates are surfaces.
-    near: dict[Of, list[Floats]] = {
-        "change": _of_changes(pair.coarse, pair.fine, measured),
-        "deviation": _of_deviations(coarse, fine, measured),
-    }
-    varied: dict[Of, dict[str, list[Floats]]] = {
-        "change": {name: _of_changes(run, pair.coarse, measured) for name, run in pair.varied.items()},
-        "deviation": {
-            name: _of_deviations(run, coarse, measured) for name, run in zip(pair.varied, others, strict=True)
-        },
-    }
-    exact: dict[Of, list[Floats]] = {}
-    if pair.exact is not None:
-        exact["change"] = _of_changes(pair.exact, pair.coarse, measured)
-        exact["deviation"] = _of_deviations(_surface(pair.exact), coarse, measured)
-    for of, differences in near.items():
-        for i, one in enumerate(measured(fine, fine)):
-            # The worst places of two runs may be others: by the triangle inequality, what the runs differ by bounds the change too.
-            found = differences[i]
-            if is_local(one.statistic):
-                found = np.fmax(np.abs(found), np.abs(near["deviation"][i]))
-            parts = {TETRAHEDRA: pair.share(of, one.metric, one.statistic) * typical(found, apart(coarse, fine))}
-            parts |= {name: VARIATION * typical(other[i], gaps[name]) for name, other in varied[of].items()}
+    for of in get_args(Of):
+        for i, one in enumerate(statistics):
+            left = dict.fromkeys(sizes, VARIATION) | {TETRAHEDRA: pair.share(of, one.metric, one.statistic)}
+            parts = {name: left[name] * size[of][i] for name, size in sizes.items()}
             greatest = {name: float(part.max()) for name, part in parts.items()}
-            model = np.abs(exact[of][i]) if of in exact else None
+            model = None if exact is None else np.abs(exact[of][i])
             total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))  # of causes that are independent
             bars.append(ErrorBar(of, one.metric, one.statistic, one.unit, total, greatest, model))
-    return ErrorBars(pair.fine.numbers, pair.sizes, pair.orders.general, tuple(bars))
+    return ErrorBars(pair.fine.numbers, pair.sizes, ORDER, tuple(bars))
 
 
 def is_local(statistic: str) -> bool:
@@ -180,15 +143,65 @@ def is_local(statistic: str) -> bool:
     return statistic.startswith(("max", "hausdorff"))
 
 
+def _order(of: Of, metric: str, statistic: str) -> float:
+    """The order of the error of a statistic. The volume is nearly kept, so that it says as little of what is left as the worst
+    place does. Of changes, and of deviations on average, the errors of fibres cancel in part: the rms of deviations alone adds up
+    what is wrong where they end.
+    """
+    if metric == "volume" or is_local(statistic):
+        return ORDER_OF_WORST
+    return ORDER_OF_FIBRES if (of, metric) == ("deviation", "fibre_length") and statistic.startswith("rms") else ORDER
+
+
+def ratio(differences: Floats, scale: Floats) -> float:
+    """The root mean square of ``differences`` (f,) over that of ``scale`` (f,), of the frames where both are known; NaN where the
+    scale is 0.
+    """
+    known = np.isfinite(differences) & np.isfinite(scale)
+    squares = float(scale[known] @ scale[known])
+    return math.sqrt(float(differences[known] @ differences[known]) / squares) if squares > 0 else math.nan
+
+
 def typical(differences: Floats, apart: Floats) -> Floats:
     """The size (f,) of signed ``differences`` (f,) of a statistic between two runs whose surfaces are ``apart`` (f,) [mm]: at least
     what it is for surfaces so far apart on average over the frames. A difference that crosses zero says nothing about the error
     there; where the surfaces are the same it is 0.
     """
-    known = np.isfinite(differences) & np.isfinite(apart)
-    squares = float(apart[known] @ apart[known])
-    ratio = math.sqrt(float(differences[known] @ differences[known]) / squares) if squares > 0 else 0.0
-    return np.maximum(np.abs(differences), ratio * apart)
+    return np.maximum(np.abs(differences), np.nan_to_num(ratio(differences, apart)) * apart)
+
+
+def typical_changes(changes: list[Floats], deviations: list[Floats], metrics: list[str]) -> list[Floats]:
+    """The sizes (f,) of signed differences of ``changes`` (f,) from rest between two runs, by statistic: at least the share of the
+    ``deviations`` (f,) of these runs from each other that they are on average, over the frames and the statistics of their metric.
+
+    By the triangle inequality a change of the same places differs by no more than their deviation, and by less as most of that is
+    not along the displacement or cancels. How much less, one statistic alone does not show: its difference may be small by chance,
+    that of the worst place above all.
+    """
+    shares = [ratio(found, deviation) for found, deviation in zip(changes, deviations, strict=True)]
+    means = {name: _rms_of_known(zip(metrics, shares, strict=True), name) for name in set(metrics)}
+    return [
+        np.maximum(np.abs(found), means[metric] * deviation)
+        for metric, found, deviation in zip(metrics, changes, deviations, strict=True)
+    ]
+
+
+def _rms_of_known(shares: Iterable[tuple[str, float]], wanted: str) -> float:
+    """The root mean square of the shares of the metric ``wanted`` that are known, 0 without any."""
+    known = [share for metric, share in shares if metric == wanted and math.isfinite(share)]
+    return math.sqrt(sum(share**2 for share in known) / len(known)) if known else 0.0
+
+
+def _sizes(differences: _Differences, statistics: tuple[Measure, ...]) -> _Differences:
+    """The sizes of the signed ``differences`` of these ``statistics`` between two runs."""
+    (apart,) = (
+        found
+        for one, found in zip(statistics, differences["deviation"], strict=True)
+        if (one.metric, one.statistic) == ("surface_deviation", "rms")
+    )
+    deviations = [typical(found, apart) for found in differences["deviation"]]
+    metrics = [one.metric for one in statistics]
+    return {"change": typical_changes(differences["change"], deviations, metrics), "deviation": deviations}
 
 
 def _surface(run: Run) -> Run:

@@ -8,7 +8,7 @@ measured ``AGAINST``: the reference (or the rest state), the exact solution, or 
 import importlib
 import pkgutil
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import singledispatch
 from typing import Any, Protocol, cast
 
@@ -165,6 +165,14 @@ def at_rest(run: Run) -> Run:
     still = np.broadcast_to(run.surface.points, (frames, *run.surface.points.shape))
     fibres = None if run.fibres is None else np.broadcast_to(run.fibres.points, (frames, *run.fibres.points.shape))
     return Run("rest", "rest", run.outcome, run.numbers, run.surface, still, run.fibres, fibres)
+
+
+def change(run: Run, context: MeasurementContext, wanted: Iterable[str] | None = None) -> tuple[Measure, ...]:
+    """Every statistic of the change from rest of a ``run`` of the reference's solver, on the fibres inside it: where overlaps with
+    bones are removed first, two runs begin with them in other places, and their lengths would else be taken from the surface.
+    """
+    own = context if run.fibres is None else replace(context, fibres=run.fibres)
+    return measure(run, at_rest(run), own, wanted)
 
 
 def at_vertices(run: Run, vertices: Ints) -> tuple[str, ...]:

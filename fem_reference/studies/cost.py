@@ -16,7 +16,7 @@ from fem_reference.assessment.cost_study import CaseStudy, Study
 from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.assessment.fronts import COSTS, Point
 from fem_reference.foundations.errors import InputError
-from fem_reference.metrics import MeasurementContext, at_rest, measure
+from fem_reference.metrics import MeasurementContext, change, measure
 from fem_reference.runs.cost import seconds_per_frame
 from fem_reference.runs.key import versions
 from fem_reference.runs.store import Run
@@ -171,7 +171,7 @@ def _claims(made: Sequence[Made], truth: Run, context: MeasurementContext, store
 def _claimed(trial: Trial, bars: ErrorBars, run: Run, truth: Run, context: MeasurementContext) -> list[Claim]:
     """The claims of the ``bars`` of a ``run`` about its change from rest and about deviations from it."""
     names = ("surface_deviation", "fibre_length", "volume")
-    changes = [measure(one, at_rest(one), context, names) for one in (run, truth)]
+    changes = [change(one, context, names) for one in (run, truth)]
     surfaces = [replace(one, fibres=None, fibre_positions=None) for one in (run, truth)]  # as candidates are
     deviations = [measure(surfaces[0], one, context, names) for one in surfaces]
     case = f"{trial.scene.name}, {trial.value}"

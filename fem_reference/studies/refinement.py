@@ -12,7 +12,7 @@ import numpy as np
 
 from fem_reference import metrics, solvers
 from fem_reference.assessment import error_bars
-from fem_reference.assessment.error_bars import SAFETY, ErrorBars, Orders, Pair
+from fem_reference.assessment.error_bars import SAFETY, ErrorBars, Pair
 from fem_reference.effects import Effect
 from fem_reference.effects.contact import Contact, among
 from fem_reference.foundations.errors import InputError
@@ -29,13 +29,9 @@ log = logging.getLogger(__name__)
 
 _EXACT = "exact attachments"
 
-# A scene whose tetrahedra are refined has the coarse member of its pair in them, before the last refinement. These orders make
-# bars cover 95 of 100 differences from finer solutions: docs/accuracy.md.
-NESTED = Orders(general=1.9, volume=1.3, fibres=1.4, worst=1.1)
-# Another has a mesh of its own for it, larger by so much, and rims that are not graded: order 1, whatever the element (Grisvard
-# 1985, Elliptic Problems in Nonsmooth Domains).
+# A scene whose tetrahedra are refined has the coarse member of its pair in them, before the last refinement; another has a mesh of
+# its own for it, larger by so much.
 RATIO = 1.5
-UNRELATED = Orders(general=1.0, volume=1.0, fibres=1.0, worst=0.5)
 # Up to this share of the time of a reference its error bars are made without being asked for: a run on larger tetrahedra takes the
 # share of the time that these are of the number.
 CHEAP = 0.2
@@ -159,7 +155,6 @@ def finer(bench: Bench[MuscleCase], reference: Run, ratio: float) -> MuscleCase:
 
 def _pair(bench: Bench[MuscleCase], reference: Run, model: bool) -> Pair:
     coarser, sizes = _coarser(bench.scene)
-    orders = NESTED if bench.scene.muscle.refinements else UNRELATED
     varied = _needed(bench, reference)
     scenes = {f"tetrahedra of {sizes[1]:.3g} mm": coarser}
     scenes |= {entry.name: coarser.model_copy(update=entry.changes) for entry in varied}
@@ -187,7 +182,7 @@ def _pair(bench: Bench[MuscleCase], reference: Run, model: bool) -> Pair:
             "a size that coarser meshes differ from",
         )
     halved = {variation.name: run for variation, run in zip(varied, others, strict=False)}
-    return Pair(reference, coarse, sizes, orders, halved, runs.get(_EXACT), _safety(bench))
+    return Pair(reference, coarse, sizes, halved, runs.get(_EXACT), _safety(bench))
 
 
 def _safety(bench: Bench[MuscleCase]) -> float:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fem_reference.assessment.claims import CLAIMED, FINER, Claim, Claims, claimed
 from fem_reference.foundations.errors import InputError
-from fem_reference.metrics import MeasurementContext, at_rest, measure
+from fem_reference.metrics import MeasurementContext, change, measure
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import refinement
 from fem_reference.studies.execution import Bench, complete
@@ -55,7 +55,7 @@ def _of(scene: MuscleCase, store: Path) -> list[Claim]:
         return []
     context = MeasurementContext.of(reference, reference.fibres, bench.setup().bones, bench.setup().free)
     names = dict.fromkeys(metric for metric, _ in CLAIMED)
-    changes = [measure(one, at_rest(one), context, names) for one in (reference, run)]
+    changes = [change(one, context, names) for one in (reference, run)]
     surfaces = [replace(one, fibres=None, fibre_positions=None) for one in (reference, run)]  # as candidates are
     deviations = [measure(surfaces[0], one, context, names) for one in surfaces]
     return [
