@@ -51,10 +51,11 @@ def of_spline(coefficients: Floats, origin: Floats, spacing: float, level: float
 
 def _may_be_low(coefficients: Floats, level: float) -> NDArray[np.bool_]:
     """In which cells, three fewer along each axis, a spline may be at ``level`` or below: it is no lower than the least of the
-    64 coefficients that reach into it, and than the least of its Bernstein coefficients.
+    64 coefficients that reach into it, and than the least of its Bernstein coefficients. Nor is it higher than the greatest of them:
+    deep inside nothing is left to ask.
     """
     found = _least_of_four(coefficients) <= level
-    cells = np.argwhere(found)
+    cells = np.argwhere(found & (-_least_of_four(-coefficients) > level))
     for first in range(0, len(cells), _CHUNK):
         i, j, k = cells[first : first + _CHUNK].T
         around = np.lib.stride_tricks.sliding_window_view(coefficients, (4, 4, 4))[i, j, k]
