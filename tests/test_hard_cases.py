@@ -130,6 +130,7 @@ def test_judging() -> None:
     bounds = [(Bound(quantity="volume", at_most=2.0), course)]
     assert stress.unfinished(ended, "a cell", bounds, "").verdict == "failed"
     assert stress.unfinished(ended, "a cell", bounds, "it is flat").verdict == "refused"
+    assert stress.unfinished(replace(blank, status="limit point"), "", bounds, "").verdict == "refused"
     assert stress.unfinished(replace(ended, status="timed out"), "", bounds, "it is flat").verdict == "failed"
     first = [(bounds[0][0], replace(course, numbers=(0,), values=course.values[:1]))]
     assert stress.unfinished(ended, "a cell", first, "it is flat").verdict == "failed"
