@@ -102,7 +102,7 @@ def _softest(body: AssembledBody) -> PETSc.Vec:
         vector.normalize()
         body.linear.solve(vector, image, 1e-10)
     vector.array[:] = image.array * moves
-    image.scale(1 / float(vector.norm()))
+    image.scale(float(vector.dot(vector)) ** -0.5)
     return image
 
 
