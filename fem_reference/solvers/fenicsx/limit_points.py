@@ -12,6 +12,8 @@ from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolveError
 _ITERATIONS = 40  # of inverse iteration
 # The share of the smallest load step over which slopes are taken.
 _DIFFERENCE = 1e-3
+# Of the smallest load steps. One that failed was up to two of them, and the distance is known to a factor.
+_NEAR = 4
 
 
 @dataclass(frozen=True)
@@ -30,8 +32,8 @@ class LimitPoint:
 
 
 def ahead(body: AssembledBody, step: float) -> LimitPoint | None:
-    """The limit point that follows on the last good state within two load ``step``; None where none does, or where it cannot be
-    known. Collective.
+    """The limit point that follows on the last good state within a few load steps of the smallest size ``step``; None where none
+    does, or where it cannot be known. Collective.
 
     Before a limit point the least eigenvalue of the tangent falls as the root of what is left of the way there: its square is
     linear, and half of it over its slope along the path is what is left. The slope is that of a step of Newton's method.
@@ -45,7 +47,7 @@ def ahead(body: AssembledBody, step: float) -> LimitPoint | None:
         return None
     finally:
         _take_up(body, before)
-    return found if found is not None and found.frame - body.at <= 2 * step else None
+    return found if found is not None and found.frame - body.at <= _NEAR * step else None
 
 
 def _limit_point(body: AssembledBody, difference: float) -> LimitPoint | None:
