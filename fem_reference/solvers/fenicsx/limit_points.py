@@ -14,6 +14,7 @@ _ITERATIONS = 40  # of inverse iteration
 _DIFFERENCE = 1e-3
 # Of the smallest load steps. One that failed was up to two of them, and the distance is known to a factor.
 _NEAR = 4
+_SOFT = 0.3  # The share of the stiffness at rest that the softest mode has near a limit point at most.
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,8 @@ def _limit_point(body: AssembledBody, difference: float) -> LimitPoint | None:
     linear.changed()
     mode = _softest(body)
     stiffness = _stiffness(body, mode)
+    if abs(stiffness) > _SOFT * _stiffness_at_rest(body):
+        return None
     motion = _motion(body, difference)
     now, ends = np.array(body.unknowns.x.array), []
     for sign in (1, -1):
@@ -70,6 +73,19 @@ def _limit_point(body: AssembledBody, difference: float) -> LimitPoint | None:
     slope = (ends[0] - ends[1]) / (2 * difference)
     left = -stiffness / (2 * slope) if slope != 0 else np.inf
     return LimitPoint(body.at + left, _largest(body, mode)) if 0 < left < np.inf else None
+
+
+def _stiffness_at_rest(body: AssembledBody) -> float:
+    """The least eigenvalue at rest, without contact; the state is as before, but for the tangent."""
+    now, body.system.contact = np.array(body.unknowns.x.array), None
+    body.unknowns.x.array[:] = 0
+    body.system.linearise()
+    body.linear.changed()
+    found = _stiffness(body, _softest(body))
+    body.unknowns.x.array[:], body.system.contact = now, body.contact
+    body.system.linearise()
+    body.linear.changed()
+    return found
 
 
 def _motion(body: AssembledBody, difference: float) -> Floats:
