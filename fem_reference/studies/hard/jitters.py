@@ -44,7 +44,9 @@ def compare(hard: Hard, first: tuple[Outcome, Followed], count: int, solve: Solv
     for number in range(1, count + 1):
         try:
             other, found = solve(jittered(hard, number))
-        except InputError:
+        except InputError as error:
+            if not ended:
+                return SameEnd(True, f"no jitters: {error}")
             ended["refused"] += 1
             continue
         ended[other.status] += 1
@@ -56,7 +58,8 @@ def compare(hard: Hard, first: tuple[Outcome, Followed], count: int, solve: Solv
     if off:
         words += f", up to frame {min(reached)}" + (f" to {max(reached)}" if min(reached) < max(reached) else "")
         words += f", apart by {max(off):.2g} % at most, {np.median(off):.2g} % in the median"
-    alike = set(ended) == {"converged"} if outcome.status == "converged" else "converged" not in ended
+    statuses = set(ended) - {"refused"}
+    alike = statuses <= {"converged"} if outcome.status == "converged" else "converged" not in statuses
     return SameEnd(alike, f"jitters: {words}")
 
 
