@@ -74,7 +74,7 @@ def test_torsion_stiffness_of_a_square_bar() -> None:
 def bent():
     """A bar bent by 0.6 rad and back: (problem, outcome, frames) on one rank."""
     motion = Rotation((1, 0, 0), (5, 5, 0), (0.0, 10.0, 20.0), (0.0, 0.6, 0.0))
-    problem = shapes.bar((2, 2, 6), (10, 10, 40), {"bottom": None, "top": motion}, MUSCLE, (0, 5, 10, 20))
+    problem = shapes.bar((2, 2, 6), (10, 10, 40), {"bottom": None, "top": motion}, MUSCLE, (0, 5, 10, 15, 20))
     return problem, *solved(problem, ranks=1)
 
 
@@ -82,7 +82,7 @@ def test_there_and_back_ends_at_rest(bent) -> None:
     problem, outcome, frames = bent
     assert outcome.status == "converged"
     assert np.abs(frames[2].surface - problem.surface.points).max() > 5
-    assert np.abs(frames[3].surface - problem.surface.points).max() < 1e-6
+    assert np.abs(frames[-1].surface - problem.surface.points).max() < 1e-6
     assert all(frame.scalars["volume_ratio"] == pytest.approx(1, abs=5e-3) for frame in frames)
 
 
@@ -110,8 +110,8 @@ def test_cost_says_where_the_time_went(bent) -> None:
     cost = outcome.cost
     assert cost["newton_iterations"] == sum(frame.scalars["newton_iterations"] for frame in frames)
     assert cost["seconds_processor_solve"] == pytest.approx(sum(frame.scalars["seconds_processor"] for frame in frames))
-    # Of a body so small one for each iteration, and one for the stability of each frame but the last, which is rest again.
-    assert cost["factorisations"] == cost["newton_iterations"] + len(frames) - 1
+    # Of a body so small one for each iteration, and one for the stability of each frame but the last two, which were solved before.
+    assert cost["factorisations"] == cost["newton_iterations"] + len(frames) - 2
     assert cost["krylov_iterations"] >= cost["newton_iterations"]
     assert cost["load_steps"] >= 2
     spent = cost["seconds_solve"] + cost["seconds_stability"]
@@ -133,8 +133,9 @@ def test_an_old_factorisation_serves_as_long_as_it_is_worth_it(bent) -> None:
 
 
 def test_a_pose_that_was_solved_before_needs_no_iteration(bent) -> None:
+    """At rest again, and halfway there."""
     _, _, frames = bent
-    assert [frame.scalars["newton_iterations"] > 0 for frame in frames] == [False, True, True, False]
+    assert [frame.scalars["newton_iterations"] > 0 for frame in frames] == [False, True, True, False, False]
 
 
 def test_what_cannot_be_reached_is_a_status_that_keeps_the_frames_before() -> None:

@@ -149,6 +149,15 @@ def test_both_ends_turned_alike_is_a_rigid_motion(element, session) -> None:
     assert state.scalars["volume_ratio"] == pytest.approx(1, abs=1e-9)
 
 
+def test_a_body_that_is_prescribed_everywhere_is_where_it_is_prescribed(session) -> None:
+    """Though no force is out of balance where nothing may move."""
+    mesh = box("Q1", (1, 1, 1))
+    shift = Affine(((0.0, 0.0, 0.0),) * 3, (0.0, 0.2, 0.1))
+    body = replace(turned(mesh, shift), effects=PENALTY)
+    state = session.solve(body, settings("Q1")).last
+    assert state.points - mesh.points == pytest.approx(np.where(mesh.points[:, 2:] == 1, [0, 0.2, 0.1], 0.0), abs=1e-14)
+
+
 @BOTH
 def test_the_order_of_nodes_and_cells_does_not_matter(element, session) -> None:
     mesh, random = box(element, (1, 2, 2)), np.random.default_rng(4)

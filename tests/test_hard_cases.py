@@ -12,8 +12,9 @@ from fem_reference.assessment.stress import Bound, Cell, Course
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import tet_volumes
 from fem_reference.problems.muscle_body import as_body
+from fem_reference.runs.store import Outcome
 from fem_reference.scenes.case import SolverChoice
-from fem_reference.studies.hard import blocks, records, running, steps
+from fem_reference.studies.hard import blocks, jitters, records, running, steps
 
 CASES = {hard.name: hard for hard in records.read_all()}
 FAST = [name for name in running.choices() if name not in ("fenicsx", "scikit_fem")]
@@ -91,6 +92,42 @@ def test_the_farthest_frame_is_where_load_steps_are_compared() -> None:
     assert steps.farthest(health.Followed((0,), surface, np.array(moved[:1]))) is None
 
 
+def test_jitters_are_other_meshes_of_the_same_body_compared_at_the_same_material() -> None:
+    hard = CASES["twist.whole_turn"]
+    mesh = blocks.problem(hard).mesh
+    others = [blocks.problem(jitters.jittered(hard, number)).mesh for number in (1, 2, 1)]
+    assert np.array_equal(others[0].points, others[2].points)
+    for other in others[:2]:
+        moved = np.linalg.norm(other.points - mesh.points, axis=1)
+        assert 0 < moved.max() < 2 * jitters.MOVED * 20 / 3  # of cells of 20 / 3 mm
+        assert tet_volumes(other.points, other.tets).sum() == pytest.approx(20 * 20 * 60)
+    assert not np.array_equal(others[0].points, others[1].points)
+
+    def bent(one: records.Hard) -> tuple[Outcome, health.Followed]:
+        """By a linear motion, which every mesh has exactly, and half a per cent of the size more by a mesh of the number 2."""
+        built = blocks.problem(one)
+        more = 0.005 * np.linalg.norm([20, 20, 60]) * (one.block.seed == 2)
+        points, nodes = (
+            where @ np.diag([1.0, 1.1, 0.9]) + [more, 0, 0] for where in (built.surface.points, built.mesh.points)
+        )
+        followed = health.Followed((0,), built.surface, points[None], built.mesh, nodes[None])
+        return Outcome("diverged" if one.block.seed == 3 else "converged", "so"), followed
+
+    same = jitters.compare(hard, bent(hard), 2, bent)
+    assert same == steps.SameEnd(
+        True, "jitters: 2 converged, up to frame 0, apart by 0.5 % at most, 0.25 % in the median"
+    )
+    assert not jitters.compare(hard, bent(hard), 3, bent).same
+
+
+def test_jitters_of_a_shipped_case_have_tetrahedra_of_another_size() -> None:
+    hard = CASES["hip.one_radian_at_once"]
+    sizes = [running.shipped_case(jitters.jittered(hard, number).shipped).muscle.tet_size for number in (1, 2)]
+    given = running.shipped_case(hard.shipped).muscle.tet_size
+    assert sizes[0] != sizes[1]
+    assert all(0 < abs(size / given - 1) < jitters.SIZES for size in sizes)
+
+
 def test_what_explodes_with_finite_numbers_is_found_out() -> None:
     """Negative controls: a time step far beyond the stable one, and one time step for each frame."""
     exploded = cell("twist.one_radian_at_once", "mass_spring", time_step="20 ms")
@@ -130,6 +167,7 @@ def test_judging() -> None:
     bounds = [(Bound(quantity="volume", at_most=2.0), course)]
     assert stress.unfinished(ended, "a cell", bounds, "").verdict == "failed"
     assert stress.unfinished(ended, "a cell", bounds, "it is flat").verdict == "refused"
+    assert stress.unfinished(replace(blank, status="limit point"), "", bounds, "").verdict == "refused"
     assert stress.unfinished(replace(ended, status="timed out"), "", bounds, "it is flat").verdict == "failed"
     first = [(bounds[0][0], replace(course, numbers=(0,), values=course.values[:1]))]
     assert stress.unfinished(ended, "a cell", first, "it is flat").verdict == "failed"

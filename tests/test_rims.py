@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import shapes
+import small
 from numpy.testing import assert_allclose, assert_array_equal
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface, check_closed, enclosed_volume, triangle_areas
@@ -138,3 +139,15 @@ def test_a_strip_narrower_than_a_triangle_is_kept() -> None:
     assert_allclose(_area(surface, labels, 1), wanted["strip"], rtol=1e-2)
     attached = distances(BOX.points[strip], Surface(surface.points, surface.triangles[labels == 1])).distance
     assert np.mean(attached < 12.5 / 4) > 0.9
+
+
+def test_flat_triangles_at_a_rim_leave_it_where_it_is() -> None:
+    """As of both ends of a bar that triangles of more than its width are to fill; warnings are errors here."""
+    bar, ends = small.body(), (0.0, 40.0)
+    attached = {str(z): np.flatnonzero(np.abs(bar.points[:, 2] - z) < 1.5) for z in ends}
+    shares = {name: attached_shares(bar, vertices) for name, vertices in attached.items()}
+    surface, labels = with_rims(coarsen(bar, 26), bar, shares, 13.0)
+    assert_array_equal(check_closed(surface).triangles, surface.triangles)
+    for label, z in enumerate(ends, start=1):
+        assert np.ptp(_rim(surface, labels, label), axis=0)[:2] == pytest.approx([10, 10], rel=0.05)
+        assert_allclose(surface.points[surface.triangles[labels == label]][..., 2], z, atol=0.3)

@@ -12,6 +12,7 @@ from fem_reference import effects
 from fem_reference.effects import Effect
 from fem_reference.foundations.motion import Translation
 from fem_reference.foundations.records import parse
+from fem_reference.geometry.skins import Skin
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.paths import Affine, Rest
@@ -137,6 +138,27 @@ def test_nobody_counts_where_a_load_may_have_no_energy(session) -> None:
     solved = session.solve(replace(body, effects=(*body.effects, pressed)), BodySettings(element="Q2/Q1"))
     assert solved.outcome.status == "converged"
     assert not any("negative_modes" in state.scalars for state in solved.states)
+
+
+def test_a_shallow_arch_that_a_soft_spring_pulls_comes_to_a_limit_point(session) -> None:
+    """Its frame is foreseen from a step before it; where smaller steps go on, none is claimed."""
+    straight = shapes.box((8, 1, 1), (20.0, 1.0, 1.0), "tetrahedron")
+    rise = 2.5 * (1 - np.abs(straight.points[:, [0]] - 10) / 10)
+    mesh = replace(straight, points=straight.points + rise * [0, 0, 1])
+    top = np.array([[9.9, 0.45, 3.4]])
+    cell = np.argmin(np.linalg.norm(mesh.points[mesh.cells].mean(axis=1) - top, axis=1))
+    pull = Affine(STILL, (0.0, 0.0, -8.0))
+    spring = Prescribed("pull", Skin(np.array([cell]), top, np.ones(1)), (2,), pull, 5e-5)
+    ends = tuple(Prescribed(end, end, (0, 1, 2), Rest()) for end in ("x0", "x1"))
+    body = Body(mesh, flesh("P2/P1"), (*ends, spring), tuple(np.linspace(0, 1, 11)))
+    settings = BodySettings(element="P2/P1", first_step=0.1, largest_step=0.1, residual=1e-10)
+    outcomes = [
+        session.solve(body, settings.model_copy(update={"smallest_step": smallest})).outcome
+        for smallest in (2e-2, 8e-3, 1e-5)
+    ]
+    assert [outcome.status for outcome in outcomes] == ["diverged", "limit point", "limit point"]
+    foreseen, found = (float(one.message.split("at frame ")[1].split(",")[0]) for one in outcomes[1:])
+    assert foreseen == pytest.approx(found, abs=2e-3)
 
 
 @pytest.mark.usefixtures("all_cores")

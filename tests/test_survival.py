@@ -1,8 +1,11 @@
 """Runs that are cut off go on and end as those that were not; what cannot be written is one sentence, and nothing is half there."""
 
 import errno
+import itertools
 import os
 import re
+import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -15,7 +18,9 @@ import pytest
 import shapes
 import small
 
-from fem_reference import cli
+from fem_reference import cli, report
+from fem_reference.assessment.stress import Stress
+from fem_reference.export.folders import new_folder
 from fem_reference.foundations import scratch, subprocesses
 from fem_reference.io import files
 from fem_reference.runs import cut_off, store
@@ -201,6 +206,99 @@ def test_what_was_there_stays_where_there_is_no_room(
         files.write_surface(path, SURFACE, SURFACE.points)
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="no folder here that root cannot write into either")
+@pytest.mark.parametrize("words", [["run", "--solver", "pbd", "--out"], ["export", "--to"]])
+def test_a_folder_that_is_read_only_is_one_sentence(words: list[str], tmp_path: Path, capsys: Any) -> None:
+    """Nobody can write below /proc, and root does not know before it tries."""
+    scene = small.write(tmp_path / "bar")
+    before = sorted(tmp_path.rglob("*"))
+    assert cli.main([words[0], str(scene), *words[1:], "/proc/not_ours", "--quiet"]) == cli.BAD_INPUT
+    said = capsys.readouterr().err
+    assert re.fullmatch(r"fem-reference: \S*not_ours\S*: cannot be written: [\w ]+\n", said), said
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_run_whose_folder_cannot_be_written_into_any_more_keeps_what_it_has(tmp_path: Path) -> None:
+    writer = begun(tmp_path / "run")
+    surfaces = (tmp_path / "run" / "surface").rename(tmp_path / "kept")
+    (tmp_path / "run" / "surface").touch()  # no folder any more
+    with pytest.raises(OSError, match="surface"):
+        writer.add(Frame(10, SURFACE.points + 10, scalars={"energy": 10.0}))
+    (tmp_path / "run" / "surface").unlink()
+    surfaces.rename(tmp_path / "run" / "surface")
+    assert Writer(tmp_path / "run", IDENTITY, SURFACE).frames == (0, 5)
+    assert len(list((tmp_path / "run" / "surface").iterdir())) == 2
+
+
+def write_both(folder: Path, word: str) -> None:
+    """A page with its numbers, and an export."""
+    report.write_stress(Stress((), (), (), 0.0, {"said": 1000 * word}), folder, "page", "")
+    with new_folder(folder / "exported") as part:
+        files.write_text(part / "README.md", 1000 * word)
+
+
+@pytest.mark.parametrize("which", [1, 2, 3])
+def test_what_is_interrupted_while_it_is_written_leaves_what_was_there(
+    which: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In the middle of the numbers of a page, of the page and of an export."""
+    write_both(tmp_path, "old ")
+    before = {path.name: path.read_bytes() for path in tmp_path.glob("page*")}
+    shutil.rmtree(tmp_path / "exported")
+    write, count = Path.write_text, itertools.count(1)
+
+    def cut(path: Path, text: str, **more: Any) -> int:
+        if next(count) == which:
+            write(path, text[: len(text) // 2], **more)
+            raise KeyboardInterrupt
+        return write(path, text, **more)
+
+    monkeypatch.setattr(Path, "write_text", cut)
+    with pytest.raises(KeyboardInterrupt):
+        write_both(tmp_path, "new ")
+    after = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert set(after) == set(before) == {"page.json", "page.html"}  # nothing half-written, and no export
+    assert [after[name] == before[name] for name in ("page.json", "page.html")] == [which == 1, which <= 2]
+
+
+# What begins to write a page, or an export, and is killed in the middle.
+_KILLED = """
+import os, signal, sys
+from pathlib import Path
+from fem_reference.export.folders import new_folder
+from fem_reference.io import files
+
+def cut(path, text, **_):
+    path.write_bytes(text[:500].encode())
+    os.kill(os.getpid(), signal.SIGKILL)
+
+Path.write_text = cut
+folder = Path(sys.argv[1])
+if os.fork() == 0:
+    files.write_text(folder / "page.html", 1000 * "new ")
+os.wait()
+with new_folder(folder / "exported") as part:
+    files.write_text(part / "README.md", 1000 * "new ")
+"""
+
+
+def test_what_is_killed_while_it_is_written_leaves_what_was_there(tmp_path: Path) -> None:
+    """And what it had begun is removed by who writes there next."""
+    files.write_text(tmp_path / "page.html", "old")
+    done = subprocess.run(
+        subprocesses.command("-c", _KILLED, str(tmp_path)), env=subprocesses.environment(), check=False
+    )
+    assert done.returncode == -signal.SIGKILL
+    assert {path.name for path in tmp_path.iterdir() if path.name[0] != "."} == {"page.html"}
+    assert (tmp_path / "page.html").read_text() == "old"
+    for path in tmp_path.iterdir():
+        os.utime(path, (time.time() - 100,) * 2)
+    files.write_text(tmp_path / "page.html", "new")
+    with new_folder(tmp_path / "exported") as part:
+        files.write_text(part / "README.md", "new")
+    assert {path.name for path in tmp_path.iterdir()} == {"page.html", "exported"}
 
 
 def dead() -> int:

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapes as bodies
+from scipy.optimize import brentq, minimize_scalar
 
 from fem_reference import effects
 from fem_reference.effects import Effect, State
@@ -130,12 +131,25 @@ def test_a_mean_over_a_cell_weighs_by_volume(session) -> None:
 def test_a_squeeze_to_collapse_is_no_result(frames, fem_lab) -> None:
     """In one frame or in many: no state of it is kept, and the law that ended is named."""
     solved = squeezed(fem_lab, "Q1/P0", POISSON, tuple(np.linspace(1, 0.1, frames + 1).tolist()))
-    assert solved.outcome.status in (
-        "collapsed",
-        "diverged",
-    )  # on the steep branch towards it Newton's method may find nothing
+    # On the steep branch towards it, which folds back, Newton's method may find nothing.
+    assert solved.outcome.status in ("collapsed", "diverged", "limit point")
     assert "is outside the range that it is meant for" in solved.outcome.message
     assert all(state.scalars["min_cell_volume_ratio"] >= COLLAPSED for state in solved.states)
+
+
+def test_a_limit_point_is_where_the_closed_form_folds_back(fem_lab) -> None:
+    solved = squeezed(fem_lab, "Q1/P0", POISSON, (1.0, 0.1))
+    assert solved.outcome.status == "limit point"
+    bulk = bulk_modulus(POISSON)
+
+    def stretch(J: float) -> float:
+        """At which a block of the volume ``J`` is in balance, as in ``loads.squeezed_volume``."""
+        return brentq(lambda s: MU / 3 * J ** (-2 / 3) * (J / s - s**2) + bulk * J * (J - 1), 0.05, 1.0)
+
+    fold = minimize_scalar(stretch, bounds=(0.25, 0.35), method="bounded")
+    assert fold.x == pytest.approx(0.285, abs=0.01)
+    found = float(solved.outcome.message.split("limit point at frame ")[1].split(",")[0])
+    assert found == pytest.approx(1 - fold.fun, abs=1e-3)  # which the smallest load step is
 
 
 @pytest.mark.parametrize("element", ["Q1/P0", "P2"])

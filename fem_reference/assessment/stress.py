@@ -117,10 +117,12 @@ def judge(cell: Cell, weighed: Weighed) -> Cell:
 
 
 def unfinished(cell: Cell, message: str, weighed: Weighed, no_solution: str) -> Cell:
-    """``cell``, of a run that ended with a status: failed, or refused where it came some way and found
+    """``cell``, of a run that ended with a status: failed, or refused where it came to a limit point, or came some way and found
     that there is ``no_solution``, for the reason given.
     """
     shown = _decisive(cell, weighed)
+    if cell.status == "limit point":
+        return replace(shown, verdict="refused", sentence=message)
     if no_solution and cell.status not in _OTHER_REASONS and len(weighed[0][1].numbers) > 1:
         sentence = f"as it should, for {no_solution}: {cell.status}: {message}"
         return replace(shown, verdict="refused", sentence=sentence)

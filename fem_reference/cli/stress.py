@@ -25,15 +25,20 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     many = "take the reference to the farthest frame of each case in 1, 10 and 40 load steps as well: the same end, or a status"
     parser.add_argument("--steps", action="store_true", help=many)
+    meshes = "run the reference on so many other meshes of each case as well, a little different at random"
+    parser.add_argument("--jitters", type=int, default=0, metavar="N", help=meshes)
     add_name(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run them all and write the page: whatever becomes of a run is a result, and not a failure of this."""
-    found = running.run(records.read_all(tuple(options.names)), options.solver, in_steps=options.steps)
+    found = running.run(
+        records.read_all(tuple(options.names)), options.solver, in_steps=options.steps, jitters=options.jitters
+    )
     parts = [Part((name,), name) for name in options.names]
     parts += [Part(("--solver", name), name) for name in options.solver]
     parts += [Part(("--steps",), "steps")] if options.steps else []
+    parts += [Part(("--jitters", str(options.jitters)), "jitters")] if options.jitters else []
     _, lines = written(options, Asked("stress", PAGE, tuple(parts)), partial(report.write_stress, found))
     write_output(facts(found), "\n".join([stress_page.text(found), *lines]), options)
     return DONE

@@ -25,10 +25,9 @@ def new_folder(folder: Path) -> Iterator[Path]:
     """
     folder = folder.resolve()
     check(folder)
-    folder.parent.mkdir(parents=True, exist_ok=True)
     files.clear(folder)
     part = folder.with_name(f".{folder.name}-{os.getpid()}")
-    part.mkdir()
+    files.make_folder(part)
     try:
         yield part
         part.replace(folder)

@@ -205,8 +205,16 @@ def whole(path: Path) -> Iterator[Path]:
             part.unlink(missing_ok=True)
 
 
+def make_folder(path: Path) -> None:
+    """The folder ``path``, with those above it, where it is not there. An OSError says that it cannot be written, and why."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _unwritten(path, error) from error
+
+
 def _unwritten(path: Path, error: OSError) -> OSError:
-    """Why ``path`` could not be written, in a sentence."""
+    """Why ``path``, a file or a folder, could not be written, in a sentence."""
     why = error.strerror or str(error)
     if error.errno in (None, *NO_ROOM):  # numpy does not say why
         free = shutil.disk_usage(path.parent).free

@@ -145,6 +145,6 @@ def _write_page(folder: Path, name: str, facts: Any, text: str, about: About) ->
 
 def _write(texts: dict[str, str], folder: Path) -> None:
     """Write each text into ``folder`` under its name."""
-    folder.mkdir(parents=True, exist_ok=True)
+    files.make_folder(folder)
     for name, text in texts.items():
         files.write_text(folder / name, text)

@@ -30,7 +30,7 @@ class Entry:
 
 def write(folder: Path) -> None:
     """Write ``index.html`` of the pages in ``folder``, unless a file of that name is there that is no index of ours."""
-    folder.mkdir(parents=True, exist_ok=True)
+    files.make_folder(folder)
     path = folder / f"{NAME}.html"
     there = pages.read(path)
     if path.exists() and (there is None or there.kind != KIND):

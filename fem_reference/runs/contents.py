@@ -8,7 +8,9 @@ from pydantic import ConfigDict, Field, field_validator, model_validator
 from fem_reference.foundations.records import Name, Record
 from fem_reference.scenes.muscle import LAST_FRAME, MOST_FRAMES
 
-Status = Literal["converged", "diverged", "inverted", "collapsed", "out of steps", "timed out", "crashed", "stopped"]
+Status = Literal[
+    "converged", "diverged", "inverted", "collapsed", "limit point", "out of steps", "timed out", "crashed", "stopped"
+]
 FORMAT = 1
 
 

@@ -166,7 +166,7 @@ class Writer:
             self.state = stored | {"name": identity["name"], "origin": identity["origin"]}
             return
         shutil.rmtree(folder) if folder.exists() else None
-        folder.mkdir(parents=True)
+        files.make_folder(folder)
         self._write_state()
 
     @property

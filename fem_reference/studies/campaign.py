@@ -27,7 +27,7 @@ log = logging.getLogger(__name__)
 # How often a run is tried again whose worker died.
 ATTEMPTS = 3
 # A run that ended so ends so again; one that timed out or crashed may have had other reasons.
-_LASTING = ("diverged", "inverted", "collapsed", "out of steps")
+_LASTING = ("diverged", "inverted", "collapsed", "limit point", "out of steps")
 
 
 @dataclass(frozen=True)

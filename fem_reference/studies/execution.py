@@ -18,6 +18,7 @@ from filelock import FileLock, Timeout
 from fem_reference import __version__, solvers
 from fem_reference.foundations.records import Record, join
 from fem_reference.foundations.usage import forget_peak_memory, peak_memory
+from fem_reference.io import files
 from fem_reference.problems import of_case
 from fem_reference.problems.muscle import Problem, Setup
 from fem_reference.problems.scalar import FieldProblem
@@ -226,7 +227,7 @@ def _(built: FieldProblem, solver: Any, settings: Record, folder: Path, identity
 @contextmanager
 def _alone(folder: Path) -> Iterator[None]:
     """Nobody else makes the run in ``folder`` meanwhile: whoever comes second waits, and then finds it made."""
-    folder.parent.mkdir(parents=True, exist_ok=True)
+    files.make_folder(folder.parent)
     lock = FileLock(folder.parent / f".{folder.name}.lock")
     try:
         lock.acquire(timeout=0)

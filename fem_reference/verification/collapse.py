@@ -46,11 +46,12 @@ def squeezed(lab: Lab, element: str, poisson: float, stretches: tuple[float, ...
 
 def collapses(lab: Lab, element: str, poisson: float) -> Finding:
     """1 where the squeeze does not come through, keeps no state below a fifth of its volume, and names the law that was
-    outside its range; else 0. Newton's method finds a collapsed state or, on the steep branch towards it, none.
+    outside its range; else 0. Newton's method finds a collapsed state or, on the steep branch towards it, which folds back, none.
     """
     solved = squeezed(lab, element, poisson, tuple(np.linspace(1, DOWN_TO, 7).tolist()))
     least = min(state.scalars["min_cell_volume_ratio"] for state in solved.states)
-    ended, message = solved.outcome.status in ("collapsed", "diverged"), solved.outcome.message
+    ended = solved.outcome.status in ("collapsed", "diverged", "limit point")
+    message = solved.outcome.message
     found = ended and least >= 0.2 and "incompressible is outside the range" in message
     return Finding(float(found), note=f"{solved.outcome.status}: {message}")
 

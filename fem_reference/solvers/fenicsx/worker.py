@@ -20,6 +20,7 @@ from fem_reference.solvers.fenicsx.processes import MARK
 from fem_reference.solvers.fenicsx import compiling, assembled_field  # isort: skip - after the door
 from fem_reference.solvers.fenicsx.body import AssembledBody  # isort: skip
 from fem_reference.solvers.fenicsx.branching import leave  # isort: skip
+from fem_reference.solvers.fenicsx.limit_points import ahead  # isort: skip
 from fem_reference.solvers.fenicsx.restart import Restart  # isort: skip
 from fem_reference.solvers.fenicsx.validity import Ranges  # isort: skip
 from fem_reference.solvers.common.load_steps import Attempt, Step, Steps, march  # isort: skip
@@ -76,8 +77,8 @@ class Worker:
             ):
                 self.counts[name] += count
             if reached.status != "converged":
-                status = "collapsed" if self.collapse else reached.status
-                self.report(status=status, message=self.sentence(reached), cost=self.cost())
+                status, message = self.failure(reached)
+                self.report(status=status, message=message, cost=self.cost())
                 return
             self.stabilise(reached.frame)
             self.report_frame(reached)
@@ -132,6 +133,15 @@ class Worker:
             f"; in {len(self.unstable)} of them the equilibrium is unstable, first at frame {min(self.unstable):g} "
             f"(negative modes: up to {most:.0f}, of which the material has {own:.0f} for certain)"
         )
+
+    def failure(self, reached: Step) -> tuple[str, str]:
+        """The status of a run that did not reach a frame, and why in words."""
+        if self.collapse:
+            return "collapsed", self.sentence(reached)
+        limit = ahead(self.body, self.settings.smallest_step)
+        if limit is None:
+            return reached.status, self.sentence(reached)
+        return "limit point", f"{limit}; {self.sentence(reached)}"
 
     def sentence(self, reached: Step) -> str:
         """Why a frame could not be reached, where, and what to try."""

@@ -18,7 +18,6 @@ from fem_reference.problems.muscle import AttachedVertices, Problem, RigidBody, 
 from fem_reference.scenes.bones import Bone
 from fem_reference.studies.hard.records import FACES, Block, Face, Hard, Hold, Start
 
-SEED = 17
 # What blocks are of where a case says nothing else: muscle's usual matrix.
 MATERIAL = ({"name": "neo_hooke", "mu": "10 kPa"}, {"name": "incompressible", "bulk": "10 MPa"})
 _LINES, _POINTS = 4, 9  # measured lines of each block, and points of each
@@ -130,7 +129,7 @@ def _placed(block: Block, nodes: Ints) -> Floats:
     axes = [_ticks(count, ratio) for count, ratio in zip(block.cells, block.grading, strict=True)]
     shares = np.column_stack([ticks[nodes[:, k]] for k, ticks in enumerate(axes)])
     if block.jitter:
-        random = np.random.default_rng(SEED).uniform(-1, 1, shares.shape) * block.jitter / np.array(block.cells)
+        random = np.random.default_rng(block.seed).uniform(-1, 1, shares.shape) * block.jitter / np.array(block.cells)
         random[(nodes == 0) | (nodes == block.cells)] = 0  # faces stay flat, and edges and corners where they are
         shares = shares + random
     return np.asarray(np.asarray(block.corner) + shares * np.asarray(block.size))

@@ -25,7 +25,7 @@ class Block(Record):
     """A block of ``size`` from its ``corner``, in so many ``cells`` along each axis, each cut into six tetrahedra.
 
     ``grading``: along each axis, the last cell over the first. ``jitter``: how far nodes are moved at random inside the block and
-    its faces, in cells. ``fibre``: the direction of fibres, along which the lines run that are measured.
+    its faces, in cells, by a ``seed``. ``fibre``: the direction of fibres, along which the lines run that are measured.
     """
 
     size: Point
@@ -33,6 +33,7 @@ class Block(Record):
     corner: Point = (0.0, 0.0, 0.0)
     grading: tuple[float, float, float] = (1.0, 1.0, 1.0)
     jitter: float = Field(default=0.0, ge=0, lt=0.5)
+    seed: int = Field(default=17, ge=0)
     fibre: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
     @model_validator(mode="after")

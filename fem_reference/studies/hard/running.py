@@ -32,7 +32,7 @@ from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Case, SolverChoice
 from fem_reference.scenes.scalar import ScalarCase
 from fem_reference.solvers import fenicsx
-from fem_reference.studies.hard import blocks, steps
+from fem_reference.studies.hard import blocks, jitters, steps
 from fem_reference.studies.hard.records import Hard, Shipped
 
 log = logging.getLogger(__name__)
@@ -70,9 +70,11 @@ def choices() -> dict[str, SolverChoice]:
 class Posed:
     """A hard case with the problem that it poses, made once, and the reference's run of it."""
 
-    def __init__(self, hard: Hard, *, in_steps: bool = False) -> None:
-        """``in_steps``: the reference goes to its farthest frame in several numbers of load steps, whether the case asks or not."""
-        self.hard, self.in_steps = hard, in_steps
+    def __init__(self, hard: Hard, *, in_steps: bool = False, jitters: int = 0) -> None:
+        """``in_steps``: the reference goes to its farthest frame in several numbers of load steps, whether the case asks or not;
+        ``jitters``: on how many other meshes it runs.
+        """
+        self.hard, self.in_steps, self.jitters = hard, in_steps, jitters
         self.truth: tuple[Floats, tuple[int, ...]] | None = None
 
     @cached_property
@@ -107,15 +109,15 @@ def shipped_case(shipped: Shipped) -> Case:
     return casefile.read(shipped.case, changes=quick | shipped.changes)
 
 
-def run(hard: Sequence[Hard], only: Sequence[str] = (), *, in_steps: bool = False) -> Stress:
+def run(hard: Sequence[Hard], only: Sequence[str] = (), *, in_steps: bool = False, jitters: int = 0) -> Stress:
     """Every solver, or ``only`` these, on each of the cases; the reference first, which others may be measured against, and
-    ``in_steps`` of 1, 10 and 40 to each case's farthest frame.
+    ``in_steps`` of 1, 10 and 40 to each case's farthest frame, and on so many other meshes.
     """
     begin, cells = time.perf_counter(), list[Cell]()
     chosen = {name: choice for name, choice in choices().items() if not only or name in only}
     with fenicsx.shared():
         for i, one in enumerate(hard):
-            posed = Posed(one, in_steps=in_steps)
+            posed = Posed(one, in_steps=in_steps, jitters=jitters)
             for name, choice in chosen.items():
                 cells.append(cell(posed, one.choice(choice)))
                 found = cells[-1]
@@ -137,7 +139,7 @@ def cell(posed: Posed, choice: SolverChoice) -> Cell:
             return Cell(hard.name, solver, "refused", f"the case is about {', '.join(hard.only)} only: {hard.because}")
         if hard.by_effects and not (solver == SECOND or solvers.takes_effects(solver)):
             return Cell(hard.name, solver, "refused", "nothing but effects acts, and this solver simulates none")
-        with _limited(LONGER if posed.in_steps else 2 * LIMIT):
+        with _limited(LONGER if posed.in_steps or posed.jitters else 2 * LIMIT):
             found = _solved(posed, choice)
     except (InputError, MissingSoftware) as error:
         found = Cell(hard.name, solver, "refused", str(error))
@@ -198,9 +200,21 @@ def _solved(posed: Posed, choice: SolverChoice) -> Cell:
         ends = steps.compare(built, choice, wanted)
         found = replace(found, sentence=f"{found.sentence}; {ends.sentence}")
         found = found if ends.same else replace(found, verdict="failed")
+    if choice.solver == REFERENCE and isinstance(built, Problem) and posed.jitters:
+        others = jitters.compare(
+            hard, (outcome, followed), posed.jitters, lambda one: _muscle(_muscle_problem(one), choice)
+        )
+        found = replace(found, sentence=f"{found.sentence}; {others.sentence}")
+        found = found if others.same else replace(found, verdict="failed")
     if found.verdict == "ok" and (doubt := health.unstable(followed)):
         found = replace(found, verdict="degraded", sentence=f"{doubt}; {found.sentence}")
     return replace(found, scene=_scene(found, followed))
+
+
+def _muscle_problem(hard: Hard) -> Problem:
+    built = Posed(hard).problem
+    assert isinstance(built, Problem)  # as that of the case is
+    return built
 
 
 def _muscle(built: Problem, choice: SolverChoice) -> tuple[Outcome, Followed]:

@@ -1,0 +1,156 @@
+"""Limit points: where a path of equilibria turns back in time, and no state is near beyond."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from petsc4py import PETSc
+
+from fem_reference.foundations.mesh import Floats
+from fem_reference.solvers.fenicsx.body import AssembledBody
+from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolveError
+
+_ITERATIONS = 40  # of inverse iteration
+# The share of the smallest load step over which slopes are taken.
+_DIFFERENCE = 1e-3
+# Of the smallest load steps. One that failed was up to two of them, and the distance is known to a factor.
+_NEAR = 4
+_SOFT = 0.3  # The share of the stiffness at rest that the softest mode has near a limit point at most.
+
+
+@dataclass(frozen=True)
+class LimitPoint:
+    """The ``frame`` of a limit point, and the rest position [mm] where its mode moves most."""
+
+    frame: float
+    at: tuple[float, float, float]
+
+    def __str__(self) -> str:
+        x, y, z = self.at
+        return (
+            f"the equilibrium comes to a limit point at frame {self.frame:.4g}, where the stiffness of its softest mode, "
+            f"largest at ({x:.1f}, {y:.1f}, {z:.1f}) mm, is 0: no state is near beyond it, and what follows is a snap"
+        )
+
+
+def ahead(body: AssembledBody, step: float) -> LimitPoint | None:
+    """The limit point that follows on the last good state within a few load steps of the smallest size ``step``; None where none
+    does, or where it cannot be known. Collective.
+
+    Before a limit point the least eigenvalue of the tangent falls as the root of what is left of the way there: its square is
+    linear, and half of it over its slope along the path is what is left. The slope is that of a step of Newton's method.
+    """
+    if body.stability is None or body.clock.matters:
+        return None
+    before = np.array(body.unknowns.x.array)
+    try:
+        found = _limit_point(body, step * _DIFFERENCE)
+    except LinearSolveError:
+        return None
+    finally:
+        _take_up(body, before)
+    return found if found is not None and found.frame - body.at <= _NEAR * step else None
+
+
+def _limit_point(body: AssembledBody, difference: float) -> LimitPoint | None:
+    system, linear = body.system, body.linear
+    assert isinstance(linear, Factorised)  # where there is a stability
+    _set(body, body.at)
+    system.contact = body.contact
+    system.linearise()
+    linear.changed()
+    mode = _softest(body)
+    stiffness = _stiffness(body, mode)
+    if abs(stiffness) > _SOFT * _stiffness_at_rest(body):
+        return None
+    motion = _motion(body, difference)
+    now, ends = np.array(body.unknowns.x.array), []
+    for sign in (1, -1):
+        body.unknowns.x.array[:] = now + sign * motion
+        if body.contact:
+            body.contact.update(body.at + sign * difference)
+        system.linearise()
+        ends.append(_stiffness(body, mode))
+    slope = (ends[0] - ends[1]) / (2 * difference)
+    left = -stiffness / (2 * slope) if slope != 0 else np.inf
+    return LimitPoint(body.at + left, _largest(body, mode)) if 0 < left < np.inf else None
+
+
+def _stiffness_at_rest(body: AssembledBody) -> float:
+    """The least eigenvalue at rest, without contact; the state is as before, but for the tangent."""
+    now, body.system.contact = np.array(body.unknowns.x.array), None
+    body.unknowns.x.array[:] = 0
+    body.system.linearise()
+    body.linear.changed()
+    found = _stiffness(body, _softest(body))
+    body.unknowns.x.array[:], body.system.contact = now, body.contact
+    body.system.linearise()
+    body.linear.changed()
+    return found
+
+
+def _motion(body: AssembledBody, difference: float) -> Floats:
+    """What the unknowns (n,) change by from the present state over a small ``difference`` in frames, to first order."""
+    system, frame = body.system, body.at + difference
+    _set(body, frame)
+    moves = -system.missing()
+    system.linearise(moves, body.contact.predicted(frame, moves) if body.contact else None)
+    step = system.b.duplicate()
+    body.linear.solve(system.b, step, 1e-9)
+    free = ~system.fixed[: system.owned]
+    before = np.array(body.unknowns.x.array)
+    body.unknowns.x.array[: system.owned] -= np.where(free, system.scale[: system.owned] * step.array, 0.0)
+    body.unknowns.x.scatter_forward()
+    found = np.asarray(body.unknowns.x.array - before + moves)
+    body.unknowns.x.array[:] = before
+    return found
+
+
+def _softest(body: AssembledBody) -> PETSc.Vec:
+    """The mode of the least eigenvalue of the tangent as it is, with its pressures; of length 1 in its displacements."""
+    system = body.system
+    moves = np.zeros(system.size)
+    moves[body.displacement.dofs.ravel()] = 1.0
+    moves[system.fixed] = 0.0
+    moves = moves[: system.owned]
+    vector: PETSc.Vec = system.b.duplicate()
+    image: PETSc.Vec = system.b.duplicate()
+    image.array[:] = moves * np.random.default_rng(body.comm.rank).normal(size=len(moves))
+    for _ in range(_ITERATIONS):
+        vector.array[:] = image.array * moves
+        vector.normalize()
+        body.linear.solve(vector, image, 1e-10)
+    vector.array[:] = image.array * moves
+    image.scale(float(vector.dot(vector)) ** -0.5)
+    return image
+
+
+def _stiffness(body: AssembledBody, mode: PETSc.Vec) -> float:
+    """Twice the energy of a ``mode`` by the tangent as it is."""
+    image = mode.duplicate()
+    body.system.matrix.mult(mode, image)
+    return float(image.dot(mode))
+
+
+def _largest(body: AssembledBody, mode: PETSc.Vec) -> tuple[float, float, float]:
+    """The rest position [mm] where a mode moves most."""
+    found: Floats = np.zeros(body.system.size)
+    found[: body.system.owned] = mode.array
+    lengths = np.linalg.norm(found[body.displacement.dofs].reshape(-1, 3), axis=1)
+    i = int(np.argmax(lengths))
+    place = body.displacement.space.tabulate_dof_coordinates()[i].tolist()
+    _, (x, y, z) = max(body.comm.allgather((float(lengths[i]), place)))
+    return x, y, z
+
+
+def _set(body: AssembledBody, frame: float) -> None:
+    body.set_amounts(frame)
+    for one in body.conditions:
+        one.move_to(frame)
+
+
+def _take_up(body: AssembledBody, unknowns: Floats) -> None:
+    """Be in the last good state again, that of the ``unknowns``."""
+    _set(body, body.at)
+    body.unknowns.x.array[:] = unknowns
+    if body.contact:
+        body.contact.go_back()
