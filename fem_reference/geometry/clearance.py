@@ -51,7 +51,7 @@ def of_spline(coefficients: Floats, origin: Floats, spacing: float, level: float
 
 def _may_be_low(coefficients: Floats, level: float) -> NDArray[np.bool_]:
     """In which cells, three fewer along each axis, a spline may be at ``level`` or below: it is no lower than the least of the
-    64 coefficients that reach into it, and than the least of its Bernstein coefficients. Nor is it higher than the greatest of them:
+    64 coefficients that reach into it, and than the least of its Bernstein coefficients. Nor is it above the greatest of them:
     deep inside nothing is left to ask.
     """
     found = _least_of_four(coefficients) <= level
