@@ -58,6 +58,14 @@ def test_no_points_have_no_distances() -> None:
     assert [len(part) for part in found] == [0, 0, 0, 0]
 
 
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_where_squares_overflow_everything_is_far() -> None:
+    found = distances(np.array([[0.0, 0, 0], [1e300, 0, 0]]), Surface(np.full((3, 3), 1e300), np.array([[0, 1, 2]])))
+    assert (found.distance == np.inf).all()
+    assert (found.triangle == 0).all()
+    assert (found.closest == 1e300).all()
+
+
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_what_is_not_finite_has_no_distance(bad: float) -> None:
     points = np.ones((3, 3))

@@ -35,15 +35,16 @@ def distances(points: Floats, surface: Surface) -> Distances:
     )
     tree = _tree(vertices.tobytes(), triangles.tobytes())
     squares, triangle, closest = tree.squared_distance(vertices, triangles, points)
+    lost = ~np.isfinite(squares)  # what libigl says of places whose squares overflow is left from anything
+    triangle[lost], closest[lost] = 0, vertices[triangles[0, 0]]
     corners = surface.points[surface.triangles[triangle]]
     return Distances(
         np.sqrt(np.maximum(squares, 0)), np.asarray(triangle, np.int64), closest, _barycentric(closest, corners)
     )
 
 
-@lru_cache(
-    maxsize=8
-)  # one surface is asked for few points many times, and its tree takes as long as some thousand of them
+# A surface is often asked for few points at a time, and its tree takes as long as thousands of them.
+@lru_cache(maxsize=8)
 def _tree(points: bytes, triangles: bytes) -> igl.AABB:
     """The boxes around parts of the surface with the arrays ``points``, 64 bit floats, and ``triangles``, 64 bit integers."""
     tree = igl.AABB()

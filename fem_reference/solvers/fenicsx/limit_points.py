@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from fem_reference.foundations.mesh import Floats
@@ -112,6 +113,8 @@ def _softest(body: AssembledBody) -> PETSc.Vec:
     moves[body.displacement.dofs.ravel()] = 1.0
     moves[system.fixed] = 0.0
     moves = moves[: system.owned]
+    if not body.comm.allreduce(moves.any(), MPI.LOR):
+        raise LinearSolveError("nothing is left to move")
     vector: PETSc.Vec = system.b.duplicate()
     image: PETSc.Vec = system.b.duplicate()
     image.array[:] = moves * np.random.default_rng(body.comm.rank).normal(size=len(moves))
