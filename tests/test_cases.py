@@ -205,7 +205,7 @@ def test_muscles_with_negative_control_fail(name, tmp_path, monkeypatch, request
     assert wanted in failed
 
 
-@pytest.mark.usefixtures("without_page")
+@pytest.mark.usefixtures("without_page", "coarse_contact")
 def test_half_the_bulk_modulus_of_the_box_doubles_its_change_of_volume(tmp_path, monkeypatch) -> None:
     status, facts = run(casefile.read(BOX, changes=FEW, with_negative_control=True), tmp_path, monkeypatch)
     assert (status, facts["verdict"]) == (cli.VERDICT_FAIL, "fail")
