@@ -14,6 +14,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+import ufl
 from dolfinx import fem, jit
 from ufl.algorithms import expand_derivatives
 from ufl.corealg.map_dag import map_expr_dag
@@ -57,11 +58,22 @@ def form(expression: Any, entity_maps: Any = None) -> Any:
 
 
 def expression(value: Any, points: Any) -> Any:
-    """A compiled expression at reference ``points`` (q, 3). The variables that it was differentiated by are taken out: they are
-    numbered through the whole process, so that what is compiled would not be found again.
+    """A compiled expression at reference ``points`` (q, 3)."""
+    return fem.Expression(_expanded(value), points, jit_options=OPTIONS)
+
+
+def expressions(values: list[Any], points: Any, first: int) -> tuple[Any, Any]:
+    """Compiled expressions at reference ``points`` (q, 3): of the ``first`` ones of the scalars ``values``, and of all of them."""
+    whole = _expanded(ufl.as_vector(values))
+    parts = ufl.as_vector(whole.ufl_operands[:first])
+    return tuple(fem.Expression(one, points, jit_options=OPTIONS) for one in (parts, whole))
+
+
+def _expanded(value: Any) -> Any:
+    """``value`` with its derivatives worked out, and without the variables that it was differentiated by: they are numbered through
+    the whole process, so that what is compiled would not be found again.
     """
-    plain = map_expr_dag(_WithoutVariables(), expand_derivatives(value))
-    return fem.Expression(plain, points, jit_options=OPTIONS)
+    return map_expr_dag(_WithoutVariables(), expand_derivatives(value))
 
 
 class _WithoutVariables(MultiFunction):  # type: ignore[misc]  # UFL has no types

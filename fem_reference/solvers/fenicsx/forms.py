@@ -93,8 +93,7 @@ class Form:
 
     def _derivatives(self, acting: list[tuple[Effect, Any]], state: State, by: "_Variables") -> Derivatives:
         first, second = _differentiated(total_energy(acting, state), by, self.kinds)
-        vectors = ufl.as_vector(first), ufl.as_vector(first + second)
-        return Derivatives(*(compiling.expression(vector, self.rule[0]) for vector in vectors))
+        return Derivatives(*compiling.expressions(first + second, self.rule[0], len(first)))
 
     def _kinetic(self, effects: list[Any]) -> Any:
         if self.step is None or self.step.velocity is None:
