@@ -128,7 +128,7 @@ def rows(facts, metric, statistic):
 
 
 def test_main_job(tmp_path, monkeypatch) -> None:
-    # With its mesh's refinement, error bars and pictures, on a third of the tetrahedra; ``.ci/run`` runs it as it is shipped.
+    # With its mesh's refinement and its pictures, on a third of the tetrahedra; ``.ci/run`` runs it as it is shipped.
     scene, target = casefile.read(MAIN_JOB, changes={"muscle.tet_size": "14 mm"}), tmp_path / "facts.json"
     monkeypatch.setattr(casefile, "read", lambda _: scene)
     status = cli.main(["demo", "--out", str(tmp_path), "--json", str(target), "--quiet"])
