@@ -1,5 +1,6 @@
 """Fixtures that several test files share."""
 
+import gc
 import importlib.util
 import os
 from collections.abc import Iterator
@@ -26,6 +27,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Where processes share the tests, those that take long come first, so that none is left to one process at the end."""
     if hasattr(config, "workerinput"):
         items.sort(key=lambda item: (item.path.name not in SINGLE, item.get_closest_marker("slow") is None))
+
+
+def pytest_collection_finish() -> None:
+    """What was imported and collected stays to the end: nothing of it is looked at again for what can be freed."""
+    gc.freeze()
 
 
 @pytest.hookimpl(optionalhook=True)

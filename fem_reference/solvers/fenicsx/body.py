@@ -125,7 +125,7 @@ class AssembledBody:
         if self.clock.begins():
             self._begin(before)
         self.clock.start(frame, before)
-        self._set(frame)
+        self.set_frame(frame)
         self.recalled = None
         failure, iterations = self.newton.solve_among(self.contact, frame)
         smallest = self.determinants.smallest()
@@ -155,7 +155,7 @@ class AssembledBody:
     def _begin(self, before: Floats) -> None:
         """Find with what acceleration the body leaves its rest at ``before``: by a step in which nothing moves."""
         self.clock.instant(before)
-        self._set(self.clock.at)
+        self.set_frame(self.clock.at)
         self.newton.solve(self.clock.at)  # of a tangent that is all mass: what it cannot do, the first step will show
         self.clock.begin(self.unknowns.x.array)
         self.unknowns.x.array[:] = before
@@ -169,7 +169,7 @@ class AssembledBody:
         if self.clock.matters or not self.reuse or self._comes_back(frame):
             return False
         before, self.system.contact = np.array(self.unknowns.x.array), self.contact
-        self._set(frame)
+        self.set_frame(frame)
         self.recalled = self.known.find(self._acting(frame))
         if self.recalled is None:
             return False
@@ -190,12 +190,12 @@ class AssembledBody:
     def know(self, frame: float, unknowns: Floats, modes: float | None) -> None:
         """Have solved ``frame`` before, with these ``unknowns`` (n,) and negative ``modes``."""
         if self.reuse and not self.clock.matters:
-            self._set(frame)
+            self.set_frame(frame)
             self.known.add(State(self._acting(frame), unknowns, modes))
 
     def take_up(self, frame: float, unknowns: Floats, *, recalled: bool) -> None:
         """Be in the state of ``frame`` with ``unknowns`` (n,), as when it was reached."""
-        self._set(frame)
+        self.set_frame(frame)
         self.unknowns.x.array[:] = unknowns
         self.at = frame
         if self.contact:
@@ -212,7 +212,7 @@ class AssembledBody:
         """
         values = []
         for number in (self.at, (self.at + frame) / 2, frame):
-            self._set(number)
+            self.set_frame(number)
             values.append(np.concatenate([np.zeros(0), *(one.prescribed for one in self.conditions)]))
         start, halfway, end = values
         aside, moved = (
@@ -229,7 +229,7 @@ class AssembledBody:
         values = [one.prescribed for one in self.conditions]
         return np.concatenate([amounts, allowed, *poses, *values])
 
-    def _set(self, frame: float) -> None:
+    def set_frame(self, frame: float) -> None:
         """What acts and is prescribed at ``frame``."""
         self.set_amounts(frame)
         for one in self.conditions:

@@ -55,7 +55,7 @@ def ahead(body: AssembledBody, step: float) -> LimitPoint | None:
 def _limit_point(body: AssembledBody, difference: float) -> LimitPoint | None:
     system, linear = body.system, body.linear
     assert isinstance(linear, Factorised)  # where there is a stability
-    _set(body, body.at)
+    body.set_frame(body.at)
     system.contact = body.contact
     system.linearise()
     linear.changed()
@@ -92,7 +92,7 @@ def _stiffness_at_rest(body: AssembledBody) -> float:
 def _motion(body: AssembledBody, difference: float) -> Floats:
     """What the unknowns (n,) change by from the present state over a small ``difference`` in frames, to first order."""
     system, frame = body.system, body.at + difference
-    _set(body, frame)
+    body.set_frame(frame)
     moves = -system.missing()
     system.linearise(moves, body.contact.predicted(frame, moves) if body.contact else None)
     step = system.b.duplicate()
@@ -145,15 +145,9 @@ def _largest(body: AssembledBody, mode: PETSc.Vec) -> tuple[float, float, float]
     return x, y, z
 
 
-def _set(body: AssembledBody, frame: float) -> None:
-    body.set_amounts(frame)
-    for one in body.conditions:
-        one.move_to(frame)
-
-
 def _take_up(body: AssembledBody, unknowns: Floats) -> None:
     """Be in the last good state again, that of the ``unknowns``."""
-    _set(body, body.at)
+    body.set_frame(body.at)
     body.unknowns.x.array[:] = unknowns
     if body.contact:
         body.contact.go_back()

@@ -236,6 +236,7 @@ def main(argument: str) -> None:
     """Solve the job in a file; or, for ``-``, one after the other those whose files standard input names."""
     end_with_starter()
     compiling.prepare()
+    gc.freeze()  # what is imported stays: what is collected after each job is looked for among what that left
     for line in sys.stdin if argument == "-" else [argument]:
         path = Path(line.strip())
         job = pickle.loads(path.read_bytes())
