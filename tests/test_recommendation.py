@@ -3,6 +3,7 @@ out.
 """
 
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -53,6 +54,16 @@ def study(case: str, motion: float, triangles: float = 1000, bar: float = 0.0) -
     return CaseStudy(
         case, case, "made up", points, {RMS: "mm"}, known, (), int(triangles), motion, features(motion, triangles)
     )
+
+
+def test_the_values_of_a_scene_are_recommended_on_no_other_case() -> None:
+    known = study("a", 50)
+    softer = replace(known.points[-1], choice={"solver": "pbd", "scene": {"effect[1].stiffness": "1 MPa/mm"}})
+    better = replace(softer, errors={RMS: 0.001}, knob="contact stiffness")
+    known = replace(known, points=(*known.points, better))
+    assert recommend(features(50), "a", [known], RMS, {"error": 0.5}).best.point is better
+    assert recommend(features(50), "new", [known], RMS, {"time": 1.0}).best.point is known.points[2]
+    assert recommend(features(50), "new", [known], RMS, {"error": 0.5}).best is None
 
 
 STUDIES = [study("a", 50), study("b", 80, 3000), study("c", 120, 2000)]

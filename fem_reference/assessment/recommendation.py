@@ -101,7 +101,9 @@ def _expected(
     the worst of the cases counts.
     """
     chosen = alike(features, studies)
-    by_key = [{_key(one.point, study): one for one in _measured(study, metric)} for study in chosen]
+    by_key = [
+        {_key(one.point, study): one for one in _measured(study, metric) if _elsewhere(one.point)} for study in chosen
+    ]
     for key in set.intersection(*map(set, by_key)) if by_key else ():
         found = [(study, known[key]) for study, known in zip(chosen, by_key, strict=True)]
         error = max(one.error * scale(features, study.features, metric) for study, one in found)
@@ -122,14 +124,19 @@ def scale(features: Mapping[str, float], other: Mapping[str, float], metric: str
 def _key(point: Point, study: CaseStudy) -> str:
     """What makes a setting the same on two cases; tetrahedra count by their size in that of the case's own reference."""
     scene = point.choice.get("scene", {})
-    if set(scene) - {*_TETS, "triangles"}:
-        return f"{study.case}: {point.label}"  # of that scene's own values, on no other case
+    if not _elsewhere(point):
+        return f"{study.case}: {point.label}"
     if "triangles" in scene:
         return f"{point.solver}: {scene['triangles']} as many triangles, {_settings(point)}"
     if scene:
         factor, fewer = tetrahedra(point, study)
         return f"{point.solver}: tetrahedra {factor:.3g}, {fewer:g} refinements fewer, {_settings(point)}"
     return f"{point.solver}: {_settings(point)}"
+
+
+def _elsewhere(point: Point) -> bool:
+    """Whether a setting can be taken on another case too: the values of a scene are its own, but for its mesh."""
+    return not set(point.choice.get("scene", {})) - {*_TETS, "triangles"}
 
 
 def tetrahedra(point: Point, study: CaseStudy) -> tuple[float, float]:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fem_reference import __version__, metrics
+from fem_reference import __version__, metrics, solvers
 from fem_reference.assessment.claims import Claim, claimed
 from fem_reference.assessment.cost_study import CaseStudy, Study
 from fem_reference.assessment.error_bars import ErrorBars
@@ -103,7 +103,7 @@ def known(bars: ErrorBars | None) -> dict[str, float]:
 
 def _point(scene: MuscleCase, one: Made, truth: Run, context: MeasurementContext) -> Point:
     trial, run = one.trial, one.run
-    choice = {"solver": trial.choice.solver, **trial.choice.settings}
+    choice = {"solver": trial.choice.solver, **_chosen(trial)}
     if trial.changed:
         choice["scene"] = trial.changed
     point = Point(
@@ -120,6 +120,17 @@ def _point(scene: MuscleCase, one: Made, truth: Run, context: MeasurementContext
         return point
     status, message = run.outcome.status, run.outcome.message
     return replace(point, status=status, message=message, errors=errors(run, truth, context), costs=costs(run))
+
+
+def _chosen(trial: Trial) -> dict[str, object]:
+    """The settings of a trial without those that are their solver's own anyway: a case may name them, and another not."""
+    given = trial.choice.settings
+    try:
+        own = solvers.settings(trial.choice, trial.name)
+    except InputError:  # the trial failed for it
+        return given
+    fields = type(own).model_fields
+    return {key: value for key, value in given.items() if getattr(own, key) != fields[key].default}
 
 
 def errors(run: Run, truth: Run, context: MeasurementContext) -> dict[str, float]:
