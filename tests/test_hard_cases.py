@@ -163,6 +163,13 @@ def test_judging() -> None:
     lost = replace(course, values=np.array([0.0, np.nan, 0.0]))
     found = stress.judge(blank, [(Bound(quantity="volume", at_most=2.0), lost)])
     assert (found.verdict, found.at) == ("failed", 1)
+    shown, kept = (
+        stress.judge(blank, [(Bound(quantity="volume", at_most=most), course)], "there is no pressure")
+        for most in (2.0, 4.0)
+    )
+    assert (shown.verdict, kept.verdict) == ("degraded", "failed")
+    assert shown.sentence.startswith("as it should be, for there is no pressure: volume 3 %")
+    assert kept.sentence.startswith("though it should not be, for there is no pressure: volume 3 %")
     ended = replace(blank, status="inverted")
     bounds = [(Bound(quantity="volume", at_most=2.0), course)]
     assert stress.unfinished(ended, "a cell", bounds, "").verdict == "failed"

@@ -75,3 +75,25 @@ def test_a_frame_that_is_a_little_further_than_the_largest_step_takes_two() -> N
     tried = []
     list(march(lambda at: tried.append(at) or Attempt(None, 2), (0, 3.5), Steps(3.0, 0.5, 3.0)))
     assert tried == [1.75, 3.5]
+
+
+def test_a_last_resort_begins_anew_and_is_asked_once_it_helps_no_more() -> None:
+    tried, resorts = [], [True, False]
+    can = {"steps": 1.0}
+
+    def attempt(at: float) -> Attempt:
+        tried.append(at)
+        return Attempt("diverged", 14) if at > 10 and can["steps"] else Attempt(None, 6)
+
+    def give_in() -> bool:
+        can["steps"] = 0.0
+        return resorts.pop(0)
+
+    reached = list(march(attempt, (0, 10, 20), Steps(10.0, 4.0), last_resort=give_in))
+    assert [entry.status for entry in reached] == ["converged", "converged"]
+    assert tried == [10, 20, 15, 20]  # whole, halved, and whole anew
+    tried.clear()
+    can["steps"] = 1.0
+    stays = list(march(lambda at: Attempt("diverged" if at > 10 else None, 9, "why"), (0, 10, 20), Steps(10.0, 4.0), last_resort=lambda: resorts.pop(0)))
+    assert [entry.status for entry in stays] == ["converged", "diverged"]
+    assert not resorts

@@ -106,14 +106,19 @@ _OTHER_REASONS = ("timed out", "crashed")  # that a run may have to end than tha
 Weighed = Sequence[tuple[Bound, Course]]
 
 
-def judge(cell: Cell, weighed: Weighed) -> Cell:
+def judge(cell: Cell, weighed: Weighed, contrast: str = "") -> Cell:
     """``cell``, of a run that reached every frame, with the verdict of what it must keep: the first bound that is passed, else
-    the first of all. What is not finite has failed, whatever the status says.
+    the first of all. What is not finite has failed, whatever the status says; and so has a case that is to pass its bound, to
+    show a ``contrast``, and does not.
     """
     shown = _decisive(cell, weighed)
     if shown.value is None or shown.bound is None or not np.isfinite(shown.value):
         return replace(shown, verdict="failed", sentence=f"{cell.status}, but {shown.sentence}")
-    return replace(shown, verdict="ok" if shown.value <= shown.bound else "degraded")
+    kept = shown.value <= shown.bound
+    if not contrast:
+        return replace(shown, verdict="ok" if kept else "degraded")
+    said = f"{'though it should not be' if kept else 'as it should be'}, for {contrast}: {shown.sentence}"
+    return replace(shown, verdict="failed" if kept else "degraded", sentence=said)
 
 
 def unfinished(cell: Cell, message: str, weighed: Weighed, no_solution: str) -> Cell:

@@ -34,6 +34,7 @@ log = logging.getLogger(__name__)
 METRICS = ("volume", "fibre_length", "surface_deviation", "penetration")
 # Solvers of surfaces are also tried on 4 to these powers as many triangles, whose files are kept beside the runs.
 _POWERS = (-1, 1)
+_MOST_TRIANGLES = 20_000  # above it a run takes minutes, most of a study's time
 SURFACES = "surfaces"
 # Error bars of so many of the reference's coarser members are set beside their errors: the finest of those that are cheap.
 _CLAIMING = 4
@@ -72,8 +73,11 @@ def _of(scene: MuscleCase, store: Path, workers: Workers, only: Collection[str])
     if not only or scene.reference.solver in only:
         trials += reference_trials(scene)
     if not only or set(only) - {scene.reference.solver}:
+        own = len(truth.surface.triangles)
         others = [
-            (f"{4.0**power:g} times", resample(scene, bench.setup(), power, store / SURFACES)) for power in _POWERS
+            (f"{4.0**power:g} times", resample(scene, bench.setup(), power, store / SURFACES))
+            for power in _POWERS
+            if power < 0 or 4**power * own <= _MOST_TRIANGLES
         ]
         trials += [one for one in candidate_trials(scene, dict(others)) if not only or one.choice.solver in only]
     made = carry_out(trials, store, workers)

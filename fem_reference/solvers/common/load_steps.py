@@ -50,10 +50,12 @@ def march(
     frames: tuple[float, ...],
     steps: Steps,
     recall: Callable[[float], bool] = lambda _: False,
+    last_resort: Callable[[], bool] = lambda: False,
 ) -> Iterator[Step]:
     """Go from ``frames[0]`` (where the body rests, or goes on) through every frame; ``attempt`` solves at a load, from the last
     state that converged, and must leave that state untouched where it fails. A frame whose state ``recall`` can take up from before
-    needs no step. Ends after the first frame that cannot be reached.
+    needs no step. Before it is given up ``last_resort`` is asked for another way to solve: where it says that there is one, load
+    steps begin anew. Ends after the first frame that cannot be reached.
     """
     largest = math.inf if steps.largest is None else steps.largest
     at, step = float(frames[0]), min(steps.first, largest)
@@ -70,7 +72,9 @@ def march(
             if result.failure is not None:
                 cutbacks += 1
                 step = size / 2
-                if step < steps.smallest:
+                if step < steps.smallest and last_resort():
+                    step = min(steps.first, largest)
+                elif step < steps.smallest:
                     yield Step(frame, taken, iterations, cutbacks, result.failure, result.sentence, at)
                     return
                 continue

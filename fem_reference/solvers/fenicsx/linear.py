@@ -37,6 +37,9 @@ class LinearSolver(Protocol):
     def solve(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> None:
         """Solve for ``x``, up to ``tolerance`` times the norm of ``b``; ``LinearSolveError`` where that does not succeed."""
 
+    def solve_exactly(self) -> bool:
+        """From now on solve each system exactly; whether that is another way than until now."""
+
 
 class Factorised:
     """Solves with the ``matrix`` as it is now. With ``lagged`` by FGMRES with a factorisation of it as it was: where that took
@@ -76,6 +79,15 @@ class Factorised:
     def changed(self) -> None:
         """The matrix is another now."""
         self.fresh = False
+
+    def solve_exactly(self) -> bool:
+        """From now on by a factorisation of each matrix, in double precision; whether that is another way than until now."""
+        if not self.lagged:
+            return False
+        self.lagged = self.fresh = self.there = False
+        if self.precision == "single":
+            self._choose("double")
+        return True
 
     def factorise(self) -> None:
         """Factorise the matrix as it is. ``LinearSolveError`` where that cannot be done."""

@@ -62,6 +62,10 @@ class Multigrid:
         if fresh or not self._iterate(b, x, tolerance):
             raise LinearSolveError(f"multigrid does not converge in {_MOST} iterations")
 
+    def solve_exactly(self) -> bool:
+        """It cannot: there is no memory for a factorisation."""
+        return False
+
     def _iterate(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> bool:
         with self.spent.on("krylov"):
             self.krylov.setTolerances(rtol=tolerance, atol=0.0, max_it=_MOST)

@@ -48,6 +48,7 @@ class Worker:
         self.unstable: dict[float, tuple[float, float]] = {}  # by frame, negative modes, and those of the material
         self.left: dict[float, float] = {}  # perturbation [mm] by frame
         self.ranges = Ranges()
+        self.exact = False  # whether linear systems are solved exactly because Newton's method failed else
         self.collapse = ""  # to what attempts since the last good state led, where a body collapsed in one
         self.earlier: dict[str, float] = {}  # what processes before this one cost
         self.restart = Restart(self.body, job.kept) if job.kept else None
@@ -63,13 +64,15 @@ class Worker:
             first, self.earlier = facts["size"], facts["cost"]
             self.unstable = {frame: tuple(modes) for frame, modes in facts["unstable"]}
             self.ranges.know(facts["ranges"])
+            if facts["exact"]:
+                self.solve_exactly()
             frames = tuple(frame for frame in frames if frame >= good[-1])
         return frames, Steps(first, settings.smallest_step, settings.largest_step)
 
     def run(self) -> None:
         """March through the frames and report how it ended."""
         frames, steps = self.begin()
-        for reached in march(self.attempt, frames, steps, self.body.recall):
+        for reached in march(self.attempt, frames, steps, self.body.recall, self.solve_exactly):
             for name, count in (
                 ("newton_iterations", reached.iterations),
                 ("load_steps", reached.steps),
@@ -96,6 +99,14 @@ class Worker:
         if result.failure in (None, "collapsed"):
             self.collapse = result.sentence
         return result
+
+    def solve_exactly(self) -> bool:
+        """From now on solve linear systems exactly; whether that is another way than until now. What is left of an inexact solution
+        moves a body that is next to free far away.
+        """
+        other = self.body.linear.solve_exactly()
+        self.exact |= other
+        return other
 
     def stabilise(self, frame: float) -> None:
         """Leave the equilibrium of a ``frame`` where it is unstable and that is not wanted."""
@@ -180,7 +191,7 @@ class Worker:
         if self.body.comm.rank == 0:
             np.savez(path, allow_pickle=False, **arrays)
         if self.restart is not None and reached.frame >= self.job.body.first:
-            facts = {"size": reached.size, "cost": self.cost(), "ranges": self.ranges.facts()}
+            facts = {"size": reached.size, "exact": self.exact, "cost": self.cost(), "ranges": self.ranges.facts()}
             self.restart.write(reached.frame, facts | {"unstable": list(self.unstable.items())})
         self.report(frame=reached.frame, file=str(path), scalars=scalars)
 

@@ -194,7 +194,7 @@ def _solved(posed: Posed, choice: SolverChoice) -> Cell:
     elif outcome.status != "converged":
         found = stress.unfinished(blank, outcome.message, courses, hard.no_solution)
     else:
-        found = stress.judge(blank, courses)
+        found = stress.judge(blank, courses, hard.contrast)
     wanted = hard.steps or (steps.farthest(followed) if posed.in_steps and hard.start is None else None)
     if choice.solver == REFERENCE and isinstance(built, Problem) and wanted is not None:
         ends = steps.compare(built, choice, wanted)
