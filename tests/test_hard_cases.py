@@ -11,9 +11,11 @@ from fem_reference.assessment import health, stress
 from fem_reference.assessment.stress import Bound, Cell, Course
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import tet_volumes
+from fem_reference.geometry import skins
 from fem_reference.problems.muscle_body import as_body
 from fem_reference.runs.store import Outcome
 from fem_reference.scenes.case import SolverChoice
+from fem_reference.solvers import fenicsx
 from fem_reference.studies.hard import blocks, jitters, records, running, steps
 
 CASES = {hard.name: hard for hard in records.read_all()}
@@ -142,6 +144,28 @@ def test_a_bone_that_passes_between_frames_is_found_out() -> None:
     assert (found.verdict, found.quantity) == ("degraded", "passed")
 
 
+@pytest.mark.slow
+def test_where_inexact_linear_solutions_lead_nowhere_exact_ones_are_tried(monkeypatch) -> None:
+    # Springs of 1e-3 Pa/mm hold the block along the plates: a force of 1 mN that is left over moves it by a metre.
+    monkeypatch.setattr(skins, "_ACROSS", 10)  # few points of contact, in seconds
+    hard = CASES["squeeze_sliding.4_cells"]
+    block = hard.block.model_copy(update={"cells": (3, 3, 3)})
+    built = running.Posed(hard.model_copy(update={"block": block})).problem
+    given = hard.choice(running.choices()["fenicsx"]).settings
+    given |= {"first_step": 2.0, "smallest_step": 2.0, "newton_iterations": 10}
+    ends = []
+    with fenicsx.shared():
+        for kind in ("direct", "lagged"):
+            frames = []
+            settings = fenicsx.Settings(**given | {"linear_solver": kind})
+            outcome = fenicsx.solve(replace(built, frames=(0, 2)), settings, frames.append)
+            assert outcome.status == "converged", f"{kind}: {outcome.message}"
+            ends.append(frames[-1].tets)
+    assert (
+        np.abs(ends[1] - ends[0]).max() < 1e-3
+    )  # it is free to slide: by 1.3e-2 mm with what Newton's method leaves over, 1e-8 N
+
+
 def test_a_solver_that_raises_has_failed(monkeypatch) -> None:
     monkeypatch.setattr(running, "_solved", lambda *_: 1 / 0)
     found = cell("at_rest.millimetres", "pbd")
@@ -170,6 +194,9 @@ def test_judging() -> None:
     assert (shown.verdict, kept.verdict) == ("degraded", "failed")
     assert shown.sentence.startswith("as it should be, for there is no pressure: volume 3 %")
     assert kept.sentence.startswith("though it should not be, for there is no pressure: volume 3 %")
+    assert stress.doubted(blank, "", "it is flat") is blank
+    assert [stress.doubted(blank, "unstable", why).verdict for why in ("", "it is flat")] == ["degraded", "refused"]
+    assert stress.doubted(shown, "unstable", "it is flat") is shown
     ended = replace(blank, status="inverted")
     bounds = [(Bound(quantity="volume", at_most=2.0), course)]
     assert stress.unfinished(ended, "a cell", bounds, "").verdict == "failed"

@@ -92,8 +92,13 @@ def test_a_last_resort_begins_anew_and_is_asked_once_it_helps_no_more() -> None:
     reached = list(march(attempt, (0, 10, 20), Steps(10.0, 4.0), last_resort=give_in))
     assert [entry.status for entry in reached] == ["converged", "converged"]
     assert tried == [10, 20, 15, 20]  # whole, halved, and whole anew
-    tried.clear()
-    can["steps"] = 1.0
-    stays = list(march(lambda at: Attempt("diverged" if at > 10 else None, 9, "why"), (0, 10, 20), Steps(10.0, 4.0), last_resort=lambda: resorts.pop(0)))
-    assert [entry.status for entry in stays] == ["converged", "diverged"]
+    fails = list(
+        march(
+            lambda at: Attempt("diverged" if at > 10 else None, 9, "why"),
+            (0, 10, 20),
+            Steps(10.0, 4.0),
+            last_resort=lambda: resorts.pop(0),
+        )
+    )
+    assert [entry.status for entry in fails] == ["converged", "diverged"]
     assert not resorts

@@ -134,6 +134,17 @@ def unfinished(cell: Cell, message: str, weighed: Weighed, no_solution: str) -> 
     return replace(shown, verdict="failed", sentence=f"{cell.status}: {message}")
 
 
+def doubted(cell: Cell, doubt: str, no_solution: str) -> Cell:
+    """``cell`` with a ``doubt`` about what the solver says that it found (none where that is empty): no plain success, and refused
+    where there is ``no_solution``.
+    """
+    if not doubt or cell.verdict != "ok":
+        return cell
+    if no_solution:
+        return replace(cell, verdict="refused", sentence=f"as it should, for {no_solution}: {doubt}; {cell.sentence}")
+    return replace(cell, verdict="degraded", sentence=f"{doubt}; {cell.sentence}")
+
+
 def _decisive(cell: Cell, weighed: Weighed) -> Cell:
     """``cell`` with the first quantity that is beyond its bound, else the first of all."""
     values = [(bound, course, course.worst(bound.frame)) for bound, course in weighed]

@@ -82,9 +82,10 @@ class Hard(Record):
     """A hard case: a ``block`` with what acts on it, or a ``shipped`` case.
 
     ``healthy`` says in words what a healthy run shows, ``bound`` in numbers, the decisive quantity first. ``only``: the solvers
-    that it is about, by default all; ``because``: why. ``no_solution``: why physics has no answer, so that a run should end with a
-    status; ``contrast``: what it shows that goes wrong, so that a run should pass its bound. ``by_effects``: effects are all that acts, and solvers that simulate none have nothing to do. ``settings``: by solver,
-    those that differ from Table 5.1. ``steps``: in which numbers of load steps the reference is asked for the same end state.
+    that it is about, by default all; ``because``: why. ``no_solution``: why physics has no answer, so that a run should end with
+    a status; ``contrast``: what it shows that goes wrong, so that a run should pass its bound. ``by_effects``: effects are all
+    that acts, and solvers that simulate none have nothing to do. ``settings``: by solver, those that differ from Table 5.1.
+    ``steps``: in which numbers of load steps the reference is asked for the same end state.
     """
 
     title: str

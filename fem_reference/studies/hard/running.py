@@ -206,8 +206,7 @@ def _solved(posed: Posed, choice: SolverChoice) -> Cell:
         )
         found = replace(found, sentence=f"{found.sentence}; {others.sentence}")
         found = found if others.same else replace(found, verdict="failed")
-    if found.verdict == "ok" and (doubt := health.unstable(followed)):
-        found = replace(found, verdict="degraded", sentence=f"{doubt}; {found.sentence}")
+    found = stress.doubted(found, health.unstable(followed), hard.no_solution)
     return replace(found, scene=_scene(found, followed))
 
 
