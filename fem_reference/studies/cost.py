@@ -81,13 +81,16 @@ def _of(scene: MuscleCase, store: Path, workers: Workers, only: Collection[str])
         ]
         trials += [one for one in candidate_trials(scene, dict(others)) if not only or one.choice.solver in only]
     made = carry_out(trials, store, workers)
-    points = tuple(_point(scene, one, truth, context) for one in made)
+    points = list[Point]()
+    for i, one in enumerate(made):
+        log.info("measuring run %d of %d: %s", i + 1, len(made), one.trial.label)
+        points.append(_point(scene, one, truth, context))
     size = scene.muscle.tet_size / 2**scene.muscle.refinements
     return CaseStudy(
         case=scene.name,
         title=scene.title,
         truth=f"its reference on tetrahedra of {size:.3g} mm",
-        points=points,
+        points=tuple(points),
         units=metrics.units(),
         bars=known(bars),
         claims=_claims(made, truth, context, store),

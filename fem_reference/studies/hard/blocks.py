@@ -92,7 +92,7 @@ def _start(block: Block, start: Start | None) -> Moved | None:
 
 
 def _problem(block: Block, setup: Setup, mesh: TetMesh, acting: tuple[effects.Effect, ...]) -> Problem:
-    apart = spacing(setup.surface)
+    apart = block.points_apart or spacing(setup.surface)
     fibre = Along(block.fibre) if any("fibre" in effect.needs for effect in acting) else None
     return Problem(
         setup.surface,

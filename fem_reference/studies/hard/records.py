@@ -11,7 +11,7 @@ from fem_reference.assessment import health
 from fem_reference.assessment.stress import Bound
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record, join, parse
-from fem_reference.foundations.units import AreaStiffness, Point
+from fem_reference.foundations.units import AreaStiffness, Point, PositiveLength
 from fem_reference.scenes.bones import Bone, Motion
 from fem_reference.scenes.case import HOME, SolverChoice
 from fem_reference.scenes.muscle import Frames
@@ -26,6 +26,7 @@ class Block(Record):
 
     ``grading``: along each axis, the last cell over the first. ``jitter``: how far nodes are moved at random inside the block and
     its faces, in cells, by a ``seed``. ``fibre``: the direction of fibres, along which the lines run that are measured.
+    ``points_apart`` [mm]: how far apart points are on which bones press and springs pull, by default as on muscles.
     """
 
     size: Point
@@ -35,6 +36,7 @@ class Block(Record):
     jitter: float = Field(default=0.0, ge=0, lt=0.5)
     seed: int = Field(default=17, ge=0)
     fibre: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    points_apart: PositiveLength | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
