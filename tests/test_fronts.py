@@ -51,6 +51,8 @@ def test_solvers_are_compared_at_most_at_what_is_asked() -> None:
     within_two = at_same_error(points, ERROR, COST, 2)
     assert {name: one.costs[COST] for name, one in within_two.best.items()} == {"pbd": 4, "fem": 50}
     assert solvers(points) == ("pbd", "arap", "fem")
+    alike = [point(2, 9), point(2, 3)]  # equally near
+    assert at_same_cost(alike, ERROR, COST, 10).best["pbd"] is alike[1]
 
 
 def test_levels_are_round_and_within_the_range() -> None:

@@ -83,6 +83,16 @@ def test_what_is_not_known_of_the_truth_counts_as_error() -> None:
     assert found.best.point.choice["sweeps"] == 10
 
 
+def test_the_truth_itself_is_recommended_where_it_alone_is_good_enough() -> None:
+    about = ("a", "fenicsx", "reference", "", "", {"solver": "fenicsx"}, "converged", "")
+    known = study("a", 50, bar=0.5)
+    known = replace(known, points=(*known.points, Point(*about, {}, {TIME: 2.0})))
+    found = recommend(features(50), "a", [known], RMS, {"error": 0.6})
+    assert found.best is not None
+    assert (found.best.point.label, found.best.error) == ("reference, as it is", 0.5)
+    assert recommend(features(50), "a", [known], RMS, {"error": 0.4}).best is None
+
+
 def test_the_nearest_within_the_time_is_taken() -> None:
     found = recommend(features(50), "a", STUDIES, RMS, {"time": 0.004})
     assert found.best is not None

@@ -73,6 +73,27 @@ def test_the_page_shows_what_was_left_out_and_why(tmp_path) -> None:
     assert not re.search(r'(?:src|href)="https?:', text)
 
 
+def test_an_error_below_the_truths_bar_counts_as_the_bar_and_so_does_the_truth() -> None:
+    about = ("hip", "fenicsx", "reference", "", "", {"solver": "fenicsx"}, "converged", "")
+    truth = Point(*about, {}, {"seconds_per_frame": 0.2, "unknowns": 900.0})
+    case = study("hip", truth)
+    assert case.counted[3].errors["surface_deviation.rms"] == 0.2  # 0.1 mm was measured
+    assert case.counted[-1].errors == {"surface_deviation.rms": 0.2}
+    tables = {same: rows for same, _, rows in study_page.matched(case)}
+    assert all(row.at >= 0.2 for row in tables["surface_deviation.rms"])
+    # At the bar the cheapest is taken, and not the one that happens to be nearest.
+    assert tables["unknowns"][-1].best["fenicsx"].costs["seconds_per_frame"] == 0.04
+    shown = [point for point, _ in study_page._shown(case)]
+    assert shown[3].errors["surface_deviation.rms"] == 0.1
+    assert shown[-1].errors == {"surface_deviation.rms": 0.2}
+
+
+def test_a_study_in_which_nothing_reached_its_end_has_a_page(tmp_path) -> None:
+    failed = Point("hip", "xpbd", "xpbd", "sweeps", "1", {}, "diverged", "frame 3")
+    case = CaseStudy("hip", "The hip", "its reference", (failed,), UNITS, {}, (), 1000, 100.0)
+    assert "diverged: frame 3" in write_study(Study((case,)), tmp_path, "study").read_text(encoding="utf-8")
+
+
 def test_tables_compare_at_the_same_cost_and_never_at_the_same_settings() -> None:
     tables = {same: rows for same, _, rows in study_page.matched(study())}
     assert set(tables) == {"seconds_per_frame", "peak_memory_mb", "unknowns", "surface_deviation.rms"}

@@ -1,6 +1,6 @@
 """What accuracy costs on cases: points of error and cost, as pages show them and files keep them."""
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,20 @@ class CaseStudy:
     triangles: int
     travel: float
     features: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def counted(self) -> tuple[Point, ...]:
+        """The points with errors as they count: an error below the truth's bar is that bar, as nothing is known below it, and so
+        is that of the truth itself.
+        """
+        names = {name for point in self.points for name in point.errors}
+        own = {name: bar for name, bar in self.bars.items() if name in names}
+        return tuple(
+            replace(point, errors=own if point.is_truth else self._at_least_bars(point.errors)) for point in self.points
+        )
+
+    def _at_least_bars(self, errors: dict[str, float]) -> dict[str, float]:
+        return {name: max(value, self.bars.get(name, 0.0)) for name, value in errors.items()}
 
 
 @dataclass(frozen=True, eq=False)

@@ -54,6 +54,11 @@ class Point:
         return not self.knob
 
     @property
+    def is_truth(self) -> bool:
+        """Whether it is the case's own reference, which the others are measured against."""
+        return self.name == "reference" and self.is_default
+
+    @property
     def label(self) -> str:
         """What distinguishes it from the other points of its solver."""
         name = "" if self.name in (self.solver, "reference") else f"{self.name}, "
@@ -89,13 +94,10 @@ class Price:
     count: int
 
 
-def price(points: Iterable[Point], solver: str, error: str, cost: str, known: float = 0.0) -> Price | None:
-    """The price of a ``solver``: a line through its front in logarithms, by least squares; None where nothing is known of it. An
-    error below ``known``, the truth's own bar, counts as that.
-    """
+def price(points: Iterable[Point], solver: str, error: str, cost: str) -> Price | None:
+    """The price of a ``solver``: a line through its front in logarithms, by least squares; None where nothing is known of it."""
     front = pareto((point for point in points if point.solver == solver), error, cost)
-    pairs = [(max(pair[0], known), pair[1]) for point in front if (pair := point.at(error, cost))]
-    pairs = [pair for i, pair in enumerate(pairs) if i == 0 or pair[0] < pairs[i - 1][0]]
+    pairs = [pair for point in front if (pair := point.at(error, cost))]
     if not pairs:
         return None
     errors, costs = np.array(pairs).T
@@ -121,24 +123,23 @@ class Match:
 
 
 def at_same_cost(points: Sequence[Point], error: str, cost: str, at: float) -> Match:
-    """Of each solver the point of the least ``error`` among those that cost at most ``at``."""
-    known = [(pair[0], point) for point in points if (pair := point.at(error, cost)) and pair[1] <= at]
+    """Of each solver the point of the least ``error`` among those that cost at most ``at``, the cheapest where several have it."""
+    known = [(pair, point) for point in points if (pair := point.at(error, cost)) and pair[1] <= at]
     return Match(cost, at, _least(known))
 
 
 def at_same_error(points: Sequence[Point], error: str, cost: str, at: float) -> Match:
     """Of each solver the point that costs the least among those whose ``error`` is at most ``at``."""
-    known = [(pair[1], point) for point in points if (pair := point.at(error, cost)) and pair[0] <= at]
+    known = [(pair[::-1], point) for point in points if (pair := point.at(error, cost)) and pair[0] <= at]
     return Match(error, at, _least(known))
 
 
-def _least(known: Iterable[tuple[float, Point]]) -> dict[str, Point]:
-    """Of each solver the point of the least value, the first where several have it."""
-    best = dict[str, tuple[float, Point]]()
-    for value, point in known:
-        if point.solver not in best or value < best[point.solver][0]:
-            best[point.solver] = value, point
-    return {solver: point for solver, (_, point) in best.items()}
+def _least(known: Sequence[tuple[tuple[float, float], Point]]) -> dict[str, Point]:
+    """Of each solver the point of the least pair of numbers."""
+    best = dict[str, Point]()
+    for _, point in sorted(known, key=lambda one: one[0]):
+        best.setdefault(point.solver, point)
+    return best
 
 
 def levels(points: Iterable[Point], error: str, cost: str, *, of_error: bool, count: int = 5) -> tuple[float, ...]:

@@ -88,10 +88,11 @@ def _compared(features: Mapping[str, float], name: str) -> float:
 
 
 def _measured(study: CaseStudy, metric: str) -> list[Expected]:
-    """The settings measured on a case; what is not known of the truth counts as error."""
+    """The settings measured on a case, the truth itself among them; what is not known of it counts as error."""
     bar = study.bars.get(metric, 0.0)
-    pairs = [(point, pair) for point in study.points if (pair := point.at(metric, TIME))]
-    return [Expected(point, pair[0] + bar, pair[1], (study.case,)) for point, pair in pairs]
+    pairs = zip(study.points, study.counted, strict=True)
+    known = [(point, pair[1]) for point, counted in pairs if (pair := counted.at(metric, TIME))]
+    return [Expected(point, point.errors.get(metric, 0.0) + bar, time, (study.case,)) for point, time in known]
 
 
 def _expected(

@@ -36,10 +36,11 @@
     return { at, ticks };
   }
 
-  function front(points, error, cost) { // the points that no other beats in both, the cheapest first
+  function front(points, error, cost, bar) { // [cost, error] that no other beats in both, the cheapest first; below the bar all are alike
     let best = Infinity;
-    return [...points].sort((a, b) => a.costs[cost] - b.costs[cost] || a.errors[error] - b.errors[error])
-      .filter(point => point.errors[error] < best && ((best = point.errors[error]), true));
+    return points.map(point => [point.costs[cost], Math.max(point.errors[error], bar)])
+      .sort((a, b) => a[0] - b[0] || a[1] - b[1])
+      .filter(pair => pair[1] < best && ((best = pair[1]), true));
   }
 
   function draw(place, found, error, cost) {
@@ -73,7 +74,7 @@
     [...new Set(found.points.map(point => point.solver))].forEach((solver, i) => {
       const own = points.filter(point => point.solver === solver), colour = study.colours[i % study.colours.length];
       if (!own.length) return;
-      const line = front(own, error, cost).map(point => `${x.at(point.costs[cost])},${y.at(point.errors[error])}`).join(" ");
+      const line = front(own, error, cost, bar).map(pair => `${x.at(pair[0])},${y.at(pair[1])}`).join(" ");
       svg.append(element("polyline", { points: line, fill: "none", stroke: colour, "stroke-width": 1.5 }));
       for (const point of own) {
         const at = { cx: x.at(point.costs[cost]), cy: y.at(point.errors[error]) };

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -77,12 +78,8 @@ def title_of(name: str) -> str:
 
 def sentences(case: CaseStudy, error: str = MAIN) -> list[str]:
     """What a case says about the price of accuracy."""
-    unit = case.units[error]
-    prices = {
-        solver: found
-        for solver in solvers(case.points)
-        if (found := price(case.points, solver, error, TIME, case.bars.get(error, 0.0)))
-    }
+    unit, points = case.units[error], case.counted
+    prices = {solver: found for solver in solvers(points) if (found := price(points, solver, error, TIME))}
     said = [_sentence(one, unit) for one in prices.values()]
     others = {solver: one.best for solver, one in prices.items() if solver != REFERENCE}
     if REFERENCE in prices and others:
@@ -103,15 +100,12 @@ def _sentence(one: Price, unit: str) -> str:
 
 def matched(case: CaseStudy, error: str = MAIN) -> list[tuple[str, str, list[Match]]]:
     """Tables at the same time, memory, unknowns and error: what is the same, what is compared, and the rows."""
+    points = case.counted
     tables = [
-        (
-            cost,
-            error,
-            [at_same_cost(case.points, error, cost, at) for at in levels(case.points, error, cost, of_error=False)],
-        )
+        (cost, error, [at_same_cost(points, error, cost, at) for at in levels(points, error, cost, of_error=False)])
         for cost in MATCHED
     ]
-    rows = [at_same_error(case.points, error, TIME, at) for at in levels(case.points, error, TIME, of_error=True)]
+    rows = [at_same_error(points, error, TIME, at) for at in levels(points, error, TIME, of_error=True)]
     return [*tables, (error, TIME, rows)]
 
 
@@ -130,20 +124,16 @@ def _front(case: CaseStudy, error: str) -> Curve:
 
     def draw(figure: Figure, axes: Axes) -> None:
         for i, solver in enumerate(solvers(case.points)):
-            _draw(
-                axes,
-                [point for point in case.points if point.solver == solver],
-                error,
-                solver,
-                _COLOURS[i % len(_COLOURS)],
-            )
+            pairs = [pair for pair in _shown(case) if pair[0].solver == solver]
+            _draw(axes, pairs, error, solver, _COLOURS[i % len(_COLOURS)])
         logarithmic(axes)
         if (bar := case.bars.get(error, 0.0)) > 0:
             axes.set_ylim(bottom=min(axes.get_ylim()[0], bar / 2))
             axes.axhspan(axes.get_ylim()[0], bar, color=BAND, linewidth=0, label="error bar of the truth")
         axes.set_xlabel("time of a frame, s")
         axes.set_ylabel(f"{title_of(error)}, {case.units[error]}")
-        figure.legend(loc="outside lower center", ncols=3, fontsize="small")
+        if axes.get_legend_handles_labels()[0]:
+            figure.legend(loc="outside lower center", ncols=3, fontsize="small")
 
     return drawn(f"front-{case.case}-{error.replace('.', '-')}", title, (4.9, 4.2), draw)
 
@@ -165,15 +155,24 @@ def _growth(study: Study) -> Curve:
     return drawn("growth", title, (6.4, 4.2), draw)
 
 
-def _draw(axes: Any, points: Sequence[Point], error: str, solver: str, colour: str) -> None:
-    """The points of a solver, its front as a line, its default settings as rings."""
-    pairs = [(point, pair) for point in points if (pair := point.at(error, TIME))]
+def _shown(case: CaseStudy) -> list[tuple[Point, Point]]:
+    """The points as drawings show them, below the truth's bar too where they were measured there, and as they count."""
+    return [
+        (replace(point, errors=point.errors or counted.errors), counted)
+        for point, counted in zip(case.points, case.counted, strict=True)
+    ]
+
+
+def _draw(axes: Any, points: Sequence[tuple[Point, Point]], error: str, solver: str, colour: str) -> None:
+    """The points of a solver as they are shown, its front as they count as a line, its default settings as rings."""
+    pairs = [(point, pair) for point, _ in points if (pair := point.at(error, TIME))]
     if not pairs:
         return
     axes.plot(
         [pair[1] for _, pair in pairs], [pair[0] for _, pair in pairs], ".", color=colour, markersize=5, label=solver
     )
-    front = [pair for point in pareto(points, error, TIME) if (pair := point.at(error, TIME))]
+    best = pareto((counted for _, counted in points), error, TIME)
+    front = [pair for point in best if (pair := point.at(error, TIME))]
     axes.plot([pair[1] for pair in front], [pair[0] for pair in front], "-", color=colour, linewidth=1.2)
     rings = [pair for point, pair in pairs if point.is_default]
     axes.plot(
@@ -200,7 +199,7 @@ def _data(study: Study) -> dict[str, Any]:
                         "errors": one.errors,
                         "costs": one.costs,
                     }
-                    for one in case.points
+                    for one, _ in _shown(case)
                     if one.status == "converged"
                 ],
             }
