@@ -67,10 +67,10 @@ def carry_out(trials: Sequence[Trial], store: Path, workers: Workers) -> tuple[M
 def solve(trial: Trial, store: Path) -> Run:
     """The run of a trial, in this process; one that failed before is not tried again, where it would fail again."""
     bench = shared_bench(trial.scene, store)
-    folder = bench.folder(trial.choice, trial.label)
+    folder = bench.folder(trial.choice, trial.name)
     if runs.status(folder) in _LASTING:
         return replace(runs.load(folder), name=trial.name)
-    return bench.obtain(trial.name, trial.choice, trial.label)
+    return bench.obtain(trial.name, trial.choice, trial.name)
 
 
 @lru_cache(maxsize=2)

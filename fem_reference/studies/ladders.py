@@ -1,7 +1,7 @@
 """Ladders of a study of accuracy against time: the reference and the candidates of a case, one setting varied at a time."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from fem_reference import solvers
@@ -15,6 +15,7 @@ TETRAHEDRA, TRIANGLES = "tetrahedra", "triangles"
 _SIZES = (2.0, 1.6, 1.25, 1.0)
 # The reference's settings are varied on the mesh before the last refinement, or without one on tetrahedra so much larger.
 _COARSER = 1.6
+_REFINED = {0: "not refined", 1: "refined once", 2: "refined twice"}
 _STIFFNESSES, _DISTANCES = (0.1, 0.3, 3.0), (10.0, 3.0, 0.3)
 
 
@@ -87,8 +88,9 @@ def _on(whole: Trial, size: float, refinements: int) -> Trial:
     scene = whole.scene
     muscle = scene.muscle.model_copy(update={"tet_size": size, "refinements": refinements})
     changed = {"muscle.tet_size": f"{size:.6g} mm", "muscle.refinements": refinements}
-    often = f", refined {refinements} times" if scene.muscle.refinements else ""
-    value = f"{size / 2**refinements:.3g} mm{often}"
+    value = f"{size / 2**refinements:.3g} mm"
+    if scene.muscle.refinements:
+        value += f", {_REFINED.get(refinements, f'refined {refinements} times')}"
     return Trial(scene.model_copy(update={"muscle": muscle}), whole.choice, whole.name, TETRAHEDRA, value, changed)
 
 
@@ -100,7 +102,7 @@ def _settings(base: Trial) -> Iterator[Trial]:
             if value not in (getattr(own, key), base.choice.settings.get(key)):
                 choice = base.choice.model_copy(update={key: value})
                 text = f"{value:.3g}" if isinstance(value, float) else str(value)
-                yield Trial(base.scene, choice, base.name, key, text, base.changed)
+                yield replace(base, choice=choice, knob=key, value=text + _beside(base))
 
 
 def _contact(base: Trial) -> Iterator[Trial]:
@@ -127,5 +129,10 @@ def _contact(base: Trial) -> Iterator[Trial]:
 
 def _changed(base: Trial, update: Mapping[str, Any], knob: str, value: str, key: str) -> Trial:
     """The trial ``base`` with another value in its scene."""
-    scene = base.scene.model_copy(update=dict(update))
-    return Trial(scene, base.choice, base.name, knob, value, base.changed | {key: value})
+    scene, changed = base.scene.model_copy(update=dict(update)), base.changed | {key: value}
+    return replace(base, scene=scene, knob=knob, value=value + _beside(base), changed=changed)
+
+
+def _beside(base: Trial) -> str:
+    """What a trial has otherwise than its case already, before anything else is varied."""
+    return f" ({base.knob} = {base.value})" if base.knob else ""

@@ -1,0 +1,32 @@
+"""Ladders of a study: one setting varied at a time, and what is varied says on which tetrahedra."""
+
+import pytest
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.scenes import casefile
+from fem_reference.studies.campaign import Workers, carry_out, solve
+from fem_reference.studies.ladders import reference_trials
+
+
+def test_what_is_varied_on_coarser_tetrahedra_says_so() -> None:
+    trials = list(reference_trials(casefile.read_muscle("hip_flexion")))
+    whole, *others = trials
+    assert (whole.knob, whole.changed) == ("", {})
+    sizes = [one.value for one in others if one.knob == "tetrahedra"]
+    assert "10 mm, not refined" in sizes
+    assert "6.25 mm, refined once" in sizes
+    varied = [one for one in others if one.knob != "tetrahedra"]
+    assert {"element", "contact stiffness", "error of distances to bones"} < {one.knob for one in varied}
+    assert all(one.value.endswith("(tetrahedra = 10 mm, not refined)") for one in varied)
+    softer = next(one for one in varied if one.knob == "contact stiffness")
+    assert softer.changed["effect[3].stiffness"] == "0.05 MPa/mm"
+
+
+def test_a_setting_that_is_refused_is_named_once(tmp_path) -> None:
+    trials = reference_trials(casefile.read_muscle("hip_flexion"))
+    refused = next(one for one in trials if one.knob == "element" and one.value.startswith("P1 "))
+    with pytest.raises(InputError, match=r"case\.toml: reference\.element: got \"P1\""):
+        solve(refused, tmp_path)
+    (made,) = carry_out([refused], tmp_path, Workers())
+    assert made.run is None
+    assert "reference.element" in made.failure
