@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -36,7 +37,22 @@ def test_the_price_of_half_the_error_is_said_in_a_sentence() -> None:
     # Errors that fall as the square root of the time take four times the time to halve, those of first order twice.
     assert said[0].startswith("To halve the error of fenicsx costs 2.00 times the time")
     assert said[1].startswith("To halve the error of pbd costs 4.00 times the time")
+    assert said[1].endswith("(4 settings, from 11.3 mm to 4 mm with sweeps = 8, 80 ms a frame).")
     assert said[2] == "Below 4 mm, the best of pbd, only the reference gets."
+
+
+def test_half_an_error_that_no_setting_reached_would_cost() -> None:
+    case = study()
+    some = replace(case, points=tuple(one for one in case.points if one.solver == "pbd" and one.value in ("4", "8")))
+    assert study_page.sentences(some)[0].startswith("To halve the error of pbd would cost 4.00 times the time")
+
+
+def test_what_is_within_the_bar_from_the_fastest_setting_on_is_said_to_be_so() -> None:
+    said = study_page.sentences(replace(study(), bars={"surface_deviation.rms": 1.0}))
+    assert (
+        said[0]
+        == "The error of fenicsx is within the bar of the truth, 1 mm, from 10 ms a frame on (fenicsx, as it is)."
+    )
 
 
 def test_a_solver_that_time_does_not_help_is_said_to_be_so() -> None:

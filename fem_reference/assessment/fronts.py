@@ -84,7 +84,8 @@ def pareto(points: Iterable[Point], error: str, cost: str) -> tuple[Point, ...]:
 @dataclass(frozen=True)
 class Price:
     """What a ``solver`` asks for accuracy: ``factor``, how many times the cost for half the error along its front, NaN where more
-    cost does not make it better; the ``best`` and ``worst`` errors of the front, from ``count`` points.
+    cost does not make it better; the ``best`` and ``worst`` errors of the front, from ``count`` points, of which ``nearest`` has
+    the best.
     """
 
     solver: str
@@ -92,6 +93,12 @@ class Price:
     best: float
     worst: float
     count: int
+    nearest: Point
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether the front spans half the error, so that its factor is no extrapolation."""
+        return self.worst >= 2 * self.best
 
 
 def price(points: Iterable[Point], solver: str, error: str, cost: str) -> Price | None:
@@ -105,7 +112,7 @@ def price(points: Iterable[Point], solver: str, error: str, cost: str) -> Price 
     if len(pairs) >= _LEAST_POINTS and errors.max() > _LEAST_SPAN * errors.min():
         slope = np.polyfit(np.log(errors), np.log(costs), 1)[0]
         factor = float(2.0**-slope)
-    return Price(solver, factor, float(errors.min()), float(errors.max()), len(pairs))
+    return Price(solver, factor, float(errors.min()), float(errors.max()), len(pairs), front[-1])
 
 
 def solvers(points: Iterable[Point]) -> tuple[str, ...]:

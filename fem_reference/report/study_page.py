@@ -27,7 +27,7 @@ from fem_reference.report.claims_page import UNITS as CLAIMED_UNITS
 from fem_reference.report.claims_page import drawing as claims_drawing
 from fem_reference.report.curves import BAND, PALETTE, Curve, drawn, logarithmic
 from fem_reference.report.templates import template
-from fem_reference.report.words import listed, number, words
+from fem_reference.report.words import duration, listed, number, words
 
 REFERENCE = "fenicsx"
 TIME = "seconds_per_frame"
@@ -80,7 +80,7 @@ def sentences(case: CaseStudy, error: str = MAIN) -> list[str]:
     """What a case says about the price of accuracy."""
     unit, points = case.units[error], case.counted
     prices = {solver: found for solver in solvers(points) if (found := price(points, solver, error, TIME))}
-    said = [_sentence(one, unit) for one in prices.values()]
+    said = [_sentence(one, unit, case.bars.get(error, 0.0)) for one in prices.values()]
     others = {solver: one.best for solver, one in prices.items() if solver != REFERENCE}
     if REFERENCE in prices and others:
         nearest = min(others, key=lambda solver: others[solver])
@@ -89,13 +89,17 @@ def sentences(case: CaseStudy, error: str = MAIN) -> list[str]:
     return said
 
 
-def _sentence(one: Price, unit: str) -> str:
-    reach = f"{number(one.worst)} to {number(one.best)} {unit}"
+def _sentence(one: Price, unit: str, bar: float) -> str:
+    best, label, time = f"{number(one.best)} {unit}", one.nearest.label, duration(one.nearest.costs[TIME])
+    if one.best <= bar and not one.is_measured:
+        return f"The error of {one.solver} is within the bar of the truth, {best}, from {time} a frame on ({label})."
+    reach = f"{one.count} settings, from {number(one.worst)} {unit} to {best} with {label}, {time} a frame"
     if one.factor > 1:
-        return f"To halve the error of {one.solver} costs {number(one.factor)} times the time (from {reach})."
+        verb = "costs" if one.is_measured else "would cost"
+        return f"To halve the error of {one.solver} {verb} {number(one.factor)} times the time ({reach})."
     if one.count > 1:
-        return f"More time hardly makes {one.solver} better: from {reach} along its front."
-    return f"Of {one.solver} one setting is both the fastest and the nearest, with {number(one.best)} {unit}."
+        return f"More time hardly makes {one.solver} better ({reach})."
+    return f"Of {one.solver} one setting is both the fastest and the nearest: {best} with {label}, {time} a frame."
 
 
 def matched(case: CaseStudy, error: str = MAIN) -> list[tuple[str, str, list[Match]]]:
