@@ -117,6 +117,18 @@ def test_tables_compare_at_the_same_cost_and_never_at_the_same_settings() -> Non
         assert all(point.costs["seconds_per_frame"] <= row.at for point in row.best.values())
 
 
+def test_columns_of_all_tables_have_one_order_and_the_best_of_a_row_is_marked(tmp_path) -> None:
+    text = write_study(Study((study(),)), tmp_path, "study").read_text(encoding="utf-8")
+    heads = re.findall(r"at most</small></th>(.*?)</tr>", text)
+    assert len(heads) == 4
+    assert all(re.findall("<th>(.*?)</th>", head) == ["fenicsx", "pbd"] for head in heads)
+    rows = re.findall(
+        r"<tr><th>[^\n]*\n(?:\n?<td[^\n]*\n?)+</tr>", text[text.index("The same") : text.index("<details>")]
+    )
+    assert rows
+    assert all(row.count('class="best"') == 1 for row in rows)
+
+
 def test_numbers_of_the_page_are_valid_json_with_every_point(tmp_path) -> None:
     write_study(Study((study(),), {}, {"machine": "here"}), tmp_path, "study")
     found = json.loads(

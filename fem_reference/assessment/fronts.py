@@ -22,7 +22,7 @@ COSTS: dict[str, tuple[str, str]] = {
     "factorisation_flops": ("operations of the factorisations", ""),
     "krylov_iterations": ("Krylov iterations", ""),
     "projections": ("projections of a constraint", ""),
-    "peak_memory_mb": ("most memory", "MB"),
+    "peak_memory_mb": ("peak memory", "MB"),
 }
 # A slope needs so many points, whose errors span so much.
 _LEAST_POINTS, _LEAST_SPAN = 2, 1.3
@@ -122,7 +122,9 @@ def solvers(points: Iterable[Point]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Match:
-    """The points, one of each solver at most, that are best at the ``same`` cost or error, ``at`` most so much."""
+    """The points, one of each solver at most, that are best at the ``same`` cost or error, ``at`` most so much; the best of all
+    first.
+    """
 
     same: str
     at: float
@@ -142,7 +144,7 @@ def at_same_error(points: Sequence[Point], error: str, cost: str, at: float) -> 
 
 
 def _least(known: Sequence[tuple[tuple[float, float], Point]]) -> dict[str, Point]:
-    """Of each solver the point of the least pair of numbers."""
+    """Of each solver the point of the least pair of numbers, the least of all first."""
     best = dict[str, Point]()
     for _, point in sorted(known, key=lambda one: one[0]):
         best.setdefault(point.solver, point)

@@ -48,6 +48,7 @@ def render(study: Study) -> str:
         main=MAIN,
         time=TIME,
         costs=COSTS,
+        solvers=solvers,
         fronts=fronts,
         sentences=sentences,
         matched=matched,
