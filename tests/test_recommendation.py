@@ -137,6 +137,18 @@ def test_a_file_that_is_no_study_is_refused_by_name(tmp_path, text) -> None:
         load(path)
 
 
+def test_tetrahedra_that_err_more_elsewhere_widen_the_margin() -> None:
+    # Twice as large as each case has them, of which the sizes differ; on the last case they err three times as much.
+    def with_tets(one: CaseStudy, size: float, error: float) -> CaseStudy:
+        choice = {"solver": "fenicsx", "scene": {"muscle.tet_size": f"{2 * size:g} mm", "muscle.refinements": 1}}
+        errors, costs = {RMS: error * one.travel}, {TIME: 1e-3 * one.triangles}
+        fem = Point(one.case, "fenicsx", "reference", "tetrahedra", "", choice, "converged", "", errors, costs)
+        return replace(one, points=(fem,), features=one.features | {"tet_size": size})
+
+    studies = [with_tets(*each) for each in zip(STUDIES, (10.0, 6.0, 4.0), (0.01, 0.01, 0.03), strict=True)]
+    assert recommend(features(60), "new", studies, RMS, {"error": 1e9}).margins.error == pytest.approx(3.0, rel=0.1)
+
+
 def test_tetrahedra_are_recommended_in_the_size_of_the_case_itself() -> None:
     # Twice as large as a studied case has them, which is 10 mm; the new case has 6 mm.
     def with_tets(one: CaseStudy) -> CaseStudy:

@@ -171,8 +171,7 @@ def _margins(studies: Sequence[CaseStudy], metric: str) -> Margins:
         others = [other for other in studies if other is not study]
         measured = {_key(one.point, study): one for one in _measured(study, metric)}
         for one in _expected(study.features, others, metric, Margins()):
-            key = next((_key(one.point, other) for other in others if one.point.case == other.case), "")
-            if (here := measured.get(key)) is not None:
+            if (here := measured.get(_key(one.point, study))) is not None:
                 errors.append(here.error / one.error)
                 times.append(here.time / one.time)
     if not errors:
