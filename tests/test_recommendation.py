@@ -93,6 +93,13 @@ def test_the_truth_itself_is_recommended_where_it_alone_is_good_enough() -> None
     assert recommend(features(50), "a", [known], RMS, {"error": 0.4}).best is None
 
 
+def test_a_case_that_was_changed_since_is_not_taken_for_measured() -> None:
+    found = recommend(features(60), "a", [study("a", 50)], RMS, {"error": 1e9})
+    assert not found.measured
+    assert found.margins.error == 2.0
+    assert recommend(features(50), "a", [study("a", 50)], RMS, {"error": 1e9}).measured
+
+
 def test_the_nearest_within_the_time_is_taken() -> None:
     found = recommend(features(50), "a", STUDIES, RMS, {"time": 0.004})
     assert found.best is not None

@@ -44,13 +44,14 @@ class Margins:
 @dataclass(frozen=True, eq=False)
 class Recommendation:
     """What is recommended (None: no setting meets what is asked), out of ``count`` settings, with the ``margins`` that are
-    in it.
+    in it; ``measured``: whether on the case itself.
     """
 
     best: Expected | None
     count: int
     margins: Margins
     of: tuple[str, ...]
+    measured: bool
 
 
 def recommend(
@@ -59,7 +60,7 @@ def recommend(
     """The setting for a ``case``: the cheapest whose ``metric`` is at most ``limits["error"]``, or the nearest whose time
     for a frame [s] is at most ``limits["time"]``; both where both are given (the cheapest then).
     """
-    own = [study for study in studies if study.case == case]
+    own = [study for study in studies if study.case == case and _is_same(features, study.features)]
     margins = Margins() if own else _margins(studies, metric)
     known = _measured(own[0], metric) if own else list(_expected(features, studies, metric, margins))
     of = (case,) if own else tuple(study.case for study in alike(features, studies))
@@ -67,7 +68,12 @@ def recommend(
         one for one in known if one.error <= limits.get("error", math.inf) and one.time <= limits.get("time", math.inf)
     ]
     rank = (lambda one: (one.time, one.error)) if "error" in limits else (lambda one: (one.error, one.time))
-    return Recommendation(min(fitting, key=rank, default=None), len(known), margins, of)
+    return Recommendation(min(fitting, key=rank, default=None), len(known), margins, of, bool(own))
+
+
+def _is_same(one: Mapping[str, float], other: Mapping[str, float]) -> bool:
+    """Whether a case is as it was when it was studied, and not changed in what it is like."""
+    return all(math.isclose(value, other.get(name, math.nan), rel_tol=1e-6) for name, value in one.items())
 
 
 def alike(features: Mapping[str, float], studies: Iterable[CaseStudy]) -> list[CaseStudy]:

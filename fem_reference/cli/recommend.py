@@ -96,17 +96,16 @@ def facts(found: Recommendation, metric: str) -> dict[str, object]:
 
 
 def _text(found: Recommendation, case: str, metric: str, named: dict[str, str]) -> str:
+    most_alike = "the studied case" if len(found.of) == 1 else "the studied cases"
     measured = (
-        "measured on it"
-        if found.of == (case,)
-        else f"expected from {listed(list(found.of))}, the studied cases most like it"
+        "measured on it" if found.measured else f"expected from {listed(list(found.of))}, {most_alike} most like it"
     )
     if found.best is None:
         return f"none of {found.count} settings meets what is asked on {case} ({measured})"
     lines = [f"{found.best.point.solver}: {_settings(found.best)}"]
     error = f"{title_of(metric)} at most {number(found.best.error)} {named[metric]} with the bar of the truth"
     lines.append(f"{error}, {duration(found.best.time)} a frame, {measured}")
-    if found.of != (case,):
+    if not found.measured:
         lines.append(
             f"margins in it: {number(found.margins.error)} times the error, {number(found.margins.time)} times the time"
         )
