@@ -168,3 +168,7 @@ def test_tetrahedra_are_recommended_in_the_size_of_the_case_itself() -> None:
     found = recommend(fine, "new", [with_tets(one) for one in STUDIES], RMS, {"error": 1.0})
     assert found.best is not None
     assert found.best.point.choice["scene"] == {"muscle.tet_size": "12 mm", "muscle.refinements": 1}
+    # Without refinements there are none to leave out: the tetrahedra are as large as those would have been.
+    found = recommend(fine | {"refinements": 0.0}, "new", [with_tets(one) for one in STUDIES], RMS, {"error": 1.0})
+    assert found.best is not None
+    assert found.best.point.choice["scene"] == {"muscle.tet_size": "24 mm", "muscle.refinements": 0}

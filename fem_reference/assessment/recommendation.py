@@ -156,12 +156,16 @@ def tetrahedra(point: Point, study: CaseStudy) -> tuple[float, float]:
 
 
 def _translated(point: Point, study: CaseStudy, features: Mapping[str, float]) -> Point:
-    """A point of a studied case as it is on another: tetrahedra in the size of that case's own."""
+    """A point of a studied case as it is on another: tetrahedra in the size of that case's own; twice as large for each refinement
+    that they should have less than none.
+    """
     scene = dict(point.choice.get("scene", {}))
     if not set(_TETS) <= set(scene):
         return point
     factor, fewer = tetrahedra(point, study)
-    own = (f"{factor * features['tet_size']:.6g} mm", max(0, round(features["refinements"] - fewer)))
+    refinements = round(features["refinements"] - fewer)
+    size = factor * features["tet_size"] * 2 ** max(0, -refinements)
+    own = (f"{size:.6g} mm", max(0, refinements))
     return replace(point, choice=point.choice | {"scene": scene | dict(zip(_TETS, own, strict=True))})
 
 
