@@ -21,7 +21,14 @@ def points(solver: str, order: float, best: float, case: str = "hip") -> list[Po
     for i, seconds in enumerate((1, 2, 4, 8)):
         errors = dict.fromkeys(UNITS, best * (8 / seconds) ** order)
         costs = {"seconds_per_frame": 0.01 * seconds, "peak_memory_mb": 100.0 * seconds, "unknowns": 500.0}
-        about = (case, solver, solver, "sweeps" if i else "", str(seconds) if i else "", {"solver": solver})
+        about = (
+            case,
+            solver,
+            solver,
+            "sweeps" if i else "",
+            str(seconds) if i else "",
+            {"solver": solver, "sweeps": seconds},
+        )
         found.append(Point(*about, "converged", "", errors, costs))
     return found
 
@@ -152,4 +159,4 @@ def test_settings_are_tried_on_cases_that_they_were_not_chosen_on(tmp_path) -> N
     whole = Study(tuple(study(case) for case in ("hip", "knee", "jaw")), {}, {"machine": "here"})
     text = write_study(whole, tmp_path, "study").read_text(encoding="utf-8")
     assert "Are settings that are good on some cases good on another?" in text
-    assert math.isclose(max(one.loss for one in study_page.transfers(whole.points, "surface_deviation.rms")), 0.0)
+    assert math.isclose(max(one.loss for one in study_page.transfers(whole.cases, "surface_deviation.rms")), 0.0)

@@ -10,15 +10,15 @@ import numpy as np
 
 from fem_reference.assessment.cost_study import CaseStudy
 from fem_reference.assessment.fronts import Point
+from fem_reference.assessment.settings import TETRAHEDRA, is_elsewhere, setting, tetrahedra
 
 TIME = "seconds_per_frame"
 # Of other cases so many are asked, those most alike.
 _ALIKE = 3
 # Of what is expected from other cases, this share is met on each case that was left out when the margin was found.
 _MET = 0.95
-# By which features cases are alike, and the keys of a scene that say its tetrahedra.
+# By which features cases are alike.
 _COMPARED = ("motion_to_size", "contact", "bulk_to_shear", "fibres_to_shear")
-_TETS = ("muscle.tet_size", "muscle.refinements")
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,8 @@ def _expected(
     """
     chosen = alike(features, studies)
     by_key = [
-        {_key(one.point, study): one for one in _measured(study, metric) if _elsewhere(one.point)} for study in chosen
+        {setting(one.point, study): one for one in _measured(study, metric) if is_elsewhere(one.point)}
+        for study in chosen
     ]
     for key in set.intersection(*map(set, by_key)) if by_key else ():
         found = [(study, known[key]) for study, known in zip(chosen, by_key, strict=True)]
@@ -128,50 +129,18 @@ def scale(features: Mapping[str, float], other: Mapping[str, float], metric: str
     return 1.0 if metric.startswith("volume.") or metric.endswith("_percent") else features["motion"] / other["motion"]
 
 
-def _key(point: Point, study: CaseStudy) -> str:
-    """What makes a setting the same on two cases; tetrahedra count by their size in that of the case's own reference."""
-    scene = point.choice.get("scene", {})
-    if not _elsewhere(point):
-        return f"{study.case}: {point.label}"
-    if "triangles" in scene:
-        return f"{point.solver}: {scene['triangles']} as many triangles, {_settings(point)}"
-    if scene:
-        factor, fewer = tetrahedra(point, study)
-        return f"{point.solver}: tetrahedra {factor:.3g}, {fewer:g} refinements fewer, {_settings(point)}"
-    return f"{point.solver}: {_settings(point)}"
-
-
-def _elsewhere(point: Point) -> bool:
-    """Whether a setting can be taken on another case too: the values of a scene are its own, but for its mesh."""
-    return not set(point.choice.get("scene", {})) - {*_TETS, "triangles"}
-
-
-def tetrahedra(point: Point, study: CaseStudy) -> tuple[float, float]:
-    """Of a point on other tetrahedra, their size in that of the case's own before refinement, and how much less they are
-    refined.
-    """
-    scene = point.choice["scene"]
-    size = float(str(scene["muscle.tet_size"]).removesuffix(" mm"))
-    return size / study.features["tet_size"], study.features["refinements"] - scene["muscle.refinements"]
-
-
 def _translated(point: Point, study: CaseStudy, features: Mapping[str, float]) -> Point:
     """A point of a studied case as it is on another: tetrahedra in the size of that case's own; twice as large for each refinement
     that they should have less than none.
     """
     scene = dict(point.choice.get("scene", {}))
-    if not set(_TETS) <= set(scene):
+    if not set(TETRAHEDRA) <= set(scene):
         return point
     factor, fewer = tetrahedra(point, study)
     refinements = round(features["refinements"] - fewer)
     size = factor * features["tet_size"] * 2 ** max(0, -refinements)
     own = (f"{size:.6g} mm", max(0, refinements))
-    return replace(point, choice=point.choice | {"scene": scene | dict(zip(_TETS, own, strict=True))})
-
-
-def _settings(point: Point) -> str:
-    own = {name: value for name, value in point.choice.items() if name not in ("scene", "solver", "name")}
-    return ", ".join(f"{name} = {value}" for name, value in sorted(own.items(), key=str))
+    return replace(point, choice=point.choice | {"scene": scene | dict(zip(TETRAHEDRA, own, strict=True))})
 
 
 def _margins(studies: Sequence[CaseStudy], metric: str) -> Margins:
@@ -179,9 +148,9 @@ def _margins(studies: Sequence[CaseStudy], metric: str) -> Margins:
     errors, times = list[float](), list[float]()
     for study in studies:
         others = [other for other in studies if other is not study]
-        measured = {_key(one.point, study): one for one in _measured(study, metric)}
+        measured = {setting(one.point, study): one for one in _measured(study, metric)}
         for one in _expected(study.features, others, metric, Margins()):
-            if (here := measured.get(_key(one.point, study))) is not None:
+            if (here := measured.get(setting(one.point, study))) is not None:
                 errors.append(here.error / one.error)
                 times.append(here.time / one.time)
     if not errors:

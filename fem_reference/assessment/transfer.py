@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import fmean
 
-from fem_reference.assessment.fronts import Point
+from fem_reference.assessment.cost_study import CaseStudy
+from fem_reference.assessment.settings import is_elsewhere, setting
 
 
 @dataclass(frozen=True)
@@ -27,26 +28,30 @@ class Transfer:
         return self.error / self.best - 1
 
 
-def transfers(points: Iterable[Point], error: str) -> tuple[Transfer, ...]:
+def transfers(studies: Iterable[CaseStudy], error: str) -> tuple[Transfer, ...]:
     """For every solver and case, settings chosen by the least mean logarithm of the error over the other cases among those that
-    were measured on every case.
+    were measured on every case; an error below the bar of a truth counts as that.
     """
     by_solver: dict[str, dict[str, dict[str, float]]] = {}
     defaults: dict[tuple[str, str], float] = {}
-    for point in points:
-        value = point.errors.get(error, math.nan)
-        if point.status != "converged" or not value > 0:
-            continue
-        by_solver.setdefault(point.solver, {}).setdefault(f"{point.name}: {point.label}", {})[point.case] = value
-        if point.is_default:
-            defaults.setdefault((point.solver, point.case), value)
+    labels: dict[tuple[str, str], str] = {}
+    for study in studies:
+        for point in study.counted:
+            value = point.errors.get(error, math.nan)
+            if point.status != "converged" or not value > 0 or not is_elsewhere(point):
+                continue
+            key = setting(point, study)
+            labels[key, study.case] = point.label
+            by_solver.setdefault(point.solver, {}).setdefault(key, {})[study.case] = value
+            if point.is_default:
+                defaults.setdefault((point.solver, study.case), value)
     found = list[Transfer]()
     for solver, settings in by_solver.items():
         cases = sorted({case for values in settings.values() for case in values})
         everywhere = {label: values for label, values in settings.items() if len(values) == len(cases)}
         if len(cases) > 1 and everywhere:
             found += [_left_out(solver, everywhere, cases, case, defaults) for case in cases]
-    return tuple(found)
+    return tuple(replace(one, chosen=labels[one.chosen, one.left_out]) for one in found)
 
 
 def _left_out(

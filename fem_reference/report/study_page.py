@@ -59,7 +59,7 @@ def render(study: Study) -> str:
         claims=lambda case: [claims_drawing(case.claims, metric, case.case) for metric in CLAIMED_UNITS],
         large=LARGE,
         growth_drawing=_growth(study) if study.growth else None,
-        transfers=transfers(study.points, MAIN) if len(study.cases) > 1 else (),
+        transfers=transfers(study.cases, MAIN) if len(study.cases) > 1 else (),
     )
 
 

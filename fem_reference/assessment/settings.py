@@ -1,0 +1,39 @@
+"""Settings of solvers as they are the same on several cases, whose tetrahedra differ in size."""
+
+from fem_reference.assessment.cost_study import CaseStudy
+from fem_reference.assessment.fronts import Point
+
+# The keys of a scene that say its tetrahedra.
+TETRAHEDRA = ("muscle.tet_size", "muscle.refinements")
+
+
+def setting(point: Point, study: CaseStudy) -> str:
+    """What makes a setting the same on two cases; tetrahedra count by their size in that of the case's own reference."""
+    scene = point.choice.get("scene", {})
+    if not is_elsewhere(point):
+        return f"{study.case}: {point.label}"
+    if "triangles" in scene:
+        return f"{point.solver}: {scene['triangles']} as many triangles, {_settings(point)}"
+    if scene:
+        factor, fewer = tetrahedra(point, study)
+        return f"{point.solver}: tetrahedra {factor:.3g}, {fewer:g} refinements fewer, {_settings(point)}"
+    return f"{point.solver}: {_settings(point)}"
+
+
+def is_elsewhere(point: Point) -> bool:
+    """Whether a setting can be taken on another case too: the values of a scene are its own, but for its mesh."""
+    return not set(point.choice.get("scene", {})) - {*TETRAHEDRA, "triangles"}
+
+
+def tetrahedra(point: Point, study: CaseStudy) -> tuple[float, float]:
+    """Of a point on other tetrahedra, their size in that of the case's own before refinement, and how much less they are
+    refined.
+    """
+    scene = point.choice["scene"]
+    size = float(str(scene["muscle.tet_size"]).removesuffix(" mm"))
+    return size / study.features["tet_size"], study.features["refinements"] - scene["muscle.refinements"]
+
+
+def _settings(point: Point) -> str:
+    own = {name: value for name, value in point.choice.items() if name not in ("scene", "solver", "name")}
+    return ", ".join(f"{name} = {value}" for name, value in sorted(own.items(), key=str))
