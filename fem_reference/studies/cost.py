@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from fem_reference import __version__, metrics, solvers
-from fem_reference.assessment.claims import Claim, claimed
+from fem_reference.assessment.claims import Claim
 from fem_reference.assessment.cost_study import CaseStudy, Study
 from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.assessment.fronts import COSTS, Point
 from fem_reference.foundations.errors import InputError
-from fem_reference.metrics import MeasurementContext, change, measure
+from fem_reference.metrics import MeasurementContext, measure
 from fem_reference.runs.cost import seconds_per_frame
 from fem_reference.runs.key import versions
 from fem_reference.runs.store import Run
@@ -27,6 +27,7 @@ from fem_reference.studies.execution import Bench, complete
 from fem_reference.studies.features import features
 from fem_reference.studies.ladders import TETRAHEDRA, Trial, candidate_trials, reference_trials
 from fem_reference.studies.resampled_scenes import carried, resample
+from fem_reference.studies.true_errors import claims_of
 
 log = logging.getLogger(__name__)
 
@@ -148,13 +149,10 @@ def errors(run: Run, truth: Run, context: MeasurementContext) -> dict[str, float
         return {}
     whole = carried(complete(run, truth.numbers), truth.surface)
     found = {
-        f"{one.metric}.{one.statistic}": float(np.abs(one.values).max()) for one in _measures(whole, truth, context)
+        f"{one.metric}.{one.statistic}": float(np.abs(one.values).max())
+        for one in measure(whole, truth, context, METRICS)
     }
     return {name: value for name, value in found.items() if math.isfinite(value)}
-
-
-def _measures(run: Run, truth: Run, context: MeasurementContext) -> tuple[metrics.Measure, ...]:
-    return measure(run, truth, context, METRICS)
 
 
 def costs(run: Run) -> dict[str, float]:
@@ -182,15 +180,6 @@ def _claims(made: Sequence[Made], truth: Run, context: MeasurementContext, store
         log.info("error bars of %s", one.trial.label)
         bars = refinement.stored(one.run) or refinement.obtain(Bench(one.trial.scene, store), one.run, model=False)
         if bars is not None:
-            found += _claimed(one.trial, bars, one.run, truth, context)
+            case = f"{one.trial.scene.name}, {one.trial.value}"
+            found += claims_of(case, bars, (one.run, truth), context)
     return tuple(found)
-
-
-def _claimed(trial: Trial, bars: ErrorBars, run: Run, truth: Run, context: MeasurementContext) -> list[Claim]:
-    """The claims of the ``bars`` of a ``run`` about its change from rest and about deviations from it."""
-    names = ("surface_deviation", "fibre_length", "volume")
-    changes = [change(one, context, names) for one in (run, truth)]
-    surfaces = [replace(one, fibres=None, fibre_positions=None) for one in (run, truth)]  # as candidates are
-    deviations = [measure(surfaces[0], one, context, names) for one in surfaces]
-    case = f"{trial.scene.name}, {trial.value}"
-    return [*claimed(case, "change", bars, *changes), *claimed(case, "deviation", bars, *deviations)]

@@ -6,8 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from fem_reference.assessment.claims import CLAIMED, FINER, Claim, Claims, claimed
+from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.foundations.errors import InputError
 from fem_reference.metrics import MeasurementContext, change, measure
+from fem_reference.runs.store import Run
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import refinement
 from fem_reference.studies.execution import Bench, complete
@@ -54,11 +56,15 @@ def _of(scene: MuscleCase, store: Path) -> list[Claim]:
     if reference.fibres is None or run.outcome.status != "converged":
         return []
     context = MeasurementContext.of(reference, reference.fibres, bench.setup().bones, bench.setup().free)
+    return claims_of(scene.name, bars, (reference, run), context)
+
+
+def claims_of(case: str, bars: ErrorBars, runs: tuple[Run, Run], context: MeasurementContext) -> list[Claim]:
+    """The claims of the ``bars`` of the first of two runs about its change from rest and about deviations from it; the second is a
+    sharper solution.
+    """
     names = dict.fromkeys(metric for metric, _ in CLAIMED)
-    changes = [change(one, context, names) for one in (reference, run)]
-    surfaces = [replace(one, fibres=None, fibre_positions=None) for one in (reference, run)]  # as candidates are
+    changes = [change(one, context, names) for one in runs]
+    surfaces = [replace(one, fibres=None, fibre_positions=None) for one in runs]  # as candidates are
     deviations = [measure(surfaces[0], one, context, names) for one in surfaces]
-    return [
-        *claimed(scene.name, "change", bars, *changes),
-        *claimed(scene.name, "deviation", bars, *deviations),
-    ]
+    return [*claimed(case, "change", bars, *changes), *claimed(case, "deviation", bars, *deviations)]
