@@ -22,6 +22,12 @@ def test_what_is_varied_on_coarser_tetrahedra_says_so() -> None:
     assert softer.changed["effect[3].stiffness"] == "0.05 MPa/mm"
 
 
+def test_how_runs_were_made_is_said_of_a_cluster_too() -> None:
+    assert str(Workers()) == "runs one after the other"
+    assert str(Workers(2)) == "runs 2 at once"
+    assert str(Workers(address="tcp://there:8786")) == "runs by the workers of a cluster"
+
+
 def test_a_setting_that_is_refused_is_named_once(tmp_path) -> None:
     trials = reference_trials(casefile.read_muscle("hip_flexion"))
     refused = next(one for one in trials if one.knob == "element" and one.value.startswith("P1 "))

@@ -43,6 +43,12 @@ class Workers:
         if self.count < 1:
             raise InputError("--workers", self.count, "1 or more")
 
+    def __str__(self) -> str:
+        """How runs are made, beside what machine it is."""
+        if self.address is not None:
+            return "runs by the workers of a cluster"
+        return "runs one after the other" if self.count == 1 else f"runs {self.count} at once"
+
 
 @dataclass(frozen=True, eq=False)
 class Made:

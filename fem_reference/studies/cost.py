@@ -52,8 +52,7 @@ def study(scenes: Iterable[MuscleCase], store: Path, workers: Workers, only: Col
         except InputError as error:
             log.info("%s is left out: %s", scene.name, error)
             missing[scene.name] = str(error)
-    together = "one after the other" if workers == Workers() else f"{workers.count} at once"
-    machine = f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores, runs {together}"
+    machine = f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores, {workers}"
     return Study(tuple(cases), missing, {"fem_reference": __version__, "machine": machine, **versions()})
 
 
