@@ -9,7 +9,7 @@ from fem_reference.cli._pages import Asked, Part, written
 from fem_reference.cli._parser import add_name
 from fem_reference.cli._printing import DONE, write_output
 from fem_reference.report import stress_page
-from fem_reference.studies.hard import records, running
+from fem_reference.studies.hard import choosing, records, running
 
 PAGE = "stress"
 HELP = "run the hard cases by every solver, and write the page of who stays stable"
@@ -21,7 +21,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("names", metavar="NAME", nargs="*", help=which)
     only = "only this solver; may be repeated (default: all)"
     parser.add_argument(
-        "--solver", action="append", default=[], choices=list(running.choices()), metavar="NAME", help=only
+        "--solver", action="append", default=[], choices=list(choosing.choices()), metavar="NAME", help=only
     )
     many = "take the reference to the farthest frame of each case in 1, 10 and 40 load steps as well: the same end, or a status"
     parser.add_argument("--steps", action="store_true", help=many)

@@ -173,13 +173,9 @@ def made(table: dict[str, Any], whose: dict[str, Any]) -> Case:
     for key in whose:
         if key in table:
             raise InputError(join(place, key), "an unknown key", f"one of {', '.join(keys(record))}")
-    effects = table.get("effect", [])
-    if isinstance(effects, list | tuple):
-        read_effects = tuple(_effect(entry, join(place, f"effect[{i}]"), kind) for i, entry in enumerate(effects))
-        table = table | {"effect": read_effects}
+    if "effect" in table:
+        table = table | {"effect": effects(table["effect"], place, kind)}
     case: Case = parse(record, table | whose, place)
-    _check_effects([entry["name"] for entry in effects], case.effects, place)
-    _check_moduli(case.effects, place)
     reference, *others = _candidate_names(case)
     expected = [(f"expect[{i}].of", entry.of) for i, entry in enumerate(case.expect)]
     _check_used([reference, "candidates", *others], expected, place)
@@ -188,6 +184,16 @@ def made(table: dict[str, Any], whose: dict[str, Any]) -> Case:
         _check_rest(case)
         _check_time(case)
     return case
+
+
+def effects(entries: Any, place: str, kind: type[Record] = Effect) -> Any:
+    """The effects of a ``kind`` that are written below the key ``effect``, each once; as it is, what is no list."""
+    if not isinstance(entries, list | tuple):
+        return entries
+    found = tuple(_effect(entry, join(place, f"effect[{i}]"), kind) for i, entry in enumerate(entries))
+    _check_effects([entry["name"] for entry in entries], found, place)
+    _check_moduli(found, place)
+    return found
 
 
 def _check_effects(names: list[str], effects: tuple[Record, ...], place: str) -> None:
