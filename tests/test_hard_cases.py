@@ -161,9 +161,8 @@ def test_where_inexact_linear_solutions_lead_nowhere_exact_ones_are_tried(monkey
             outcome = fenicsx.solve(replace(built, frames=(0, 2)), settings, frames.append)
             assert outcome.status == "converged", f"{kind}: {outcome.message}"
             ends.append(frames[-1].tets)
-    assert (
-        np.abs(ends[1] - ends[0]).max() < 1e-3
-    )  # it is free to slide: by 1.3e-2 mm with what Newton's method leaves over, 1e-8 N
+    # It is free to slide: by 1.3e-2 mm with what Newton's method leaves over, 1e-8 N.
+    assert np.abs(ends[1] - ends[0]).max() < 1e-3
 
 
 def test_a_solver_that_raises_has_failed(monkeypatch) -> None:
@@ -292,6 +291,20 @@ def test_a_wrong_file_is_refused(text, message, tmp_path) -> None:
     (tmp_path / "case.toml").write_text(text)
     with pytest.raises(InputError, match=message):
         list(records.read(tmp_path / "case.toml"))
+
+
+@pytest.mark.parametrize(
+    ("words", "got"),
+    [
+        (["--jitters", "-1"], "--jitters: got -1, want 0 or more"),
+        (["--steps", "--solver", "pbd"], "--steps: got it with pbd alone, want --solver fenicsx too"),
+        (["--jitters", "2", "--solver", "pbd", "--solver", "arap"], "--jitters: got it with pbd, arap alone, want"),
+    ],
+)
+def test_runs_of_the_reference_that_nobody_would_make_are_refused(words, got, tmp_path, capsys) -> None:
+    assert cli.main(["stress", "at_rest.millimetres", "--out", str(tmp_path), *words]) == cli.BAD_INPUT
+    assert got in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_verb_and_its_page(tmp_path, capsys) -> None:

@@ -8,6 +8,7 @@ from fem_reference.assessment.stress import facts
 from fem_reference.cli._pages import Asked, Part, written
 from fem_reference.cli._parser import add_name
 from fem_reference.cli._printing import DONE, write_output
+from fem_reference.foundations.errors import InputError
 from fem_reference.report import stress_page
 from fem_reference.studies.hard import choosing, records, running
 
@@ -32,6 +33,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run them all and write the page: whatever becomes of a run is a result, and not a failure of this."""
+    _check_reference(options)
     found = running.run(
         records.read_all(tuple(options.names)), options.solver, in_steps=options.steps, jitters=options.jitters
     )
@@ -42,3 +44,15 @@ def run(options: argparse.Namespace) -> int:
     _, lines = written(options, Asked("stress", PAGE, tuple(parts)), partial(report.write_stress, found))
     write_output(facts(found), "\n".join([stress_page.text(found), *lines]), options)
     return DONE
+
+
+def _check_reference(options: argparse.Namespace) -> None:
+    """InputError where more runs of the reference are wanted than can be, or are wanted without it."""
+    if options.jitters < 0:
+        raise InputError("--jitters", options.jitters, "0 or more")
+    for name, wanted in (("--steps", options.steps), ("--jitters", options.jitters)):
+        if wanted and options.solver and choosing.REFERENCE not in options.solver:
+            others = ", ".join(options.solver)
+            raise InputError(
+                name, f"it with {others} alone", f"--solver {choosing.REFERENCE} too, which alone it is about"
+            )
