@@ -20,8 +20,8 @@ class BodySettings(Record):
     ``quadrature_degree``: of the polynomials that are integrated exactly on a straight cell, by default what the element needs.
     ``linear_solver``: how the linear systems of Newton's method are solved: ``"direct"``, each exactly, by a factorisation of its
     own; ``"lagged"``, as exactly as it is worth it, by FGMRES with a factorisation that serves until a new one is cheaper, and
-    exactly from where load steps would else end; by default as the size asks. ``precision``: of factorisations, by default double of direct ones and single of lagged ones. Both
-    change the time and not the answer.
+    exactly from where load steps would else end; by default as the size asks. ``precision``: of factorisations, by default double
+    of direct ones and single of lagged ones. Both change the time and not the answer.
     ``follow``: ``"equilibrium"`` as Newton's method finds it, or ``"stable"``: at a frame whose equilibrium is unstable, as far as
     negative modes are counted, the body is moved along its lowest mode by a ``perturbation``, a share of its size (up to eight
     times that, in both directions, until there are fewer), and solved anew.
