@@ -24,7 +24,7 @@ from fem_reference.foundations.mesh import Surface, check_finite
 from fem_reference.foundations.records import FileName, Name, Record, parse
 from fem_reference.foundations.units import positive, quantity
 from fem_reference.geometry.patches import draped, fan
-from fem_reference.io import files
+from fem_reference.io import files, texts
 from fem_reference.problems import muscle
 from fem_reference.runs import states, store
 from fem_reference.scenes import casefile
@@ -76,6 +76,13 @@ def test_a_baseline_and_a_run_without_end_are_refused(text: str, tmp_path: Path)
     with pytest.raises(InputError, match=r"run\.json: got .*want the run\.json of a stored run"):
         store.load(tmp_path)
     assert store.status(tmp_path) == "damaged"
+
+
+def test_a_text_may_begin_with_the_mark_of_its_order_of_bytes(tmp_path: Path) -> None:
+    (tmp_path / "candidate.toml").write_text('name = "mine"', encoding="utf-8-sig")
+    assert recorded.about(tmp_path).name == "mine"
+    (tmp_path / "a.json").write_text("[1]", encoding="utf-8-sig")
+    assert texts.read_json(tmp_path / "a.json", "numbers") == [1]
 
 
 def test_a_text_that_is_too_large_is_refused_unread(tmp_path: Path) -> None:
