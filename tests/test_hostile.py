@@ -2,6 +2,7 @@
 
 import base64
 import json
+import os
 import re
 import struct
 import zipfile
@@ -169,6 +170,20 @@ def test_what_is_no_name_of_a_file_is_refused(file: str) -> None:
         InputError, match=r"file: got .*want a name of 1 to 100 letters, digits and \. _ -, with no dot first"
     ):
         parse(Called, {"file": file}, "record")
+
+
+@pytest.mark.parametrize("kind", ["folder", "pipe", "dangling"])
+def test_what_a_candidate_says_is_not_passed_over(kind: str, tmp_path: Path) -> None:
+    place = tmp_path / "candidate.toml"
+    {"folder": place.mkdir, "pipe": lambda: os.mkfifo(place), "dangling": lambda: place.symlink_to("nothing")}[kind]()
+    with pytest.raises(InputError, match=r"candidate\.toml: got no file, want a TOML file"):
+        recorded.about(tmp_path)
+
+
+def test_a_unit_that_is_empty_is_not_millimetres(tmp_path: Path) -> None:
+    assert recorded.choice(tmp_path).settings["unit"] == "mm"
+    with pytest.raises(InputError, match='unit: got "", want a unit of length'):
+        parse(recorded.Settings, recorded.choice(tmp_path, "").settings, "case.toml")
 
 
 def test_landmarks_a_kilometre_apart_are_refused() -> None:
