@@ -231,6 +231,8 @@ block = { size = "20, 20, 60 mm", cells = [2, 2, 3] }
 hold = [{ face = "z0" }]
 frames = { first = 0, last = 2, every = 1 }
 """
+CONTACT = 'effect = [{ name = "contact", stiffness = "500 kPa/mm", bones = ["d"] }]\n'
+SPHERE = 'bone = [{ name = "c", sphere = { centre = "0, 0, 200 mm", radius = "5 mm" } }'
 ROD = 'title = "a"\nhealthy = "b"\nbound = [{ quantity = "overshoot", at_most = 1 }]\n'
 
 
@@ -255,6 +257,9 @@ ROD = 'title = "a"\nhealthy = "b"\nbound = [{ quantity = "overshoot", at_most = 
         ("frames", 'effect = [{ mu = "1 kPa" }]\nframes', r"effect\[0\].name: got .*want one of active_tension"),
         ("frames", 'effect = [{ name = "neo_hooke", nu = 1 }]\nframes', r"effect\[0\].nu: got an unknown key, want one of mu"),
         ("frames", 'bone = [{ name = "c", surface = "c.ply", unit = "mm" }]\nframes', "bone: got .*want bones of closed forms"),
+        ("frames", CONTACT + SPHERE + "]\nframes", r'effect\[0\].bones: got "d", want one of c'),
+        ("frames", SPHERE + SPHERE.replace("bone = [", ", ") + "]\nframes", 'bone: got the name "c" twice'),
+        ("frames", 'effect = [{ name = "inertia", density = "1 g/ml" }]\nframes', "frames.interval: got nothing, want the time"),
         ("frames", "variant = 3\nframes", "variant: got 3, want tables"),
         ("frames", "variant = [3]\nframes", r"variant: got \[3\], want tables"),
         ("frames", "variant = []\nframes", r"variant: got \[\], want tables"),

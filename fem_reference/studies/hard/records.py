@@ -223,6 +223,8 @@ def _hard(table: dict[str, Any], name: str, where: str) -> Hard:
         if (bound.quantity == "overshoot") != scalar:
             want = "overshoot for a scalar field, and only there"
             raise InputError(join(where, f"bound[{i}].quantity"), f'"{bound.quantity}"', want)
+    if hard.frames is not None:
+        casefile.check_acting(hard.effect, [bone.name for bone in hard.bone], hard.frames, where)
     _check_solvers(hard, scalar=scalar)
     _check_steps(hard, scene)
     return hard
