@@ -203,6 +203,12 @@ def test_a_table_that_is_no_text_is_refused(tmp_path: Path) -> None:
         files.read_rows(tmp_path / "table.csv")
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device here that is full")
+def test_a_device_that_takes_nothing_is_named() -> None:
+    with pytest.raises(OSError, match="No space left on device: '/dev/full'"):
+        files.write_text(Path("/dev/full"), "text")
+
+
 def test_a_failed_write_leaves_what_was_there(tmp_path: Path) -> None:
     path = tmp_path / "note.txt"
     files.write_text(path, "before")

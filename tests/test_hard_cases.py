@@ -16,14 +16,14 @@ from fem_reference.problems.muscle_body import as_body
 from fem_reference.runs.store import Outcome
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.solvers import fenicsx
-from fem_reference.studies.hard import blocks, jitters, records, running, steps
+from fem_reference.studies.hard import blocks, choosing, jitters, records, running, steps
 
 CASES = {hard.name: hard for hard in records.read_all()}
-FAST = [name for name in running.choices() if name not in ("fenicsx", "scikit_fem")]
+FAST = [name for name in choosing.choices() if name not in ("fenicsx", "scikit_fem")]
 
 
 def cell(name: str, solver: str, **settings: object) -> Cell:
-    choice = running.choices()[solver]
+    choice = choosing.choices()[solver]
     return running.cell(running.Posed(CASES[name]), SolverChoice(**{"solver": solver, **choice.settings, **settings}))
 
 
@@ -39,9 +39,9 @@ def test_blocks_are_whole(hard) -> None:
     assert all(len(problem.mesh.facets[entry.attachment]) for entry in problem.attached)
     assert np.isin(problem.surface.points, problem.mesh.points).all()
     assert hard.healthy
-    assert set(hard.settings) <= set(running.choices())
-    assert set(hard.only) <= set(running.choices())
-    for choice in running.choices().values():
+    assert set(hard.settings) <= set(choosing.choices())
+    assert set(hard.only) <= set(choosing.choices())
+    for choice in choosing.choices().values():
         running.solvers.settings(
             hard.choice(choice), hard.place, "solve_body" if choice.solver == "scikit_fem" else "solve"
         )
@@ -124,8 +124,8 @@ def test_jitters_are_other_meshes_of_the_same_body_compared_at_the_same_material
 
 def test_jitters_of_a_shipped_case_have_tetrahedra_of_another_size() -> None:
     hard = CASES["hip.one_radian_at_once"]
-    sizes = [running.shipped_case(jitters.jittered(hard, number).shipped).muscle.tet_size for number in (1, 2)]
-    given = running.shipped_case(hard.shipped).muscle.tet_size
+    sizes = [jitters.jittered(hard, number).shipped.read().muscle.tet_size for number in (1, 2)]
+    given = hard.shipped.read().muscle.tet_size
     assert sizes[0] != sizes[1]
     assert all(0 < abs(size / given - 1) < jitters.SIZES for size in sizes)
 
@@ -151,7 +151,7 @@ def test_where_inexact_linear_solutions_lead_nowhere_exact_ones_are_tried(monkey
     hard = CASES["squeeze_sliding.4_cells"]
     block = hard.block.model_copy(update={"cells": (3, 3, 3)})
     built = running.Posed(hard.model_copy(update={"block": block})).problem
-    given = hard.choice(running.choices()["fenicsx"]).settings
+    given = hard.choice(choosing.choices()["fenicsx"]).settings
     given |= {"first_step": 2.0, "smallest_step": 2.0, "newton_iterations": 10}
     ends = []
     with fenicsx.shared():
@@ -161,9 +161,8 @@ def test_where_inexact_linear_solutions_lead_nowhere_exact_ones_are_tried(monkey
             outcome = fenicsx.solve(replace(built, frames=(0, 2)), settings, frames.append)
             assert outcome.status == "converged", f"{kind}: {outcome.message}"
             ends.append(frames[-1].tets)
-    assert (
-        np.abs(ends[1] - ends[0]).max() < 1e-3
-    )  # it is free to slide: by 1.3e-2 mm with what Newton's method leaves over, 1e-8 N
+    # It is free to slide: by 1.3e-2 mm with what Newton's method leaves over, 1e-8 N.
+    assert np.abs(ends[1] - ends[0]).max() < 1e-3
 
 
 def test_a_solver_that_raises_has_failed(monkeypatch) -> None:
@@ -175,7 +174,7 @@ def test_a_solver_that_raises_has_failed(monkeypatch) -> None:
 
 def test_what_a_case_is_not_about_is_refused_with_the_reason() -> None:
     hard = CASES["at_rest.millimetres"].model_copy(update={"only": ("pbd",), "because": "it is about PBD"})
-    found = running.cell(running.Posed(hard), running.choices()["arap"])
+    found = running.cell(running.Posed(hard), choosing.choices()["arap"])
     assert (found.verdict, found.sentence) == ("refused", "the case is about pbd only: it is about PBD")
 
 
@@ -224,6 +223,67 @@ def test_a_name_that_is_not_there() -> None:
         records.read_all(("nothing",))
 
 
+BLOCK = """
+title = "a"
+healthy = "b"
+bound = [{ quantity = "from_rest", at_most = 1 }]
+block = { size = "20, 20, 60 mm", cells = [2, 2, 3] }
+hold = [{ face = "z0" }]
+frames = { first = 0, last = 2, every = 1 }
+"""
+CONTACT = 'effect = [{ name = "contact", stiffness = "500 kPa/mm", bones = ["d"] }]\n'
+SPHERE = 'bone = [{ name = "c", sphere = { centre = "0, 0, 200 mm", radius = "5 mm" } }'
+ROD = 'title = "a"\nhealthy = "b"\nbound = [{ quantity = "overshoot", at_most = 1 }]\n'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("[2, 2, 3]", "[2000, 2000, 2000]", "block: got .*want at most 50000 cells"),
+        ("[2, 2, 3]", "[2, 2, 3], fibre = [0, 0, 0]", "block: got .*want a fibre that has a direction"),
+        ("[2, 2, 3]", '[2, 2, 3], points_apart = "-1 mm"', "block.points_apart: got .*want more than zero"),
+        ("at_most = 1", "at_most = -1", r"bound\[0\].at_most: got -1"),
+        ("from_rest", "overshoot", r"bound\[0\].quantity: got .*want overshoot for a scalar field, and only there"),
+        ('{ face = "z0" }', '{ face = "z0" }, { face = "z0" }', "hold: got .*want every face once"),
+        ("frames", 'contrast = "c"\nno_solution = "d"\nframes', 'contrast: got "c", want nothing beside "no_solution"'),
+        ("frames", 'settings = { pdb = { damping = 1 } }\nframes', 'settings.pdb: got "pdb", want one of fenicsx'),
+        ("frames", "settings = { pbd = { dampong = 1 } }\nframes", "settings.pbd.dampong: got an unknown key, want damping"),
+        ("frames", 'settings = { pbd = { solver = "xpbd" } }\nframes', "settings.pbd.solver: got an unknown key"),
+        ("frames", 'only = ["pdb"]\nbecause = "c"\nframes', r'only\[0\]: got "pdb", want one of fenicsx'),
+        ("frames", "steps = { until = 3 }\nframes", "steps.until: got 3, want a frame after 0, up to 2"),
+        ("frames", "steps = { until = 0 }\nframes", "steps.until: got 0, want a frame after 0, up to 2"),
+        ("frames", "steps = { until = 2, counts = [0] }\nframes", r"steps.counts\[0\]: got 0, want greater than 0"),
+        ("frames", "steps = { until = 2, counts = [] }\nframes", r"steps.counts: got \[\]"),
+        ("frames", 'effect = [{ mu = "1 kPa" }]\nframes', r"effect\[0\].name: got .*want one of active_tension"),
+        ("frames", 'effect = [{ name = "neo_hooke", nu = 1 }]\nframes', r"effect\[0\].nu: got an unknown key, want one of mu"),
+        ("frames", 'bone = [{ name = "c", surface = "c.ply", unit = "mm" }]\nframes', "bone: got .*want bones of closed forms"),
+        ("frames", CONTACT + SPHERE + "]\nframes", r'effect\[0\].bones: got "d", want one of c'),
+        ("frames", SPHERE + SPHERE.replace("bone = [", ", ") + "]\nframes", 'bone: got the name "c" twice'),
+        ("frames", 'effect = [{ name = "inertia", density = "1 g/ml" }]\nframes', "frames.interval: got nothing, want the time"),
+        ("frames", "variant = 3\nframes", "variant: got 3, want tables"),
+        ("frames", "variant = [3]\nframes", r"variant: got \[3\], want tables"),
+        ("frames", "variant = []\nframes", r"variant: got \[\], want tables"),
+        ("frames", 'variant = [{ title = "c" }]\nframes', r"variant\[0\].name: got '', want a name of its own"),
+        ("frames", 'variant = [{ name = "c" }, { name = "c" }]\nframes', r"variant\[1\].name: got 'c', want a name of its"),
+        ("frames", 'variant = [{ name = "<b>" }]\nframes', r'variant\[0\].name: got "hard.<b>"'),
+        ("frames", 'name = "c"\nframes', "name: got an unknown key"),
+        ("frames", f"x = {'[' * 5000}{']' * 5000}\nframes", "case.toml: got tables or lists more than 32 deep"),
+        (BLOCK, ROD + 'shipped = { case = "nothing" }', 'CASE: got "nothing"'),
+        (BLOCK, ROD + 'shipped = { case = "rod", changes = { "a.b" = 1 } }', "a.b: got nothing, want a key"),
+        (BLOCK, ROD.replace("overshoot", "volume") + 'shipped = { case = "rod" }', r'bound\[0\].quantity: got "volume"'),
+        (BLOCK, ROD + 'shipped = { case = "rod" }\nsteps = { until = 1 }', "steps.until: got 1"),
+    ],
+)  # fmt: skip
+def test_a_mistake_in_a_file_is_no_refusal_by_a_solver(old, new, message, tmp_path) -> None:
+    path = tmp_path / "hard" / "case.toml"
+    path.parent.mkdir()
+    path.write_text(BLOCK)
+    assert [hard.name for hard in records.read(path)] == ["hard"]
+    path.write_text(BLOCK.replace(old, new, 1))
+    with pytest.raises(InputError, match=message):
+        list(records.read(path))
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -236,6 +296,20 @@ def test_a_wrong_file_is_refused(text, message, tmp_path) -> None:
     (tmp_path / "case.toml").write_text(text)
     with pytest.raises(InputError, match=message):
         list(records.read(tmp_path / "case.toml"))
+
+
+@pytest.mark.parametrize(
+    ("words", "got"),
+    [
+        (["--jitters", "-1"], "--jitters: got -1, want 0 or more"),
+        (["--steps", "--solver", "pbd"], "--steps: got it with pbd alone, want --solver fenicsx too"),
+        (["--jitters", "2", "--solver", "pbd", "--solver", "arap"], "--jitters: got it with pbd, arap alone, want"),
+    ],
+)
+def test_runs_of_the_reference_that_nobody_would_make_are_refused(words, got, tmp_path, capsys) -> None:
+    assert cli.main(["stress", "at_rest.millimetres", "--out", str(tmp_path), *words]) == cli.BAD_INPUT
+    assert got in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_verb_and_its_page(tmp_path, capsys) -> None:

@@ -2,6 +2,7 @@
 
 import base64
 import json
+import os
 import re
 import struct
 import zipfile
@@ -24,7 +25,7 @@ from fem_reference.foundations.mesh import Surface, check_finite
 from fem_reference.foundations.records import FileName, Name, Record, parse
 from fem_reference.foundations.units import positive, quantity
 from fem_reference.geometry.patches import draped, fan
-from fem_reference.io import files
+from fem_reference.io import files, texts
 from fem_reference.problems import muscle
 from fem_reference.runs import states, store
 from fem_reference.scenes import casefile
@@ -76,6 +77,13 @@ def test_a_baseline_and_a_run_without_end_are_refused(text: str, tmp_path: Path)
     with pytest.raises(InputError, match=r"run\.json: got .*want the run\.json of a stored run"):
         store.load(tmp_path)
     assert store.status(tmp_path) == "damaged"
+
+
+def test_a_text_may_begin_with_the_mark_of_its_order_of_bytes(tmp_path: Path) -> None:
+    (tmp_path / "candidate.toml").write_text('name = "mine"', encoding="utf-8-sig")
+    assert recorded.about(tmp_path).name == "mine"
+    (tmp_path / "a.json").write_text("[1]", encoding="utf-8-sig")
+    assert texts.read_json(tmp_path / "a.json", "numbers") == [1]
 
 
 def test_a_text_that_is_too_large_is_refused_unread(tmp_path: Path) -> None:
@@ -158,8 +166,24 @@ class Called(Record):
 
 @pytest.mark.parametrize("file", ["", ".", "..", ".a", "a/b", "a b", "a\\b", "a\n", "é" * 101, "a:b"])
 def test_what_is_no_name_of_a_file_is_refused(file: str) -> None:
-    with pytest.raises(InputError, match="file: got "):
+    with pytest.raises(
+        InputError, match=r"file: got .*want a name of 1 to 100 letters, digits and \. _ -, with no dot first"
+    ):
         parse(Called, {"file": file}, "record")
+
+
+@pytest.mark.parametrize("kind", ["folder", "pipe", "dangling"])
+def test_what_a_candidate_says_is_not_passed_over(kind: str, tmp_path: Path) -> None:
+    place = tmp_path / "candidate.toml"
+    {"folder": place.mkdir, "pipe": lambda: os.mkfifo(place), "dangling": lambda: place.symlink_to("nothing")}[kind]()
+    with pytest.raises(InputError, match=r"candidate\.toml: got no file, want a TOML file"):
+        recorded.about(tmp_path)
+
+
+def test_a_unit_that_is_empty_is_not_millimetres(tmp_path: Path) -> None:
+    assert recorded.choice(tmp_path).settings["unit"] == "mm"
+    with pytest.raises(InputError, match='unit: got "", want a unit of length'):
+        parse(recorded.Settings, recorded.choice(tmp_path, "").settings, "case.toml")
 
 
 def test_landmarks_a_kilometre_apart_are_refused() -> None:

@@ -57,7 +57,9 @@ def test_a_page_says_of_itself_what_it_was_given(tmp_path: Path) -> None:
         b'<script type="application/json" id="page-facts">[[[',
         b'<script type="application/json" id="page-facts">{"kind": "a", "title": "b", "headlines": [[1, 2, 3]]}</script>',
         b'<script type="application/json" id="page-facts">{"kind": "a", "title": "b", "headlines": "abc"}</script>',
+        b'<script type="application/json" id="page-facts">' + b"[" * 100_000 + b"</script>",
     ],
+    ids=range(8),
 )
 def test_what_is_no_page_of_ours_is_none_and_breaks_no_index(tmp_path: Path, text: bytes) -> None:
     (tmp_path / "mine.html").write_bytes(text)

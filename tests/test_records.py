@@ -5,6 +5,7 @@ import pickle
 from typing import Any, Literal
 
 import pytest
+from pydantic import Field
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record, join, parse
@@ -24,6 +25,7 @@ class Tree(Record):
     height: float = 1.0
     age: int | Literal["any"] = "any"
     rings: tuple[tuple[float, float], ...] = ()
+    seeds: tuple[Leaf, ...] = Field(default=(Leaf(number=1),), min_length=1)
 
 
 LEAF = {"number": 1}
@@ -39,7 +41,7 @@ LEAF = {"number": 1}
         ),
         (
             {"leaf": {"number": 1}, "root": 1},
-            "a.toml: root: got an unknown key, want one of age, height, leaf, leaves, rings",
+            "a.toml: root: got an unknown key, want one of age, height, leaf, leaves, rings, seeds",
         ),
         ({"leaf": {}}, "a.toml: leaf.number: got nothing, want this key"),
         ({"leaf": {"number": True}}, "a.toml: leaf.number: got True, want a valid integer"),
@@ -61,6 +63,16 @@ def test_record_names_the_key(table: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError) as caught:
         parse(Tree, table, "a.toml")
     assert str(caught.value).startswith(message)
+
+
+def test_a_list_is_not_too_short_for_what_is_wrong_inside_it() -> None:
+    for seeds, message in (
+        ([{"number": "x"}], 'a.toml: seeds[0].number: got "x", want a valid integer'),
+        ([], "a.toml: seeds: got [], want Tuple should have at least 1 item after validation, not 0"),
+    ):
+        with pytest.raises(InputError) as caught:
+            parse(Tree, {"leaf": LEAF, "seeds": seeds}, "a.toml")
+        assert str(caught.value) == message
 
 
 def test_lists_become_tuples_and_integers_floats() -> None:

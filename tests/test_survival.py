@@ -24,8 +24,10 @@ from fem_reference.export.folders import new_folder
 from fem_reference.foundations import scratch, subprocesses
 from fem_reference.io import files
 from fem_reference.runs import cut_off, store
+from fem_reference.runs.states import write_arrays
 from fem_reference.runs.store import Frame, Outcome, Run, Writer
 from fem_reference.scenes import casefile
+from fem_reference.solvers.fenicsx import jobs
 from fem_reference.studies.execution import Bench
 
 SURFACE = shapes.sphere(1, 10.0)
@@ -187,6 +189,16 @@ def test_a_disk_that_is_full_is_one_sentence(tmp_path: Path) -> None:
     assert [path for path in tmp_path.rglob(".*") if path.suffix != ".lock"] == []
     done = ended(10**9)
     assert done.returncode in (cli.DONE, cli.VERDICT_FAIL), done.stderr
+
+
+@pytest.mark.parametrize("facts", ["[" * 100_000, "[]", '{"mesh": "a", "layout": 3}', '{"mesh": "a"}', "{}", "NaN", ""])
+def test_a_state_with_damaged_facts_is_not_gone_on_from(facts: str, tmp_path: Path) -> None:
+    whole = jobs.Kept(tmp_path, "a")
+    (tmp_path / "layout_0.npz").touch()
+    write_arrays(whole.place(10), {"facts": np.array('{"mesh": "a", "layout": "layout_0.npz"}')})
+    assert jobs._is_of(whole, 10)
+    write_arrays(whole.place(10), {"facts": np.array(facts)})
+    assert not jobs._is_of(whole, 10)
 
 
 @pytest.mark.parametrize("name", ["a.vtp", "a.vtk", "a.vtu", "a.ply", "a.msh", "a.stl"])

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
+from pydantic import Field
 
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.records import Record
@@ -18,7 +19,7 @@ class Bound(Record):
     """What a healthy run keeps: a ``quantity`` of ``assessment.health`` at most ``at_most``, at every frame or at the ``last``."""
 
     quantity: str
-    at_most: float
+    at_most: float = Field(ge=0)
     frame: Literal["any", "last"] = "any"
 
 

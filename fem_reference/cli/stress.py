@@ -8,8 +8,9 @@ from fem_reference.assessment.stress import facts
 from fem_reference.cli._pages import Asked, Part, written
 from fem_reference.cli._parser import add_name
 from fem_reference.cli._printing import DONE, write_output
+from fem_reference.foundations.errors import InputError
 from fem_reference.report import stress_page
-from fem_reference.studies.hard import records, running
+from fem_reference.studies.hard import choosing, records, running
 
 PAGE = "stress"
 HELP = "run the hard cases by every solver, and write the page of who stays stable"
@@ -21,7 +22,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("names", metavar="NAME", nargs="*", help=which)
     only = "only this solver; may be repeated (default: all)"
     parser.add_argument(
-        "--solver", action="append", default=[], choices=list(running.choices()), metavar="NAME", help=only
+        "--solver", action="append", default=[], choices=list(choosing.choices()), metavar="NAME", help=only
     )
     many = "take the reference to the farthest frame of each case in 1, 10 and 40 load steps as well: the same end, or a status"
     parser.add_argument("--steps", action="store_true", help=many)
@@ -32,6 +33,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run them all and write the page: whatever becomes of a run is a result, and not a failure of this."""
+    _check_reference(options)
     found = running.run(
         records.read_all(tuple(options.names)), options.solver, in_steps=options.steps, jitters=options.jitters
     )
@@ -42,3 +44,15 @@ def run(options: argparse.Namespace) -> int:
     _, lines = written(options, Asked("stress", PAGE, tuple(parts)), partial(report.write_stress, found))
     write_output(facts(found), "\n".join([stress_page.text(found), *lines]), options)
     return DONE
+
+
+def _check_reference(options: argparse.Namespace) -> None:
+    """InputError where more runs of the reference are wanted than can be, or are wanted without it."""
+    if options.jitters < 0:
+        raise InputError("--jitters", options.jitters, "0 or more")
+    for name, wanted in (("--steps", options.steps), ("--jitters", options.jitters)):
+        if wanted and options.solver and choosing.REFERENCE not in options.solver:
+            others = ", ".join(options.solver)
+            raise InputError(
+                name, f"it with {others} alone", f"--solver {choosing.REFERENCE} too, which alone it is about"
+            )

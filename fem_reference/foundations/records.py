@@ -1,10 +1,11 @@
 """Strict frozen records read from TOML: an unknown key, a missing key or a wrong value is one InputError that names it."""
 
+import re
 from collections.abc import Sequence
 from difflib import get_close_matches
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
 from fem_reference.foundations.errors import InputError
 
@@ -26,12 +27,18 @@ def _check_name(name: str) -> str:
     return name
 
 
+def _check_file_name(name: str) -> str:
+    if not re.fullmatch(rf"[\w-][\w.-]{{0,{_LONGEST_NAME - 1}}}", name):
+        raise ValueError(f"a name of 1 to {_LONGEST_NAME} letters, digits and . _ -, with no dot first")
+    return name
+
+
 _SHOWN = 12  # errors of one file
 # What pages and messages call something.
 _LONGEST_NAME = 100
 Name = Annotated[str, AfterValidator(_check_name)]
 # A name that a file or folder can have too.
-FileName = Annotated[str, Field(pattern=r"^[\w-][\w.-]{0,99}$")]
+FileName = Annotated[str, AfterValidator(_check_file_name)]
 
 
 def parse[R: Record](record: type[R], table: object, place: str) -> R:
@@ -42,8 +49,14 @@ def parse[R: Record](record: type[R], table: object, place: str) -> R:
         raise InputError(place, "tables inside tables without end", "the keys of a file") from error
     except ValidationError as error:
         # Unknown keys first: where a key is mistyped, it says more than that the right one is missing.
-        wrong = sorted(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
+        wrong = sorted(_own(error.errors()), key=lambda one: one["type"] != "extra_forbidden")
         raise together([_as_input_error(one, record, place, table) for one in wrong]) from None
+
+
+def _own(errors: Sequence[Any]) -> list[Any]:
+    """``errors`` without lists that are too short because of what is wrong inside them."""
+    inside = {one["loc"][:i] for one in errors for i in range(len(one["loc"]))}
+    return [one for one in errors if one["type"] != "too_short" or one["loc"] not in inside]
 
 
 def together(wrong: Sequence[InputError]) -> InputError:

@@ -182,7 +182,10 @@ def write_pvd(path: Path, frames: Sequence[tuple[float, str]]) -> None:
 def write_text(path: Path, text: str) -> None:
     """The text in UTF-8; into ``path`` itself where that is a pipe or a device."""
     if path.exists() and not path.is_file():
-        path.write_text(text, encoding="utf-8")
+        try:
+            path.write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(path)) from error
         return
     with whole(path) as part:
         part.write_text(text, encoding="utf-8")

@@ -74,7 +74,7 @@ def _text(path: Path, most: int, want: str) -> str:
         raise InputError(path, "no file", want)
     try:
         check_size(path, most, want)
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")  # some editors begin a text with the mark of its order of bytes
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(path, str(error), want) from error
 

@@ -54,7 +54,7 @@ def read(path: Path) -> About | None:
             head = file.read(_HEAD).decode("utf-8", "ignore")
         facts = json.loads(head.partition(_BEGIN)[2].partition(_END)[0])
         found = About(**facts | {"headlines": tuple((name, word, said) for name, word, said in facts["headlines"])})
-    except (OSError, ValueError, TypeError, KeyError):
+    except (OSError, ValueError, TypeError, KeyError, RecursionError):
         return None
     plain = (found.kind, found.title, found.asked, found.made, found.picture, *sum(found.headlines, ()))
     return found if all(isinstance(one, str) for one in plain) else None

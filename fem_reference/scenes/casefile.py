@@ -20,7 +20,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record, join, keys, parse
 from fem_reference.io import texts
 from fem_reference.scenes.case import HOME, Case, NegativeControl
-from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.scenes.muscle import Frames, MuscleCase
 from fem_reference.scenes.scalar import ScalarCase
 
 # What a load acts on, where it is no attachment: the surface that is not attached to bone.
@@ -173,21 +173,26 @@ def made(table: dict[str, Any], whose: dict[str, Any]) -> Case:
     for key in whose:
         if key in table:
             raise InputError(join(place, key), "an unknown key", f"one of {', '.join(keys(record))}")
-    effects = table.get("effect", [])
-    if isinstance(effects, list | tuple):
-        read_effects = tuple(_effect(entry, join(place, f"effect[{i}]"), kind) for i, entry in enumerate(effects))
-        table = table | {"effect": read_effects}
+    if "effect" in table:
+        table = table | {"effect": effects(table["effect"], place, kind)}
     case: Case = parse(record, table | whose, place)
-    _check_effects([entry["name"] for entry in effects], case.effects, place)
-    _check_moduli(case.effects, place)
     reference, *others = _candidate_names(case)
     expected = [(f"expect[{i}].of", entry.of) for i, entry in enumerate(case.expect)]
     _check_used([reference, "candidates", *others], expected, place)
     if isinstance(case, MuscleCase):
         _check_names(case)
         _check_rest(case)
-        _check_time(case)
     return case
+
+
+def effects(entries: Any, place: str, kind: type[Record] = Effect) -> Any:
+    """The effects of a ``kind`` that are written below the key ``effect``, each once; as it is, what is no list."""
+    if not isinstance(entries, list | tuple):
+        return entries
+    found = tuple(_effect(entry, join(place, f"effect[{i}]"), kind) for i, entry in enumerate(entries))
+    _check_effects([entry["name"] for entry in entries], found, place)
+    _check_moduli(found, place)
+    return found
 
 
 def _check_effects(names: list[str], effects: tuple[Record, ...], place: str) -> None:
@@ -221,19 +226,12 @@ def _check_names(scene: MuscleCase) -> None:
     """Names are used once and refer to something."""
     bones = [bone.name for bone in scene.bone]
     attachments = [attachment.name for attachment in scene.attachment]
-    _check_once(bones, join(scene.place, "bone"))
+    check_acting(scene.effects, bones, scene.frames, scene.place)
     _check_once([*attachments, FREE], join(scene.place, "attachment"))
     traced = scene.fibres.traced
     ends = [(f"fibres.traced.{end}", getattr(traced, end)) for end in ("start", "end") if traced]
     _check_used(bones, [(f"attachment[{i}].bone", entry.bone) for i, entry in enumerate(scene.attachment)], scene.place)
     _check_used(attachments, ends, scene.place)
-    obstacles = [
-        (f"effect[{i}].bones", name)
-        for i, effect in enumerate(scene.effects)
-        if isinstance(effect, Contact)
-        for name in effect.bones or ()
-    ]
-    _check_used(bones, obstacles, scene.place)
     _check_forces(scene)
     loads = [(f"effect[{i}].on", effect.on) for i, effect in enumerate(scene.effects) if isinstance(effect, Load)]
     _check_used([*attachments, FREE], loads, scene.place)
@@ -288,9 +286,12 @@ def _check_rest(scene: MuscleCase) -> None:
             raise InputError(join(scene.place, f"bone[{i}].motion"), f"a bone {what} at the first frame", want)
 
 
-def _check_time(scene: MuscleCase) -> None:
-    """Where time matters to an effect, the scene says how fast it passes."""
-    for i, effect in enumerate(scene.effects):
-        if "interval" in effect.needs and scene.frames.interval is None:
+def check_acting(acting: tuple[Record, ...], bones: list[str], frames: Frames, place: str) -> None:
+    """Bones have a name each, contact is with some of them, and ``frames`` say how fast time passes where that matters."""
+    _check_once(bones, join(place, "bone"))
+    for i, effect in enumerate(acting):
+        if isinstance(effect, Contact):
+            _check_used(bones, [(f"effect[{i}].bones", name) for name in effect.bones or ()], place)
+        if isinstance(effect, Effect) and "interval" in effect.needs and frames.interval is None:
             want = f"the time from a frame number to the next, which effect[{i}] ({effect.title}) needs"
-            raise InputError(join(scene.place, "frames.interval"), "nothing", want)
+            raise InputError(join(place, "frames.interval"), "nothing", want)

@@ -2,6 +2,7 @@
 
 import logging
 import math
+import os
 import re
 from collections.abc import Iterable
 from pathlib import Path
@@ -72,7 +73,7 @@ class About(Record):
 def about(path: Path) -> About:
     """What is said of the sequence at ``path``, a folder or an index file; nothing where there is no ``candidate.toml``."""
     file = _about_file(path)
-    if not file.is_file():
+    if not os.path.lexists(file):
         return About()
     return parse(About, texts.toml(file), str(file))
 
@@ -87,7 +88,12 @@ def choice(path: Path, unit: str | None = None, place: str = "folder") -> Candid
     said = about(folder)
     plain = re.sub(r"[^\w.-]+", "_", folder.stem if folder.is_file() else folder.name)
     name = said.name or plain.lstrip(".")[:100] or "candidate"
-    table = {"name": name, "solver": "recorded", "folder": str(folder), "unit": unit or said.unit or "mm"}
+    table = {
+        "name": name,
+        "solver": "recorded",
+        "folder": str(folder),
+        "unit": said.unit or "mm" if unit is None else unit,
+    }
     return parse(Candidate, table, place)
 
 

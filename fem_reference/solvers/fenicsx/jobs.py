@@ -42,7 +42,7 @@ def kept(cut_off: CutOff, body: Body) -> Kept:
 
 
 def _is_of(whole: Kept, number: int) -> bool:
-    with suppress(InputError, ValueError, KeyError):
+    with suppress(InputError, ValueError, KeyError, TypeError, RecursionError):
         facts = json.loads(str(read_arrays(whole.place(number))["facts"]))
         return bool(facts["mesh"] == whole.mesh) and (whole.folder / facts["layout"]).is_file()
     return False

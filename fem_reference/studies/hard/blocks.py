@@ -19,7 +19,7 @@ from fem_reference.scenes.bones import Bone
 from fem_reference.studies.hard.records import FACES, Block, Face, Hard, Hold, Start
 
 # What blocks are of where a case says nothing else: muscle's usual matrix.
-MATERIAL = ({"name": "neo_hooke", "mu": "10 kPa"}, {"name": "incompressible", "bulk": "10 MPa"})
+MATERIAL = (effects.make("neo_hooke", mu="10 kPa"), effects.make("incompressible", bulk="10 MPa"))
 _LINES, _POINTS = 4, 9  # measured lines of each block, and points of each
 # The bones of held faces are balls of this share of the block's size, so far away that nothing meets them.
 _BALL, _AWAY = 0.01, 50.0
@@ -58,8 +58,7 @@ def problem(hard: Hard) -> Problem:
         if hold.middle:
             facets[end.attachment] = index[triangles[np.isin(triangles, end.vertices).any(axis=1)]]
     mesh = TetMesh(points, _upright(points, tets), facets, maker="lattice")
-    acting = tuple(_effect(table, join(hard.place, f"effect[{i}]")) for i, table in enumerate(hard.effect or MATERIAL))
-    return _problem(block, setup, mesh, acting)
+    return _problem(block, setup, mesh, hard.effect or MATERIAL)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,14 +113,6 @@ def _problem(block: Block, setup: Setup, mesh: TetMesh, acting: tuple[effects.Ef
             if end.stiffness is not None
         },
     )
-
-
-def _effect(table: dict[str, object], place: str) -> effects.Effect:
-    values = {key: value for key, value in table.items() if key != "name"}
-    try:
-        return effects.make(str(table.get("name")), **values)
-    except InputError as error:
-        raise InputError(f"{place}, {error.place}", error.got, error.want) from None
 
 
 def _placed(block: Block, nodes: Ints) -> Floats:
@@ -180,8 +171,7 @@ def _held(block: Block, hold: Hold, nodes: Ints, surface: Surface) -> AttachedVe
 def _bone(hard: Hard, i: int, surface: Surface) -> RigidBody:
     bone: Bone = hard.bone[i]
     form = solid(bone)
-    if form is None:
-        raise InputError(join(hard.place, f"bone[{i}].surface"), "a file", "a closed form")
+    assert form is not None  # a Hard record has no others
     motion = bone.motion.poses() if bone.motion else None
     return RigidBody(bone.name, tessellated(form, surface.points, join(hard.place, f"bone[{i}]")), motion, solid=form)
 

@@ -28,8 +28,7 @@ def jittered(hard: Hard, number: int) -> Hard:
         return hard.model_copy(update={"block": hard.block.model_copy(update={"jitter": jitter, "seed": number})})
     shipped = hard.shipped
     assert shipped is not None  # a Hard record has one of the two
-    changes = (casefile.read(shipped.case).quick if shipped.quick else {}) | shipped.changes
-    size = casefile.muscle(casefile.read(shipped.case, changes=changes)).muscle.tet_size
+    size = casefile.muscle(shipped.read()).muscle.tet_size
     share = 1 + SIZES * np.random.default_rng(number).uniform(-1, 1)
     changed = shipped.changes | {"muscle.tet_size": f"{share * float(size)!r} mm"}
     return hard.model_copy(update={"shipped": shipped.model_copy(update={"changes": changed})})

@@ -1,24 +1,32 @@
 """A hard case as a file below ``cases/hard`` says it, and its variants."""
 
-import tomllib
+import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import Field, field_validator, model_validator
 
+from fem_reference import solvers
 from fem_reference.assessment import health
 from fem_reference.assessment.stress import Bound
+from fem_reference.effects import Effect
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.records import Record, join, parse
+from fem_reference.foundations.records import FileName, Record, join, keys, parse
 from fem_reference.foundations.units import AreaStiffness, Point, PositiveLength
+from fem_reference.io import texts
+from fem_reference.scenes import casefile
 from fem_reference.scenes.bones import Bone, Motion
-from fem_reference.scenes.case import HOME, SolverChoice
+from fem_reference.scenes.case import HOME, Case, SolverChoice
 from fem_reference.scenes.muscle import Frames
+from fem_reference.scenes.scalar import ScalarCase
+from fem_reference.solvers.common.protocol import Task
+from fem_reference.studies.hard.choosing import SECOND, choices
 
 FOLDER = HOME / "cases" / "hard"
 Face = Literal["x0", "x1", "y0", "y1", "z0", "z1"]
 FACES: tuple[Face, ...] = get_args(Face)
+_MOST_CELLS = 50_000  # of a block, more than any solver takes in its time
 
 
 class Block(Record):
@@ -42,6 +50,10 @@ class Block(Record):
     def _check(self) -> Self:
         if not min(self.size) > 0 or min(self.cells) < 1 or min(self.grading) <= 0:
             raise ValueError("size, cells and grading above 0")
+        if math.prod(self.cells) > _MOST_CELLS:
+            raise ValueError(f"at most {_MOST_CELLS} cells")
+        if not any(self.fibre):
+            raise ValueError("a fibre that has a direction")
         return self
 
 
@@ -72,12 +84,17 @@ class Shipped(Record):
     quick: bool = False
     changes: dict[str, Any] = Field(default_factory=dict)
 
+    def read(self) -> Case:
+        """The case with its changes; InputError where it cannot be read."""
+        quick = casefile.read(self.case).quick if self.quick else {}
+        return casefile.read(self.case, changes=quick | self.changes)
+
 
 class Steps(Record):
     """Numbers of even load steps (``counts``) in which the reference goes to the frame ``until``: they shall end alike."""
 
     until: int
-    counts: tuple[int, ...] = (1, 10, 40)
+    counts: tuple[Annotated[int, Field(gt=0)], ...] = Field(default=(1, 10, 40), min_length=1)
 
 
 class Hard(Record):
@@ -96,7 +113,7 @@ class Hard(Record):
     block: Block | None = None
     hold: tuple[Hold, ...] = ()
     bone: tuple[Bone, ...] = ()
-    effect: tuple[dict[str, Any], ...] = ()
+    effect: tuple[Effect, ...] = ()
     frames: Frames | None = None
     start: Start | None = None
     shipped: Shipped | None = None
@@ -107,7 +124,7 @@ class Hard(Record):
     by_effects: bool = False
     settings: dict[str, dict[str, Any]] = Field(default_factory=dict)
     steps: Steps | None = None
-    name: str = Field(exclude=True)
+    name: FileName = Field(exclude=True)
     place: str = Field(exclude=True)
 
     @field_validator("bound")
@@ -119,6 +136,20 @@ class Hard(Record):
         if all(bound.quantity == "from_reference" for bound in bounds):
             raise ValueError("another quantity beside from_reference, which a run without a reference has not")
         return bounds
+
+    @field_validator("hold")
+    @classmethod
+    def _check_faces(cls, holds: tuple[Hold, ...]) -> tuple[Hold, ...]:
+        if len({hold.face for hold in holds}) < len(holds):
+            raise ValueError("every face once")
+        return holds
+
+    @field_validator("bone")
+    @classmethod
+    def _check_forms(cls, bones: tuple[Bone, ...]) -> tuple[Bone, ...]:
+        if any(bone.surface for bone in bones):
+            raise ValueError("bones of closed forms, and not of files")
+        return bones
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -155,18 +186,70 @@ def _named(hard: Hard, name: str) -> bool:
 
 
 def read(path: Path) -> Iterator[Hard]:
-    """The hard case in a file, or its variants: each is the file with the keys of a ``[[variant]]`` in their place."""
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(path, str(error), "a TOML file") from error
+    """The hard case in a file, or its variants: each is the file with the keys of a ``[[variant]]`` in their place. InputError
+    where any of it cannot be posed to a solver as it is written.
+    """
+    table = texts.toml(path)
+    given = "variant" in table
     variants = table.pop("variant", [{}])
+    if not isinstance(variants, list) or not variants or not all(isinstance(one, dict) for one in variants):
+        raise InputError(join(str(path), "variant"), repr(variants), "tables, [[variant]] each")
+    found = set[str]()
     for i, variant in enumerate(variants):
-        changes = dict(variant)
-        label = str(changes.pop("name", ""))
-        where = join(str(path), f"variant[{i}]") if label else str(path)
+        where = join(str(path), f"variant[{i}]") if given else str(path)
+        label = variant.get("name", "")
+        if given and (not isinstance(label, str) or not label or label in found):
+            raise InputError(join(where, "name"), repr(label), "a name of its own")
+        found.add(label)
         name = f"{path.parent.name}.{label}" if label else path.parent.name
-        yield parse(Hard, _merged(table, changes) | {"name": name, "place": where}, where)
+        yield _hard(_merged(table, {key: value for key, value in variant.items() if key != "name"}), name, where)
+
+
+def _hard(table: dict[str, Any], name: str, where: str) -> Hard:
+    """The hard case with the keys of ``table``."""
+    whose = {"name": name, "place": where}
+    for key in whose:
+        if key in table:
+            raise InputError(join(where, key), "an unknown key", f"one of {', '.join(keys(Hard))}")
+    if "effect" in table:
+        table = table | {"effect": casefile.effects(table["effect"], where)}
+    hard = parse(Hard, table | whose, where)
+    if hard.contrast and hard.no_solution:
+        want = 'nothing beside "no_solution", which no run should reach the end of'
+        raise InputError(join(where, "contrast"), f'"{hard.contrast}"', want)
+    scene = hard.shipped.read() if hard.shipped else None
+    scalar = isinstance(scene, ScalarCase)
+    for i, bound in enumerate(hard.bound):
+        if (bound.quantity == "overshoot") != scalar:
+            want = "overshoot for a scalar field, and only there"
+            raise InputError(join(where, f"bound[{i}].quantity"), f'"{bound.quantity}"', want)
+    if hard.frames is not None:
+        casefile.check_acting(hard.effect, [bone.name for bone in hard.bone], hard.frames, where)
+    _check_solvers(hard, scalar=scalar)
+    _check_steps(hard, scene)
+    return hard
+
+
+def _check_steps(hard: Hard, scene: Case | None) -> None:
+    """InputError where load steps lead to no frame after the first."""
+    timed = hard.frames or scene
+    assert timed is not None  # a Hard record has one of the two
+    first, last = timed.numbers[0], timed.numbers[-1]
+    if hard.steps is not None and not first < hard.steps.until <= last:
+        raise InputError(join(hard.place, "steps.until"), hard.steps.until, f"a frame after {first}, up to {last}")
+
+
+def _check_solvers(hard: Hard, *, scalar: bool) -> None:
+    """InputError where a solver is named that hard cases are not solved by, or a setting that it has not."""
+    known = choices()
+    named = [(f"only[{i}]", name) for i, name in enumerate(hard.only)]
+    for key, name in [*named, *((f"settings.{name}", name) for name in hard.settings)]:
+        if name not in known:
+            raise InputError(join(hard.place, key), f'"{name}"', f"one of {', '.join(known)}")
+    for name, changes in hard.settings.items():
+        given = changes if scalar else known[name].settings | changes
+        task: Task = "solve_field" if scalar else "solve_body" if name == SECOND else "solve"
+        parse(solvers.find(name, hard.place, task).settings, given, join(hard.place, f"settings.{name}"))
 
 
 def _merged(table: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:

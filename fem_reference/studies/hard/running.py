@@ -10,14 +10,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from fem_reference import __version__, solvers
 from fem_reference.assessment import health, stress
 from fem_reference.assessment.health import Followed
-from fem_reference.assessment.solver_table import solver_kinds
 from fem_reference.assessment.stress import Cell, HardCase, Scene, Stress
 from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.foundations.mesh import Floats
@@ -28,43 +26,23 @@ from fem_reference.problems.muscle_body import as_body
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs.key import versions
 from fem_reference.runs.store import NO_SURFACE, Frame, Outcome
-from fem_reference.scenes import casefile
-from fem_reference.scenes.case import Case, SolverChoice
+from fem_reference.scenes.case import SolverChoice
 from fem_reference.scenes.scalar import ScalarCase
 from fem_reference.solvers import fenicsx
 from fem_reference.studies.hard import blocks, jitters, steps
-from fem_reference.studies.hard.records import Hard, Shipped
+from fem_reference.studies.hard.choosing import LIMIT, REFERENCE, SECOND, choices
+from fem_reference.studies.hard.records import Hard
 
 log = logging.getLogger(__name__)
 
-REFERENCE, SECOND = "fenicsx", "scikit_fem"
-LIMIT, LONGER = 120.0, 600.0  # [s] of a run, and of all runs of a case in several numbers of load steps
+LONGER = 600.0  # [s] of all runs of a case, in several numbers of load steps or on several meshes
 _MOST_FOR_SECOND = 200  # tetrahedra, for which it takes seconds
-_OWN: dict[str, dict[str, Any]] = {
-    REFERENCE: {"ranks": 1, "time_limit": f"{LIMIT:g} s", "residual": 1e-8},
-    SECOND: {},
-    "line_of_action": {},
-}
-
-
 # How messages name a place at rest [mm].
 _PLACE = re.compile(r"cell \d+ at \((-?[\d.]+), (-?[\d.]+), (-?[\d.]+)\) mm")
 
 
 class _Late(Exception):  # noqa: N818 - it is what happened to a run, and caught beside it
     """A run took too long."""
-
-
-def choices() -> dict[str, SolverChoice]:
-    """By solver, the settings that hard cases are solved with: those of the first candidate of Table 5.1 that has it."""
-    found: dict[str, SolverChoice] = {}
-    for candidate in (one for kind in solver_kinds() for one in kind.candidate):
-        found.setdefault(candidate.solver, SolverChoice(solver=candidate.solver, **candidate.settings))
-    for name in solvers.names():
-        if name != "recorded" and (name in _OWN or name in found):
-            found.setdefault(name, SolverChoice(solver=name, **_OWN.get(name, {})))
-    first = [name for name in (REFERENCE, SECOND) if name in found]
-    return {name: found[name] for name in (*first, *sorted(set(found) - {*first}))}
 
 
 class Posed:
@@ -84,15 +62,14 @@ class Posed:
             return blocks.problem(self.hard)
         shipped = self.hard.shipped
         assert shipped is not None  # a Hard record has one of the two
-        case = shipped_case(shipped)
+        case = shipped.read()
         built: Problem | FieldProblem = of_case.problem(case, of_case.setup(case))
         return built
 
     @cached_property
     def range(self) -> tuple[float, float]:
         """The range of the constant boundary values of a scalar case."""
-        shipped = self.hard.shipped
-        case = shipped_case(shipped) if shipped else None
+        case = self.hard.shipped.read() if self.hard.shipped else None
         assert isinstance(case, ScalarCase)  # asked of no other
         values = [float(entry.value) for entry in case.boundary if entry.value is not None]
         return min(values), max(values)
@@ -101,12 +78,6 @@ class Posed:
     def row(self) -> HardCase:
         """What pages say of it."""
         return HardCase(self.hard.name, self.hard.title, self.hard.healthy, self.hard.bound)
-
-
-def shipped_case(shipped: Shipped) -> Case:
-    """The case with its changes."""
-    quick = casefile.read(shipped.case).quick if shipped.quick else {}
-    return casefile.read(shipped.case, changes=quick | shipped.changes)
 
 
 def run(hard: Sequence[Hard], only: Sequence[str] = (), *, in_steps: bool = False, jitters: int = 0) -> Stress:
