@@ -41,6 +41,7 @@ _COLOURS = ("#222222", *PALETTE, "#7f7f7f", "#8c564b", "#17becf")
 
 def render(study: Study) -> str:
     """The whole page as text."""
+    moved = transfers(study.cases, MAIN) if len(study.cases) > 1 else ()
     return template("study_page.html").render(
         study=study,
         title=title(study),
@@ -59,7 +60,8 @@ def render(study: Study) -> str:
         claims=lambda case: [claims_drawing(case.claims, metric, case.case) for metric in CLAIMED_UNITS],
         large=LARGE,
         growth_drawing=_growth(study) if study.growth else None,
-        transfers=transfers(study.cases, MAIN) if len(study.cases) > 1 else (),
+        transfers=moved,
+        losses=sorted(one.loss for one in moved),
     )
 
 
