@@ -182,6 +182,12 @@ def test_a_folder_that_is_in_use_is_refused_before_any_work(scene: MuscleCase, t
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
 
 
+def test_a_folder_that_cannot_be_written_shows_before_the_problem_is_built(scene: MuscleCase, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(OSError, match="cannot be written: Not a directory"):
+        export.export(scene, lambda: pytest.fail("built"), tmp_path / "file" / "scene", "open")
+
+
 def test_an_export_that_fails_leaves_nothing(scene: MuscleCase, built: Problem, tmp_path: Path, monkeypatch) -> None:
     def fails(*_: object) -> None:
         raise OSError("no space left")

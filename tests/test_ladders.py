@@ -18,6 +18,13 @@ def test_what_is_varied_on_coarser_tetrahedra_says_so() -> None:
     varied = [one for one in others if one.knob != "tetrahedra"]
     assert {"element", "contact stiffness", "error of distances to bones"} < {one.knob for one in varied}
     assert all(one.value.endswith("(tetrahedra = 10 mm, not refined)") for one in varied)
+    linear = next(one for one in varied if one.value.startswith("P1"))
+    assert linear.value.startswith("P1, volume by a penalty (")
+    assert linear.changed["effect[1].name"] == "incompressible_penalty"
+    # The energy that is left when the pressure is eliminated, with the same bulk modulus.
+    assert [(type(one).__name__, one.bulk) for one in linear.scene.effects if hasattr(one, "bulk")] == [
+        ("IncompressiblePenalty", whole.scene.effects[1].bulk)
+    ]
     softer = next(one for one in varied if one.knob == "contact stiffness")
     assert softer.changed["effect[3].stiffness"] == "0.05 MPa/mm"
 
@@ -30,9 +37,9 @@ def test_how_runs_were_made_is_said_of_a_cluster_too() -> None:
 
 def test_a_setting_that_is_refused_is_named_once(tmp_path) -> None:
     trials = reference_trials(casefile.read_muscle("hip_flexion"))
-    refused = next(one for one in trials if one.knob == "element" and one.value.startswith("P1 "))
-    with pytest.raises(InputError, match=r"case\.toml: reference\.element: got \"P1\""):
+    refused = next(one for one in trials if one.knob == "element" and one.value.startswith("Q1 "))
+    with pytest.raises(InputError, match=r"case\.toml: reference\.element: got \"Q1\""):
         solve(refused, tmp_path)
     (made,) = carry_out([refused], tmp_path, Workers())
     assert made.run is None
-    assert "reference.element" in made.failure
+    assert made.failure.startswith("case.toml: reference.element: got ")  # and no folder of this machine

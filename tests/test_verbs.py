@@ -36,6 +36,20 @@ def test_help_explains_every_option_and_ends_well(name: str, capsys: pytest.Capt
         assert action.help, f"{action.dest} is not explained"
 
 
+@pytest.mark.parametrize("ranks", ["0", "-1", "many", "1e3", "9" * 5000])
+def test_a_number_of_ranks_that_cannot_be_is_named(ranks: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match=r"^2$"):
+        cli.main(["run", "hip_flexion", "--ranks", ranks])
+    assert "argument --ranks: got " in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("verb", ["study", "stress"])
+def test_a_solver_that_is_named_twice_counts_once(verb: str) -> None:
+    given = [*(["hip_flexion"] if verb == "study" else []), "--solver", "pbd", "--solver", "xpbd", "--solver", "pbd"]
+    assert options_of(verb).parse_args(given).solver == ["pbd", "xpbd"]
+    assert options_of(verb).parse_args(given[:-6]).solver == []
+
+
 @pytest.mark.parametrize("name", VERBS)
 def test_what_a_verb_does_not_know_ends_with_2(name: str, tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
     given = []

@@ -7,7 +7,7 @@ import argparse
 import ast
 import importlib
 from pathlib import Path
-from typing import Protocol, cast
+from typing import Any, Protocol, cast
 
 from fem_reference import __version__
 
@@ -98,7 +98,34 @@ def add_name(parser: argparse.ArgumentParser) -> None:
 
 def add_ranks(parser: argparse.ArgumentParser) -> None:
     """On how many processes the reference is solved."""
-    parser.add_argument("--ranks", type=int, metavar="N", help=RANKS)
+    parser.add_argument("--ranks", type=count, metavar="N", help=RANKS)
+
+
+def count(text: str) -> int:
+    """A number from 1 on.
+
+    >>> count("2")
+    2
+    """
+    if not text.isdecimal() or not 0 < len(text.lstrip("0")) < 10:
+        raise argparse.ArgumentTypeError(f'got "{text}", want a number, 1 or more')
+    return int(text)
+
+
+class Distinct(argparse.Action):
+    """Values of an option that may be repeated, each once."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        """Add one."""
+        del parser, option_string
+        before = getattr(namespace, self.dest)
+        setattr(namespace, self.dest, [*before, *([values] if values not in before else [])])
 
 
 def add_workers(parser: argparse.ArgumentParser) -> None:

@@ -8,7 +8,7 @@ from functools import partial
 from fem_reference import report, solvers
 from fem_reference.assessment.cost_study import Study, facts
 from fem_reference.cli._pages import Asked, Part, case_part, changes, written
-from fem_reference.cli._parser import add_name, add_workers
+from fem_reference.cli._parser import Distinct, add_name, add_workers
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, out, write_output
 from fem_reference.report import study_page
 from fem_reference.scenes import casefile
@@ -36,7 +36,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scheduler", metavar="ADDRESS", help=cluster)
     only = "only this solver; may be repeated (default: the reference and every candidate)"
     parser.add_argument(
-        "--solver", action="append", default=[], choices=solvers.names("solve"), metavar="NAME", help=only
+        "--solver", action=Distinct, default=[], choices=solvers.names("solve"), metavar="NAME", help=only
     )
     grown = "measure too how costs grow with the size of the problem, on bodies of our own making (about 5 minutes)"
     parser.add_argument("--growth", action="store_true", help=grown)

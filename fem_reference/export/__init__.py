@@ -25,9 +25,8 @@ def export(scene: MuscleCase, build: Callable[[], Problem], folder: Path, form: 
     check(folder)
     if form == "febio":
         febio.check(scene)
-    problem = build()
-    with new_folder(folder) as part:
-        _write(scene, problem, part, form)
+    with new_folder(folder) as part:  # whether it can be written shows before a problem is built
+        _write(scene, build(), part, form)
         written = sorted(str(path.relative_to(part)) for path in part.rglob("*") if path.is_file())
     log.info("%s: %d files in %s", scene.name, len(written), folder)
     return written

@@ -6,6 +6,7 @@ not solved again, so that a campaign that was cut off goes on where it was.
 
 import logging
 import multiprocessing
+import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
@@ -103,7 +104,7 @@ def _made(trial: Trial, result: Callable[[], Run]) -> Made:
     try:
         return Made(trial, result())
     except (InputError, MissingSoftware) as error:
-        return Made(trial, None, str(error))
+        return Made(trial, None, str(error).replace(f"{trial.scene.folder}{os.sep}", ""))
 
 
 def _in_parallel(trials: Sequence[Trial], store: Path, workers: Workers) -> tuple[Made, ...]:

@@ -6,7 +6,10 @@ from typing import Any
 
 from fem_reference import solvers
 from fem_reference.assessment.solver_table import solver_kinds
+from fem_reference.effects import Effect, make
 from fem_reference.effects.contact import among
+from fem_reference.effects.incompressible import Incompressible
+from fem_reference.foundations.errors import InputError
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.scenes.muscle import MuscleCase
 
@@ -102,7 +105,29 @@ def _settings(base: Trial) -> Iterator[Trial]:
             if value not in (getattr(own, key), base.choice.settings.get(key)):
                 choice = base.choice.model_copy(update={key: value})
                 text = f"{value:.3g}" if isinstance(value, float) else str(value)
-                yield replace(base, choice=choice, knob=key, value=text + _beside(base))
+                varied = replace(base, choice=choice, knob=key, value=text + _beside(base))
+                yield varied if _suits(choice, base.scene.effects) else _without_pressure(varied, text, base)
+
+
+def _suits(choice: SolverChoice, effects: tuple[Effect, ...]) -> bool:
+    try:
+        solvers.check(choice.solver, solvers.settings(choice, choice.solver), effects, choice.solver)
+    except InputError:
+        return False
+    return True
+
+
+def _without_pressure(varied: Trial, text: str, base: Trial) -> Trial:
+    """The trial with the same energy of the volume by displacements alone, where its solver takes that; else as it is."""
+    effects, changed = list(varied.scene.effects), dict(varied.changed)
+    for i, effect in enumerate(effects):
+        if isinstance(effect, Incompressible):
+            effects[i] = make("incompressible_penalty", bulk=f"{effect.bulk} MPa")
+            changed[f"effect[{i}].name"] = "incompressible_penalty"
+    if not _suits(varied.choice, tuple(effects)):
+        return varied
+    scene = varied.scene.model_copy(update={"effect": tuple(effects)})
+    return replace(varied, scene=scene, changed=changed, value=f"{text}, volume by a penalty{_beside(base)}")
 
 
 def _contact(base: Trial) -> Iterator[Trial]:
