@@ -82,7 +82,8 @@ def test_an_element_has_a_pressure_only_as_long_as_an_effect_brings_it(tmp_path)
     assert omissions.fitting("P2/P1", (matrix, volume)) == "P2/P1"
     assert omissions.fitting("P2/P1", (matrix, penalty)) == "P2"
     assert omissions.fitting("Q1/P0", (matrix,)) == "Q1"
-    assert omissions.fitting("P1", (matrix, volume)) == "P1"  # there is none; the solver will say so
+    assert omissions.fitting("P1", (matrix, volume)) == "P1/P1"
+    assert omissions.fitting("Q1/P0", (matrix, volume)) == "Q1/P0"
     scene = scene_in(tmp_path / "bar")
     part = Part({"incompressible": scene.effects[1]})
     trial = omissions.without(Trial(scene, scene.reference, "reference"), part)

@@ -132,7 +132,7 @@ def test_frames_that_were_not_reached_are_not_numbers() -> None:
 def test_an_element_that_does_not_suit_the_effects_is_named(tmp_path) -> None:
     scene = casefile.read_muscle(small.write(tmp_path / "bar"))
     bench = Bench(scene, tmp_path / "runs")
-    for element, want in (("Q2/Q1", "P2/P0, P2/P1"), ("P1", "P2/P0, P2/P1")):
+    for element, want in (("Q2/Q1", "P1/P1, P2/P0, P2/P1"), ("P1", "P1/P1, P2/P0, P2/P1")):
         with pytest.raises(
             InputError, match=rf'case.toml: reference.element: got "{element}", want one for .*: {want}'
         ):

@@ -17,9 +17,11 @@ from fem_reference.geometry.skins import Skin
 from fem_reference.problems.contact import Contact, Obstruction
 
 Kind = Literal["tetrahedron", "hexahedron"]
-# By element: kind of cell, degree of the displacement, and of the pressure (None: no such unknown; 0: constant in each cell).
+# By element: kind of cell, degree of the displacement, and of the pressure (None: no such unknown; 0: constant in each cell). Where
+# both are of one degree, solvers stabilise the pressure (``is_stabilised``).
 ELEMENTS: dict[str, tuple[Kind, int, int | None]] = {
     "P1": ("tetrahedron", 1, None),
+    "P1/P1": ("tetrahedron", 1, 1),
     "P2": ("tetrahedron", 2, None),
     "P2/P0": ("tetrahedron", 2, 0),
     "P2/P1": ("tetrahedron", 2, 1),
@@ -28,6 +30,18 @@ ELEMENTS: dict[str, tuple[Kind, int, int | None]] = {
     "Q1/P0": ("hexahedron", 1, 0),
     "Q2/Q1": ("hexahedron", 2, 1),
 }
+
+
+def is_stabilised(element: str) -> bool:
+    """Whether an element has displacement and pressure of one degree, which alone leave the pressure free to oscillate.
+
+    It has the energy ``-1 / (4 mu) integral of (p - its mean in the cell)^2`` besides, with the shear modulus mu of the cell at
+    rest, the mean of the second derivatives of the energy by F_ij, i != j. With finer cells it falls as their size squared.
+
+    Source: Dohrmann and Bochev 2004, doi 10.1002/fld.752; with 2 mu as White and Borja 2008, doi 10.1016/j.cma.2008.05.015.
+    """
+    _, displacement, pressure = ELEMENTS[element]
+    return displacement == pressure
 
 
 def check(body: "Body", element: str) -> None:

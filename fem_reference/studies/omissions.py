@@ -128,15 +128,13 @@ def _left(scene: MuscleCase, part: Part) -> tuple[Effect, ...]:
 
 
 def fitting(element: str, effects: Sequence[Effect]) -> str:
-    """The element with the cells and the displacement of ``element`` that has a pressure if and only if an effect brings it; itself
-    where there is none.
-    """
+    """The element with the cells and the displacement of ``element`` that has a pressure if and only if an effect brings it."""
     kind, degree, pressure = ELEMENTS[element]
     brings = any("pressure" in effect.unknowns for effect in effects)
     if (pressure is not None) == brings:
         return element
     others = ((name, one) for name, one in ELEMENTS.items() if one[:2] == (kind, degree))
-    return next((name for name, one in others if (one[2] is not None) == brings), element)
+    return next((name for name, one in others if (one[2] is not None) == brings))
 
 
 def _choices(scene: MuscleCase) -> list[tuple[SolverChoice, str]]:

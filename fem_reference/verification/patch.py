@@ -111,7 +111,7 @@ def _patch(element: str, degree: int = 1) -> Entry:
     )
 
 
-_STRAIGHT = ("P1", "P2", "P2/P1", "P2/P0", "Q1", "Q2", "Q1/P0", "Q2/Q1")
+_STRAIGHT = ("P1", "P1/P1", "P2", "P2/P1", "P2/P0", "Q1", "Q2", "Q1/P0", "Q2/Q1")
 _BLOCK = Entry(
     name="turned_block",
     group="rigid motion",

@@ -247,6 +247,13 @@ ENTRIES = (
         _CONSTANT,
     ),
     _entry(
+        "bar_p1p1",
+        "A bar of muscle whose linear pressure is stabilised, bent and twisted at once,",
+        Sample((NEO_HOOKE, PASSIVE, MIXED), BAR, TURNED, "P1/P1", 2),
+        1e-11,
+        _CONSTANT,
+    ),
+    _entry(
         "mooney_rivlin",
         "A Mooney-Rivlin bar bent and twisted at once,",
         Sample((MOONEY_RIVLIN, MIXED), BAR, TURNED, "P2/P0", 9),

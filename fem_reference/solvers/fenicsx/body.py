@@ -6,15 +6,14 @@ Every method is collective: all ranks call it and, where it returns a value, get
 from collections.abc import Callable
 from typing import Any, cast
 
-import basix.ufl
 import numpy as np
-from dolfinx import fem, mesh
+from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from fem_reference.effects import Energy, Ramped
 from fem_reference.foundations.mesh import Floats, Ints
-from fem_reference.problems.body import ELEMENTS, Body, Prescribed
+from fem_reference.problems.body import Body, Prescribed
 from fem_reference.solvers.common.load_steps import Attempt
 from fem_reference.solvers.fenicsx import choice, compiling, contact_points, forms, meshes
 from fem_reference.solvers.fenicsx.boundary_conditions import PointSprings, PrescribedRegion
@@ -52,7 +51,7 @@ class AssembledBody:
         own = self.mesh.topology.index_map(3).size_local
         self.cells: Ints = np.asarray(self.mesh.topology.original_cell_index, np.int64)[:own]
         self.local = {int(cell): i for i, cell in enumerate(self.cells)}
-        self.unknowns = _unknowns(self.mesh, settings.element)
+        self.unknowns = meshes.unknowns(self.mesh, settings.element)
         self.displacement = Displacement(self.unknowns)
         form = forms.Form(self.mesh, body, self.unknowns, settings, self.cells)
         self.set_amounts = form.set_amounts
@@ -107,7 +106,7 @@ class AssembledBody:
         rest = self.displacement.space.tabulate_dof_coordinates()
         self.unknowns.x.array[self.displacement.dofs] = moved(rest) - rest
         self.unknowns.x.scatter_forward()
-        self.path.settle(self.integral(self.energy_form), connected=False)
+        self.path.settle(self.energy(), connected=False)
 
     @property
     def size(self) -> int:
@@ -136,7 +135,7 @@ class AssembledBody:
         if failure is None and smallest.value > 0 and through is None and lost is None and jump is None:
             self.at = frame
             self.clock.settle(frame, self.unknowns.x.array)
-            self.path.settle(self.integral(self.energy_form))
+            self.path.settle(self.energy())
             if self.contact:
                 self.contact.settle()
             return Attempt(None, iterations)
@@ -184,7 +183,7 @@ class AssembledBody:
             self.contact.settle() if proved else self.contact.go_back()
         if proved:
             self.at = frame
-            self.path.settle(self.integral(self.energy_form), connected=False)
+            self.path.settle(self.energy(), connected=False)
         return proved
 
     def know(self, frame: float, unknowns: Floats, modes: float | None) -> None:
@@ -201,7 +200,7 @@ class AssembledBody:
         if self.contact:
             self.contact.update(frame)
             self.contact.settle()
-        self.path.settle(self.integral(self.energy_form), connected=False)
+        self.path.settle(self.energy(), connected=False)
         if not recalled and self.stability is not None:  # an old factorisation serves on
             with self.clock.slow(np.array(self.unknowns.x.array)):
                 self.stability.negative_modes()
@@ -240,13 +239,17 @@ class AssembledBody:
         contact = self.contact.scalars(self.comm) if self.contact else {}
         moving = {} if self.kinetic_form is None else {"kinetic_energy": self.integral(self.kinetic_form)}
         gap = {"energy_gap": self.path.take_gap()} if self.conserves else {}
-        own = {
-            "min_det_F_quadrature": self.determinants.smallest("quadrature point").value,
-            "min_det_F_vertices": self.determinants.smallest("vertex").value,
-            "volume_ratio": self.validity.volume_ratio(),
-            "energy": self.integral(self.energy_form),
-        }
-        return contact | moving | gap | own
+        return (
+            contact
+            | moving
+            | gap
+            | {
+                "min_det_F_quadrature": self.determinants.smallest("quadrature point").value,
+                "min_det_F_vertices": self.determinants.smallest("vertex").value,
+                "volume_ratio": self.validity.volume_ratio(),
+                "energy": self.energy(),
+            }
+        )
 
     def examine(self, frame: float) -> float | None:
         """In how many directions the energy falls from the present state, that of a ``frame`` which was reached; the state is kept
@@ -273,6 +276,11 @@ class AssembledBody:
         with self.clock.slow(np.array(self.unknowns.x.array)):
             return self.stability.of_material()
 
+    def energy(self) -> float:
+        """The energy [N mm] that is stored inside."""
+        own = self.system.cells.stabilising_energy()
+        return self.integral(self.energy_form) + float(self.comm.allreduce(own, MPI.SUM))
+
     def integral(self, form: Any) -> float:
         """A compiled form, summed over the ranks."""
         return float(self.comm.allreduce(fem.assemble_scalar(form), MPI.SUM))
@@ -296,14 +304,3 @@ class AssembledBody:
         for indices, values in self.comm.allgather((mine, moved)):
             result[indices] = values
         return result
-
-
-def _unknowns(msh: mesh.Mesh, element: str) -> fem.Function:
-    """Displacement, and pressure where the element has one."""
-    kind, degree, pressure = ELEMENTS[element]
-    parts = [basix.ufl.element("Lagrange", kind, degree, shape=(3,))]
-    if pressure == 0:
-        parts.append(basix.ufl.element("Discontinuous Lagrange", kind, 0))
-    elif pressure is not None:
-        parts.append(basix.ufl.element("Lagrange", kind, pressure))
-    return fem.Function(fem.functionspace(msh, basix.ufl.mixed_element(parts)))

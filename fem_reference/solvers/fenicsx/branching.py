@@ -27,7 +27,7 @@ def leave(body: AssembledBody, frame: float, share: float) -> float | None:
             body.contact.update(frame)
         failure, _ = body.newton.solve(frame)
         if failure is None and body.determinants.smallest().value > 0 and body.stability.negative_modes() < modes:
-            body.path.settle(body.integral(body.energy_form), connected=False)
+            body.path.settle(body.energy(), connected=False)
             if body.contact:
                 body.contact.settle()
             return float(abs(amount))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from fem_reference.foundations.mesh import Floats, Ints
-from fem_reference.problems.body import ELEMENTS
+from fem_reference.problems.body import ELEMENTS, is_stabilised
 from fem_reference.solvers.fenicsx import compiling
 from fem_reference.solvers.fenicsx.forms import Form
 
@@ -50,7 +50,7 @@ class CellSums:
 
     def __init__(self, form: Form, unknowns: fem.Function, element: str) -> None:
         space, msh = unknowns.function_space, unknowns.function_space.mesh
-        self.form, self.mesh = form, msh
+        self.form, self.mesh, self.function = form, msh, unknowns
         self.count = msh.topology.index_map(3).size_local
         self.size = len(unknowns.x.array)
         self.unknowns = _unknowns(space)[: self.count]
@@ -69,6 +69,7 @@ class CellSums:
                 "KINDS": form.kinds,
             },
         )
+        self.projection = self._projection() if is_stabilised(element) else None
 
     def structure(self) -> Structure:
         """The entries that cells have, and all of the diagonal."""
@@ -100,6 +101,7 @@ class CellSums:
         """Add what is out of balance to ``residual`` (n,), over this rank's unknowns, ghosts too."""
         for some in self._chunks():
             self._add(self.form.derivatives.first, some, residual)
+        self._stabilise(residual)
 
     def add_tangent(self, into: Tangent, residual: Floats, moves: Floats | None, *, pointwise: bool = False) -> None:
         """Add the tangent ``into`` its entries, and what is out of balance to ``residual``: where there are ``moves`` (n,) of the
@@ -108,6 +110,7 @@ class CellSums:
         """
         for some in self._chunks():
             self._add(self.form.derivatives.second, some, residual, into, moves, pointwise=pointwise)
+        self._stabilise(residual, into)
 
     def add_points(self, into: Tangent, cells: Ints, basis: Floats, slope: Floats) -> None:
         """Add the tangent of tractions at points of ``cells`` (n,) that are carried by their ``basis`` (n, k): the ``slope``
@@ -122,19 +125,64 @@ class CellSums:
         """By cell, the mass matrix (m, p, p) of the pressures [mm3/MPa] over what resists them: twice the shear stiffness, by the
         mean of the diagonal of the energy's second derivatives, and the bulk modulus.
         """
-        kinds, pressures = self.form.kinds, self.unknowns.shape[1] - 3 * self.nodes
-        count = 3 * kinds + 1
-        rows = [count + v * count - v * (v - 1) // 2 for v in range(count)]  # of the diagonal
-        stiff = [rows[i * kinds + k] for i in range(3) for k in range(3)]
-        weights, basis = self.kept[0], self.kept[4].reshape(-1, pressures)
-        shape = self.kept[1]
-        found = np.empty((self.count, pressures, pressures))
+        rows, basis = self._diagonal(), self._pressures()
+        stiff = [rows[i * self.form.kinds + k] for i in range(3) for k in range(3)]
+        found = np.empty((self.count, basis.shape[1], basis.shape[1]))
         for some in self._chunks():
-            given = self.form.derivatives.second.eval(self.mesh, np.arange(some.start, some.stop, dtype=np.int32))
+            given = self._second(some)
             soft = 0.5 / np.abs(given[..., stiff].mean(axis=-1)) - given[..., rows[-1]]
-            volumes = np.abs(np.linalg.det(np.einsum("mgi,qgr->mqir", self.corners[some], shape)))
-            found[some] = np.einsum("mq,qc,qd->mcd", soft * volumes * weights, basis, basis)
+            found[some] = np.einsum("mq,qc,qd->mcd", soft * self._volumes(some), basis, basis)
         return found
+
+    def stabilising_energy(self) -> float:
+        """The energy [N mm] that stabilises the pressure of this rank's cells; 0 of elements that need none."""
+        if self.projection is None:
+            return 0.0
+        values = self.function.x.array[self.unknowns[:, 3 * self.nodes :]]
+        return -float(np.einsum("mc,mcd,md->", values, self.projection, values)) / 2
+
+    def _stabilise(self, residual: Floats, into: Tangent | None = None) -> None:
+        """Add what stabilises the pressure, where the element needs it."""
+        if self.projection is None:
+            return
+        names = self.unknowns[:, 3 * self.nodes :]
+        np.subtract.at(residual, names, np.einsum("mcd,md->mc", self.projection, self.function.x.array[names]))
+        if into is not None:
+            own = into.places[:, 3 * self.nodes :, 3 * self.nodes :]
+            np.subtract.at(into.entries, own, into.unit**2 * self.projection)
+
+    def _projection(self) -> Floats:
+        """By cell, the second derivative (m, p, p) [mm3/MPa] of minus the energy of ``body.is_stabilised``, at rest."""
+        rows, basis = self._diagonal(), self._pressures()
+        shear = [rows[i * self.form.kinds + k] for i in range(3) for k in range(3) if i != k]
+        found = np.empty((self.count, basis.shape[1], basis.shape[1]))
+        for some in self._chunks():
+            volumes, modulus = self._volumes(some), np.abs(self._second(some)[..., shear].mean(axis=(1, 2)))
+            mean = volumes @ basis
+            within = mean[:, :, None] * mean[:, None] / volumes.sum(axis=1)[:, None, None]
+            mass = np.einsum("mq,qc,qd->mcd", volumes, basis, basis)
+            soft = np.divide(0.5, modulus, out=np.zeros_like(modulus), where=modulus > 0)
+            found[some] = soft[:, None, None] * (mass - within)
+        return found
+
+    def _diagonal(self) -> list[int]:
+        """Where the second derivatives by one variable twice stand among the derivatives at a point."""
+        count = 3 * self.form.kinds + 1
+        return [count + v * count - v * (v - 1) // 2 for v in range(count)]
+
+    def _pressures(self) -> Floats:
+        """The basis of the pressure at the points (q, p)."""
+        return self.kept[4].reshape(-1, self.unknowns.shape[1] - 3 * self.nodes)
+
+    def _second(self, some: slice) -> Floats:
+        """First and second derivatives of the energy at the points of some cells (m, q, v), at present."""
+        cells = np.arange(some.start, some.stop, dtype=np.int32)
+        return np.asarray(self.form.derivatives.second.eval(self.mesh, cells))
+
+    def _volumes(self, some: slice) -> Floats:
+        """What each point of some cells stands for (m, q) [mm3]."""
+        slopes = np.einsum("mgi,qgr->mqir", self.corners[some], self.kept[1])
+        return np.asarray(np.abs(np.linalg.det(slopes)) * self.kept[0])
 
     def _chunks(self) -> list[slice]:
         return [slice(first, min(first + _CHUNK, self.count)) for first in range(0, self.count, _CHUNK)]

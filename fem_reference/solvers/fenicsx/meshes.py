@@ -1,13 +1,13 @@
-"""A body's mesh in DOLFINx: distributed over the ranks, with its regions found again, and its nodes' positions."""
+"""A body's mesh in DOLFINx: over the ranks, with its regions found again, its unknowns, and its nodes' positions."""
 
 import basix
 import basix.ufl
 import numpy as np
-from dolfinx import mesh
+from dolfinx import fem, mesh
 from mpi4py import MPI
 
 from fem_reference.foundations.mesh import Floats, Ints
-from fem_reference.problems.body import Cells, reference_nodes
+from fem_reference.problems.body import ELEMENTS, Cells, reference_nodes
 from fem_reference.solvers.fenicsx.tabulated import Displacement
 
 
@@ -71,3 +71,12 @@ class Nodes:
             if len(own):
                 points[self.cells.cells[own]] = self.cells.points[self.cells.cells[own]] + moved
         return points
+
+
+def unknowns(msh: mesh.Mesh, element: str) -> fem.Function:
+    """Displacement, and pressure where the element has one."""
+    kind, degree, pressure = ELEMENTS[element]
+    parts = [basix.ufl.element("Lagrange", kind, degree, shape=(3,))]
+    if pressure is not None:
+        parts.append(basix.ufl.element("Lagrange" if pressure else "Discontinuous Lagrange", kind, pressure))
+    return fem.Function(fem.functionspace(msh, basix.ufl.mixed_element(parts)))

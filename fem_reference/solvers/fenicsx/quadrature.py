@@ -7,7 +7,7 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.body import ELEMENTS
 
 # By element: the degree up to which polynomials are integrated exactly on a straight cell.
-DEGREE = {"P1": 2, "P2": 5, "P2/P0": 5, "P2/P1": 5, "Q1": 3, "Q2": 5, "Q1/P0": 3, "Q2/Q1": 5}
+DEGREE = {"P1": 2, "P1/P1": 2, "P2": 5, "P2/P0": 5, "P2/P1": 5, "Q1": 3, "Q2": 5, "Q1/P0": 3, "Q2/Q1": 5}
 
 # Share of the volume and barycentric coordinate of the orbits of a rule of degree 5 with the vertices among its points.
 _VERTEX_SHARE = 0.002

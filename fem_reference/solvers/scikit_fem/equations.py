@@ -6,16 +6,26 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, csr_array, diags_array, eye_array, kron
 
 from fem_reference.effects import Effect, Load, State, total_energy
 from fem_reference.foundations.jets import Jet, JetFunctions, constant, variables
 from fem_reference.foundations.mesh import Floats
-from fem_reference.problems.body import Body, Prescribed
+from fem_reference.problems.body import Body, Prescribed, is_stabilised
 from fem_reference.solvers.scikit_fem.spaces import DISPLACEMENT, PRESSURE, VARIABLES, Points, Space
 
 # By element: exact for what its displacement gives on a straight cell with a law of second degree in the strain.
-QUADRATURE_DEGREE = {"P1": 2, "P2": 4, "P2/P0": 4, "P2/P1": 4, "Q1": 3, "Q2": 5, "Q1/P0": 3, "Q2/Q1": 5}
+QUADRATURE_DEGREE = {
+    "P1": 2,
+    "P1/P1": 2,
+    "P2": 4,
+    "P2/P0": 4,
+    "P2/P1": 4,
+    "Q1": 3,
+    "Q2": 5,
+    "Q1/P0": 3,
+    "Q2/Q1": 5,
+}
 _AT_ONCE = 1024  # points, so that their jets fit in a cache
 
 Acting = list[tuple[Effect, float]]
@@ -50,6 +60,7 @@ class Equations:
             if entry.stiffness is not None
             for part in self._surface(str(entry.on), partial(_spring_law, entry))
         ]
+        self.stabilising = self._projection() if is_stabilised(element) else None
 
     def assembled(self, unknowns: Floats, frame: float, springs: bool = True) -> tuple[Floats, Any]:
         """The out-of-balance forces (N,) [N, mm3] and their tangent (N, N), with the pull of ``springs`` or without."""
@@ -62,7 +73,10 @@ class Equations:
                 rows, columns = np.broadcast_arrays(points.dofs[:, :, None], points.dofs[:, None, :])
                 blocks.append((stiffness.ravel(), rows.ravel(), columns.ravel()))
         values, rows, columns = (np.concatenate(entries) for entries in zip(*blocks, strict=True))
-        return residual, coo_array((values, (rows, columns)), shape=(len(unknowns),) * 2).tocsr()
+        matrix = coo_array((values, (rows, columns)), shape=(len(unknowns),) * 2).tocsr()
+        if self.stabilising is not None:
+            residual, matrix = residual - self.stabilising @ unknowns, matrix - self.stabilising
+        return residual, matrix
 
     def smallest_determinants(self, unknowns: Floats) -> tuple[float, float]:
         """The smallest det F at quadrature points and at the vertices of the cells; NaN where one is not a number."""
@@ -77,7 +91,26 @@ class Equations:
         """The energy [N mm]."""
         values = np.moveaxis(self.inside.variables(unknowns), -1, 0)
         energy = total_energy(self._acting(frame), _state(list(values), self.inside.fibre))
-        return float((energy * self.inside.weights).sum())
+        stabilising = 0.0 if self.stabilising is None else unknowns @ (self.stabilising @ unknowns) / 2
+        return float((energy * self.inside.weights).sum() - stabilising)
+
+    def _projection(self) -> Any:
+        """The matrix (N, N) of minus the energy of ``body.is_stabilised``: M - B^T D^-1 B, with the masses M of the pressure, D of
+        a constant in each cell and B between these, over twice the shear modulus.
+        """
+        inside, entries = self.inside, self.inside.variables(np.zeros(self.space.size)).reshape(-1, VARIABLES)
+        _, curvature = self._energy_law(inside, variables(entries.T), self.body.frames[0])
+        shear = np.mean([curvature[v, v] for v in range(9) if v % 4], axis=0).reshape(inside.weights.shape).mean(axis=1)
+        names = inside.dofs[:, -inside.pressures.shape[2] :]
+        cells, points = inside.weights.shape
+        shape = (cells * points, self.space.size)
+        rows = np.repeat(np.arange(shape[0]), names.shape[1])
+        values = (inside.pressures.ravel(), (rows, np.repeat(names, points, axis=0).ravel()))
+        basis = csr_array(coo_array(values, shape=shape))
+        gather = csr_array(kron(eye_array(cells), np.ones((1, points))))
+        weights = (inside.weights / (2 * np.abs(shear[:, None]))).ravel()
+        between = gather @ diags_array(weights) @ basis
+        return basis.T @ diags_array(weights) @ basis - between.T @ diags_array(1 / (gather @ weights)) @ between
 
     def _acting(self, frame: float) -> Acting:
         return [(effect, effect.amount(frame)) for effect in self.body.effects]
