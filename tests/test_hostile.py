@@ -186,9 +186,10 @@ def test_a_unit_that_is_empty_is_not_millimetres(tmp_path: Path) -> None:
         parse(recorded.Settings, recorded.choice(tmp_path, "").settings, "case.toml")
 
 
-def test_landmarks_a_kilometre_apart_are_refused() -> None:
-    points = np.array([[0, 0, 0], [30, 0, 0], [0, 30, 0], [1e6, 0, 0.0]])
-    with pytest.raises(InputError, match=r"got landmarks 1e\+06 mm apart, want those around one attachment"):
+@pytest.mark.parametrize(("far", "apart"), [(1e6, r"1e\+06"), (1e200, "inf")])
+def test_landmarks_a_kilometre_apart_are_refused(far: float, apart: str) -> None:
+    points = np.array([[0, 0, 0], [30, 0, 0], [0, 30, 0], [far, 0, 0.0]])
+    with pytest.raises(InputError, match=rf"got landmarks {apart} mm apart, want those around one attachment"):
         draped(fan(points), BALL)
 
 

@@ -99,6 +99,14 @@ def test_one_frame_that_is_moved_by_2_mm_fails_at_that_frame(path) -> None:
     assert "mm from what it was, 0.1 mm allowed" in moved.why
 
 
+def test_a_baseline_whose_positions_are_too_far_away_to_have_squares_fails(path) -> None:
+    table = json.loads(path.read_text(encoding="utf-8"))
+    table["positions"]["values"][1][0][0] = 1e300
+    path.write_text(json.dumps(table), encoding="utf-8")
+    moved = checked(path, current(known=bars())).judgements[0]
+    assert (moved.name, moved.word, moved.current) == ("positions.moved", "fail", math.inf)
+
+
 def test_a_frame_that_deviates_as_much_as_before_but_elsewhere_fails(path) -> None:
     # 12 mm aside in another direction: a chord of 2 mm of the circle around the reference.
     angle = 2 * math.asin(1 / 12)

@@ -139,7 +139,8 @@ def _moved(positions: Positions, current: CurrentMeasures) -> Judgement:
     was = np.array([[(math.nan,) * 3 if point is None else point for point in frame] for frame in positions.values])
     if max(positions.vertices) >= len(current.rest):
         raise InputError("baseline: positions.vertices", max(positions.vertices), f"0 to {len(current.rest) - 1}")
-    away = np.linalg.norm(current.points[:, list(positions.vertices)] - was, axis=2).max(axis=1)
+    with np.errstate(over="ignore"):  # squares of what is that far away: it is infinitely far
+        away = np.linalg.norm(current.points[:, list(positions.vertices)] - was, axis=2).max(axis=1)
     still = np.where(np.isnan(was).any(axis=(1, 2)), np.nan, 0.0)
     frames = _Frames(still, away, still, np.full(len(away), POSITION_ROUNDING))
     return _judged("unchanged", (MOVED, "mm"), frames, positions.tolerance, current)

@@ -31,7 +31,8 @@ def draped(patches: Surface, bone_surface: Surface) -> Surface:
 
 
 def _longest_side(points: Floats, triangles: Ints) -> float:
-    return float(np.linalg.norm(points[triangles] - points[np.roll(triangles, 1, axis=1)], axis=2).max())
+    with np.errstate(over="ignore"):  # squares of what is that far away: it is infinitely far
+        return float(np.linalg.norm(points[triangles] - points[np.roll(triangles, 1, axis=1)], axis=2).max())
 
 
 def fan(points: Floats) -> Surface:
