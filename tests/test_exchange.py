@@ -194,7 +194,7 @@ def test_an_export_that_fails_leaves_nothing(scene: MuscleCase, built: Problem, 
 
     monkeypatch.setattr(open_formats, "write_lines", fails)
     with pytest.raises(OSError, match="no space left"):
-        export.export(scene, lambda: built, tmp_path / "bar", "open")
+        export.export(scene, lambda: built, tmp_path / "new" / "folders" / "bar", "open")
     assert list(tmp_path.iterdir()) == []
     monkeypatch.undo()
     (tmp_path / "bar").mkdir()  # an empty folder is free

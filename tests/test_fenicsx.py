@@ -97,6 +97,15 @@ def test_ranks_change_the_time_and_not_the_answer(bent) -> None:
         assert two.scalars["energy"] == pytest.approx(one.scalars["energy"], rel=1e-6, abs=1e-9)
 
 
+@pytest.mark.usefixtures("all_cores")
+def test_ranks_do_not_change_what_stabilises_pressures() -> None:
+    motion = Rotation((1, 0, 0), (5, 5, 0), (0.0, 10.0), (0.0, 0.6))
+    problem = shapes.bar((2, 2, 4), (10, 10, 40), {"bottom": None, "top": motion}, MUSCLE, (0, 10))
+    (_, alone), (_, shared) = (solved(problem, ranks=ranks, element="P1/P1") for ranks in (1, 2))
+    assert shared[-1].tets == pytest.approx(alone[-1].tets, abs=1e-9)
+    assert shared[-1].scalars["energy"] == pytest.approx(alone[-1].scalars["energy"], rel=1e-9)
+
+
 def test_attached_vertices_follow_their_bone(bent) -> None:
     problem, _, frames = bent
     for frame in frames:

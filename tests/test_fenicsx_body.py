@@ -16,7 +16,7 @@ from fem_reference.geometry.skins import Skin
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed, boundary_facets, check
 from fem_reference.problems.paths import Affine, Rest, Turn
-from fem_reference.solvers import fenicsx
+from fem_reference.solvers import fenicsx, scikit_fem
 from fem_reference.solvers.fenicsx import BodySettings
 from fem_reference.solvers.fenicsx.jobs import Job
 
@@ -58,14 +58,18 @@ def settings(element: str, **changes) -> BodySettings:
 
 def test_an_element_must_exist_and_fit_the_cells_and_the_effects() -> None:
     body = Body(box("P1"), FLESH, (), (0.0, 1.0))
-    with pytest.raises(InputError, match='element: got "P3", want one of P1, P2, P2/P0, P2/P1, Q1, Q2, Q1/P0, Q2/Q1'):
+    with pytest.raises(
+        InputError, match='element: got "P3", want one of P1, P1/P1, P2, P2/P0, P2/P1, Q1, Q2, Q1/P0, Q2/Q1'
+    ):
         check(body, "P3")
     with pytest.raises(
         InputError,
-        match='element: got "Q1/P0", want one for tetrahedron cells with a pressure, which an effect brings: P2/P0, P2/P1',
+        match='element: got "Q1/P0", want one for tetrahedron cells with a pressure, which an effect brings: P1/P1, P2/P0, P2/P1',
     ):
         check(body, "Q1/P0")
-    with pytest.raises(InputError, match=r'got "P1", want one for .* with a pressure, which .* brings: P2/P0, P2/P1'):
+    with pytest.raises(
+        InputError, match=r'got "P1", want one for .* with a pressure, which .* brings: P1/P1, P2/P0, P2/P1'
+    ):
         check(body, "P1")
     free = Body(box("Q1"), PENALTY, (), (0.0, 1.0))
     with pytest.raises(
@@ -74,6 +78,17 @@ def test_an_element_must_exist_and_fit_the_cells_and_the_effects() -> None:
         check(free, "Q2/Q1")
     for element in ELEMENTS:
         check(Body(box(element), PENALTY if ELEMENTS[element][2] is None else FLESH, (), (0.0, 1.0)), element)
+
+
+def test_a_stabilised_pressure_needs_quadrature_that_sees_it(session) -> None:
+    body = Body(box("P1/P1"), FLESH, (), (0.0, 1.0))
+    given = {"element": "P1/P1", "quadrature_degree": 1}
+    with pytest.raises(InputError, match="quadrature_degree: got 1, want 2 or more for P1/P1"):
+        session.solve(body, BodySettings(**given))
+    with pytest.raises(InputError, match="quadrature_degree: got 1, want 2 or more for P1/P1"):
+        scikit_fem.solve_body(body, scikit_fem.BodySettings(**given))
+    with pytest.raises(InputError, match=r"case\.toml: reference\.quadrature_degree: got 1, want 2 or more for P1/P1"):
+        fenicsx.check_effects(fenicsx.Settings(**given), FLESH, "case.toml: reference")
 
 
 def test_a_session_checks_the_element(session) -> None:

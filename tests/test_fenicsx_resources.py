@@ -23,7 +23,7 @@ def box(element: str, counts=(2, 3, 4)):
     return shapes.box(counts, (1.0, 1.0, 1.0), ELEMENTS[element][0])
 
 
-@pytest.mark.parametrize("element", ["P1", "P2", "P2/P0", "P2/P1"])
+@pytest.mark.parametrize("element", ["P1", "P1/P1", "P2", "P2/P0", "P2/P1"])
 def test_unknowns_are_counted_as_the_solver_counts_them(element) -> None:
     if not any(importlib.util.find_spec(name) for name in ("dolfinx_solver", "dolfinx")):
         pytest.skip("FEniCSx is not installed")

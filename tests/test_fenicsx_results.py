@@ -30,7 +30,7 @@ PENALTY = (make("neo_hooke"), make("incompressible_penalty"))
 CORNERS = np.eye(4)
 
 
-@pytest.mark.parametrize("element", ["P2/P1", "P2/P0", "P2", "P1"])
+@pytest.mark.parametrize("element", ["P2/P1", "P2/P0", "P1/P1", "P2", "P1"])
 def test_a_block_stretched_by_a_half_with_free_sides(fem_lab, element: str) -> None:  # noqa: ARG001
     mesh = box((2, 2, 2), (1.0, 1.0, 1.0), "tetrahedron")
     fixed = [Prescribed(f"low {axis}", f"{axis}0", (i,), Rest()) for i, axis in enumerate("xyz")]

@@ -5,6 +5,7 @@ import pytest
 from fem_reference.foundations.errors import InputError
 from fem_reference.scenes import casefile
 from fem_reference.studies.campaign import Workers, carry_out, solve
+from fem_reference.studies.execution import Bench
 from fem_reference.studies.ladders import reference_trials
 
 
@@ -27,6 +28,37 @@ def test_what_is_varied_on_coarser_tetrahedra_says_so() -> None:
     ]
     softer = next(one for one in varied if one.knob == "contact stiffness")
     assert softer.changed["effect[3].stiffness"] == "0.05 MPa/mm"
+
+
+@pytest.mark.parametrize(
+    ("effects", "element", "values"),
+    [
+        (
+            {"effect[1].name": "incompressible_penalty"},
+            "P2",
+            {"P2/P1": "incompressible", "P1/P1": "incompressible", "P1": None},
+        ),
+        ({"effect[2]": {"name": "incompressible_penalty", "bulk": "1 MPa"}}, "P2/P1", {"P2/P0": None, "P1": None}),
+    ],
+)
+def test_the_volume_goes_with_the_element(effects, element, values) -> None:
+    """With a penalty alone a pressure takes its place; of a bulk modulus in two parts neither is moved, and P1 is refused."""
+    scene = casefile.read_muscle("hip_flexion", effects | {"reference.element": element})
+    found = {one.choice.settings.get("element"): one for one in reference_trials(scene) if one.knob == "element"}
+    for name, volume in values.items():
+        assert found[name].changed.get("effect[1].name") == volume
+        assert ("volume by" in found[name].value) == (volume is not None)
+
+
+def test_a_point_with_another_element_is_the_run_that_its_keys_give(tmp_path) -> None:
+    trials = reference_trials(casefile.read_muscle("hip_flexion"))
+    trial = next(one for one in trials if one.value.startswith("P1, "))
+    again = casefile.read_muscle("hip_flexion", trial.changed | {"reference.element": "P1"})
+    keys = [
+        Bench(scene, tmp_path).folder(choice, "reference")
+        for scene, choice in ((trial.scene, trial.choice), (again, again.reference))
+    ]
+    assert keys[0] == keys[1]
 
 
 def test_how_runs_were_made_is_said_of_a_cluster_too() -> None:

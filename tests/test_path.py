@@ -34,8 +34,8 @@ def test_a_bar_that_is_twisted_by_a_whole_turn_is_not_at_rest(frames, session) -
 
 @pytest.mark.parametrize("element", ["P2/P1", "P1/P1"])
 def test_what_the_energy_grows_by_is_the_work_of_the_forces(element, session) -> None:  # noqa: F811
-    """By the trapezoidal rule, whose error of a step falls with its cube and the energy with its square; with stabilised pressures
-    too, which oscillate in this bar.
+    """By the trapezoidal rule, whose error of a step falls with its cube and the energy with its square; where pressures are
+    stabilised too, whose energy is a part of it.
     """
     mesh = shapes.box((2, 2, 4), (1.0, 1.0, 3.0), "tetrahedron")
     turn = Follows(Rotation((0, 1, 0), (0.5, 0.5, 1.5), (0.0, 1.0), (0.0, 0.6)).pose)

@@ -98,17 +98,17 @@ def add_name(parser: argparse.ArgumentParser) -> None:
 
 def add_ranks(parser: argparse.ArgumentParser) -> None:
     """On how many processes the reference is solved."""
-    parser.add_argument("--ranks", type=count, metavar="N", help=RANKS)
+    parser.add_argument("--ranks", type=positive, metavar="N", help=RANKS)
 
 
-def count(text: str) -> int:
-    """A number from 1 on.
+def positive(text: str) -> int:
+    """A number of something, of at most nine digits.
 
-    >>> count("2")
+    >>> positive("2")
     2
     """
     if not text.isdecimal() or not 0 < len(text.lstrip("0")) < 10:
-        raise argparse.ArgumentTypeError(f'got "{text}", want a number, 1 or more')
+        raise argparse.ArgumentTypeError(f'got "{text[:20]}", want a number from 1 to 999999999')
     return int(text)
 
 

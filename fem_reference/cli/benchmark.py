@@ -3,7 +3,7 @@
 import argparse
 import os
 
-from fem_reference.cli._parser import count
+from fem_reference.cli._parser import positive
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, out, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.scenes import casefile
@@ -38,7 +38,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--repeats", type=int, metavar="N", help=often)
     ranks = "with --reference: MPI processes of a muscle (default: as run has it); fusiform bodies have 1"
-    parser.add_argument("--ranks", type=count, metavar="N", help=ranks)
+    parser.add_argument("--ranks", type=positive, metavar="N", help=ranks)
 
 
 def run(options: argparse.Namespace) -> int:

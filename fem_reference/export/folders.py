@@ -3,7 +3,7 @@
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from fem_reference.foundations.errors import InputError
@@ -27,9 +27,13 @@ def new_folder(folder: Path) -> Iterator[Path]:
     check(folder)
     files.clear(folder)
     part = folder.with_name(f".{folder.name}-{os.getpid()}")
+    above = [parent for parent in part.parents if not parent.exists()]
     files.make_folder(part)
     try:
         yield part
         part.replace(folder)
     finally:
         shutil.rmtree(part, ignore_errors=True)
+        for parent in above:
+            with suppress(OSError):  # where something is in it, as when all went well
+                parent.rmdir()

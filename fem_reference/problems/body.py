@@ -36,7 +36,7 @@ def is_stabilised(element: str) -> bool:
     """Whether an element has displacement and pressure of one degree, which alone leave the pressure free to oscillate.
 
     It has the energy ``-1 / (4 mu) integral of (p - its mean in the cell)^2`` besides, with the shear modulus mu of the cell at
-    rest, the mean of the second derivatives of the energy by F_ij, i != j. With finer cells it falls as their size squared.
+    rest, the mean of the second derivatives of the energy by F_ij, i != j. This energy falls with the square of the size of cells.
 
     Source: Dohrmann and Bochev 2004, doi 10.1002/fld.752; with 2 mu as White and Borja 2008, doi 10.1016/j.cma.2008.05.015.
     """
@@ -131,6 +131,12 @@ def check_element(element: str, kind: Kind, degree: int, effects: tuple[Effect, 
         cells = f"{'curved ' if degree > 1 else ''}{kind} cells"
         pressure = "with a pressure, which an effect brings" if brings else "without a pressure, which no effect brings"
         raise InputError(place, f'"{element}"', f"one for {cells} {pressure}: {', '.join(fitting)}")
+
+
+def check_quadrature(element: str, degree: int | None, place: str) -> None:
+    """Raise an InputError where quadrature of a ``degree`` does not see how a pressure that is stabilised varies in a cell."""
+    if degree == 1 and is_stabilised(element):
+        raise InputError(place, degree, f"2 or more for {element}, whose pressure is stabilised")
 
 
 def reference_nodes(kind: Kind, degree: int) -> Floats:

@@ -9,6 +9,7 @@ from fem_reference.assessment.solver_table import solver_kinds
 from fem_reference.effects import Effect, make
 from fem_reference.effects.contact import among
 from fem_reference.effects.incompressible import Incompressible
+from fem_reference.effects.incompressible_penalty import IncompressiblePenalty
 from fem_reference.foundations.errors import InputError
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.scenes.muscle import MuscleCase
@@ -106,7 +107,25 @@ def _settings(base: Trial) -> Iterator[Trial]:
                 choice = base.choice.model_copy(update={key: value})
                 text = f"{value:.3g}" if isinstance(value, float) else str(value)
                 varied = replace(base, choice=choice, knob=key, value=text + _beside(base))
-                yield varied if _suits(choice, base.scene.effects) else _without_pressure(varied, text, base)
+                yield _with_other_volume(varied, text, base) if key == "element" else varied
+
+
+def _with_other_volume(varied: Trial, text: str, base: Trial) -> Trial:
+    """The trial as it is where its element suits the effects; else the same energy of the volume with a pressure, or without."""
+    effects = list(varied.scene.effects)
+    found = [one for one in effects if isinstance(one, Incompressible | IncompressiblePenalty)]
+    if _suits(varied.choice, varied.scene.effects) or len(found) != 1:
+        return varied
+    name, how = "incompressible_penalty", "a penalty"
+    if isinstance(found[0], IncompressiblePenalty):
+        name, how = "incompressible", "a pressure"
+    i = effects.index(found[0])
+    effects[i] = make(name, bulk=found[0].bulk)
+    if not _suits(varied.choice, tuple(effects)):
+        return varied
+    changed = varied.changed | {f"effect[{i}].name": name}
+    scene = varied.scene.model_copy(update={"effect": tuple(effects)})
+    return replace(varied, scene=scene, changed=changed, value=f"{text}, volume by {how}{_beside(base)}")
 
 
 def _suits(choice: SolverChoice, effects: tuple[Effect, ...]) -> bool:
@@ -115,19 +134,6 @@ def _suits(choice: SolverChoice, effects: tuple[Effect, ...]) -> bool:
     except InputError:
         return False
     return True
-
-
-def _without_pressure(varied: Trial, text: str, base: Trial) -> Trial:
-    """The trial with the same energy of the volume by displacements alone, where its solver takes that; else as it is."""
-    effects, changed = list(varied.scene.effects), dict(varied.changed)
-    for i, effect in enumerate(effects):
-        if isinstance(effect, Incompressible):
-            effects[i] = make("incompressible_penalty", bulk=f"{effect.bulk} MPa")
-            changed[f"effect[{i}].name"] = "incompressible_penalty"
-    if not _suits(varied.choice, tuple(effects)):
-        return varied
-    scene = varied.scene.model_copy(update={"effect": tuple(effects)})
-    return replace(varied, scene=scene, changed=changed, value=f"{text}, volume by a penalty{_beside(base)}")
 
 
 def _contact(base: Trial) -> Iterator[Trial]:

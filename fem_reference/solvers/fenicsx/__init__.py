@@ -23,7 +23,7 @@ from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import join
 from fem_reference.foundations.subprocesses import command
 from fem_reference.geometry.embedding import Locator
-from fem_reference.problems.body import Body, check_element
+from fem_reference.problems.body import Body, check_element, check_quadrature
 from fem_reference.problems.muscle import Problem
 from fem_reference.problems.muscle_body import as_body
 from fem_reference.runs.cut_off import CutOff
@@ -66,6 +66,7 @@ def require(settings: BodySettings | FieldSettings) -> None:
 def check_effects(settings: Settings, effects: tuple[Effect, ...], place: str) -> None:
     """InputError below ``place`` unless the element suits tetrahedra and the effects."""
     check_element(settings.element, "tetrahedron", 1, effects, join(place, "element"))
+    check_quadrature(settings.element, settings.quadrature_degree, join(place, "quadrature_degree"))
 
 
 def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:

@@ -239,17 +239,13 @@ class AssembledBody:
         contact = self.contact.scalars(self.comm) if self.contact else {}
         moving = {} if self.kinetic_form is None else {"kinetic_energy": self.integral(self.kinetic_form)}
         gap = {"energy_gap": self.path.take_gap()} if self.conserves else {}
-        return (
-            contact
-            | moving
-            | gap
-            | {
-                "min_det_F_quadrature": self.determinants.smallest("quadrature point").value,
-                "min_det_F_vertices": self.determinants.smallest("vertex").value,
-                "volume_ratio": self.validity.volume_ratio(),
-                "energy": self.energy(),
-            }
-        )
+        own = {
+            "min_det_F_quadrature": self.determinants.smallest("quadrature point").value,
+            "min_det_F_vertices": self.determinants.smallest("vertex").value,
+            "volume_ratio": self.validity.volume_ratio(),
+            "energy": self.energy(),
+        }
+        return contact | moving | gap | own
 
     def examine(self, frame: float) -> float | None:
         """In how many directions the energy falls from the present state, that of a ``frame`` which was reached; the state is kept

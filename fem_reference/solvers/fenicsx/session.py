@@ -11,7 +11,7 @@ import numpy as np
 
 from fem_reference.foundations import scratch
 from fem_reference.foundations.subprocesses import command
-from fem_reference.problems.body import Body, check
+from fem_reference.problems.body import Body, check, check_quadrature
 from fem_reference.runs.solved import Reached, Solved
 from fem_reference.runs.store import Outcome
 from fem_reference.solvers.fenicsx.jobs import Job, stored_state
@@ -35,6 +35,7 @@ class Session:
         if self.closed:
             raise RuntimeError("the session is closed")
         check(body, settings.element)
+        check_quadrature(settings.element, settings.quadrature_degree, "quadrature_degree")
         job = self.folder / "job.pickle"
         job.write_bytes(cloudpickle.dumps(Job(body, settings, {})))
         states: list[Reached] = []

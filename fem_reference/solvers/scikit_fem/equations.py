@@ -108,9 +108,11 @@ class Equations:
         values = (inside.pressures.ravel(), (rows, np.repeat(names, points, axis=0).ravel()))
         basis = csr_array(coo_array(values, shape=shape))
         gather = csr_array(kron(eye_array(cells), np.ones((1, points))))
-        weights = (inside.weights / (2 * np.abs(shear[:, None]))).ravel()
-        between = gather @ diags_array(weights) @ basis
-        return basis.T @ diags_array(weights) @ basis - between.T @ diags_array(1 / (gather @ weights)) @ between
+        soft = np.divide(0.5, np.abs(shear), out=np.zeros_like(shear), where=shear != 0)
+        volumes = inside.weights.ravel()
+        between = gather @ diags_array(volumes) @ basis
+        mass = basis.T @ diags_array(volumes * np.repeat(soft, points)) @ basis
+        return mass - between.T @ diags_array(soft / (gather @ volumes)) @ between
 
     def _acting(self, frame: float) -> Acting:
         return [(effect, effect.amount(frame)) for effect in self.body.effects]
