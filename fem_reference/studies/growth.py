@@ -120,11 +120,9 @@ def _costs(solver: str, settings: Record, setup: Setup) -> dict[str, float]:
     before = peak_memory()
     _spent(solver, settings, setup, 1)
     memory = peak_memory() - before
-    times = []
-    for _ in range(REPEATS):
-        once, more = (_spent(solver, settings, setup, count) for count in (1, 1 + ITERATIONS))
-        times.append((more - once) / ITERATIONS)
-    return {"iteration": min(times), "memory": memory}
+    times = [[_spent(solver, settings, setup, count) for count in (1, 1 + ITERATIONS)] for _ in range(REPEATS)]
+    once, more = np.min(times, axis=0)  # what disturbs a run makes it longer
+    return {"iteration": float(more - once) / ITERATIONS, "memory": memory}
 
 
 def _give_back() -> None:
