@@ -399,6 +399,7 @@ def test_how_well_the_reference_is_known_is_reported(comparison):
         pytest.approx(3 / 70),
         None,
     ]
+    assert [row["frame"] for row in found] == list(comparison.reference.numbers)
     assert (found[1]["model"], found[1]["unit"]) == (pytest.approx(3 / 70), "%")
 
 

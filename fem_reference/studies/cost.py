@@ -110,7 +110,7 @@ def known(bars: ErrorBars | None) -> dict[str, float]:
 
 def _point(scene: MuscleCase, one: Made, truth: Run, context: MeasurementContext) -> Point:
     trial, run = one.trial, one.run
-    choice = {"solver": trial.choice.solver, **_chosen(trial)}
+    choice = {"solver": trial.choice.solver, **settings_of(trial)}
     if trial.changed:
         choice["scene"] = trial.changed
     point = Point(
@@ -129,7 +129,7 @@ def _point(scene: MuscleCase, one: Made, truth: Run, context: MeasurementContext
     return replace(point, status=status, message=message, errors=errors(run, truth, context), costs=costs(run))
 
 
-def _chosen(trial: Trial) -> dict[str, object]:
+def settings_of(trial: Trial) -> dict[str, object]:
     """The settings of a trial without those that are their solver's own anyway: a case may name them, and another not."""
     given = trial.choice.settings
     try:
