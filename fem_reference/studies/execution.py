@@ -26,19 +26,11 @@ from fem_reference.runs import cut_off, store
 from fem_reference.runs.fields import VALUES, NodalField
 from fem_reference.runs.key import code_hash, key, versions
 from fem_reference.runs.store import Frame, Outcome, Run, Sink
-from fem_reference.scenes.case import Case, SolverChoice
+from fem_reference.scenes.case import MACHINE_ONLY, Case, SolverChoice
 from fem_reference.solvers import recorded
 from fem_reference.solvers.common.protocol import MuscleSolver
 
 log = logging.getLogger(__name__)
-
-MACHINE_ONLY = {
-    "ranks",
-    "time_limit",
-    "linear_solver",
-    "precision",
-}  # settings that change the time and not the answer
-
 
 class StoppedError(Exception):
     """A run that goes on with other effects, and why."""
