@@ -234,6 +234,7 @@ def scene(folder: Path) -> Path:
 
 
 SPHERE = 'name = "line"\nsphere = {{ bone = "{}", centre = "{}", radius = "6 mm" }}\n'
+MULTIGRID_ON_TWO_RANKS = 'name = "line"\nsolver = "fenicsx"\nranks = 2\nlinear_solver = "multigrid"'
 SPHERE_ON_NOTHING, SPHERE_AROUND_THE_END = SPHERE.format("skull", "5, 5, 20 mm"), SPHERE.format("lid", "5, 5, 40 mm")
 
 
@@ -301,7 +302,7 @@ def test_the_page_shows_a_dash_and_says_that_there_is_no_surface(compared) -> No
         ('name = "line"\n', 'name = "line"\nvia = [{ at = 0.5, bone = "skull" }]\n', 'via[0].bone: got "skull", want one of'),
         ('name = "line"\n', SPHERE_ON_NOTHING, 'sphere.bone: got "skull", want one of floor, lid'),
         ('name = "line"\n', SPHERE_AROUND_THE_END, "an obstacle with all of them outside"),
-        ('name = "line"\nsolver = "line_of_action"', 'name = "line"\nsolver = "fenicsx"\nranks = 2\nlinear_solver = "multigrid"', "ranks: got 2, want 1"),
+        ('name = "line"\nsolver = "line_of_action"', MULTIGRID_ON_TWO_RANKS, "ranks: got 2, want 1"),
     ],
 )  # fmt: skip
 def test_what_a_candidate_cannot_have_is_refused_before_the_reference_is_solved(

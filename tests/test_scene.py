@@ -430,8 +430,16 @@ WRONG = [
         "negative_control.value: got 5, want a value that can be read (effect[1].bulk: got 5, want a pressure",
     ),
     ("negative_control", TITLE, 'negative_control.key: got "title", want a key that changes what is solved'),
-    ("negative_control", TITLE | {"key": "expect[0].truth", "value": "9 %"}, 'key: got "expect[0].truth", want a key that'),
-    ("negative_control", TITLE | {"key": "candidate[0].stretch", "value": 0.5}, 'key: got "candidate[0].stretch", want a'),
+    (
+        "negative_control",
+        TITLE | {"key": "expect[0].truth", "value": "9 %"},
+        'key: got "expect[0].truth", want a key that',
+    ),
+    (
+        "negative_control",
+        TITLE | {"key": "candidate[0].stretch", "value": 0.5},
+        'key: got "candidate[0].stretch", want a',
+    ),
     ("negative_control.value", True, "negative_control.value: got True, want"),
     ("negative_control.value", NAN, "negative_control.value: got nan, want"),
 ]

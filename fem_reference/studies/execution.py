@@ -32,6 +32,7 @@ from fem_reference.solvers.common.protocol import MuscleSolver
 
 log = logging.getLogger(__name__)
 
+
 class StoppedError(Exception):
     """A run that goes on with other effects, and why."""
 
@@ -58,8 +59,8 @@ class Bench[C: Case]:
         return settings
 
     def check(self, chosen: Sequence[tuple[SolverChoice, str]] = ()) -> None:
-        """InputError where settings of the reference, of a candidate of the case (but frames that are only made later) or of what is
-        ``chosen`` do not suit the case. What is made of it is looked at where there is something to solve.
+        """InputError where settings of the reference, of a candidate of the case (but frames that are only made later) or of what
+        is ``chosen`` do not suit the case. What is made of it is looked at where there is something to solve.
         """
         named = [(one, f"candidate[{i}]") for i, one in enumerate(self.scene.candidate) if one.solver != "recorded"]
         wanted = [(self.scene.reference, "reference"), *chosen]
