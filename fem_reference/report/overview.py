@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fem_reference.assessment.comparison import Comparison
+from fem_reference.assessment.doubts import doubts
 from fem_reference.assessment.error_bars import ErrorBar
 from fem_reference.assessment.judge import Verdict
 from fem_reference.assessment.solver_table import Table
@@ -135,6 +136,9 @@ def comparison_text(result: Comparison, page: Path | None = None) -> str:
     """What came of a comparison, line by line: its runs, its worst numbers, its verdicts and its ``page``, if it has one."""
     runs = [
         f"{run.name}: {run.outcome.status}, {run.outcome.message}" for run in (result.reference, *result.candidates)
+    ]
+    runs += [
+        f"reference: doubtful, {why}" for why in doubts(result.reference) if why != result.reference.outcome.status
     ]
     judged = [_judged(verdict) for verdict in result.verdicts]
     asked = {verdict.expectation.of for verdict in result.verdicts}

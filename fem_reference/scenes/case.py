@@ -23,6 +23,8 @@ DATA_SETTING = "FEM_REFERENCE_DATA"
 # Further folders, divided as those of PATH are, that files which a scene file names may be in.
 ALLOWED_SETTING = "FEM_REFERENCE_FILES"
 DELAUNAY = "delaunay"  # where a file of triangles may stand: no file
+# Settings of solvers that change the time and not the answer.
+MACHINE_ONLY = frozenset({"ranks", "time_limit", "linear_solver", "precision"})
 
 
 # What a run is measured against: the reference (of itself, its rest state), the exact solution, or nothing else.
@@ -186,6 +188,19 @@ class Case(Record):
         if not is_inside(path, folders):
             want = f"a file in the folder of the scene, or {ALLOWED_SETTING}=FOLDER set to one that it may be in"
             raise InputError(place, f'"{text}", which is at {path.resolve()}', want)
+
+    @property
+    def decides(self) -> list[Any]:
+        """What verdicts follow from: the keys that determine the solution, the effects, and the solvers whose runs are judged, with
+        the settings that change their answer.
+        """
+        judged = {entry.of for entry in self.expect}
+        others = [one for one in self.candidate if judged & {one.name, "candidates"}]
+        solved = [
+            (one.solver, {key: value for key, value in one.settings.items() if key not in MACHINE_ONLY})
+            for one in (self.reference, *others)
+        ]
+        return [self.model_dump(include={*self.determined_by, "choice"}), self.effects, solved]
 
     @property
     def key(self) -> str:

@@ -5,7 +5,7 @@ import math
 import os
 import platform
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache, singledispatch
@@ -26,18 +26,11 @@ from fem_reference.runs import cut_off, store
 from fem_reference.runs.fields import VALUES, NodalField
 from fem_reference.runs.key import code_hash, key, versions
 from fem_reference.runs.store import Frame, Outcome, Run, Sink
-from fem_reference.scenes.case import Case, SolverChoice
+from fem_reference.scenes.case import MACHINE_ONLY, Case, SolverChoice
 from fem_reference.solvers import recorded
 from fem_reference.solvers.common.protocol import MuscleSolver
 
 log = logging.getLogger(__name__)
-
-MACHINE_ONLY = {
-    "ranks",
-    "time_limit",
-    "linear_solver",
-    "precision",
-}  # settings that change the time and not the answer
 
 
 class StoppedError(Exception):
@@ -65,19 +58,40 @@ class Bench[C: Case]:
         solvers.check(choice.solver, settings, self.scene.effects, where, task)
         return settings
 
+    def check(self, chosen: Sequence[tuple[SolverChoice, str]] = ()) -> None:
+        """InputError where settings of the reference, of a candidate of the case (but frames that are only made later) or of what
+        is ``chosen`` do not suit the case. What is made of it is looked at where there is something to solve.
+        """
+        named = [(one, f"candidate[{i}]") for i, one in enumerate(self.scene.candidate) if one.solver != "recorded"]
+        wanted = [(self.scene.reference, "reference"), *chosen]
+        settings = [(one, place, self.settings(one, place)) for one, place in [*wanted, *named]]
+        solved = [(one, place) for one, place in wanted if one.solver != "recorded"]
+        if all(store.finished(self.folder(*one), self._ended(one[0].solver)) for one in solved):
+            return
+        for one, place, own in settings:
+            offer = solvers.find(one.solver, place, self.scene.task)
+            if offer.check_problem:
+                offer.check_problem(own, self.made_for(one.solver, own), join(self.scene.place, place))
+
     def obtain(self, name: str, choice: SolverChoice, place: str) -> Run:
         """The run of a solver of our own, by the name that pages give it; ``place`` is where the scene chooses it."""
         if choice.solver == "recorded":  # files may change behind a name; they are read anew each time
             return self.read(name, choice, place)
         settings, folder = self.settings(choice, place), self.folder(choice, place)
-        ended = ("converged", "stopped") if self._watches(choice.solver) else ("converged",)
+        ended = self._ended(choice.solver)
         if (stored := _stored(folder, name, ended)) is not None:
             return self._with_all_that_matters(stored, choice, place)
         solvers.require(choice.solver, settings, place, self.scene.task)
+        if choice == self.scene.reference:
+            self.check()
         self.made_for(choice.solver, settings)  # what is wrong with the input shows before anything is written
         with _alone(folder):
             run = _stored(folder, name, ended) or self._solve(name, choice.solver, settings, folder)
         return self._with_all_that_matters(run, choice, place)
+
+    def _ended(self, solver: str) -> tuple[str, ...]:
+        """How stored runs ended that are taken again."""
+        return ("converged", "stopped") if self._watches(solver) else ("converged",)
 
     def _watches(self, solver: str) -> bool:
         """Whether the case left effects out that may turn out to matter."""

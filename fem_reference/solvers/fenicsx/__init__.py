@@ -64,7 +64,8 @@ def require(settings: BodySettings | FieldSettings) -> None:
 
 
 def check_effects(settings: Settings, effects: tuple[Effect, ...], place: str) -> None:
-    """InputError below ``place`` unless the element suits tetrahedra and the effects."""
+    """InputError below ``place`` unless the element suits tetrahedra and the effects, and the ranks how systems are solved."""
+    _check_ranks(settings, join(place, "ranks"))
     check_element(settings.element, "tetrahedron", 1, effects, join(place, "element"))
     check_quadrature(settings.element, settings.quadrature_degree, join(place, "quadrature_degree"))
 
@@ -177,12 +178,17 @@ def _command(settings: Settings, job: Path) -> list[str]:
 def _planned(settings: Settings, body: Body) -> Settings:
     """The settings with what the size of ``body`` and the machine ask for where they leave it open."""
     chosen = resources.planned(settings, body.mesh, resources.available())
-    if chosen.linear_solver == "multigrid" and (chosen.ranks or 1) > 1:
-        raise InputError("ranks", chosen.ranks, "1, on which multigrid works")
+    _check_ranks(chosen, "ranks")
     if chosen.ranks:
         return chosen
     count = resources.unknowns(body.mesh, chosen.element)
     return chosen.model_copy(update={"ranks": resources.ranks(chosen, count) if _mpiexec() else 1})
+
+
+def _check_ranks(settings: Settings, place: str) -> None:
+    """InputError at ``place`` where multigrid is to work on more than one rank."""
+    if settings.linear_solver == "multigrid" and (settings.ranks or 1) > 1:
+        raise InputError(place, settings.ranks, "1, on which multigrid works")
 
 
 def _mpiexec() -> str | None:

@@ -24,7 +24,7 @@ from fem_reference.solvers.fenicsx.known import Known, State
 from fem_reference.solvers.fenicsx.linear import Factorised
 from fem_reference.solvers.fenicsx.newton import Newton
 from fem_reference.solvers.fenicsx.nodal import Nodal
-from fem_reference.solvers.fenicsx.path import Path, on_the_way
+from fem_reference.solvers.fenicsx.path import Path, on_the_way, settle
 from fem_reference.solvers.fenicsx.reactions import Reactions
 from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.spent import Spent
@@ -133,15 +133,9 @@ class AssembledBody:
         lost = self.validity.collapsed() if failure is None and smallest.value > 0 else None
         jump = self.path.jumped(before) if failure is None and smallest.value > 0 else None
         if failure is None and smallest.value > 0 and through is None and lost is None and jump is None:
-            self.at = frame
-            self.clock.settle(frame, self.unknowns.x.array)
-            self.path.settle(self.energy())
-            if self.contact:
-                self.contact.settle()
+            settle(self, before, frame)
             return Attempt(None, iterations)
-        self.unknowns.x.array[:] = before
-        if self.contact:
-            self.contact.go_back()
+        self.go_back(before)
         if through is not None:
             return Attempt("diverged", iterations, f"Newton's method converged, but {through}")
         if lost is not None:
@@ -151,15 +145,19 @@ class AssembledBody:
         how = failure or f"converged, but det F fell to {smallest}"
         return Attempt("diverged" if smallest.value > 0 else "inverted", iterations, f"Newton's method {how}")
 
+    def go_back(self, before: Floats) -> None:
+        """Take up the last good state again, whose unknowns are those of ``before``."""
+        self.unknowns.x.array[:] = before
+        if self.contact:
+            self.contact.go_back()
+
     def _begin(self, before: Floats) -> None:
         """Find with what acceleration the body leaves its rest at ``before``: by a step in which nothing moves."""
         self.clock.instant(before)
         self.set_frame(self.clock.at)
         self.newton.solve(self.clock.at)  # of a tangent that is all mass: what it cannot do, the first step will show
         self.clock.begin(self.unknowns.x.array)
-        self.unknowns.x.array[:] = before
-        if self.contact:
-            self.contact.go_back()
+        self.go_back(before)
 
     def recall(self, frame: float) -> bool:
         """Take up the state that was solved before under what acts at ``frame``, if there is one and it is on the path: after a
