@@ -84,7 +84,7 @@ def _linear(kind: Kind, places: Floats) -> Floats:
     if kind == "tetrahedron":
         return np.concatenate([1 - places.sum(axis=-1, keepdims=True), places], axis=-1)
     corners, beside = reference_nodes(kind, 1), places[..., None, :]
-    return np.where(corners > 0, beside, 1 - beside).prod(axis=-1)
+    return np.asarray(np.where(corners > 0, beside, 1 - beside).prod(axis=-1))
 
 
 def _shape(kind: Kind, degree: int, places: Floats) -> Floats:

@@ -33,8 +33,8 @@ class Reached:
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """The states of a body that a solver reached, the rest state first, and how it ended; of which ``body`` and with what ``settings``
-    where error bars may be asked for.
+    """The states of a body that a solver reached, the rest state first, and how it ended; of which ``body`` and with what
+    ``settings``, where error bars may be asked for.
     """
 
     states: tuple[Reached, ...]

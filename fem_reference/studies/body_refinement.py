@@ -26,9 +26,11 @@ def obtain(body: Body, solved: Solved) -> BodyBars | None:
     if solved.outcome.status != "converged":
         log.info("error bars: none, of a body that did not converge")
         return None
-    other, shared, changes, sharper = _sharper(body, solved.settings)
+    settings = solved.settings
+    assert isinstance(settings, fenicsx.BodySettings)  # what solved the body
+    other, shared, changes, sharper = _sharper(body, settings)
     log.info("error bars: solving with %s", sharper)
-    found = fenicsx.solve_body(other, solved.settings.model_copy(update=changes))
+    found = fenicsx.solve_body(other, settings.model_copy(update=changes))
     if found.outcome.status != "converged":
         log.info("error bars: with %s: %s, %s", sharper, found.outcome.status, found.outcome.message)
     bars = body_bars(solved.states, found.states, shared, sharper)
@@ -36,7 +38,7 @@ def obtain(body: Body, solved: Solved) -> BodyBars | None:
     return bars
 
 
-def _sharper(body: Body, settings: Any) -> tuple[Body, Ints, dict[str, Any], str]:
+def _sharper(body: Body, settings: fenicsx.BodySettings) -> tuple[Body, Ints, dict[str, Any], str]:
     """A sharper problem: the body, which of its points those of ``body`` are, what changes of the settings, and that in words."""
     changes: dict[str, Any] = {"store_state": False}
     said = ""
