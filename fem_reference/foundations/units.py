@@ -12,6 +12,9 @@ from typing import Annotated, Any
 import pint
 from pydantic import BeforeValidator
 
+# The units [mm] that the coordinates of a file may be in, in scenes, beside frames and on the command line. Quantities with a
+# number may have any unit of their kind; here a slip such as "Mm", 1e9 mm, would go unseen.
+LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3, "in": 25.4, "ft": 304.8}
 # What people call each kind of quantity, and the unit that numbers of this kind have inside.
 _INSIDE = {
     "a length": "mm",
@@ -126,10 +129,10 @@ def three(text: object, kind: str) -> tuple[float, float, float]:
 
 
 def length_unit(text: object) -> float:
-    """How many mm a unit of length has: ``"m"`` -> 1000.0."""
-    if not isinstance(text, str) or not text.strip().isalpha():
-        raise ValueError('a unit of length, such as "mm"')
-    return quantity(f"1 {text}", "a length")
+    """How many mm a unit of coordinates has, one of ``LENGTH_UNITS``: ``"m"`` -> 1000.0."""
+    if not isinstance(text, str) or text not in LENGTH_UNITS:
+        raise ValueError(f"a unit of length: {', '.join(LENGTH_UNITS)}")
+    return LENGTH_UNITS[text]
 
 
 def positive(text: object, kind: str) -> float:

@@ -24,7 +24,7 @@ DATA_SETTING = "FEM_REFERENCE_DATA"
 ALLOWED_SETTING = "FEM_REFERENCE_FILES"
 DELAUNAY = "delaunay"  # where a file of triangles may stand: no file
 # Settings of solvers that change the time and not the answer.
-MACHINE_ONLY = frozenset({"ranks", "time_limit", "linear_solver", "precision"})
+MACHINE_ONLY = frozenset({"ranks", "time_limit", "linear_solver", "precision", "store_state"})
 
 
 # What a run is measured against: the reference (of itself, its rest state), the exact solution, or nothing else.

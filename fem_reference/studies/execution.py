@@ -5,20 +5,18 @@ import math
 import os
 import platform
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache, singledispatch
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from filelock import FileLock, Timeout
 
 from fem_reference import __version__, solvers
 from fem_reference.foundations.records import Record, join
 from fem_reference.foundations.usage import forget_peak_memory, peak_memory
-from fem_reference.io import files
 from fem_reference.problems import of_case
 from fem_reference.problems.muscle import Problem, Setup
 from fem_reference.problems.scalar import FieldProblem
@@ -29,6 +27,7 @@ from fem_reference.runs.store import Frame, Outcome, Run, Sink
 from fem_reference.scenes.case import MACHINE_ONLY, Case, SolverChoice
 from fem_reference.solvers import recorded
 from fem_reference.solvers.common.protocol import MuscleSolver
+from fem_reference.studies import taken
 
 log = logging.getLogger(__name__)
 
@@ -79,19 +78,27 @@ class Bench[C: Case]:
             return self.read(name, choice, place)
         settings, folder = self.settings(choice, place), self.folder(choice, place)
         ended = self._ended(choice.solver)
-        if (stored := _stored(folder, name, ended)) is not None:
+        if (stored := taken.stored(folder, name, ended, settings)) is not None:
             return self._with_all_that_matters(stored, choice, place)
         solvers.require(choice.solver, settings, place, self.scene.task)
         if choice == self.scene.reference:
             self.check()
         self.made_for(choice.solver, settings)  # what is wrong with the input shows before anything is written
-        with _alone(folder):
-            run = _stored(folder, name, ended) or self._solve(name, choice.solver, settings, folder)
+        with taken.alone(folder), taken.bars_kept(folder):
+            run = taken.stored(folder, name, ended, settings) or self._solve(name, choice.solver, settings, folder)
         return self._with_all_that_matters(run, choice, place)
 
     def _ended(self, solver: str) -> tuple[str, ...]:
         """How stored runs ended that are taken again."""
         return ("converged", "stopped") if self._watches(solver) else ("converged",)
+
+    def known(self, name: str, choice: SolverChoice, place: str) -> Run | None:
+        """The stored run that ``obtain`` takes up, None where it would solve one."""
+        shelf = _Shelf(self.scene, self.store, self.ranks)
+        shelf.setup = self.setup
+        with suppress(_UnsolvedError):
+            return shelf.obtain(name, choice, place)
+        return None
 
     def _watches(self, solver: str) -> bool:
         """Whether the case left effects out that may turn out to matter."""
@@ -109,7 +116,7 @@ class Bench[C: Case]:
         self.watch.cache_clear()  # type: ignore[attr-defined]
         assert run.folder is not None  # from the store
         folder = self.folder(choice, place)
-        with _alone(folder):
+        with taken.alone(folder):
             cut_off.pass_on(run.folder, folder)
         return self.obtain(run.name, choice, place)
 
@@ -171,6 +178,18 @@ class Bench[C: Case]:
             "versions": versions(),
             "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
         }
+
+
+class _UnsolvedError(Exception):
+    """A run is not there yet."""
+
+
+class _Shelf(Bench[Any]):
+    """A bench that takes up what is stored, and solves nothing."""
+
+    def made_for(self, solver: str, settings: Record) -> Any:
+        """Nothing: what would be solved is not there."""
+        raise _UnsolvedError(f"{solver}-{self.key(solver, settings)}")
 
 
 @singledispatch
@@ -238,36 +257,9 @@ def _(built: FieldProblem, solver: Any, settings: Record, folder: Path, identity
     writer.close(solution.outcome, form=solution.form or built.form)
 
 
-@contextmanager
-def _alone(folder: Path) -> Iterator[None]:
-    """Nobody else makes the run in ``folder`` meanwhile: whoever comes second waits, and then finds it made."""
-    files.make_folder(folder.parent)
-    lock = FileLock(folder.parent / f".{folder.name}.lock")
-    try:
-        lock.acquire(timeout=0)
-    except Timeout:
-        log.info("%s: another process is making this run; waiting for it", folder)
-        lock.acquire()
-    try:
-        yield
-    finally:
-        lock.release()
-
-
-def _stored(folder: Path, name: str, ended: tuple[str, ...]) -> Run | None:
-    """The run in ``folder`` that ``ended`` so, under the name that it has here; None where there is none, or other packages made
-    it.
-    """
-    run = store.finished(folder, ended)
-    if run is None:
-        return None
-    now, then = versions(), run.origin.get("versions", {})
-    other = [package for package in now if package in then and now[package] != then[package] and package != "python"]
-    if other:
-        log.info("%s: solved before, but with another %s; solving again", name, other[0])
-        return None
-    log.info("%s: solved before, taken from %s", name, folder)
-    return replace(run, name=name)
+def without_states(choice: SolverChoice) -> SolverChoice:
+    """The ``choice`` of a run that is only measured, one of many: the reference keeps no states of it."""
+    return choice.model_copy(update={"store_state": False}) if choice.solver == "fenicsx" else choice
 
 
 def complete(run: Run, numbers: tuple[int, ...]) -> Run:

@@ -23,7 +23,7 @@ from fem_reference.runs.store import Run
 from fem_reference.scenes.bones import Bone
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx
-from fem_reference.studies.execution import Bench, complete
+from fem_reference.studies.execution import Bench, complete, without_states
 
 log = logging.getLogger(__name__)
 
@@ -212,7 +212,7 @@ def _solved(bench: Bench[MuscleCase], scene: MuscleCase, name: str, reference: R
     """The reference's run of a changed scene, over the frames of ``reference``."""
     other = Bench(scene, bench.store, bench.ranks)
     try:
-        run = other.obtain(f"reference, {name}", scene.reference, "reference")
+        run = other.obtain(f"reference, {name}", without_states(scene.reference), "reference")
     except InputError as error:
         raise InputError(
             f"error bar, {name}", f"a scene that cannot be set up ({error})", "a finer reference"

@@ -96,7 +96,7 @@ def go_on(problem: Problem, settings: Settings, sink: Sink, cut_off: CutOff) -> 
 
 
 def _solve(problem: Problem, body: Body, settings: Settings, sink: Sink, folder: Path, kept: Kept | None) -> Outcome:
-    settings = _planned(settings, body)
+    settings = _planned(_with_states(problem, body, settings), body)
     job = folder.resolve() / "job.pickle"  # a process that is shared may have been started elsewhere
     job.write_bytes(pickle.dumps(Job(body, settings, _samples(problem), kept)))
     passed: list[int] = list(kept.frames) if kept else []
@@ -189,6 +189,15 @@ def _check_ranks(settings: Settings, place: str) -> None:
     """InputError at ``place`` where multigrid is to work on more than one rank."""
     if settings.linear_solver == "multigrid" and (settings.ranks or 1) > 1:
         raise InputError(place, settings.ranks, "1, on which multigrid works")
+
+
+def _with_states(problem: Problem, body: Body, settings: Settings) -> Settings:
+    """The settings with whether states are kept: as asked for, else where those of all frames are small."""
+    if settings.store_state is not None:
+        return settings
+    steps = any("interval" in effect.needs for effect in body.effects)
+    size = len(problem.frames) * resources.state(body.mesh, settings.element, steps=steps)
+    return settings.model_copy(update={"store_state": size <= resources.MOST_STATES})
 
 
 def _mpiexec() -> str | None:
