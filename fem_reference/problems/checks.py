@@ -19,6 +19,8 @@ _UNIT = 1e-6  # by which a unit vector may be longer or shorter
 _FLAT = 1e-9  # of the cube of its longest edge: a cell of less volume has none
 _FARTHEST = 1e9  # [mm] from the origin
 _MOST = 100_000  # frames
+_MOST_CELLS = 10_000_000  # of a box
+_SHORTEST, _LONGEST = 1e-6, 1e6  # edges of a box, in mm and of each other
 
 
 def check(body: Body, element: str) -> None:
@@ -43,6 +45,28 @@ def check(body: Body, element: str) -> None:
     _check_regions(body.mesh, tuple(used))
     _check_needs(body)
     check_agreement(body)
+
+
+def check_box(counts: Any, size: Any, kind: Any, degree: Any) -> None:
+    """InputError unless a box has numbers of cells, lengths, a kind of cell and a degree."""
+    many = isinstance(counts, tuple | list) and len(counts) == 3
+    if not many or not all(isinstance(one, Integral) and not isinstance(one, bool) and one > 0 for one in counts):
+        raise InputError("counts", _said(counts), "numbers of cells along x, y, z, from 1 on")
+    if int(counts[0]) * int(counts[1]) * int(counts[2]) > _MOST_CELLS:
+        raise InputError("counts", _said(counts), f"{_MOST_CELLS} cells at most")
+    many = isinstance(size, tuple | list | np.ndarray) and len(np.shape(size)) == 1 and len(size) == 3
+    if not many or not all(_is_number(one) and one > _SHORTEST for one in size):
+        raise InputError("size", _said(size), f"lengths along x, y, z, from {_SHORTEST:g} to {_FARTHEST:g} mm")
+    if not max(size) < _LONGEST * min(size):
+        raise InputError("size", _said(size), f"an edge less than {_LONGEST:g} times as long as another")
+    _check_kind("", kind, degree)
+
+
+def _check_kind(place: str, kind: Any, degree: Any) -> None:
+    if not isinstance(kind, str) or kind not in ("tetrahedron", "hexahedron"):
+        raise InputError(f"{place}kind", _said(kind), '"tetrahedron" or "hexahedron"')
+    if not isinstance(degree, Integral) or isinstance(degree, bool) or degree not in (1, 2):
+        raise InputError(f"{place}degree", _said(degree), "1 or 2")
 
 
 def check_frames(frames: Any, place: str) -> None:
@@ -89,10 +113,7 @@ def _check_cells(mesh: Any) -> None:
     """InputError unless ``mesh`` has finite points, and cells and facets between them."""
     if not isinstance(mesh, Cells):
         raise InputError("mesh", _said(mesh), "Cells")
-    if mesh.kind not in ("tetrahedron", "hexahedron"):
-        raise InputError("mesh.kind", _said(mesh.kind), '"tetrahedron" or "hexahedron"')
-    if mesh.degree not in (1, 2) or not isinstance(mesh.degree, Integral):
-        raise InputError("mesh.degree", _said(mesh.degree), "1 or 2")
+    _check_kind("mesh.", mesh.kind, mesh.degree)
     points = mesh.points
     if not isinstance(points, np.ndarray) or points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind != "f":
         raise InputError("mesh.points", _said(points), "an array (n, 3) of floats")

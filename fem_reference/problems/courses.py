@@ -49,8 +49,11 @@ def course(path: Any, points: Floats) -> Course | None:
     has turned by at each; None of one that says none.
     """
     owner = getattr(path, "__self__", path)  # of a method
-    known = getattr(owner, "course", None)
-    return known(points) if callable(known) and type(owner).__module__.startswith("fem_reference.") else None
+    if not type(owner).__module__.startswith("fem_reference."):
+        return None
+    motion = getattr(owner, "motion", owner)  # of a bone, which may have none
+    known = getattr(motion, "course", None)
+    return ((), ()) if motion is None else known(points) if known else None
 
 
 def moving_ramp(effect: Effect, size: float) -> Moving | None:

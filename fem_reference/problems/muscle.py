@@ -28,7 +28,7 @@ from fem_reference.foundations.mesh import (
     tet_volumes,
     triangle_areas,
 )
-from fem_reference.foundations.motion import Course, RigidMotion
+from fem_reference.foundations.motion import RigidMotion
 from fem_reference.foundations.records import join
 from fem_reference.geometry import block
 from fem_reference.geometry.distance import distances
@@ -88,10 +88,6 @@ class RigidBody:
     def pose(self, frame: float) -> Floats:
         """The matrix (4, 4) that takes rest positions to positions at ``frame``."""
         return np.eye(4) if self.motion is None else self.motion.pose(frame)
-
-    def course(self, points: Floats) -> Course:
-        """At which frames the motion bends, and by how much it has turned at each."""
-        return ((), ()) if self.motion is None else self.motion.course(points)
 
 
 @dataclass(frozen=True, eq=False)

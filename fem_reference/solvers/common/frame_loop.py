@@ -62,14 +62,17 @@ def _unseen(setup: Setup, per_frame: int) -> Trouble | None:
         return None
     points, count = setup.surface.points, (setup.frames[-1] - setup.frames[0]) * per_frame
     seen = np.linspace(setup.frames[0], setup.frames[-1], count + 1)
-    things = [posed(bone.name, bone.pose, points) for bone in setup.bones]
+    bones = [
+        bone for bone in setup.bones if np.isfinite([bone.pose(frame) for frame in seen]).all()
+    ]  # else its loop says so
+    things = [posed(f'bone "{bone.name}"', bone.pose, points) for bone in bones]
     found = skipped(things, seen.tolist(), float(np.linalg.norm(np.ptp(points, axis=0))))
     if found is None:
         return None
     thing, early, late = found
     return Trouble(
         "out of steps",
-        f'bone "{thing.place}" turns by more than a right angle, goes farther than the muscle is long, or goes there and back, '
+        f"{thing.place} turns by more than a right angle, goes farther than the muscle is long, or goes there and back, "
         f"between frames {early:g} and {late:g}, where this solver does not look; a slower motion, over more frames, helps",
     )
 
