@@ -53,6 +53,25 @@ def test_at_rest_stays_at_rest(solver) -> None:
     assert found.verdict == ("refused" if solver == "line_of_action" else "ok")
 
 
+def test_holds_that_would_tear_an_edge_are_refused() -> None:
+    """Whichever came last would win at the vertices that faces share."""
+    hard = CASES["twist.whole_turn"]
+    bottom, top = hard.hold
+    for other in ("x0", "y1"):
+        torn = hard.model_copy(update={"hold": (top, bottom.model_copy(update={"face": other}))})
+        with pytest.raises(
+            InputError, match=rf"hold\[1\]\.face: got {other}, which shares 4 vertices with z1 and moves other"
+        ):
+            blocks.problem(torn)
+        found = running.cell(running.Posed(torn), choosing.choices()["pbd"])
+        assert (found.verdict, "moves otherwise" in found.sentence) == ("refused", True)
+    # Faces that move alike may meet, as may the middle of one.
+    alike = (top, top.model_copy(update={"face": "x0"}))
+    assert len(blocks.problem(hard.model_copy(update={"hold": alike})).attached) == 2
+    middle = (top, bottom.model_copy(update={"face": "x0", "middle": True}))
+    assert len(blocks.problem(hard.model_copy(update={"hold": middle})).attached) == 2
+
+
 @pytest.mark.slow
 def test_the_reference_stays_at_rest_in_every_unit_and_place() -> None:
     for name in ("at_rest.millimetres", "at_rest.metres", "at_rest.kilometre_away"):

@@ -7,6 +7,7 @@ from typing import Literal, get_args
 
 from fem_reference.export import febio, febio_differences, open_formats, texts
 from fem_reference.export.folders import check, new_folder
+from fem_reference.foundations.errors import InputError
 from fem_reference.io import files
 from fem_reference.problems.muscle import Problem
 from fem_reference.scenes.muscle import MuscleCase
@@ -23,6 +24,8 @@ def export(scene: MuscleCase, build: Callable[[], Problem], folder: Path, form: 
     ``"febio"`` adds FEBio's own file to the open ones, and warns of what is another model there. InputError where the folder is
     not free, or FEBio has not the same.
     """
+    if form not in FORMATS:
+        raise InputError("form", repr(form), f"one of {', '.join(FORMATS)}")
     check(folder)
     if form == "febio":
         febio.check(scene)

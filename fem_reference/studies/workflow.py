@@ -5,8 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, overload
 
-import numpy as np
-
 from fem_reference import export, report
 from fem_reference.assessment import judge, solver_table
 from fem_reference.assessment.body_bars import BodyBars
@@ -23,7 +21,7 @@ from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Case, SolverChoice
 from fem_reference.solvers import fenicsx, recorded
-from fem_reference.studies import body_refinement, judging, refinement
+from fem_reference.studies import arguments, body_refinement, judging, refinement
 from fem_reference.studies.execution import Bench
 
 STORE = Path("reports/runs")
@@ -45,6 +43,8 @@ def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Cas
         Where a key is missing, unknown or wrong; it names file, key, what was got and what is wanted.
 
     """
+    arguments.check_changes(changes)
+    arguments.path(case, "case")
     return of_case.chosen(casefile.read(case, changes=dict(changes or {})))
 
 
@@ -78,12 +78,16 @@ def solve(
         Where physics fails, the status says so and the frames that were reached are there.
 
     """
+    arguments.check_case(case)
+    arguments.check_solver(solver, settings)
+    arguments.check_progress(progress)
+    folder = arguments.free_folder(store, "store")
     choice: SolverChoice = case.reference
     if solver is not None:
         choice = SolverChoice(solver=solver, **settings) if settings else solver_table.choice(case, solver)[1]
     name = "reference" if solver is None else solver
     with reported(progress):
-        return Bench(case, Path(store)).obtain(name, choice, f'solver "{choice.solver}"')
+        return Bench(case, folder).obtain(name, choice, f'solver "{choice.solver}"')
 
 
 def read_run(folder: str | Path, case: Case, *, unit: str | None = None) -> Run:
@@ -109,7 +113,8 @@ def read_run(folder: str | Path, case: Case, *, unit: str | None = None) -> Run:
         Where a file cannot be read whole, or its vertices or its first frame are not those of the case.
 
     """
-    choice = recorded.choice(Path(folder), unit)
+    arguments.check_case(case)
+    choice = recorded.choice(arguments.path(folder, "folder"), unit)
     return Bench(case, STORE).read(choice.name, choice, "folder")
 
 
@@ -149,13 +154,16 @@ def error_bars(
         where the reference did not converge.
 
     """
+    arguments.check_progress(progress)
     with reported(progress):
         if isinstance(case, Body) and isinstance(reference, Solved):
             return body_refinement.obtain(case, reference)
         if isinstance(case, Body) or isinstance(reference, Solved):
             want = "what solve_body returned of a body, or what solve returned of a case"
             raise InputError("reference", f"a {type(reference).__name__} of a {type(case).__name__}", want)
-        bench = Bench(casefile.muscle(case), Path(store))
+        arguments.check_case(case)
+        arguments.check_run(reference, case, "reference")
+        bench = Bench(casefile.muscle(case), arguments.free_folder(store, "store"))
         return refinement.stored(reference) or refinement.obtain(bench, reference)
 
 
@@ -181,20 +189,11 @@ def compare(
         ``comparison["pbd", "surface_deviation", "rms"]`` is a measure: ``values`` (f,), ``unit``, ``worst`` frame.
 
     """
+    arguments.check_case(case)
+    arguments.check_runs(reference, candidates, case)
+    arguments.check_error_bars(error_bars, case)
     judge.check(case)
-    _check_runs(reference, candidates)
     return judging.compare(Bench(case, STORE), reference, candidates, error_bars)
-
-
-def _check_runs(reference: Run, candidates: Sequence[Run]) -> None:
-    """InputError where runs cannot be compared: two of one name, or with other vertices than the reference."""
-    names = [run.name for run in (reference, *candidates)]
-    for run in candidates:
-        if names.count(run.name) > 1:
-            raise InputError("candidates", f'the name "{run.name}" twice', "runs of different names")
-        if run.positions.shape[1:] != reference.positions.shape[1:]:
-            got, want = (f"{one.positions.shape[1]} vertices" for one in (run, reference))
-            raise InputError(f'candidate "{run.name}"', got, f"the {want} of the reference: a run of the same case")
 
 
 def export_case(case: Case, folder: str | Path, form: export.Format = "open") -> list[str]:
@@ -220,8 +219,9 @@ def export_case(case: Case, folder: str | Path, form: export.Format = "open") ->
         Where ``folder`` is not empty, or FEBio has not the same effects.
 
     """
+    arguments.check_case(case)
     muscle = casefile.muscle(case)
-    return export.export(muscle, Bench(muscle, STORE).problem, Path(folder), form)
+    return export.export(muscle, Bench(muscle, STORE).problem, arguments.free_folder(folder, "folder"), form)
 
 
 def export_runs(comparison: Comparison, folder: str | Path) -> list[str]:
@@ -245,12 +245,14 @@ def export_runs(comparison: Comparison, folder: str | Path) -> list[str]:
         Where ``folder`` is not empty.
 
     """
-    return paraview.write(comparison, Path(folder))
+    arguments.check_comparison(comparison)
+    return paraview.write(comparison, arguments.free_folder(folder, "folder"))
 
 
 def write_report(comparison: Comparison, folder: str | Path) -> Path:
     """Write ``report.html``, ``measures.json`` and ``measures.csv`` into ``folder``; the path of the page."""
-    return report.write(comparison, Path(folder))
+    arguments.check_comparison(comparison)
+    return report.write(comparison, arguments.free_folder(folder, "folder"))
 
 
 def solve_body(body: Body, *, progress: Progress | None = None, **settings: Any) -> Solved:
@@ -273,10 +275,7 @@ def solve_body(body: Body, *, progress: Progress | None = None, **settings: Any)
         ``outcome``. How far they are from the truth on cells of this size, :func:`error_bars` says.
 
     """
-    for entry in body.prescribed:
-        if (shape := np.shape(entry.path(body.mesh.points[:2], body.frames[0]))) != (2, 3):
-            got = f"displacements {shape} of points (2, 3)"
-            raise InputError(f'prescribed "{entry.name}": path', got, "one (3,) for each point, as (n, 3)")
+    arguments.check_progress(progress)
     with reported(progress):
         chosen = parse(fenicsx.BodySettings, settings, "settings")
         return replace(fenicsx.solve_body(body, chosen), body=body, settings=chosen)

@@ -11,7 +11,8 @@ import numpy as np
 
 from fem_reference.foundations import scratch
 from fem_reference.foundations.subprocesses import command
-from fem_reference.problems.body import Body, check, check_quadrature
+from fem_reference.problems.body import Body, check_quadrature
+from fem_reference.problems.checks import check
 from fem_reference.runs.solved import Reached, Solved
 from fem_reference.runs.store import Outcome
 from fem_reference.solvers.fenicsx.jobs import Job, stored_state

@@ -67,7 +67,7 @@ class Worker:
             if facts["exact"]:
                 self.solve_exactly()
             frames = tuple(frame for frame in frames if frame >= good[-1])
-        return frames, Steps(first, settings.smallest_step, settings.largest_step)
+        return frames, Steps(first, settings.smallest_step, settings.largest_step, self.job.body.stops)
 
     def run(self) -> None:
         """March through the frames and report how it ended."""
