@@ -18,8 +18,9 @@ class Pressure(Ramped, Load):
 
     def indicator(self, scene: Estimates) -> Indicator:
         """By how far it presses the thickness together."""
-        part = scene.greatest(self) * abs(self.pressure) / scene.shear
-        return Indicator("pressure over the shear modulus", part, part * scene.thickness / 3)
+        load = scene.greatest(self) * abs(self.pressure)
+        part = load / scene.shear
+        return Indicator("pressure over the shear modulus", part, part * scene.thickness / 3, load)
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:
         """Force per rest area [MPa], (3,)."""

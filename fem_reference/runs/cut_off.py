@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import parse
-from fem_reference.io import texts
+from fem_reference.io import files, texts
 from fem_reference.runs.contents import Contents
 
 FOLDER = "restart"
@@ -54,6 +55,15 @@ def truncate(state: dict[str, Any], number: int) -> None:
     kept = sum(stored < number for stored in state["numbers"])
     state["numbers"] = state["numbers"][:kept]
     state["scalars"] = {name: values[:kept] for name, values in state["scalars"].items()} if kept else {}
+
+
+def places(folder: Path, number: int) -> tuple[Floats, Floats | None]:
+    """Where the surface (n, 3) and the points of the tets (k, 3), if there are any, are [mm] in a stored frame of the run in
+    ``folder``.
+    """
+    tets = folder / "tets" / f"frame_{number:04d}.vtu"
+    surface = files.read_surface(folder / "surface" / f"frame_{number:04d}.vtp", 1.0).points
+    return surface, files.read_points(tets) if tets.is_file() else None
 
 
 def pass_on(folder: Path, to: Path) -> None:

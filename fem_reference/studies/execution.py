@@ -23,17 +23,13 @@ from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs import cut_off, store
 from fem_reference.runs.fields import VALUES, NodalField
 from fem_reference.runs.key import code_hash, key, versions
-from fem_reference.runs.store import Frame, Outcome, Run, Sink
+from fem_reference.runs.store import Frame, Outcome, Run
 from fem_reference.scenes.case import MACHINE_ONLY, Case, SolverChoice
 from fem_reference.solvers import recorded
 from fem_reference.solvers.common.protocol import MuscleSolver
-from fem_reference.studies import taken
+from fem_reference.studies import taken, watched
 
 log = logging.getLogger(__name__)
-
-
-class StoppedError(Exception):
-    """A run that goes on with other effects, and why."""
 
 
 class Bench[C: Case]:
@@ -43,7 +39,7 @@ class Bench[C: Case]:
         self.setup: Callable[[], Any] = cache(lambda: of_case.setup(scene))
         self.scene, self.store, self.ranks = of_case.chosen(scene, self.setup), store, ranks
         self.problem: Callable[[], Any] = cache(lambda: of_case.problem(self.scene, self.setup()))
-        self.watch: Callable[[], Any] = cache(lambda: of_case.watch(self.scene, self.setup()))
+        self.watch: Callable[[], Any] = cache(lambda: of_case.watch(self.scene, self.setup(), self.problem))
 
     def settings(self, choice: SolverChoice, place: str) -> Record:
         """The settings of ``choice``, checked; a folder that the scene names is found as its files are, and only there."""
@@ -102,13 +98,15 @@ class Bench[C: Case]:
 
     def _watches(self, solver: str) -> bool:
         """Whether the case left effects out that may turn out to matter."""
-        return bool(self.scene.decisions) and solvers.takes_effects(solver)
+        return solvers.takes_effects(solver) and self.watch() is not None
 
     def _with_all_that_matters(self, run: Run, choice: SolverChoice, place: str) -> Run:
         """The ``run``; where an effect that the case left out turns out to matter in it, one with that effect, which goes on from
         what is kept of a run that was stopped for it.
         """
-        found = self.watch()(run.numbers, run.positions) if self._watches(choice.solver) else ()
+        if not self._watches(choice.solver) or run.origin.get("watched") == self.watch().names:
+            return run
+        found = watched.again(self.watch(), run)
         if not found:
             return run
         self.scene = of_case.with_effects(self.scene, found)
@@ -119,12 +117,6 @@ class Bench[C: Case]:
         with taken.alone(folder):
             cut_off.pass_on(run.folder, folder)
         return self.obtain(run.name, choice, place)
-
-    def _check(self, frame: Frame) -> None:
-        """StoppedError where an effect that the case left out matters in a ``frame`` that was solved."""
-        if frame.surface is not None and (found := self.watch()((frame.number,), frame.surface[None])):
-            titles = " and ".join(one.effect.title for one in found)
-            raise StoppedError(f"{titles}, left out, turned out to matter at frame {frame.number}")
 
     def folder(self, choice: SolverChoice, place: str) -> Path:
         """Where the run of a solver of our own is stored, once there is one."""
@@ -139,7 +131,7 @@ class Bench[C: Case]:
             settings,
             folder,
             identity,
-            self._check if self._watches(solver) else lambda _: None,
+            self.watch() if self._watches(solver) else None,
         )
         return store.load(folder)
 
@@ -193,39 +185,44 @@ class _Shelf(Bench[Any]):
 
 
 @singledispatch
-def _solved(built: object, solver: Any, settings: Record, folder: Path, identity: dict[str, Any], check: Sink) -> None:  # noqa: ARG001
-    """Solve what was ``built`` of a case, and write the run into ``folder`` as it goes; ``check`` sees each frame of a muscle, and
+def _solved(built: object, solver: Any, settings: Record, folder: Path, identity: dict[str, Any], watch: Any) -> None:  # noqa: ARG001
+    """Solve what was ``built`` of a case, and write the run into ``folder`` as it goes; ``watch`` sees each frame of a muscle, and
     may stop it.
     """
     raise TypeError(f"{type(built).__name__} is no problem of a case")
 
 
 @_solved.register
-def _(built: Problem, solver: Any, settings: Record, folder: Path, identity: dict[str, Any], check: Sink) -> None:
+def _(built: Problem, solver: Any, settings: Record, folder: Path, identity: dict[str, Any], watch: Any) -> None:
     identity["origin"]["mesh"] = built.mesh_facts
     writer = store.Writer(folder, identity, built.surface, built.fibres, built.mesh, built.directions)
-    _write(writer, built, solver, settings, Frame(built.frames[0], built.surface.points, built.fibres.points), check)
+    _write(writer, built, solver, settings, Frame(built.frames[0], built.surface.points, built.fibres.points), watch)
 
 
 @_solved.register
-def _(built: Setup, solver: Any, settings: Record, folder: Path, identity: dict[str, Any], check: Sink) -> None:
+def _(built: Setup, solver: Any, settings: Record, folder: Path, identity: dict[str, Any], watch: Any) -> None:
     writer = store.Writer(folder, identity, built.surface)
-    _write(writer, built, solver, settings, Frame(built.frames[0], built.surface.points), check)
+    _write(writer, built, solver, settings, Frame(built.frames[0], built.surface.points), watch)
 
 
-def _write(writer: store.Writer, built: Setup, solver: Any, settings: Record, rest: Frame, check: Sink) -> None:
+def _write(writer: store.Writer, built: Setup, solver: Any, settings: Record, rest: Frame, watch: Any) -> None:
     """The run of a muscle, with what it cost; of one that failed before its first frame that frame, which is ``rest``."""
 
     def add(frame: Frame) -> None:
         writer.add(frame)
-        check(frame)
+        if watch is not None:
+            watched.see(watch, frame)
 
+    if watch is not None:
+        watch.seen.clear()
     forget_peak_memory()
     began = time.process_time()
     go_on = solver.go_on
     try:
         outcome = go_on(built, settings, add, writer.cut_off) if go_on else solver.solve(built, settings, add)
-    except StoppedError as why:
+        if watch is not None and outcome.status == "converged":
+            watched.end(watch, writer)
+    except watched.StoppedError as why:
         outcome = Outcome("stopped", str(why))
     processor, cost = time.process_time() - began, outcome.cost
     if "seconds_compile" in cost:  # which does not count: what is left takes no more processor time than time
@@ -234,7 +231,8 @@ def _write(writer: store.Writer, built: Setup, solver: Any, settings: Record, re
     outcome = replace(outcome, cost=used | outcome.cost)  # a solver with processes of its own says what those used
     if not writer.frames:
         writer.add(rest)
-    writer.close(outcome, **_contact(writer.state))
+    names = {"watched": watch.names} if watch is not None and outcome.status == "converged" else {}
+    writer.close(outcome, **_contact(writer.state), **names)
 
 
 def _contact(state: dict[str, Any]) -> dict[str, str]:
@@ -247,7 +245,7 @@ def _contact(state: dict[str, Any]) -> dict[str, str]:
 
 
 @_solved.register
-def _(built: FieldProblem, solver: Any, settings: Record, folder: Path, identity: dict[str, Any], check: Sink) -> None:  # noqa: ARG001
+def _(built: FieldProblem, solver: Any, settings: Record, folder: Path, identity: dict[str, Any], watch: Any) -> None:  # noqa: ARG001
     identity["origin"]["mesh"] = built.mesh_facts
     writer = store.Writer(folder, identity)
     solution = solver.solve_field(built, settings)
