@@ -8,7 +8,8 @@ from fem_reference.effects import make
 from fem_reference.foundations.mesh import tet_volumes
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems import shapes
-from fem_reference.problems.body import Body, ByCell, Cells, Prescribed, boundary_facets, check
+from fem_reference.problems.body import Body, ByCell, Cells, Prescribed, boundary_facets
+from fem_reference.problems.checks import check
 from fem_reference.problems.contact import Contact
 from fem_reference.problems.finer import finer
 
