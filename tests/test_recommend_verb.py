@@ -2,6 +2,7 @@
 
 import html
 import json
+import math
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,6 +11,8 @@ from typing import Any
 
 import pytest
 import small
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from test_recommendation import RMS, TIME, features, study
 
 from fem_reference import cli
@@ -84,6 +87,7 @@ DAMAGE = {
     "a feature that is text": (put("large", "features", "motion"), 'features.motion: got "large", want '),
     "a negative feature": (put(-1.0, "features", "motion"), "features.motion: got -1.0, want "),
     "foreign unit": (put("inch", "units", RMS), f'units.{RMS}: got "inch", want mm'),
+    "another unit of ours": (put("%", "units", RMS), f'units.{RMS}: got "%", want mm'),
     "unit of nobody": (put("furlong", "units", "mine.own"), 'units.mine.own: got "furlong", want one of '),
     "an error below zero": (put(-1.0, "points", 1, "errors", RMS), f"points[1].errors.{RMS}: got -1.0, want "),
     "an error beyond all": (put(1e999, "points", 1, "errors", RMS), f"points[1].errors.{RMS}: got inf, want "),
@@ -277,3 +281,53 @@ def test_a_case_whose_bones_are_still_is_compared_by_no_motion() -> None:
 def test_a_file_is_read_back_whole(tmp_path: Path) -> None:
     path = saved(tmp_path, own_study(features(50), bar=1.0)) / "bar" / "study.json"
     assert vars(load(path)) == vars(own_study(features(50), bar=1.0))
+
+
+VALUES = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(-2, 10**18),
+    st.floats(),
+    st.text(max_size=5),
+    st.lists(st.integers(), max_size=2),
+    st.dictionaries(
+        st.sampled_from(["muscle.tet_size", "muscle.refinements", "triangles", "scene", RMS]),
+        st.floats() | st.text(max_size=3),
+        max_size=3,
+    ),
+)
+
+
+def places(table: Any, at: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Where something stands in a table, the way to each."""
+    inside = (
+        list(table.items()) if isinstance(table, dict) else list(enumerate(table)) if isinstance(table, list) else []
+    )
+    return [found for key, value in inside for found in ((*at, key), *places(value, (*at, key)))]
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_whatever_a_study_says_a_recommendation_is_finite_or_refused(data: st.DataObject, tmp_path: Path) -> None:
+    base = own_study(features(50), bar=1.0)
+    choice = {"solver": "fenicsx", "scene": {"muscle.tet_size": "20 mm", "muscle.refinements": 0}}
+    fem = replace(base.points[0], solver="fenicsx", name="reference", knob="tetrahedra", choice=choice)
+    table = json.loads(json.dumps(facts(replace(base, points=(*base.points, fem)), {})))
+    for _ in range(data.draw(st.integers(1, 3))):
+        *above, last = data.draw(st.sampled_from(places(table)))
+        inside = table
+        for key in above:
+            inside = inside[key]
+        inside[last] = data.draw(VALUES)
+        if data.draw(st.booleans()) and isinstance(inside, dict):
+            del inside[last]
+    (tmp_path / "study.json").write_text(json.dumps(table).replace("Infinity", "1e999"))
+    for case, known in (("bar", features(50)), ("new", features(70, 3000))):
+        for metric, limits in ((RMS, {"error": 6.0}), (PERCENT, {"time": 0.004}), (RMS, {"error": 0.1, "time": 0.004})):
+            try:
+                found = recommend(known, case, [load(tmp_path / "study.json"), study("b", 80)], metric, limits)
+            except InputError:
+                continue
+            for one in (found.best, found.nearest):
+                assert one is None or (one.error >= 0 and one.time > 0 and math.isfinite(one.error + one.time))
+            assert found.best is None or all(getattr(found.best, name) <= limit for name, limit in limits.items())
