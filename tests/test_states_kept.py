@@ -116,6 +116,9 @@ def test_the_size_of_states_is_that_of_their_files(element: str, tmp_path: Path)
     written = (tmp_path / states.FOLDER / "frame_0000.npz").stat().st_size
     # Beside the arrays a file has four headers of 128 bytes, their names and a directory.
     assert written == pytest.approx(resources.state(cells, element, steps=False), abs=1500)
+    states.write(tmp_path, 1, replace(state, before=state.displacement))
+    written = (tmp_path / states.FOLDER / "frame_0001.npz").stat().st_size
+    assert written == pytest.approx(resources.state(cells, element, steps=True), abs=1500)
 
 
 @pytest.mark.slow
