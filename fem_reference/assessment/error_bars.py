@@ -28,10 +28,12 @@ FORMAT = 2
 SAFETY = 1.25
 # What is left of an error of first order, when halving its cause changes the result by 1.
 VARIATION = 2.0
-# Of which order in the size of tetrahedra an error is, on meshes graded towards the rims of attachments, where displacement goes
-# with the root of the distance: in general, and of the worst place or fibre alone. Of fibres, which end there, it is between.
-ORDER, ORDER_OF_FIBRES, ORDER_OF_WORST = 2.0, 1.5, 1.0
+# Of which order in the size of tetrahedra an error is: in general, and of the worst place or fibre alone. From rims of attachments,
+# where displacement goes with the root of the distance, order 1 comes, and 2 only where a mesh that resolves them is graded towards
+# them; from elsewhere 2 or more: in general it is between, as three sizes in a row show too (docs/accuracy.md).
+ORDER, ORDER_OF_WORST = 1.5, 1.0
 TETRAHEDRA = "tetrahedra"
+_MOVED = 0.01  # of what a surface moves at most: where it has moved by less, shares of that say nothing
 # The measures of a run against another or (None) its rest.
 _Measured = Callable[[Run, Run | None], tuple[Measure, ...]]
 # By what a bar is of, by how much (f,) each statistic differs between two runs.
@@ -101,9 +103,12 @@ class Pair:
     exact: Run | None = None
     safety: float = SAFETY
 
-    def share(self, of: Of, metric: str, statistic: str) -> float:
-        """The error of the fine run over what the two differ by, with the safety of a grid convergence index."""
-        return float(self.safety / ((self.sizes[1] / self.sizes[0]) ** _order(of, metric, statistic) - 1))
+    def share(self, metric: str, statistic: str) -> float:
+        """The error of the fine run over what the two differ by, with the safety of a grid convergence index. The volume, which is
+        nearly kept, says as little of what is left as the worst place does.
+        """
+        order = ORDER_OF_WORST if metric == "volume" or is_local(statistic) else ORDER
+        return float(self.safety / ((self.sizes[1] / self.sizes[0]) ** order - 1))
 
 
 def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
@@ -123,13 +128,14 @@ def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
         return {"change": changes, "deviation": _of_deviations(surface(run), surface(other), measured)}
 
     statistics = measured(surface(pair.fine), surface(pair.fine))
-    sizes = {TETRAHEDRA: _sizes(differences(pair.coarse, pair.fine), statistics)}
+    moved = _rms_of_surface(statistics, [one.values for one in measured(surface(pair.fine), None)])
+    sizes = {TETRAHEDRA: _sizes(differences(pair.coarse, pair.fine), statistics, moved)}
     sizes |= {name: _sizes(differences(run, pair.coarse), statistics) for name, run in pair.varied.items()}
     exact = None if pair.exact is None else differences(pair.exact, pair.coarse)
     bars = []
     for of in get_args(Of):
         for i, one in enumerate(statistics):
-            left = dict.fromkeys(sizes, VARIATION) | {TETRAHEDRA: pair.share(of, one.metric, one.statistic)}
+            left = dict.fromkeys(sizes, VARIATION) | {TETRAHEDRA: pair.share(one.metric, one.statistic)}
             parts = {name: left[name] * size[of][i] for name, size in sizes.items()}
             greatest = {name: float(part.max()) for name, part in parts.items()}
             model = None if exact is None else np.abs(exact[of][i])
@@ -143,16 +149,6 @@ def is_local(statistic: str) -> bool:
     return statistic.startswith(("max", "hausdorff"))
 
 
-def _order(of: Of, metric: str, statistic: str) -> float:
-    """The order of the error of a statistic. The volume is nearly kept, so that it says as little of what is left as the worst
-    place does. Of changes, and of deviations on average, the errors of fibres cancel in part: the rms of deviations alone adds up
-    what is wrong where they end.
-    """
-    if metric == "volume" or is_local(statistic):
-        return ORDER_OF_WORST
-    return ORDER_OF_FIBRES if (of, metric) == ("deviation", "fibre_length") and statistic.startswith("rms") else ORDER
-
-
 def ratio(differences: Floats, scale: Floats) -> float:
     """The root mean square of ``differences`` (f,) over that of ``scale`` (f,), of the frames where both are known; NaN where the
     scale is 0.
@@ -162,12 +158,22 @@ def ratio(differences: Floats, scale: Floats) -> float:
     return math.sqrt(float(differences[known] @ differences[known]) / squares) if squares > 0 else math.nan
 
 
-def typical(differences: Floats, apart: Floats) -> Floats:
+def typical(differences: Floats, apart: Floats, moved: Floats | None = None) -> Floats:
     """The size (f,) of signed ``differences`` (f,) of a statistic between two runs whose surfaces are ``apart`` (f,) [mm]: at least
     what it is for surfaces so far apart on average over the frames. A difference that crosses zero says nothing about the error
     there; where the surfaces are the same it is 0.
+
+    Of surfaces that have ``moved`` (f,) [mm], where that is given, it counts as at least the share of it that it is in the median
+    frame: two meshes that agree better in some poses than in others do so by chance.
     """
-    return np.maximum(np.abs(differences), np.nan_to_num(ratio(differences, apart)) * apart)
+    size = apart if moved is None else np.maximum(apart, _median_share(apart, moved) * moved)
+    return np.maximum(np.abs(differences), np.nan_to_num(ratio(differences, apart)) * size)
+
+
+def _median_share(apart: Floats, moved: Floats) -> float:
+    """What surfaces are ``apart`` (f,) over what they have ``moved`` (f,), in the median frame where they have; 0 without any."""
+    known = np.isfinite(apart) & (moved > _MOVED * np.nanmax(moved, initial=0.0))
+    return float(np.median(apart[known] / moved[known])) if known.any() else 0.0
 
 
 def typical_changes(changes: list[Floats], deviations: list[Floats], metrics: list[str]) -> list[Floats]:
@@ -192,16 +198,17 @@ def _rms_of_known(shares: Iterable[tuple[str, float]], wanted: str) -> float:
     return math.sqrt(sum(share**2 for share in known) / len(known)) if known else 0.0
 
 
-def _sizes(differences: _Differences, statistics: tuple[Measure, ...]) -> _Differences:
-    """The sizes of the signed ``differences`` of these ``statistics`` between two runs."""
-    (apart,) = (
-        found
-        for one, found in zip(statistics, differences["deviation"], strict=True)
-        if (one.metric, one.statistic) == ("surface_deviation", "rms")
-    )
-    deviations = [typical(found, apart) for found in differences["deviation"]]
+def _sizes(differences: _Differences, statistics: tuple[Measure, ...], moved: Floats | None = None) -> _Differences:
+    """The sizes of the signed ``differences`` of these ``statistics`` between two runs, whose surfaces have ``moved`` (f,) [mm]."""
+    apart = _rms_of_surface(statistics, differences["deviation"])
+    deviations = [typical(found, apart, moved) for found in differences["deviation"]]
     metrics = [one.metric for one in statistics]
     return {"change": typical_changes(differences["change"], deviations, metrics), "deviation": deviations}
+
+
+def _rms_of_surface(statistics: tuple[Measure, ...], values: list[Floats]) -> Floats:
+    """Those of the ``values`` by statistic that are of the surface's distance, rms (f,) [mm]."""
+    return values[[(one.metric, one.statistic) for one in statistics].index(("surface_deviation", "rms"))]
 
 
 def _surface(run: Run) -> Run:
