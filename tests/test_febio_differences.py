@@ -10,6 +10,7 @@ import pytest
 import shapes
 import small
 
+import fem_reference as fr
 from fem_reference import cli
 from fem_reference.export import febio, febio_differences
 from fem_reference.export.febio_contact import overlaps
@@ -116,3 +117,11 @@ def test_the_terminal_and_the_page_beside_the_file_say_it(tmp_path: Path, capsys
     assert cli.main([*words, "--set", "muscle.tet_size=9 mm", "--to", str(tmp_path / "exact")]) == cli.DONE
     assert "another model" not in capsys.readouterr().err
     assert "- no springs at points of the surface" in (tmp_path / "exact" / "FEBIO.md").read_text()
+
+
+def test_python_exports_for_febio_as_well(tmp_path: Path) -> None:
+    case = fr.load_case(small.write(tmp_path / "bar"), {"muscle.tet_size": "9 mm"})
+    written = fr.export_case(case, tmp_path / "febio", "febio")
+    assert {"scene.feb", "tet10.csv", "FEBIO.md"} <= set(written)
+    assert ElementTree.parse(tmp_path / "febio" / "scene.feb").getroot().tag == "febio_spec"
+    assert "scene.feb" not in fr.export_case(case, tmp_path / "open")

@@ -24,8 +24,8 @@ from fem_reference.geometry.signed_distance import signed_distances
 from fem_reference.problems.muscle import Problem
 
 SEARCH_RADIUS = 5.0  # [mm]: contact is not looked for deeper than this inside a bone
-# Shear moduli of the matrix with which an overlap at rest may press at once: with 34 of them FEBio never took its first step
-# (gluteus_maximus_anatomical), and with 10, a search radius of 0.1 mm there, it did.
+# Shear moduli of the matrix with which an overlap at rest may press at once: in gluteus_maximus_anatomical, where it is up to 34 of
+# them, FEBio never took its first step with a search radius of 5 mm, and 0.1 mm, which is 10 of them, helped.
 _AT_ONCE = 10.0
 SPRING_SEARCH_RADIUS = 1.0  # [mm]: at rest the two surfaces of springs coincide
 # By penalty alone, in one pass, the penalty as it is given, with the whole tangent.
