@@ -35,7 +35,8 @@ def summary(comparison: Comparison) -> dict[str, Any]:
 
     ``measures`` has each candidate's deviation from the reference, and under ``"reference"`` its own change from rest
     with the inversion numbers that its solver recorded; ``doubts`` what makes the reference doubtful, in words; ``from_rest`` the
-    change from rest of every run; ``error_bars`` how well the reference is known and ``rankings`` whom that separates, empty without any.
+    change from rest of every run; ``error_bars`` how well the reference is known and ``rankings`` whom that separates, empty
+    without any.
     """
     reference = comparison.reference
     deviations = [row for run in comparison.candidates for row in rows(run, comparison.deviations[run.name])]
