@@ -11,8 +11,8 @@ from pydantic import Field
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.records import Record
 
-Verdict = Literal["ok", "degraded", "failed", "refused"]
-VERDICTS: tuple[Verdict, ...] = ("ok", "degraded", "failed", "refused")
+Verdict = Literal["ok", "degraded", "failed", "refused", "inconclusive"]
+VERDICTS: tuple[Verdict, ...] = ("ok", "degraded", "failed", "refused", "inconclusive")
 
 
 class Bound(Record):

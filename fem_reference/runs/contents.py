@@ -9,7 +9,16 @@ from fem_reference.foundations.records import Name, Record
 from fem_reference.scenes.muscle import LAST_FRAME, MOST_FRAMES
 
 Status = Literal[
-    "converged", "diverged", "inverted", "collapsed", "limit point", "out of steps", "timed out", "crashed", "stopped"
+    "converged",
+    "diverged",
+    "inverted",
+    "collapsed",
+    "limit point",
+    "out of steps",
+    "timed out",
+    "stalled",
+    "crashed",
+    "stopped",
 ]
 FORMAT = 1
 

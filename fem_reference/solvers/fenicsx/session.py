@@ -31,7 +31,7 @@ class Session:
 
     def solve(self, body: Body, settings: BodySettings) -> Solved:
         """The states of ``body``; a process that dies is the status *crashed*, and one that takes longer than the time limit is
-        ended and *timed out*, not an exception. RuntimeError once it is closed.
+        ended and *timed out* or *stalled*, not an exception. RuntimeError once it is closed.
         """
         if self.closed:
             raise RuntimeError("the session is closed")
