@@ -87,6 +87,11 @@ def test_the_sag_of_a_beam_is_that_of_timoshenko() -> None:
     assert SCENE.bend(force) == pytest.approx(0.3 * by_hand)
 
 
+def test_rates_are_by_second() -> None:
+    assert SCENE.in_time(2.0) == pytest.approx(200.0), "2 by frame number, of which there is one each 10 ms"
+    assert replace(SCENE, interval=None).in_time(2.0) == 0.0
+
+
 def test_tension_between_fixed_ends_straightens_and_makes_stiff() -> None:
     assert SCENE.straighten(1e3) == pytest.approx(0.6 * SCENE.sag, rel=1e-3)
     assert replace(SCENE, sag=0.0).straighten(1.0) == 0, "a straight muscle between fixed ends cannot shorten"

@@ -1,8 +1,11 @@
 """``effects = "auto"`` keeps what makes a force and moves little, and finds out what only a solution shows."""
 
 import importlib.util
+from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +16,7 @@ import stand_ins
 
 from fem_reference import cli
 from fem_reference.effects import make
-from fem_reference.problems import muscle, of_case
+from fem_reference.problems import guess, muscle, of_case
 from fem_reference.problems.estimates import STRESS_TOLERANCE, estimates
 from fem_reference.problems.stresses import Sampled, kirchhoff
 from fem_reference.runs.store import Frame, Outcome
@@ -61,12 +64,19 @@ def spindle(folder: Path, choice: str, effects: str = ACTIVE) -> MuscleCase:
     return casefile.read_muscle(path.parent)
 
 
+@pytest.fixture(scope="module")
+def fem() -> Iterator[None]:
+    if not any(importlib.util.find_spec(name) for name in ("dolfinx_solver", "dolfinx")):
+        pytest.skip("FEniCSx is not installed")
+    with fenicsx.shared():
+        yield
+
+
 @pytest.mark.slow
+@pytest.mark.usefixtures("fem")
 @pytest.mark.parametrize(("scene", "moves"), [(pennate, 5.0), (spindle, 0.05)])
 def test_an_isometric_contraction_is_that_of_the_listed_effects(scene, moves, tmp_path) -> None:
     """300 kPa, or 10, between bones that rest: by an indicator of displacement alone nothing happened, and forces were 0."""
-    if not any(importlib.util.find_spec(name) for name in ("dolfinx_solver", "dolfinx")):
-        pytest.skip("FEniCSx is not installed")
     found = []
     for choice in ("listed", "auto"):
         case = scene(tmp_path / choice, choice)
@@ -110,12 +120,42 @@ def test_a_motion_allows_stresses_of_its_own_size(tmp_path) -> None:
     rest = muscle.setup(scene)
     known = estimates(scene, rest)
     assert known.stress_tolerance == pytest.approx(STRESS_TOLERANCE * 0.01 * 0.1, rel=0.1)
-    together = tuple(
-        entry.__class__(entry.attachment, rest.attached[1].bone, entry.vertices) for entry in rest.attached
-    )
+    together = tuple(replace(entry, bone=rest.attached[1].bone) for entry in rest.attached)
     alike = estimates(scene, muscle.Setup(rest.surface, rest.bones, together, rest.frames, rest.interval))
     assert alike.travel == pytest.approx(4.0)
     assert alike.stress_tolerance < 1e-4 * known.stress_tolerance
+
+
+def test_what_happens_in_the_middle_of_a_motion_is_asked_for(tmp_path) -> None:
+    """A bone that comes down to the bar, 10 mm wide, and is back at the last frame."""
+    values = STILL | {"centre": "5, 17, 20", "contact": 500.0}
+    case = random_scenes.TEXT.format(**values, choice="auto", effects=random_scenes.EFFECTS["contact"].format(**values))
+    path = '[{ frame = 0, distance = "0 mm" }, { frame = 2, distance = "3 mm" }, { frame = 4, distance = "0 mm" }]'
+    ball = 'name = "ball"\nmotion = { direction = [0, -1, 0], keyframes = ' + path + " }"
+    scene = random_scenes.write(tmp_path / "ball", case.replace('name = "ball"', ball), random_scenes.lines(0.0, 0.0))
+    contact = of_case.explained(scene)[-1]
+    assert contact.needed
+    assert "ball, nearest at frame 2" in str(contact)
+
+
+def test_bones_that_turn_together_bend_nothing(tmp_path) -> None:
+    rest, turned = muscle.setup(pennate(tmp_path / "scene", "auto")), np.eye(4)
+    turned[:3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+    for first, angle in ((turned, 0.0), (np.eye(4), np.pi / 2)):
+        bones = [
+            replace(rest.bones[i], motion=SimpleNamespace(pose=lambda _, pose=pose: pose))
+            for i, pose in enumerate((first, turned))
+        ]
+        attached = tuple(replace(entry, bone=bone) for entry, bone in zip(rest.attached, bones, strict=True))
+        assert guess.turn(replace(rest, attached=attached), 1) == pytest.approx(angle, abs=1e-12)
+
+
+def test_a_strain_is_what_no_rigid_motion_makes() -> None:
+    points = shapes.box((2, 2, 8), (10, 10, 40)).points
+    turn = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]])
+    assert guess.strain(points, points @ turn.T + [3, -2, 70]) == pytest.approx(0, abs=1e-12)
+    assert guess.strain(points, 1.1 * points @ turn.T) == pytest.approx(0.1)
+    assert guess.strain(points, 5 * points) == 1
 
 
 def test_fibres_stretched_at_rest_are_asked_for_at_that_stretch(tmp_path) -> None:
@@ -162,13 +202,20 @@ def test_stresses_of_a_stretched_bar_are_those_of_the_closed_form() -> None:
 
 
 def test_a_prestretch_counts_by_what_it_changes_of_the_rest() -> None:
-    """At rest the energies see a bar stretched by 1.1: its stress, turned by nothing."""
+    """At rest the energies see a bar stretched by 1.1: its stress. What is stretched by that already has a stress of its own, which
+    is no part of what the prestretch adds.
+    """
     mesh, stretch, mu = shapes.box((1, 1, 1), (1.0, 1.0, 1.0)), 1.1, 0.01
     fibre = np.tile([1.0, 0.0, 0.0], (len(mesh.tets), 1))
     effect = make("prestretch", stretch=stretch, ramp=[{"frame": 0, "amount": 1.0}])
     found = Sampled(mesh, fibre).asked(mesh.points, [(make("neo_hooke", mu=mu), 1.0)], [(effect, 1.0)])
     assert Sampled(mesh, fibre).asked(mesh.points, [(effect, 1.0)], []).stretch == pytest.approx((stretch, stretch))
     assert found.acts == pytest.approx(0.0, abs=1e-12)
+    longer = mesh.points * [stretch, stretch**-0.5, stretch**-0.5]
+    own = Sampled(mesh, fibre).asked(longer, [(make("neo_hooke", mu=mu), 1.0)], [(effect, 1.0)])
+    (uniaxial, doubly) = (mu * (one**2 - 1 / one) * np.sqrt(2 / 3) for one in (stretch, stretch**2))
+    assert own.acts == pytest.approx(uniaxial)
+    assert own.added == pytest.approx([doubly - uniaxial])
     assert found.added == pytest.approx([mu * (stretch**2 - 1 / stretch) * np.sqrt(2 / 3)], rel=1e-9)
 
 
@@ -235,6 +282,29 @@ def test_what_loads_move_has_a_speed(tmp_path, monkeypatch) -> None:
     assert "Damping: left out" in str(bench.scene.decisions[-1])
     bench.obtain("reference", scene.reference, "reference")
     assert [len(titles) for titles in made] == [3, 4]
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("fem")
+def test_a_run_that_is_stopped_at_its_end_goes_on_with_what_matters(tmp_path) -> None:
+    """Springs so soft that the bar hardly follows its bones, though these draw it a third longer: its weight is some of the force.
+    At frame 0 it does not act yet, so that this frame is good.
+    """
+    weight = random_scenes.EFFECTS["gravity"].format(density=20.0, weight="0, 0, -9.81")
+    found = []
+    for choice in ("auto", "listed"):
+        case = random_scenes.TEXT.format(**STILL | {"distance": 12.0, "every": 2}, choice=choice, effects=weight)
+        case = case.replace('"1.5 mm"', '"1.5 mm"\nstiffness = "0.01 kPa/mm"')
+        scene = random_scenes.write(tmp_path / choice, case, random_scenes.lines(0.0, 0.0))
+        bench = Bench(scene, tmp_path / f"runs of {choice}")
+        found.append(bench.obtain("reference", scene.reference, "reference"))
+    chosen, listed = found
+    assert any("Gravity: needed as it turned out at frame 0" in text for text in chosen.origin["effects_chosen"])
+    assert "effects were added, from frame 0 on" in chosen.outcome.message
+    assert chosen.positions == pytest.approx(listed.positions, abs=1e-6)
+    # 4 cm3 of 20 kg/m3 weigh 0.78 mN, which one bone carries more than the other does; springs of 1e-5 MPa/mm over 100 mm2.
+    forces = [chosen.scalars[f"force_{name}"][-1] for name in ("origin", "insertion")]
+    assert abs(forces[1] - forces[0]) == pytest.approx(4000 * 20e-12 * 9810, rel=1e-3)
 
 
 def test_at_its_end_a_run_is_judged_by_the_stress_that_there_was(tmp_path, monkeypatch) -> None:

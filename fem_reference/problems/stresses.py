@@ -1,18 +1,18 @@
 """Stresses by the energies of effects, differentiated by ``jets``: they share nothing with a solver."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from fem_reference.effects import Effect, State, elastic_state, total_energy
+from fem_reference.effects import Effect, Energy, Prestrain, State, elastic_state, total_energy
 from fem_reference.foundations.jets import Jet, JetFunctions, variables
 from fem_reference.foundations.mesh import Floats, Ints, TetMesh, tet_volumes
 
 Acting = Sequence[tuple[Effect, float]]
 
 # So many tetrahedra are looked at, evenly spread, and so many at once, so that their jets fit in a cache.
-_MOST, _AT_ONCE = 4096, 1024
+_MOST, _AT_ONCE = 2048, 1024
 _SMALLEST = 0.05  # det F of tetrahedra that are looked at: between their corners what is curved may turn inside out
 
 
@@ -70,11 +70,18 @@ class Sampled:
             return Asked(np.nan, (np.nan,) * len(others), (np.nan, np.nan))
         F, volumes, fibre = F[good], self.volumes[good], None if self.fibre is None else self.fibre[good]
         now = kirchhoff(acting, F, fibre)
-        added = [kirchhoff([*acting, one], F, fibre) - now for one in others]
+        added = [_added(acting, one, now, lambda terms: kirchhoff(terms, F, fibre)) for one in others]
         shear = now - np.trace(now, axis1=1, axis2=2)[:, None, None] / 3 * np.eye(3)
         return Asked(
             _mean(shear, volumes), tuple(_mean(one, volumes) for one in added), _stretches(acting, F, fibre, volumes)
         )
+
+
+def _added(acting: Acting, one: tuple[Effect, float], now: Floats, stress: Callable[[Acting], Floats]) -> Floats:
+    """What an effect adds to the stress ``now`` (n, 3, 3) of what is ``acting``: an energy its own, in what is prestretched."""
+    if isinstance(one[0], Energy):
+        return stress([*(other for other in acting if isinstance(other[0], Prestrain)), one])
+    return stress([*acting, one]) - now if isinstance(one[0], Prestrain) else np.zeros(now.shape)
 
 
 def _stretches(acting: Acting, F: Floats, fibre: Floats | None, volumes: Floats) -> tuple[float, float]:
