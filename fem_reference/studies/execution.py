@@ -16,6 +16,7 @@ import numpy as np
 from filelock import FileLock, Timeout
 
 from fem_reference import __version__, solvers
+from fem_reference.assessment import second_check
 from fem_reference.foundations.records import Record, join
 from fem_reference.foundations.usage import forget_peak_memory, peak_memory
 from fem_reference.io import files
@@ -70,14 +71,21 @@ class Bench[C: Case]:
         if choice.solver == "recorded":  # files may change behind a name; they are read anew each time
             return self.read(name, choice, place)
         settings, folder = self.settings(choice, place), self.folder(choice, place)
-        ended = ("converged", "stopped") if self._watches(choice.solver) else ("converged",)
+        ended = ("converged", "denied", *(("stopped",) if self._watches(choice.solver) else ()))
         if (stored := _stored(folder, name, ended)) is not None:
-            return self._with_all_that_matters(stored, choice, place)
+            return self._with_all_that_matters(self._checked(stored), choice, place)
         solvers.require(choice.solver, settings, place, self.scene.task)
         self.made_for(choice.solver, settings)  # what is wrong with the input shows before anything is written
         with _alone(folder):
-            run = _stored(folder, name, ended) or self._solve(name, choice.solver, settings, folder)
+            run = self._checked(_stored(folder, name, ended) or self._solve(name, choice.solver, settings, folder))
         return self._with_all_that_matters(run, choice, place)
+
+    def _checked(self, run: Run) -> Run:
+        """The ``run``; that of a muscle by a solver of effects with the second check of it, which is stored with it."""
+        asked = self.scene.task == "solve" and solvers.takes_effects(run.solver)
+        if not asked or run.outcome.status not in ("converged", "denied"):
+            return run
+        return second_check.confirmed_run(self.problem(), run)
 
     def _watches(self, solver: str) -> bool:
         """Whether the case left effects out that may turn out to matter."""

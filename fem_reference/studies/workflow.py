@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fem_reference import export, report
-from fem_reference.assessment import judge, solver_table
+from fem_reference.assessment import judge, second_check, solver_table
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.export import paraview
@@ -259,7 +259,8 @@ def solve_body(body: Body, *, progress: Progress | None = None, **settings: Any)
             got = f"displacements {shape} of points (2, 3)"
             raise InputError(f'prescribed "{entry.name}": path', got, "one (3,) for each point, as (n, 3)")
     with _reported(progress):
-        return fenicsx.solve_body(body, parse(fenicsx.BodySettings, settings, "settings"))
+        solved = fenicsx.solve_body(body, parse(fenicsx.BodySettings, settings, "settings"))
+        return second_check.confirmed_body(body, solved)
 
 
 @contextmanager

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from fem_reference.assessment import second_check
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.metrics import Measure
 from fem_reference.report.sections import Section
@@ -14,7 +15,7 @@ from fem_reference.runs.store import Run
 
 def _facts(_: Comparison) -> dict[str, Any]:
     """What its alarms are made of."""
-    return {"inversion": inversion, "least": least, "greatest": greatest, "gap": gap}
+    return {"inversion": inversion, "least": least, "greatest": greatest, "gap": gap, "second_check": second_check.said}
 
 
 def greatest(run: Run, scalar: str) -> float:
