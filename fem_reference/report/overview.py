@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fem_reference.assessment import second_check
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.doubts import doubts
 from fem_reference.assessment.error_bars import ErrorBar
@@ -140,6 +141,9 @@ def comparison_text(result: Comparison, page: Path | None = None) -> str:
     runs += [
         f"reference: doubtful, {why}" for why in doubts(result.reference) if why != result.reference.outcome.status
     ]
+    answers = second_check.said(result.reference)
+    if answers and result.reference.outcome.status == "converged":
+        runs.append(f"second check: passed, {len(answers)} questions")
     judged = [_judged(verdict) for verdict in result.verdicts]
     asked = {verdict.expectation.of for verdict in result.verdicts}
     unjudged = result.candidates and asked == {"reference"}

@@ -59,6 +59,8 @@ def _failed(comparison: Comparison) -> str:
     why = f"{reference.outcome.message.rstrip('.')}."
     if not len(kept):
         return f"{why} No frame was reached, so that nothing could be measured against it."
+    if reference.outcome.status == "denied":
+        return f"{why} What follows is measured against no truth."
     last = label(comparison.scene, comparison.setup, reference.numbers[kept[-1]])
     return f"{why} {len(kept)} of {wanted} frames were reached, up to {last}: what follows is about these."
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
-from fem_reference.assessment import ranking
+from fem_reference.assessment import ranking, second_check
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.convergence import Ladder
 from fem_reference.assessment.doubts import doubts
@@ -48,6 +48,7 @@ def summary(comparison: Comparison) -> dict[str, Any]:
         "message": reference.outcome.message,
         "verdict": comparison.word,
         "doubts": doubts(reference),
+        "second_check": reference.origin.get(second_check.RECORD, {}),
         "cost": {run.name: {key: finite(value) for key, value in run.outcome.cost.items()} for run in runs(comparison)},
         "measures": from_rest[reference.name] + rows(reference, inversion(reference)) + deviations,
         "from_rest": [row for rows in from_rest.values() for row in rows],

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from fem_reference import __version__, solvers
+from fem_reference.assessment import second_check
 from fem_reference.foundations.records import Record, join
 from fem_reference.foundations.usage import forget_peak_memory, peak_memory
 from fem_reference.problems import of_case
@@ -75,18 +76,19 @@ class Bench[C: Case]:
         settings, folder = self.settings(choice, place), self.folder(choice, place)
         ended = self._ended(choice.solver)
         if (stored := taken.stored(folder, name, ended, settings)) is not None:
-            return self._with_all_that_matters(stored, choice, place)
+            return self._with_all_that_matters(self._checked(stored), choice, place)
         solvers.require(choice.solver, settings, place, self.scene.task)
         if choice == self.scene.reference:
             self.check()
         self.made_for(choice.solver, settings)  # what is wrong with the input shows before anything is written
         with taken.alone(folder), taken.bars_kept(folder):
             run = taken.stored(folder, name, ended, settings) or self._solve(name, choice.solver, settings, folder)
+            run = self._checked(run)
         return self._with_all_that_matters(run, choice, place)
 
     def _ended(self, solver: str) -> tuple[str, ...]:
         """How stored runs ended that are taken again."""
-        return ("converged", "stopped") if self._watches(solver) else ("converged",)
+        return ("converged", "denied", *(("stopped",) if self._watches(solver) else ()))
 
     def known(self, name: str, choice: SolverChoice, place: str) -> Run | None:
         """The stored run that ``obtain`` takes up, None where it would solve one."""
@@ -95,6 +97,13 @@ class Bench[C: Case]:
         with suppress(_UnsolvedError):
             return shelf.obtain(name, choice, place)
         return None
+
+    def _checked(self, run: Run) -> Run:
+        """The ``run``; that of a muscle by a solver of effects with the second check of it, which is stored with it."""
+        asked = self.scene.task == "solve" and solvers.takes_effects(run.solver)
+        if not asked or run.outcome.status not in ("converged", "denied"):
+            return run
+        return second_check.confirmed_run(self.problem, run)
 
     def _watches(self, solver: str) -> bool:
         """Whether the case left effects out that may turn out to matter."""

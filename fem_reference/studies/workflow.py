@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, overload
 
 from fem_reference import export, report
-from fem_reference.assessment import judge, solver_table
+from fem_reference.assessment import judge, second_check, solver_table
 from fem_reference.assessment.body_bars import BodyBars
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import ErrorBars
@@ -278,4 +278,5 @@ def solve_body(body: Body, *, progress: Progress | None = None, **settings: Any)
     arguments.check_progress(progress)
     with reported(progress):
         chosen = parse(fenicsx.BodySettings, settings, "settings")
-        return replace(fenicsx.solve_body(body, chosen), body=body, settings=chosen)
+        solved = second_check.confirmed_body(body, fenicsx.solve_body(body, chosen))
+        return replace(solved, body=body, settings=chosen)

@@ -232,6 +232,9 @@ def _frame(event: dict[str, Any]) -> Frame:
             for name in arrays
             if name.startswith("force ")
         }
+        for kind in ("force", "moment"):  # of all that keeps the muscle where it is
+            sums = [arrays[name] for name in arrays if name.startswith(f"{kind} ")]
+            pulls[f"net_{kind}"] = float(np.linalg.norm(np.sum(sums, axis=0)))
         places = arrays["surface"], arrays["fibres"], arrays["nodes"]
         return Frame(event["frame"], *places, scalars | pulls, note, stored_state(arrays))
 
