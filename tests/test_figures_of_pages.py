@@ -22,7 +22,15 @@ def test_the_energy_gap_is_that_which_is_farthest_from_0_in_per_cent(values: lis
 
 @pytest.mark.parametrize(
     ("seconds", "text"),
-    [(0.0, "0 s"), (0.25, "250 ms"), (1.0, "1 s"), (61.0, "61 s"), (599.0, "599 s"), (600.0, "10 min"), (None, "\N{EN DASH}")],
+    [
+        (0.0, "0 s"),
+        (0.25, "250 ms"),
+        (1.0, "1 s"),
+        (61.0, "61 s"),
+        (599.0, "599 s"),
+        (600.0, "10 min"),
+        (None, "\N{EN DASH}"),
+    ],
 )
 def test_a_time_reads_as_people_say_it(seconds: float | None, text: str) -> None:
     assert words.duration(seconds) == text
