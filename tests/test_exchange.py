@@ -138,6 +138,12 @@ def test_springs_are_stated_in_the_unit_that_they_have(scene: MuscleCase, built:
     ]
 
 
+def test_bones_that_contact_names_are_obstacles(scene: MuscleCase, built: Problem) -> None:
+    contact = parse(acting.effects.find("contact"), acting.PARAMETERS["contact"] | {"bones": ["lid"]}, "test")
+    facts = open_formats.facts(scene, replace(built, effects=(*built.effects, contact)))
+    assert [bone["obstacle"] for bone in facts["bones"]] == [False, True]
+
+
 @pytest.mark.parametrize("name", sorted(acting.PARAMETERS))
 def test_every_effect_can_be_stated(scene: MuscleCase, built: Problem, name: str) -> None:
     effect = parse(acting.effects.find(name), acting.PARAMETERS[name], "test")
