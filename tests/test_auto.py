@@ -27,6 +27,7 @@ SCENE = Estimates(
     tension=0.0,
     fixed=2,
     sag=10.0,
+    lean=0.0,
     travel=50.0,
     stretch=(0.8, 1.3),
     interval=0.01,
@@ -95,6 +96,7 @@ def test_rates_are_by_second() -> None:
 def test_tension_between_fixed_ends_straightens_and_makes_stiff() -> None:
     assert SCENE.straighten(1e3) == pytest.approx(0.6 * SCENE.sag, rel=1e-3)
     assert replace(SCENE, sag=0.0).straighten(1.0) == 0, "a straight muscle between fixed ends cannot shorten"
+    assert replace(SCENE, sag=0.0, lean=0.5).straighten(1e3) == pytest.approx(0.15 * SCENE.length, rel=1e-3)
     assert replace(SCENE, fixed=1).straighten(1e3) == pytest.approx(0.3 * SCENE.length, rel=1e-3)
     assert replace(SCENE, tension=SCENE.shear).bend(1e-5) < SCENE.bend(1e-5) / 3
 

@@ -23,6 +23,7 @@ from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx
+from fem_reference.studies import watched
 from fem_reference.studies.execution import Bench
 
 ACTIVE = """
@@ -150,6 +151,14 @@ def test_bones_that_turn_together_bend_nothing(tmp_path) -> None:
         assert guess.turn(replace(rest, attached=attached), 1) == pytest.approx(angle, abs=1e-12)
 
 
+def test_fibres_at_an_angle_lean_by_the_sine_of_twice_that(tmp_path) -> None:
+    scene = pennate(tmp_path / "scene", "auto")
+    assert estimates(scene, muscle.setup(scene)).lean == pytest.approx(np.sin(np.radians(50)))
+    case = random_scenes.TEXT.format(**STILL, choice="auto", effects="")
+    straight = random_scenes.write(tmp_path / "straight", case, random_scenes.lines(0.0, 0.0))
+    assert estimates(straight, muscle.setup(straight)).lean == pytest.approx(0, abs=1e-6)
+
+
 def test_a_strain_is_what_no_rigid_motion_makes() -> None:
     points = shapes.box((2, 2, 8), (10, 10, 40)).points
     turn = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]])
@@ -269,6 +278,9 @@ def test_a_run_that_was_watched_to_its_end_is_not_watched_again(tmp_path, monkey
     assert len(made) == 1
     assert run.origin["watched"] == bench.watch().names
     assert bench.watch().seen == {}
+    watched.begin(bench.watch(), SimpleNamespace(folder=run.folder, frames=run.numbers[:3]))  # of one that was cut off
+    assert tuple(bench.watch().seen) == run.numbers[:3]
+    assert all(one.asked.acts == pytest.approx(0, abs=1e-12) for one in bench.watch().seen.values())
 
 
 def test_what_loads_move_has_a_speed(tmp_path, monkeypatch) -> None:

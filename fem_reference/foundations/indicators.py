@@ -41,8 +41,9 @@ class Estimates:
 
     ``length`` and ``thickness`` of the muscle, its ``shear`` modulus at rest, and the ``tension`` [MPa] of its
     fibres at their length at rest, the mean over the frames; ``fixed``: to how many bones; ``sag``: how far its
-    axis gets from the straight line between two of them; ``travel``: how far its surface goes at most, by the motion of the bones;
-    ``stretch``: of the line from one attachment to the other, the smallest and the greatest; ``interval``
+    axis gets from the straight line between two of them; ``lean``: by how much fibres lean against that line, from 0 to 1;
+    ``travel``: how far its surface goes at most, by the motion of the bones;
+    ``stretch`` of fibres, by that of the line from one attachment to the other, the smallest and the greatest; ``interval``
     from a frame number to the next, None where the scene does not say it; ``speed``, its part
     ``sideways`` of that line, ``jump`` (of velocity from one instant to the next) and ``acceleration``: the greatest, by frame
     numbers; ``frames``: all numbers, and knots of ramps; ``tolerance`` [mm] and ``stress_tolerance`` [MPa]:
@@ -55,6 +56,7 @@ class Estimates:
     tension: float
     fixed: int
     sag: float
+    lean: float
     travel: float
     stretch: tuple[float, float]
     interval: float | None
@@ -98,11 +100,12 @@ class Estimates:
 
     def straighten(self, pull: float) -> float:
         """How far the surface moves, root mean square, where fibres ``pull`` [MPa] at a beam with clamped ends: 0.6 of its sag is
-        the most that they can take out, and its stiffness in bending resists. One that has not two ends is free to shorten.
+        the most that they can take out, and its stiffness in bending resists; those that lean shear it. One that has not two ends
+        is free to shorten.
         """
         if self.fixed < 2:
             return self.shorten(pull, 0.3)
-        return 0.6 * self.sag * self.taut(pull) / (1 + self.taut(pull))
+        return 0.6 * self.sag * self.taut(pull) / (1 + self.taut(pull)) + self.shorten(pull, 0.3) * self.lean
 
     def shorten(self, pull: float, share: float) -> float:
         """How far the surface moves, root mean square, where fibres ``pull`` [MPa] against the matrix: by a ``share`` of the length

@@ -19,6 +19,7 @@ from fem_reference.effects import (
 from fem_reference.foundations.indicators import Estimates, Indicator, Near
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.motion import apply
+from fem_reference.problems import fibre_field
 from fem_reference.problems.guess import (
     Guess,
     axis_of,
@@ -143,6 +144,7 @@ def estimates(scene: MuscleCase, rest: Setup) -> Estimates:
         tension=_tension(scene),
         fixed=len(rest.attached),
         sag=sag(rest, frames, travel),
+        lean=fibre_field.lean(scene, axis_of(rest)),
         travel=travel,
         stretch=(taut * low, taut * high),
         interval=scene.frames.interval,

@@ -223,14 +223,14 @@ def _write(writer: store.Writer, built: Setup, solver: Any, settings: Record, re
             watched.see(watch, frame)
 
     if watch is not None:
-        watch.seen.clear()
+        watched.begin(watch, writer)
     forget_peak_memory()
     began = time.process_time()
     go_on = solver.go_on
     try:
         outcome = go_on(built, settings, add, writer.cut_off) if go_on else solver.solve(built, settings, add)
         if watch is not None and outcome.status == "converged":
-            watched.end(watch, writer)
+            watched.end(watch)
     except watched.StoppedError as why:
         outcome = Outcome("stopped", str(why))
     processor, cost = time.process_time() - began, outcome.cost

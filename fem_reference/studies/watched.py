@@ -12,16 +12,21 @@ class StoppedError(Exception):
     """A run that goes on with other effects, and why."""
 
 
+def begin(watch: Watch, writer: store.Writer) -> None:
+    """Begin to watch a run, of which a process before this one may have stored frames."""
+    watch.seen.clear()
+    for number in writer.frames:
+        watch.see(number, *cut_off.places(writer.folder, number))
+
+
 def see(watch: Watch, frame: Frame) -> None:
     """StoppedError where an effect matters in a ``frame`` that was solved."""
     if frame.surface is not None:
         _stop(watch.see(frame.number, frame.surface, frame.tets))
 
 
-def end(watch: Watch, writer: store.Writer) -> None:
-    """StoppedError where one matters beside all that acted in a run; frames that a process before this one solved are read."""
-    for number in set(writer.frames) - set(watch.seen):
-        _stop(watch.see(number, *cut_off.places(writer.folder, number)))
+def end(watch: Watch) -> None:
+    """StoppedError where one matters beside all that acted in a run."""
     _stop(watch.end())
 
 
