@@ -15,6 +15,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from fem_reference.assessment.differences import carried, typical, typical_changes
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.io import files, texts
@@ -32,8 +33,7 @@ VARIATION = 2.0
 # where displacement goes with the root of the distance, order 1 comes, and 2 only where a mesh that resolves them is graded towards
 # them; from elsewhere 2 or more: in general it is between, as three sizes in a row show too (docs/accuracy.md).
 ORDER, ORDER_OF_WORST = 1.5, 1.0
-TETRAHEDRA = "tetrahedra"
-_MOVED = 0.01  # of what a surface moves at most: where it has moved by less, shares of that say nothing
+TETRAHEDRA, CARRIED = "tetrahedra", "surface in tetrahedra"
 # The measures of a run against another or (None) its rest.
 _Measured = Callable[[Run, Run | None], tuple[Measure, ...]]
 # By what a bar is of, by how much (f,) each statistic differs between two runs.
@@ -131,12 +131,15 @@ def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
     moved = _rms_of_surface(statistics, [one.values for one in measured(surface(pair.fine), None)])
     sizes = {TETRAHEDRA: _sizes(differences(pair.coarse, pair.fine), statistics, moved)}
     sizes |= {name: _sizes(differences(run, pair.coarse), statistics) for name, run in pair.varied.items()}
+    outside = carried(pair.fine, moved)
     exact = None if pair.exact is None else differences(pair.exact, pair.coarse)
     bars = []
     for of in get_args(Of):
         for i, one in enumerate(statistics):
             left = dict.fromkeys(sizes, VARIATION) | {TETRAHEDRA: pair.share(one.metric, one.statistic)}
             parts = {name: left[name] * size[of][i] for name, size in sizes.items()}
+            if one.metric == "volume" and one.statistic in outside:
+                parts[CARRIED] = SAFETY * outside[one.statistic]
             greatest = {name: float(part.max()) for name, part in parts.items()}
             model = None if exact is None else np.abs(exact[of][i])
             total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))  # of causes that are independent
@@ -147,55 +150,6 @@ def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
 def is_local(statistic: str) -> bool:
     """Whether a ``statistic`` is that of the worst place, or of the worst fibre, alone."""
     return statistic.startswith(("max", "hausdorff"))
-
-
-def ratio(differences: Floats, scale: Floats) -> float:
-    """The root mean square of ``differences`` (f,) over that of ``scale`` (f,), of the frames where both are known; NaN where the
-    scale is 0.
-    """
-    known = np.isfinite(differences) & np.isfinite(scale)
-    squares = float(scale[known] @ scale[known])
-    return math.sqrt(float(differences[known] @ differences[known]) / squares) if squares > 0 else math.nan
-
-
-def typical(differences: Floats, apart: Floats, moved: Floats | None = None) -> Floats:
-    """The size (f,) of signed ``differences`` (f,) of a statistic between two runs whose surfaces are ``apart`` (f,) [mm]: at least
-    what it is for surfaces so far apart on average over the frames. A difference that crosses zero says nothing about the error
-    there; where the surfaces are the same it is 0.
-
-    Of surfaces that have ``moved`` (f,) [mm], where that is given, it counts as at least the share of it that it is in the median
-    frame: two meshes that agree better in some poses than in others do so by chance.
-    """
-    size = apart if moved is None else np.maximum(apart, _median_share(apart, moved) * moved)
-    return np.maximum(np.abs(differences), np.nan_to_num(ratio(differences, apart)) * size)
-
-
-def _median_share(apart: Floats, moved: Floats) -> float:
-    """What surfaces are ``apart`` (f,) over what they have ``moved`` (f,), in the median frame where they have; 0 without any."""
-    known = np.isfinite(apart) & (moved > _MOVED * np.nanmax(moved, initial=0.0))
-    return float(np.median(apart[known] / moved[known])) if known.any() else 0.0
-
-
-def typical_changes(changes: list[Floats], deviations: list[Floats], metrics: list[str]) -> list[Floats]:
-    """The sizes (f,) of signed differences of ``changes`` (f,) from rest between two runs, by statistic: at least the share of the
-    ``deviations`` (f,) of these runs from each other that they are on average, over the frames and the statistics of their metric.
-
-    By the triangle inequality a change of the same places differs by no more than their deviation, and by less as most of that is
-    not along the displacement or cancels. How much less, one statistic alone does not show: its difference may be small by chance,
-    that of the worst place above all.
-    """
-    shares = [ratio(found, deviation) for found, deviation in zip(changes, deviations, strict=True)]
-    means = {name: _rms_of_known(zip(metrics, shares, strict=True), name) for name in set(metrics)}
-    return [
-        np.maximum(np.abs(found), means[metric] * deviation)
-        for metric, found, deviation in zip(metrics, changes, deviations, strict=True)
-    ]
-
-
-def _rms_of_known(shares: Iterable[tuple[str, float]], wanted: str) -> float:
-    """The root mean square of the shares of the metric ``wanted`` that are known, 0 without any."""
-    known = [share for metric, share in shares if metric == wanted and math.isfinite(share)]
-    return math.sqrt(sum(share**2 for share in known) / len(known)) if known else 0.0
 
 
 def _sizes(differences: _Differences, statistics: tuple[Measure, ...], moved: Floats | None = None) -> _Differences:
