@@ -29,6 +29,7 @@ from fem_reference.runs.store import Frame, Outcome, Run, Sink
 from fem_reference.scenes.case import MACHINE_ONLY, Case, SolverChoice
 from fem_reference.solvers import recorded
 from fem_reference.solvers.common.protocol import MuscleSolver
+from fem_reference.studies import expected_cost
 
 log = logging.getLogger(__name__)
 
@@ -84,7 +85,10 @@ class Bench[C: Case]:
         solvers.require(choice.solver, settings, place, self.scene.task)
         if choice == self.scene.reference:
             self.check()
-        self.made_for(choice.solver, settings)  # what is wrong with the input shows before anything is written
+        built = self.made_for(choice.solver, settings)  # what is wrong with the input shows before anything is written
+        takes = expected_cost.seconds(choice.solver, built, settings)
+        long = "" if takes is None else f", about {takes:.2g} s of processor time"
+        log.info("%s: no stored run of it in %s; solving%s", name, folder.parent.resolve(), long)
         with _alone(folder):
             run = _stored(folder, name, ended) or self._solve(name, choice.solver, settings, folder)
         return self._with_all_that_matters(run, choice, place)
