@@ -28,7 +28,7 @@ from fem_reference.runs.store import Frame, Outcome, Run
 from fem_reference.scenes.case import MACHINE_ONLY, Case, SolverChoice
 from fem_reference.solvers import recorded
 from fem_reference.solvers.common.protocol import MuscleSolver
-from fem_reference.studies import taken, watched
+from fem_reference.studies import expected_cost, taken, watched
 
 log = logging.getLogger(__name__)
 
@@ -80,7 +80,10 @@ class Bench[C: Case]:
         solvers.require(choice.solver, settings, place, self.scene.task)
         if choice == self.scene.reference:
             self.check()
-        self.made_for(choice.solver, settings)  # what is wrong with the input shows before anything is written
+        built = self.made_for(choice.solver, settings)  # what is wrong with the input shows before anything is written
+        takes = expected_cost.seconds(choice.solver, built, settings)
+        long = "" if takes is None else f", about {takes:.2g} s of processor time"
+        log.info("%s: no stored run of it in %s; solving%s", name, folder.parent.resolve(), long)
         with taken.alone(folder), taken.bars_kept(folder):
             run = taken.stored(folder, name, ended, settings) or self._solve(name, choice.solver, settings, folder)
             run = self._checked(run)

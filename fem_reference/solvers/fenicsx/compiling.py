@@ -62,21 +62,21 @@ def _lock(folder: Path, number: int) -> FileLock:
     return FileLock(folder / f".fem_reference_{number}.lock")
 
 
-def _alone[**P, R](compiled: Callable[P, R]) -> Callable[P, R]:
+def _alone[R](compiled: Callable[..., R]) -> Callable[..., R]:
     """FFCx's way to compile, by one process at a time for what is the same: it takes for granted that nothing of a form is there
     when it has compiled it, and ends with an error where an interrupted process, or one that was taken for dead, left some.
     """
 
     @wraps(compiled)
-    def waiting(*given: P.args, **options: P.kwargs) -> R:
+    def waiting(objects: list[Any], *given: Any, **options: Any) -> R:
         folder = Path(str(options["cache_dir"]))
         folder.mkdir(parents=True, exist_ok=True)
-        with _lock(folder, int(naming.compute_signature(given[0], "")[:8], 16) % _LOCKS):
+        with _lock(folder, int(naming.compute_signature(objects, "")[:8], 16) % _LOCKS):
             try:
-                return compiled(*given, **options)
+                return compiled(objects, *given, **options)
             except (FileExistsError, ModuleNotFoundError, TimeoutError):
                 _remove_broken(folder)
-            return compiled(*given, **options)
+            return compiled(objects, *given, **options)
 
     return waiting
 
