@@ -21,7 +21,7 @@ from fem_reference.foundations.usage import forget_peak_memory, peak_memory
 from fem_reference.problems import of_case
 from fem_reference.problems.muscle import Problem, Setup
 from fem_reference.problems.scalar import FieldProblem
-from fem_reference.runs import cut_off, store
+from fem_reference.runs import cut_off, states, store
 from fem_reference.runs.fields import VALUES, NodalField
 from fem_reference.runs.key import code_hash, key, versions
 from fem_reference.runs.store import Frame, Outcome, Run
@@ -75,7 +75,7 @@ class Bench[C: Case]:
             return self.read(name, choice, place)
         settings, folder = self.settings(choice, place), self.folder(choice, place)
         ended = self._ended(choice.solver)
-        if (stored := taken.stored(folder, name, ended, settings)) is not None:
+        if (stored := _stored(folder, name, ended, settings)) is not None:
             return self._with_all_that_matters(self._checked(stored), choice, place)
         solvers.require(choice.solver, settings, place, self.scene.task)
         if choice == self.scene.reference:
@@ -85,7 +85,7 @@ class Bench[C: Case]:
         long = "" if takes is None else f", about {takes:.2g} s of processor time"
         log.info("%s: no stored run of it in %s; solving%s", name, folder.parent.resolve(), long)
         with taken.alone(folder), taken.bars_kept(folder):
-            run = taken.stored(folder, name, ended, settings) or self._solve(name, choice.solver, settings, folder)
+            run = _stored(folder, name, ended, settings) or self._solve(name, choice.solver, settings, folder)
             run = self._checked(run)
         return self._with_all_that_matters(run, choice, place)
 
@@ -270,6 +270,25 @@ def _(built: FieldProblem, solver: Any, settings: Record, folder: Path, identity
 def without_states(choice: SolverChoice) -> SolverChoice:
     """The ``choice`` of a run that is only measured, one of many: the reference keeps no states of it."""
     return choice.model_copy(update={"store_state": False}) if choice.solver == "fenicsx" else choice
+
+
+def _stored(folder: Path, name: str, ended: tuple[str, ...], settings: Record) -> Run | None:
+    """The run in ``folder`` that ``ended`` so, under the name that it has here; None where there is none, other packages made
+    it, or it lacks states that the ``settings`` ask for.
+    """
+    run = store.finished(folder, ended)
+    if run is None:
+        return None
+    now, then = versions(), run.origin.get("versions", {})
+    other = [package for package in now if package in then and now[package] != then[package] and package != "python"]
+    if other:
+        log.info("%s: solved before, but with another %s; solving again", name, other[0])
+        return None
+    if getattr(settings, "store_state", None) and not states.are_kept(folder, run.numbers):
+        log.info("%s: solved before without its states; solving again", name)
+        return None
+    log.info("%s: solved before, taken from %s", name, folder)
+    return replace(run, name=name)
 
 
 def complete(run: Run, numbers: tuple[int, ...]) -> Run:

@@ -1,19 +1,16 @@
-"""Runs that are taken from the store: who makes them meanwhile, which fit what is asked for, what is kept beside them."""
+"""The folders of runs while they are made: by one process at a time, and with the error bars that are beside them."""
 
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 from filelock import FileLock, Timeout
 
 from fem_reference.assessment import error_bars
-from fem_reference.foundations.records import Record
 from fem_reference.io import files
-from fem_reference.runs import states, store
+from fem_reference.runs import store
 from fem_reference.runs.key import versions
-from fem_reference.runs.store import Run
 
 log = logging.getLogger(__name__)
 
@@ -43,22 +40,3 @@ def bars_kept(folder: Path) -> Iterator[None]:
     yield
     if bars is not None:
         files.write_text(path, bars)
-
-
-def stored(folder: Path, name: str, ended: tuple[str, ...], settings: Record) -> Run | None:
-    """The run in ``folder`` that ``ended`` so, under the name that it has here; None where there is none, other packages made
-    it, or it lacks states that the ``settings`` ask for.
-    """
-    run = store.finished(folder, ended)
-    if run is None:
-        return None
-    now, then = versions(), run.origin.get("versions", {})
-    other = [package for package in now if package in then and now[package] != then[package] and package != "python"]
-    if other:
-        log.info("%s: solved before, but with another %s; solving again", name, other[0])
-        return None
-    if getattr(settings, "store_state", None) and not states.are_kept(folder, run.numbers):
-        log.info("%s: solved before without its states; solving again", name)
-        return None
-    log.info("%s: solved before, taken from %s", name, folder)
-    return replace(run, name=name)
