@@ -76,7 +76,7 @@ def test_what_is_left_out_does_not_matter_and_what_is_kept_does(seed: int, tmp_p
     found = [one for one in of_case.explained(scene) if one.indicator is not None]
     built = problem(scene, SIZES[0])
     whole = solved(scene, built)
-    context = MeasurementContext.of(whole, whole.fibres, built.bones, built.free)
+    context = MeasurementContext.of(whole, whole.fibres, built.bones, built.exempt)
     pair = Pair(whole, solved(scene, problem(scene, SIZES[1])), SIZES, {}, safety=SAFETY * UNGRADED)
     bars = known(error_bars.error_bars(pair, context))
     left = [one.effect for one in found if not acts(one, whole)]
