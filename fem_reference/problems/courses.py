@@ -69,7 +69,8 @@ def moving_ramp(effect: Effect, size: float) -> Moving | None:
 
 def some(points: Floats) -> Floats:
     """As many of ``points`` (n, 3) as are looked at, evenly among them."""
-    return points[np.unique(np.linspace(0, len(points) - 1, min(len(points), _POINTS)).astype(int))]
+    chosen = np.unique(np.linspace(0, len(points) - 1, min(len(points), _POINTS)).astype(int))
+    return np.asarray(points[chosen])
 
 
 def stops(things: Sequence[Moving], frames: Sequence[float], size: float) -> tuple[float, ...]:

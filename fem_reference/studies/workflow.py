@@ -11,6 +11,7 @@ from fem_reference.assessment import judge, solver_table
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.export import paraview
+from fem_reference.foundations.given import path
 from fem_reference.foundations.records import parse
 from fem_reference.problems import of_case
 from fem_reference.problems.body import Body
@@ -43,7 +44,7 @@ def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Cas
 
     """
     arguments.check_changes(changes)
-    arguments.path(case, "case")
+    path(case, "case")
     return of_case.chosen(casefile.read(case, changes=dict(changes or {})))
 
 
@@ -113,7 +114,7 @@ def read_run(folder: str | Path, case: Case, *, unit: str | None = None) -> Run:
 
     """
     arguments.check_case(case)
-    choice = recorded.choice(arguments.path(folder, "folder"), unit)
+    choice = recorded.choice(path(folder, "folder"), unit)
     return Bench(case, STORE).read(choice.name, choice, "folder")
 
 
