@@ -123,8 +123,8 @@ SETTINGS: dict[str, list[Any]] = {
     "first_step": [1.0, 0.1, 100.0],
     "residual": [1e-8, 1e-300, 1e300],
     "newton_iterations": [14, 1, 2**40],
-    "smallest_step": [0.02, 1e-12, 10.0],
-    "largest_step": [None, 0.3, 1e-9],
+    "smallest_step": [0.02, 10.0],
+    "largest_step": [None, 0.3],
     "quadrature_degree": [None, 2, 10**6],
     "store_state": [True, False],
     "follow": ["stable", "equilibrium"],
@@ -218,7 +218,7 @@ def solving(draw: Any) -> Callable[[], Any]:
     fitting = "P1" if isinstance(body, fr.Body) and getattr(body.mesh, "kind", "") == "tetrahedron" else "Q1"
     with suppress(AttributeError, TypeError):
         fitting = {"P1": "P1/P1", "Q1": "Q1/P0"}[fitting] if any(one.unknowns for one in body.effects) else fitting
-    settings = {"element": fitting, "time_limit": "8 s"} | {name: draw(often(SETTINGS[name])) for name in names}
+    settings = {"element": fitting, "time_limit": "60 s"} | {name: draw(often(SETTINGS[name])) for name in names}
     progress = draw(often([None]))
     return lambda: denied(body, fr.solve_body(body, progress=progress, **settings))
 

@@ -14,7 +14,7 @@ from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import Body, Cells, Prescribed, boundary_facets, check_element, reference_nodes
 from fem_reference.problems.contact import Contact
 
-_SAME = 1e-9  # of the body's size: rounding of what two regions prescribe alike
+_SAME = 1e-6  # of the body's size, by which two regions may prescribe what is meant to be the same
 _UNIT = 1e-6  # by which a unit vector may be longer or shorter
 _FLAT = 1e-9  # of the cube of its longest edge: a cell of less volume has none
 _FARTHEST = 1e9  # [mm] from the origin
