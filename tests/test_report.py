@@ -175,6 +175,7 @@ def test_summary_has_the_documented_keys_and_survives_json(comparison):
         "status",
         "message",
         "verdict",
+        "second_check",
         "cost",
         "measures",
         "from_rest",
