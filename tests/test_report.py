@@ -176,6 +176,7 @@ def test_summary_has_the_documented_keys_and_survives_json(comparison):
         "message",
         "verdict",
         "doubts",
+        "second_check",
         "cost",
         "measures",
         "from_rest",

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from fem_reference import cli, effects
 from fem_reference.assessment import comparison, second_check
-from fem_reference.assessment.questions import of_body, of_muscle
+from fem_reference.assessment.questions import Answer, of_body, of_muscle
 from fem_reference.foundations.mesh import Surface
 from fem_reference.foundations.motion import Rotation as Turn
 from fem_reference.foundations.motion import Translation
@@ -149,6 +149,24 @@ last = 20
 every = 5
 [reference]
 solver = "fenicsx"
+[[expect]]
+of = "reference"
+metric = "volume"
+statistic = "deviation"
+frame = "any"
+truth = "0 %"
+within = "0.5 %"
+kind = "property"
+because = "it is next to incompressible"
+[[expect]]
+of = "candidates"
+metric = "surface_deviation"
+statistic = "max"
+frame = "any"
+truth = "0 mm"
+within = "1 mm"
+kind = "property"
+because = "it is the same"
 """
 
 
@@ -182,6 +200,30 @@ def test_a_ball_that_goes_through_a_bar_that_does_not_move_is_denied(tmp_path) -
     denied = second_check.confirmed(CONVERGED, of_muscle(problem, run))
     assert denied.status == "denied"
     assert denied.message.startswith("denied by the second check: ball in the muscle: ")
+
+
+def test_no_verdict_rests_on_a_denied_reference(tmp_path) -> None:
+    problem = coarse(tmp_path)
+    case, run = casefile.read(tmp_path), resting(problem)
+    fibres = np.broadcast_to(problem.fibres.points, (5, *problem.fibres.points.shape))
+    run = replace(run, fibres=problem.fibres, fibre_positions=fibres)
+    mine = replace(run, name="mine", solver="recorded")
+    words = {}
+    for status in ("converged", "denied"):
+        reference = replace(run, outcome=Outcome(status, "so it ended"))
+        result = comparison.compare(case, problem, reference, (mine,))
+        words[status] = (result.word, *((one.expectation.of, one.word) for one in result.verdicts))
+    assert words["converged"] == ("pass", ("reference", "pass"), ("mine", "pass"))
+    assert words["denied"] == ("fail", ("reference", "fail"), ("mine", "inconclusive"))
+
+
+def test_what_is_no_number_is_never_met() -> None:
+    assert [Answer("a", value, 1.0, "mm", 0).met for value in (0.0, 1.0, 1.1, np.nan, np.inf)] == [
+        True,
+        True,
+        *[False] * 3,
+    ]
+    assert not Answer("a", 0.0, np.nan, "mm", 0).met
 
 
 def test_what_is_so_at_rest_is_no_crossing(tmp_path) -> None:
@@ -261,6 +303,14 @@ def test_a_turn_takes_steps_enough(tmp_path, last, steps, met) -> None:
     assert ("lid turns by load step" in lost(problem, run)) is not met
     (answer,) = (one for one in of_muscle(problem, run) if one.asked == "lid turns by load step")
     assert_allclose(answer.value, 2 * np.pi / (steps if last == 2 else 4 * steps))
+
+
+def test_there_and_back_counts_twice(tmp_path) -> None:
+    problem = away(coarse(tmp_path))
+    lid = replace(problem.bones[1], motion=Turn((0, 0, 1), (5, 5, 0), (0.0, 1.0, 2.0), (0.0, np.pi, 0.0)))
+    problem = replace(problem, bones=(problem.bones[0], lid))
+    run = resting(problem, load_steps=np.array([0.0, 2, 1, 1, 1]))
+    assert lost(problem, run) == ["lid turns by load step"]
 
 
 def test_forces_that_are_not_in_balance(tmp_path) -> None:

@@ -6,7 +6,7 @@ farthest beyond.
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import chain, pairwise
 
@@ -105,6 +105,9 @@ def of_muscle(problem: Problem, run: Run) -> Answers:
     found = (_complete(problem.frames, run.numbers), _finite(run.numbers, arrays))
     if not all(one.met for one in found):
         return found
+    if problem.start is not None:  # its first state is where it is put
+        scalars = {name: values[1:] for name, values in run.scalars.items()}
+        run = replace(run, numbers=run.numbers[1:], positions=run.positions[1:], scalars=scalars)
     attached = chain.from_iterable(_attached(problem, run, entry) for entry in problem.attached)
     crossed = chain(_depths(problem, run), _creases(run))
     return (*found, *_worst(chain(attached, _steps(problem, run), _balance(problem, run), crossed)))
@@ -192,7 +195,7 @@ def _balance(problem: Problem, run: Run) -> Iterator[Answer]:
     residual = _BALANCE * run.origin.get("settings", {}).get("residual", math.nan)
     allowed = residual * math.sqrt(run.outcome.cost.get("unknowns", math.nan))
     for kind, unit, arm in (("force", "N", 1.0), ("moment", "N mm", float(np.abs(run.positions).max()))):
-        if not outer and f"net_{kind}" in run.scalars:
+        if not outer and f"net_{kind}" in run.scalars and math.isfinite(allowed):
             for number, value in zip(run.numbers, run.scalars[f"net_{kind}"], strict=True):
                 yield Answer(f"{kind}s out of balance", float(value), allowed * arm, unit, number)
 
@@ -217,34 +220,40 @@ def _states(run: Run, bones: Sequence[RigidBody]) -> Iterator[tuple[int, int]]:
 
 
 def _depths(problem: Problem, run: Run) -> Iterator[Answer]:
-    """How deep each bone in contact and the muscle are in each other; beyond rest, where that is more than is allowed."""
+    """How deep each bone in contact and the muscle are in each other; beyond rest, where that is more than contact gives way. Never
+    to the middle of a bone.
+    """
     contact, rest = problem.contact, Within(run.surface)
     at_rest = cache(lambda bone: depths(rest, bone.surface, bone.shape, np.eye(4)))
+    pressures = np.nan_to_num(run.scalars.get("contact_pressure", np.zeros(len(run.numbers))))
     for i, number in _states(run, bones := [one for one in problem.bones if contact and contact.is_by(one.name)]):
         muscle = Within(run.surface.moved_to(run.positions[i]))
         for bone in bones:
-            allowed = _yielding(problem, run, i, bone)
+            half, allowed = bone.shape.half_thickness, _give(problem, bone, float(pressures[i]))
             found = depths(muscle, bone.surface, bone.shape, bone.pose(number))
             deepest, place = found.deepest()
             if deepest > allowed:
                 deepest, place = found.deepest(at_rest(bone))
+                allowed += _behind(muscle.surface, place) / half if pressures[i] > 0 else 0.0
+            allowed = min(allowed, _GIVEN_WAY * half)
             yield _at(f"{bone.name} in the muscle", np.array([deepest]), np.array([allowed]), number, place[None])
 
 
-def _yielding(problem: Problem, run: Run, i: int, bone: RigidBody) -> float:
-    """How deep [mm] a bone may be in the muscle in frame i: by the give of contact under the pressure that was recorded, the
-    error of the distance to the bone, what is between points of contact, and where there is some how far the flat triangles of the
-    surface are behind the round bone that presses it. Never to its middle.
+def _give(problem: Problem, bone: RigidBody, pressure: float) -> float:
+    """How deep [mm] a bone may get: by the give of contact under the ``pressure`` [MPa] that was recorded, the error of the
+    distance to it, and what is between points of contact.
     """
     assert problem.contact is not None  # asked where there is contact
-    pressure = float(np.nan_to_num(run.scalars.get("contact_pressure", np.zeros(len(run.numbers)))[i]))
-    corners, half = run.surface.points[run.surface.triangles], bone.shape.half_thickness
-    edge = float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())
     known = bone.shape.error if isinstance(bone.shape, Grid) else 0.0
-    behind = edge**2 / (8 * half) if pressure > 0 else 0.0
-    return min(
-        pressure / problem.contact.stiffness + known + _BETWEEN * spacing(run.surface) + behind, _GIVEN_WAY * half
-    )
+    return pressure / problem.contact.stiffness + known + _BETWEEN * spacing(problem.surface)
+
+
+def _behind(surface: Surface, place: Floats) -> float:
+    """How far the middle of the flat triangle at a ``place`` is behind a sphere through its corners, times its radius [mm2]: what
+    is between vertices is curved where a bone presses.
+    """
+    corners = surface.points[surface.triangles[distances(place[None], surface).triangle[0]]]
+    return float((np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1) ** 2).max()) / 6
 
 
 def _creases(run: Run) -> Iterator[Answer]:

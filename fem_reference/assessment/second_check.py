@@ -4,18 +4,21 @@ import hashlib
 import logging
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from fem_reference.assessment import questions
 from fem_reference.assessment.questions import Answer, Answers, of_body, of_muscle
+from fem_reference.foundations.records import Record
 from fem_reference.problems.body import Body
 from fem_reference.problems.muscle import Problem
 from fem_reference.runs.contents import amend
 from fem_reference.runs.solved import Solved
-from fem_reference.runs.store import Outcome, Run
+from fem_reference.runs.store import Frame, Outcome, Run
 
 log = logging.getLogger(__name__)
 
@@ -48,6 +51,18 @@ def confirmed_run(problem: Callable[[], Problem], run: Run) -> Run:
         amend(run.folder, status=outcome.status, message=outcome.message, origin=origin)
     log.info("%s: second check: %s", run.name, "passed" if outcome.status == "converged" else outcome.message)
     return replace(run, outcome=outcome, origin=origin)
+
+
+def confirmed_frames(problem: Problem, frames: Sequence[Frame], outcome: Outcome, settings: Record) -> Outcome:
+    """The ``outcome`` of ``frames`` of a muscle that are not stored, denied where the check denies that they converged."""
+    if outcome.status != "converged":
+        return outcome
+    names = set.intersection(*(set(frame.scalars) for frame in frames))
+    scalars = {name: np.array([frame.scalars[name] for frame in frames]) for name in names}
+    numbers, positions = tuple(frame.number for frame in frames), np.array([frame.surface for frame in frames])
+    run = Run("", "", outcome, numbers, problem.surface, positions, scalars=scalars)
+    run = replace(run, origin={"settings": settings.model_dump(mode="json")})
+    return confirmed(outcome, of_muscle(problem, run))
 
 
 def _code() -> str:

@@ -103,7 +103,7 @@ class Stress:
         return Counter(cell.verdict for cell in self.cells if cell.solver == solver)
 
 
-_OTHER_REASONS = ("timed out", "crashed")  # that a run may have to end than that there is no solution
+_OTHER_REASONS = ("timed out", "crashed", "denied")  # that a run may have to end than that there is no solution
 Weighed = Sequence[tuple[Bound, Course]]
 
 

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from fem_reference import __version__, solvers
-from fem_reference.assessment import health, stress
+from fem_reference.assessment import health, second_check, stress
 from fem_reference.assessment.health import Followed
 from fem_reference.assessment.stress import Cell, HardCase, Scene, Stress
 from fem_reference.foundations.errors import InputError, MissingSoftware
@@ -215,6 +215,8 @@ def _muscle(built: Problem, choice: SolverChoice) -> tuple[Outcome, Followed]:
     steps.told(outcome)
     if not frames:
         frames.append(Frame(built.frames[0], np.array(built.surface.points)))
+    if solvers.takes_effects(choice.solver):
+        outcome = second_check.confirmed_frames(built, frames, outcome, settings)
     return outcome, _followed(built, frames)
 
 
