@@ -24,7 +24,7 @@ def export(scene: MuscleCase, build: Callable[[], Problem], folder: Path, form: 
     ``"febio"`` adds FEBio's own file to the open ones, and warns of what is another model there. InputError where the folder is
     not free, or FEBio has not the same.
     """
-    if form not in FORMATS:
+    if not isinstance(form, str) or form not in FORMATS:
         raise InputError("form", repr(form), f"one of {', '.join(FORMATS)}")
     check(folder)
     if form == "febio":

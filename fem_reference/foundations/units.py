@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Sequence
 from functools import cache, partial
+from numbers import Real
 from typing import Annotated, Any
 
 import pint
@@ -180,7 +181,7 @@ def written(value: Any, unit: str) -> Any:
     >>> written(0.01, "MPa"), written((0, 0, -1), "mm"), written("2 cm", "mm"), written(3, "")
     ('0.01 MPa', '0.0, 0.0, -1.0 mm', '2 cm', 3)
     """
-    if not unit or isinstance(value, str | bool):
-        return value
     numbers = value if isinstance(value, Sequence) else (value,)
+    if not unit or isinstance(value, str | bool) or not all(isinstance(number, Real) for number in numbers):
+        return value
     return f"{', '.join(repr(float(number)) for number in numbers)} {unit}"

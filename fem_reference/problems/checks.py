@@ -2,19 +2,19 @@
 
 from collections.abc import Sequence
 from itertools import combinations, pairwise
-from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
 
 from fem_reference.effects import Effect, Load
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.given import said
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import Body, Cells, Prescribed, boundary_facets, check_element, reference_nodes
 from fem_reference.problems.contact import Contact
 
-_SAME = 1e-9  # of the body's size: rounding of what two regions prescribe alike
+_SAME = 1e-6  # of the body's size, by which two regions may prescribe what is meant to be the same
 _UNIT = 1e-6  # by which a unit vector may be longer or shorter
 _FLAT = 1e-9  # of the cube of its longest edge: a cell of less volume has none
 _FARTHEST = 1e9  # [mm] from the origin
@@ -28,7 +28,7 @@ def check(body: Body, element: str) -> None:
     speaks of, and prescribes what can be distinguished, followed and solved.
     """
     if not isinstance(body, Body):
-        raise InputError("body", _said(body), "a Body")
+        raise InputError("body", said(body), "a Body")
     _check_cells(body.mesh)
     _check_many("effects", body.effects, Effect, "effects")
     _check_many("prescribed", body.prescribed, Prescribed, "what is prescribed where")
@@ -50,73 +50,80 @@ def check(body: Body, element: str) -> None:
 def check_box(counts: Any, size: Any, kind: Any, degree: Any) -> None:
     """InputError unless a box has numbers of cells, lengths, a kind of cell and a degree."""
     many = isinstance(counts, tuple | list) and len(counts) == 3
-    if not many or not all(isinstance(one, Integral) and not isinstance(one, bool) and one > 0 for one in counts):
-        raise InputError("counts", _said(counts), "numbers of cells along x, y, z, from 1 on")
+    if not many or not all(_is_integer(one) and one > 0 for one in counts):
+        raise InputError("counts", said(counts), "numbers of cells along x, y, z, from 1 on")
     if int(counts[0]) * int(counts[1]) * int(counts[2]) > _MOST_CELLS:
-        raise InputError("counts", _said(counts), f"{_MOST_CELLS} cells at most")
+        raise InputError("counts", said(counts), f"{_MOST_CELLS} cells at most")
     many = isinstance(size, tuple | list | np.ndarray) and len(np.shape(size)) == 1 and len(size) == 3
     if not many or not all(_is_number(one) and one > _SHORTEST for one in size):
-        raise InputError("size", _said(size), f"lengths along x, y, z, from {_SHORTEST:g} to {_FARTHEST:g} mm")
+        raise InputError("size", said(size), f"lengths along x, y, z, from {_SHORTEST:g} to {_FARTHEST:g} mm")
     if not max(size) < _LONGEST * min(size):
-        raise InputError("size", _said(size), f"an edge less than {_LONGEST:g} times as long as another")
+        raise InputError("size", said(size), f"an edge less than {_LONGEST:g} times as long as another")
     _check_kind("", kind, degree)
 
 
 def _check_kind(place: str, kind: Any, degree: Any) -> None:
     if not isinstance(kind, str) or kind not in ("tetrahedron", "hexahedron"):
-        raise InputError(f"{place}kind", _said(kind), '"tetrahedron" or "hexahedron"')
-    if not isinstance(degree, Integral) or isinstance(degree, bool) or degree not in (1, 2):
-        raise InputError(f"{place}degree", _said(degree), "1 or 2")
+        raise InputError(f"{place}kind", said(kind), '"tetrahedron" or "hexahedron"')
+    if not _is_integer(degree) or degree not in (1, 2):
+        raise InputError(f"{place}degree", said(degree), "1 or 2")
 
 
 def check_frames(frames: Any, place: str) -> None:
     """InputError unless ``frames`` are numbers, each later than the one before."""
     known = isinstance(frames, Sequence | np.ndarray) and not isinstance(frames, str | bytes)
     if not known or len(frames) == 0 or not all(_is_number(one) for one in frames):
-        raise InputError(place, _said(frames), "frame numbers, at least one")
+        raise InputError(place, said(frames), "frame numbers, at least one")
     if not all(early < late for early, late in pairwise(frames)):
-        raise InputError(place, _said(frames), "frame numbers that are each later than the one before")
+        raise InputError(place, said(frames), "frame numbers that are each later than the one before")
     if len(frames) > _MOST:
         raise InputError(place, f"{len(frames)} of them", f"{_MOST} at most")
 
 
 def _is_number(value: Any) -> bool:
     """Whether a value is a number that has a place among others, and is not a truth value."""
-    return isinstance(value, Real) and not isinstance(value, bool | np.bool_) and abs(value) <= _FARTHEST
+    return (
+        isinstance(value, int | float | np.integer | np.floating) and not _is_truth(value) and abs(value) <= _FARTHEST
+    )
 
 
-def _said(value: Any) -> str:
-    return f"{type(value).__name__} {value!r}" if not isinstance(value, np.ndarray) else f"an array {value.shape}"
+def _is_integer(value: Any) -> bool:
+    """Whether a value is an integer, and not a truth value."""
+    return isinstance(value, int | np.integer) and not _is_truth(value)
+
+
+def _is_truth(value: Any) -> bool:
+    return value is True or value is False
 
 
 def _check_many(place: str, given: Any, kind: type, want: str) -> None:
     if not isinstance(given, tuple | list):
-        raise InputError(place, _said(given), f"{want}, in a tuple")
+        raise InputError(place, said(given), f"{want}, in a tuple")
     for i, one in enumerate(given):
         if not isinstance(one, kind):
-            raise InputError(f"{place}[{i}]", _said(one), f"a {kind.__name__}")
+            raise InputError(f"{place}[{i}]", said(one), f"a {kind.__name__}")
 
 
 def _check_rest(body: Body) -> None:
     """InputError where an optional part of a body is not what it should be."""
     if body.interval is not None and not (_is_number(body.interval) and body.interval > 0):
-        raise InputError("interval", _said(body.interval), "a time above 0 s, or None")
+        raise InputError("interval", said(body.interval), "a time above 0 s, or None")
     for name in ("fibre", "start"):
         part = getattr(body, name)
         if part is not None and not callable(part):
-            raise InputError(name, _said(part), "a function, or None")
+            raise InputError(name, said(part), "a function, or None")
     if body.contact is not None and not isinstance(body.contact, Contact):
-        raise InputError("contact", _said(body.contact), "a Contact, or None")
+        raise InputError("contact", said(body.contact), "a Contact, or None")
 
 
 def _check_cells(mesh: Any) -> None:
     """InputError unless ``mesh`` has finite points, and cells and facets between them."""
     if not isinstance(mesh, Cells):
-        raise InputError("mesh", _said(mesh), "Cells")
+        raise InputError("mesh", said(mesh), "Cells")
     _check_kind("mesh.", mesh.kind, mesh.degree)
     points = mesh.points
     if not isinstance(points, np.ndarray) or points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind != "f":
-        raise InputError("mesh.points", _said(points), "an array (n, 3) of floats")
+        raise InputError("mesh.points", said(points), "an array (n, 3) of floats")
     if not (np.abs(points) <= _FARTHEST).all():
         raise InputError("mesh.points", "a point that is not finite, or too far away", f"up to {_FARTHEST:g} mm away")
     nodes = len(reference_nodes(mesh.kind, mesh.degree))
@@ -124,7 +131,7 @@ def _check_cells(mesh: Any) -> None:
     if not len(mesh.cells):
         raise InputError("mesh.cells", "none", "at least one")
     if not isinstance(mesh.facets, dict):
-        raise InputError("mesh.facets", _said(mesh.facets), "a dictionary of arrays by region")
+        raise InputError("mesh.facets", said(mesh.facets), "a dictionary of arrays by region")
     for name, facets in mesh.facets.items():
         _check_indices(f"mesh.facets[{name!r}]", facets, (3,) if mesh.kind == "tetrahedron" else (4,), len(points))
     _check_volumes(mesh)
@@ -132,9 +139,9 @@ def _check_cells(mesh: Any) -> None:
 
 def _check_indices(place: str, given: Any, widths: tuple[int, ...], count: int) -> None:
     if not isinstance(given, np.ndarray) or given.dtype.kind not in "iu" or given.ndim != 2:
-        raise InputError(place, _said(given), f"an array of integers (m, {widths[0]})")
+        raise InputError(place, said(given), f"an array of integers (m, {widths[0]})")
     if given.shape[1] not in widths:
-        raise InputError(place, _said(given), f"an array of integers (m, {widths[0]})")
+        raise InputError(place, said(given), f"an array of integers (m, {widths[0]})")
     if given.size and not (given.min() >= 0 and given.max() < count):
         raise InputError(place, f"index {int(given.min())} to {int(given.max())}", f"indices from 0 to {count - 1}")
 
@@ -155,12 +162,12 @@ def _check_prescribed(prescribed: Sequence[Prescribed]) -> None:
     for entry in prescribed:
         place = f"prescribed.{entry.name}"
         if not isinstance(entry.name, str) or not isinstance(entry.on, str | Skin):
-            raise InputError(f"{place}: name and on", f"{_said(entry.name)}, {_said(entry.on)}", "a text, and a region")
+            raise InputError(f"{place}: name and on", f"{said(entry.name)}, {said(entry.on)}", "a text, and a region")
         if names.count(entry.name) > 1:
             raise InputError("prescribed", f'"{entry.name}" twice', "a name for each")
         _check_components(f"{place}.components", entry.components)
         if not callable(entry.path):
-            raise InputError(f"{place}.path", _said(entry.path), "a function of points and a frame number")
+            raise InputError(f"{place}.path", said(entry.path), "a function of points and a frame number")
         if entry.stiffness is None and not isinstance(entry.on, str):
             raise InputError(f"{place}.stiffness", "none on a skin", "springs")
         if entry.stiffness is not None and not (_is_number(entry.stiffness) and entry.stiffness > 0):
@@ -169,9 +176,9 @@ def _check_prescribed(prescribed: Sequence[Prescribed]) -> None:
 
 def _check_components(place: str, components: Any) -> None:
     axes = isinstance(components, tuple | list) and len(components) > 0
-    axes = axes and all(isinstance(one, Integral) and not isinstance(one, bool) and 0 <= one <= 2 for one in components)
+    axes = axes and all(_is_integer(one) and 0 <= one <= 2 for one in components)
     if not axes or len(set(components)) < len(components):
-        raise InputError(place, _said(components), "axes among 0, 1, 2 for x, y, z, each once")
+        raise InputError(place, said(components), "axes among 0, 1, 2 for x, y, z, each once")
 
 
 def _check_regions(mesh: Cells, names: tuple[str, ...]) -> None:

@@ -10,7 +10,8 @@ two of them at least, and again between where it moves far: what it does within 
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
 from itertools import pairwise
 from typing import Any
 
@@ -69,7 +70,8 @@ def moving_ramp(effect: Effect, size: float) -> Moving | None:
 
 def some(points: Floats) -> Floats:
     """As many of ``points`` (n, 3) as are looked at, evenly among them."""
-    return points[np.unique(np.linspace(0, len(points) - 1, min(len(points), _POINTS)).astype(int))]
+    chosen = np.unique(np.linspace(0, len(points) - 1, min(len(points), _POINTS)).astype(int))
+    return np.asarray(points[chosen])
 
 
 def stops(things: Sequence[Moving], frames: Sequence[float], size: float) -> tuple[float, ...]:
@@ -78,6 +80,7 @@ def stops(things: Sequence[Moving], frames: Sequence[float], size: float) -> tup
     """
     if len(frames) < 2 or not things:
         return ()
+    things = [replace(thing, at=cache(thing.at)) for thing in things]
     looked = _Looked(things, np.unique(np.concatenate([_grid(thing, frames) for thing in things])), size)
     while len(wide := looked.wide()):
         looked = _Looked(things, np.unique(np.concatenate([looked.frames, wide])), size)

@@ -9,13 +9,9 @@ import numpy as np
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.given import path, said
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case
-
-
-def said(value: object) -> str:
-    """A value as messages show it."""
-    return f"{type(value).__name__} {value!r}"
 
 
 def check_case(case: Any) -> None:
@@ -44,19 +40,6 @@ def check_progress(progress: Any) -> None:
     """InputError unless it can be called, or is None."""
     if progress is not None and not callable(progress):
         raise InputError("progress", said(progress), "a function of a line, such as print, or None")
-
-
-def path(given: Any, place: str) -> Path:
-    """What ``given`` names on a disk, there or not; InputError where that can be nothing."""
-    if not isinstance(given, str | Path) or not str(given):
-        raise InputError(place, said(given), "a path")
-    try:
-        Path(given).exists()
-        (Path(given) / "x").exists()
-        str(given).encode()
-    except (OSError, ValueError) as error:  # too long, or with a null character
-        raise InputError(place, said(given), f"a path that can be there ({error})") from error
-    return Path(given)
 
 
 def free_folder(given: Any, place: str) -> Path:

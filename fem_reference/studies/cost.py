@@ -68,7 +68,7 @@ def _of(scene: MuscleCase, store: Path, workers: Workers, only: Collection[str])
     if truth.outcome.status != "converged" or truth.fibres is None:
         raise InputError(scene.place, f"a reference that {truth.outcome.status}", "one that reaches all frames")
     bars = refinement.stored(truth) or refinement.obtain(bench, truth, model=False)
-    context = MeasurementContext.of(truth, truth.fibres, bench.setup().bones, bench.setup().free)
+    context = MeasurementContext.of(truth, truth.fibres, bench.setup().bones, bench.setup().exempt)
     trials = list[Trial]()
     if not only or scene.reference.solver in only:
         trials += reference_trials(scene)

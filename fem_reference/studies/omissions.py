@@ -196,7 +196,7 @@ def _listed(trials: Mapping[str, list[tuple[Part, Trial]]]) -> list[tuple[Part, 
 def _context(bench: Bench[MuscleCase], truth: Run) -> MeasurementContext | None:
     if truth.fibres is None:
         return None
-    return MeasurementContext.of(truth, truth.fibres, bench.setup().bones, bench.setup().free)
+    return MeasurementContext.of(truth, truth.fibres, bench.setup().bones, bench.setup().exempt)
 
 
 def _bars(bench: Bench[MuscleCase], reference: Made) -> tuple[dict[str, float], str]:

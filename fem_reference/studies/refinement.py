@@ -100,7 +100,7 @@ def obtain(bench: Bench[MuscleCase], reference: Run, *, model: bool = True) -> E
         pair = _pair(bench, reference, model)
     log.info("error bar: measuring the runs against each other")
     bars = error_bars.error_bars(
-        pair, MeasurementContext.of(reference, reference.fibres, bench.setup().bones, bench.setup().free)
+        pair, MeasurementContext.of(reference, reference.fibres, bench.setup().bones, bench.setup().exempt)
     )
     if reference.folder is not None:
         error_bars.save(bars, reference.folder, _of(reference))

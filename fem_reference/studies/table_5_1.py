@@ -79,7 +79,7 @@ def _on(
     reference = complete(bench.obtain("reference", scene.reference, "reference"), numbers)
     bars = refinement.stored(reference)
     assert reference.fibres is not None  # a reference has an interior
-    context = MeasurementContext.of(reference, reference.fibres, bench.setup().bones, bench.setup().free)
+    context = MeasurementContext.of(reference, reference.fibres, bench.setup().bones, bench.setup().exempt)
     found = [_result(scene, REFERENCE, reference, bars.of_deviations if bars else ())]
     meeting = [(row.name, *entry) for row in rows for entry in chosen(scene, row)]
     for i, (kind, candidate, place) in enumerate(meeting):

@@ -55,7 +55,7 @@ def _of(scene: MuscleCase, store: Path) -> list[Claim]:
     run = complete(finer.obtain("finer", scene.reference, "reference"), reference.numbers)
     if reference.fibres is None or run.outcome.status != "converged":
         return []
-    context = MeasurementContext.of(reference, reference.fibres, bench.setup().bones, bench.setup().free)
+    context = MeasurementContext.of(reference, reference.fibres, bench.setup().bones, bench.setup().exempt)
     return claims_of(scene.name, bars, (reference, run), context)
 
 

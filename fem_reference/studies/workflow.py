@@ -12,6 +12,7 @@ from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.export import paraview
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.given import path
 from fem_reference.foundations.progress import Progress, reported
 from fem_reference.foundations.records import parse
 from fem_reference.problems import of_case
@@ -44,7 +45,7 @@ def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Cas
 
     """
     arguments.check_changes(changes)
-    arguments.path(case, "case")
+    path(case, "case")
     return of_case.chosen(casefile.read(case, changes=dict(changes or {})))
 
 
@@ -114,7 +115,7 @@ def read_run(folder: str | Path, case: Case, *, unit: str | None = None) -> Run:
 
     """
     arguments.check_case(case)
-    choice = recorded.choice(arguments.path(folder, "folder"), unit)
+    choice = recorded.choice(path(folder, "folder"), unit)
     return Bench(case, STORE).read(choice.name, choice, "folder")
 
 

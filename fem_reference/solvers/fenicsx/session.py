@@ -99,7 +99,9 @@ def session() -> Iterator[Session]:
 
 
 def solve_body(body: Body, settings: BodySettings) -> Solved:
-    """The states of ``body`` by a session of its own."""
+    """The states of ``body`` by the session that is shared now, or else by one of its own."""
+    if (shared_now := present()) is not None:
+        return shared_now.solve(body, settings)
     with session() as own:
         return own.solve(body, settings)
 

@@ -12,10 +12,12 @@ from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, Tet
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import join
 from fem_reference.geometry.block import kuhn, lattice_skin
+from fem_reference.geometry.exemption import free_skin
 from fem_reference.geometry.rigid_bodies import Sphere
 from fem_reference.geometry.sectors import attached_shares
-from fem_reference.geometry.skins import attached_skin, free_skin, spacing
+from fem_reference.geometry.skins import attached_skin, spacing
 from fem_reference.geometry.tessellation import tessellated
+from fem_reference.problems.contact import check_exempt
 from fem_reference.problems.muscle import AttachedVertices, Problem, RigidBody, Setup, solid
 from fem_reference.scenes.bones import Bone
 from fem_reference.studies.hard.records import FACES, Block, Face, Hard, Hold, Start
@@ -95,6 +97,8 @@ def _start(block: Block, start: Start | None) -> Moved | None:
 
 
 def _problem(block: Block, setup: Setup, mesh: TetMesh, acting: tuple[effects.Effect, ...]) -> Problem:
+    if among(acting) is not None:
+        check_exempt(setup.exempt, "hold")
     apart = block.points_apart or spacing(setup.surface)
     fibre = Along(block.fibre) if any("fibre" in effect.needs for effect in acting) else None
     return Problem(
@@ -110,7 +114,7 @@ def _problem(block: Block, setup: Setup, mesh: TetMesh, acting: tuple[effects.Ef
         seconds=0.0,
         fibre=fibre,
         start=setup.start,
-        skin=None if among(acting) is None else free_skin(setup.surface, setup.free, mesh, apart),
+        skin=None if among(acting) is None else free_skin(setup.exempt, mesh, apart),
         attached_skins={
             end.attachment: attached_skin(setup.surface, attached_shares(setup.surface, end.vertices), mesh, apart)
             for end in setup.attached
