@@ -20,8 +20,9 @@ from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.runs import store as runs
 from fem_reference.runs.store import Run
 from fem_reference.scenes.muscle import MuscleCase
-from fem_reference.studies.execution import Bench, without_states
+from fem_reference.studies.execution import Bench
 from fem_reference.studies.ladders import Trial
+from fem_reference.studies.taken import without_states
 
 log = logging.getLogger(__name__)
 

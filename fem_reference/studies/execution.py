@@ -267,11 +267,6 @@ def _(built: FieldProblem, solver: Any, settings: Record, folder: Path, identity
     writer.close(solution.outcome, form=solution.form or built.form)
 
 
-def without_states(choice: SolverChoice) -> SolverChoice:
-    """The ``choice`` of a run that is only measured, one of many: the reference keeps no states of it."""
-    return choice.model_copy(update={"store_state": False}) if choice.solver == "fenicsx" else choice
-
-
 def _stored(folder: Path, name: str, ended: tuple[str, ...], settings: Record) -> Run | None:
     """The run in ``folder`` that ``ended`` so, under the name that it has here; None where there is none, other packages made
     it, or it lacks states that the ``settings`` ask for.

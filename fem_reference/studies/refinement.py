@@ -24,7 +24,8 @@ from fem_reference.runs.store import Run
 from fem_reference.scenes.bones import Bone
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx
-from fem_reference.studies.execution import Bench, complete, without_states
+from fem_reference.studies.execution import Bench, complete
+from fem_reference.studies.taken import without_states
 
 log = logging.getLogger(__name__)
 

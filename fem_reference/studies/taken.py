@@ -1,4 +1,4 @@
-"""The folders of runs while they are made: by one process at a time, and with the error bars that are beside them."""
+"""The folders of runs while they are made: by one process at a time, with the error bars beside them, with states or without."""
 
 import logging
 from collections.abc import Iterator
@@ -11,6 +11,7 @@ from fem_reference.assessment import error_bars
 from fem_reference.io import files
 from fem_reference.runs import store
 from fem_reference.runs.key import versions
+from fem_reference.scenes.case import SolverChoice
 
 log = logging.getLogger(__name__)
 
@@ -40,3 +41,8 @@ def bars_kept(folder: Path) -> Iterator[None]:
     yield
     if bars is not None:
         files.write_text(path, bars)
+
+
+def without_states(choice: SolverChoice) -> SolverChoice:
+    """The ``choice`` of a run that is only measured, one of many: the reference keeps no states of it."""
+    return choice.model_copy(update={"store_state": False}) if choice.solver == "fenicsx" else choice
