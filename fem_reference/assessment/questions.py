@@ -25,6 +25,7 @@ from fem_reference.geometry.penetrations import depths
 from fem_reference.geometry.signed_distance import Grid
 from fem_reference.geometry.skins import spacing
 from fem_reference.problems.body import Body
+from fem_reference.problems.checks import SAME
 from fem_reference.problems.muscle import AttachedVertices, Problem, RigidBody
 from fem_reference.runs.solved import Solved
 from fem_reference.runs.store import Run
@@ -90,9 +91,9 @@ def _prescribed(body: Body, solved: Solved, size: float) -> Iterator[Answer]:
             if entry.stiffness is None and isinstance(entry.on, str):
                 nodes = np.unique(body.mesh.facets[entry.on])
                 rest, along = body.mesh.points[nodes], list(entry.components)
-                away = (state.points[nodes] - rest - entry.path(rest, state.frame))[:, along]
-                off = np.abs(away).max(axis=1)
-                allowed = _ROUNDING * (size + float(np.abs(rest).max()))
+                wanted = entry.path(rest, state.frame)
+                off = np.abs((state.points[nodes] - rest - wanted)[:, along]).max(axis=1)
+                allowed = SAME * (size + float(np.abs(wanted).max()))  # by which regions may contradict where they meet
                 yield _at(f"prescribed at {entry.name}", off, np.full(len(off), allowed), state.frame, rest)
 
 

@@ -14,7 +14,7 @@ from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import Body, Cells, Prescribed, boundary_facets, check_element, reference_nodes
 from fem_reference.problems.contact import Contact
 
-_SAME = 1e-6  # of the body's size, by which two regions may prescribe what is meant to be the same
+SAME = 1e-6  # of the body's size, by which two regions may prescribe what is meant to be the same
 _UNIT = 1e-6  # by which a unit vector may be longer or shorter
 _FLAT = 1e-9  # of the cube of its longest edge: a cell of less volume has none
 _FARTHEST = 1e9  # [mm] from the origin
@@ -83,7 +83,9 @@ def check_frames(frames: Any, place: str) -> None:
 def _is_number(value: Any) -> bool:
     """Whether a value is a number that has a place among others, and is not a truth value."""
     return (
-        isinstance(value, int | float | np.integer | np.floating) and not _is_truth(value) and abs(value) <= _FARTHEST
+        isinstance(value, int | float | np.integer | np.floating)
+        and not _is_truth(value)
+        and abs(float(value)) <= _FARTHEST
     )
 
 
@@ -230,7 +232,7 @@ def check_agreement(body: Body) -> None:
         for frame in looked_at if len(places) else ():
             found = [entry.displacements(places, frame)[:, common] for entry in (one, other)]
             off = np.abs(found[0] - found[1]).max(axis=1)
-            if not off.max() <= _SAME * (body.size + np.abs(found).max()):
+            if not off.max() <= SAME * (body.size + np.abs(found).max()):
                 x, y, z = places[np.argmax(off)]
                 got = f"displacements {off.max():.4g} mm apart at ({x:.4g}, {y:.4g}, {z:.4g}) mm at frame {frame:g}"
                 raise InputError(f'prescribed "{one.name}" and "{other.name}"', got, "the same at what they share")

@@ -135,7 +135,7 @@ def estimates(scene: MuscleCase, rest: Setup) -> Estimates:
     travel = max(float(np.linalg.norm(guess.at(frame) - points, axis=1).max()) for frame in frames)
     speed, sideways, jump, acceleration = motion(guess, axis_of(rest), scene.numbers)
     size, shear = scene.muscle.tet_size / 2**scene.muscle.refinements, _shear(scene)
-    most = max(strain(points, at) for at in moved.values())
+    most = max(strain(points, guess.at(frame)) for frame in frames) if rest.attached else 0.0
     (low, high), taut = _stretch(rest, frames), _taut(scene)
     return Estimates(
         length=length_of(rest),

@@ -76,7 +76,7 @@ def _parts(kind: Kind) -> Floats:
     ten = np.concatenate([corners, [corners[list(edge)].mean(axis=0) for edge in _EDGES]])
     parts = ten[np.array(_TETRAHEDRA)]
     wrong = np.linalg.det(parts[:, 1:] - parts[:, :1]) < 0
-    return np.where(wrong[:, None, None], parts[:, [1, 0, 2, 3]], parts)
+    return np.asarray(np.where(wrong[:, None, None], parts[:, [1, 0, 2, 3]], parts))
 
 
 def _linear(kind: Kind, places: Floats) -> Floats:

@@ -17,13 +17,14 @@ from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.assessment.fronts import COSTS, Point
 from fem_reference.foundations.errors import InputError
 from fem_reference.metrics import MeasurementContext, measure
+from fem_reference.runs.complete import complete
 from fem_reference.runs.cost import seconds_per_frame
 from fem_reference.runs.key import versions
 from fem_reference.runs.store import Run
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import refinement
 from fem_reference.studies.campaign import Made, Workers, carry_out
-from fem_reference.studies.execution import Bench, complete
+from fem_reference.studies.execution import Bench
 from fem_reference.studies.features import features
 from fem_reference.studies.ladders import TETRAHEDRA, Trial, candidate_trials, reference_trials
 from fem_reference.studies.resampled_scenes import carried, resample

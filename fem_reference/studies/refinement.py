@@ -20,11 +20,12 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record
 from fem_reference.geometry.sectors import attached_area, attached_shares
 from fem_reference.metrics import MeasurementContext
+from fem_reference.runs.complete import complete
 from fem_reference.runs.store import Run
 from fem_reference.scenes.bones import Bone
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx
-from fem_reference.studies.execution import Bench, complete
+from fem_reference.studies.execution import Bench
 from fem_reference.studies.taken import without_states
 
 log = logging.getLogger(__name__)
@@ -236,7 +237,7 @@ def _of(reference: Run) -> dict[str, str]:
 def _measuring_hash() -> str:
     """A hash over the source files that measure the runs."""
     digest = hashlib.sha256()
-    for path in (*sorted(Path(metrics.__file__).parent.glob("*.py")), *(Path(one.__file__) for one in _MAKING)):
+    for path in (*sorted(Path(metrics.__file__).parent.glob("*.py")), *(Path(str(one.__file__)) for one in _MAKING)):
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
