@@ -118,7 +118,9 @@ def test_attached_vertices_follow_their_bone(bent) -> None:
 def test_cost_says_where_the_time_went(bent) -> None:
     _, outcome, frames = bent
     cost = outcome.cost
-    assert cost["newton_iterations"] == sum(frame.scalars["newton_iterations"] for frame in frames)
+    # And those to states halfway, where forces change much within a load step.
+    assert 2 * sum(frame.scalars["newton_iterations"] for frame in frames) >= cost["newton_iterations"]
+    assert cost["newton_iterations"] >= sum(frame.scalars["newton_iterations"] for frame in frames)
     assert cost["seconds_processor_solve"] == pytest.approx(sum(frame.scalars["seconds_processor"] for frame in frames))
     # Of a body so small one for each iteration, and one for the stability of each frame but the last two, which were solved before.
     assert cost["factorisations"] == cost["newton_iterations"] + len(frames) - 2
@@ -222,7 +224,7 @@ def test_a_machine_that_is_busy_is_no_time_limit(monkeypatch) -> None:
     waits = f"import time; time.sleep(1.5); print({MARK + report!r}, flush=True)"
     outcome = fenicsx._run([sys.executable, "-c", waits], Settings(time_limit="0.5 s"), lambda _: None)
     assert outcome.status == "converged"
-    monkeypatch.setattr(processes, "CLOCK", 2)
+    monkeypatch.setattr(processes, "CLOCK", 0.5)
     outcome = fenicsx._run(
         [sys.executable, "-c", waits.replace("1.5", "60")], Settings(time_limit="0.5 s"), lambda _: None
     )

@@ -15,7 +15,8 @@ class Reached:
     ``forces`` (3,) [N] of the constraint, along the prescribed components, and their ``moments`` (3,) [N mm] about the origin (at
     nodes of several regions that prescribe the same component, the force counts in each), and what obstructions exert; ``scalars``:
     min_det_F_quadrature, min_det_F_vertices, volume_ratio, energy [N mm] of what acts inside, newton_iterations, cut_backs; of
-    the reference, energy_gap since the frame before (``solvers/fenicsx/path``) where all energy is stored, negative_modes and,
+    the reference, energy_gap since the frame before (``solvers/fenicsx/path``; of muscles by Simpson's rule where the trapezoid
+    leaves much) where all energy is stored, negative_modes and,
     of those, material_modes (``solvers/fenicsx/stability``) where the tangent is symmetric, and of the means over cells
     min_cell_volume_ratio and max_cell_volume_ratio, min_cell_fibre_stretch and max_cell_fibre_stretch where a law has a limit
     on it, and outside_law, in how many cells a law is outside its range; with contact the greatest contact_depth [mm] and

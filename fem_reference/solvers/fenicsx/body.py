@@ -46,6 +46,7 @@ class AssembledBody:
         self.conserves = not any(
             isinstance(one, Energy) and (isinstance(one, Ramped) or not one.stored) for one in self.effects
         )
+        self.judged = False  # whether its energy gap is: then a state halfway is worth it where work is not resolved
         self.mesh = meshes.distribute(self.comm, body.mesh)
         # Where each of this rank's own cells stood in the body's mesh.
         own = self.mesh.topology.index_map(3).size_local

@@ -101,7 +101,8 @@ def settle(body: "AssembledBody", before: Floats, frame: float) -> None:
         body.newton.thrown += iterations
         return failure is None and body.determinants.smallest().value > 0
 
-    body.path.settle(body.energy(), halfway if body.conserves and not body.clock.matters else None)
+    looks = body.judged and body.conserves and not body.clock.matters
+    body.path.settle(body.energy(), halfway if looks else None)
     if looked:
         body.set_frame(frame)
         body.system.contact = contact

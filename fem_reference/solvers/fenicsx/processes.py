@@ -26,7 +26,9 @@ _SETTINGS = {
     "OMPI_MCA_rmaps_base_oversubscribe": "1",
 }
 _PATIENCE = 5.0  # [s] until a process that was asked to end is killed
-CLOCK = 20  # times a limit of processor time that the clock may show: longer than that a machine is too busy to say anything
+# Times a limit of processor time, and what starting takes, that the clock may show: longer than that a machine is too busy to say
+# anything.
+CLOCK, _START = 20, 3.0  # [s]
 _GLANCE = 0.02  # [s]
 MARK = "@fem_reference "  # begins each line of the worker's output that is meant for us
 
@@ -105,6 +107,7 @@ class Process:
 
     def _watch(self, time_limit: float, done: threading.Event) -> None:
         begin, before = time.monotonic(), processor_times(self.process.pid)
+        longest = CLOCK * (_START + time_limit)
         while True:
             passed = time.monotonic() - begin
             now = processor_times(self.process.pid) if before else {0: passed}
@@ -112,10 +115,10 @@ class Process:
             if used >= time_limit:
                 self.overran = "timed out", f"stopped after {time_limit:g} s of processor time, the time limit"
                 break
-            if passed >= CLOCK * time_limit:
+            if passed >= longest:
                 self.overran = "stalled", _stalled(passed, used, time_limit)
                 break
-            if done.wait(max(min(time_limit - used, CLOCK * time_limit - passed), _GLANCE)):
+            if done.wait(max(min(time_limit - used, longest - passed), _GLANCE)):
                 return
         self.end()
 

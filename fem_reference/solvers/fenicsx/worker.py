@@ -39,6 +39,7 @@ class Worker:
         self.began = time.process_time()
         self.job, self.folder, self.settings = job, folder, job.settings
         self.body = AssembledBody(job.body, job.settings)
+        self.body.judged = bool(job.samples)
         if job.body.start is not None:
             self.body.start(job.body.start)
         self.set_up = time.perf_counter() - begin
