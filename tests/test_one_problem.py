@@ -19,7 +19,7 @@ def test_unrelated_meshes_of_one_size_differ_by_less_than_two_sizes(data, tmp_pa
     assert len({run.origin["mesh"]["tets"] for run in runs.values()}) == 3
     rest = Bench(casefile.read_muscle("gluteus_medius"), tmp_path).setup()
     finest = runs["10 mm"]
-    context = MeasurementContext.of(finest, finest.fibres, rest.bones, rest.free)
+    context = MeasurementContext.of(finest, finest.fibres, rest.bones, rest.exempt)
     for metric, statistic in (("surface_deviation", "rms"), ("fibre_length", "rms_percent")):
         alike, apart = (
             abs(find(measure(runs["14 mm"], runs[other], context), metric, statistic).values[-1])

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from fem_reference.foundations.mesh import Floats, Surface
-from fem_reference.geometry.overlap import shared_volume
+from fem_reference.geometry import overlap
 from fem_reference.geometry.rigid_bodies import Box, HalfSpace, Obstacle, Sphere
 
 RADIUS = 50.0
@@ -16,7 +16,11 @@ BALL = shapes.sphere(5, RADIUS)  # its 20480 triangles lie up to 0.015 mm below 
 
 def shared(surface: Surface, body: Obstacle, counts: np.ndarray | None = None) -> float:
     everything = np.ones(len(surface.triangles), bool)
-    return shared_volume(surface, everything if counts is None else counts, lambda points: body.sample(points).distance)
+    return found(surface, body, everything if counts is None else counts).volume
+
+
+def found(surface: Surface, body: Obstacle, counts: np.ndarray, *points: np.ndarray) -> overlap.Shared:
+    return overlap.shared(surface, counts, lambda places: body.sample(places).distance, np.reshape(points, (-1, 3)))
 
 
 def cap(radius: float, height: float) -> float:
@@ -73,8 +77,24 @@ def test_only_what_is_nearest_to_triangles_that_count_is_counted() -> None:
 def test_bodies_apart_and_the_same_draw_twice() -> None:
     assert shared(BALL, floor(-0.01)) == 0
     assert shared(BALL, Sphere((0, 0, 70.1), 20.0)) == 0
-    assert shared(BALL, Sphere((0, 0, 25.0), 20.0)) == 0  # swallowed whole, which no vertex shows either
     assert shared(BALL, floor(7)) == shared(BALL, floor(7))
+
+
+def test_a_body_that_is_swallowed_is_counted_whole() -> None:
+    # No vertex and no triangle comes into it, and none needs to count.
+    stone = shapes.sphere(3, 20.0)
+    nothing = np.zeros(len(BALL.triangles), bool)
+    for z, inside in ((25.0, True), (29.0, True), (71.0, False)):  # at 30 it would touch from within
+        whole = found(BALL, Sphere((0, 0, z), 20.0), nothing, stone.points + [0, 0, z])
+        assert_allclose(whole.volume, 4 / 3 * np.pi * 20**3 * inside, rtol=0.02)
+        assert_allclose(whole.deepest, 20.0 * inside, atol=2.0)  # of 4000 points and more the one next to its middle
+
+
+def test_the_deepest_point_is_known_where_something_is_shared() -> None:
+    # In a floor that is the lowest of the ball; of points drawn 4 mm apart.
+    whole = found(BALL, floor(30), np.ones(len(BALL.triangles), bool))
+    assert 26 < whole.deepest <= 30
+    assert found(BALL, floor(-1), np.ones(len(BALL.triangles), bool)) == (0, 0)
 
 
 def test_an_edge_that_no_vertex_meets_is_found() -> None:

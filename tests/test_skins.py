@@ -4,7 +4,8 @@ import numpy as np
 from numpy.testing import assert_allclose
 
 from fem_reference.foundations.mesh import Surface, TetMesh, boundary, triangle_areas
-from fem_reference.geometry.skins import attached_skin, free_skin, spacing
+from fem_reference.geometry.exemption import Exemption, free_skin
+from fem_reference.geometry.skins import attached_skin, spacing
 
 
 def unit_tet() -> tuple[Surface, TetMesh]:
@@ -12,34 +13,40 @@ def unit_tet() -> tuple[Surface, TetMesh]:
     return Surface(mesh.points, boundary(mesh.tets)[0], "tet"), mesh
 
 
+def below(surface: Surface) -> tuple[np.ndarray, Exemption]:
+    """The triangle (1,) of the face z = 0, and an exemption of all others."""
+    flat = (surface.points[surface.triangles][:, :, 2] == 0).all(axis=1)
+    shares = np.repeat(~flat[:, None], 3, axis=1).astype(float)
+    return np.flatnonzero(flat), Exemption.of(surface, [("bone", shares)])
+
+
 def test_it_stands_for_the_whole_area() -> None:
     surface, mesh = unit_tet()
-    skin = free_skin(surface, np.ones(4, bool), mesh, 2.0)
+    skin = free_skin(Exemption.of(surface), mesh, 2.0)
     assert len(skin.points) == 12
     assert_allclose(skin.areas.sum(), 1.5 + np.sqrt(3) / 2, rtol=1e-14)
 
 
 def test_what_is_attached_is_left_out_and_squares_are_exact() -> None:
-    # On the face z = 0: 1/2, 1/12 and 1/24 for 1, x^2 and x y.
+    # On the face z = 0: 1/2, 1/12 and 1/24 for 1, x^2 and x y. Its points are 0.1 and more from the other faces, the reach is 0.02.
     surface, mesh = unit_tet()
-    free = np.array([True, True, True, False])
-    skin = free_skin(surface, free, mesh, 2.0)
+    _, exempt = below(surface)
+    skin = free_skin(exempt, mesh, 2.0)
     assert_allclose(skin.points[:, 2], 0)
     assert (skin.points[:, :2] > 0.1).all()  # inside, not on its edges
     assert_allclose(skin.areas, 1 / 6)
     assert_allclose(skin.areas @ skin.points[:, 0] ** 2, 1 / 12, rtol=1e-14)
     assert_allclose(skin.areas @ (skin.points[:, 0] * skin.points[:, 1]), 1 / 24, rtol=1e-14)
     assert (skin.cells == 0).all()
-    assert len(free_skin(surface, np.zeros(4, bool), mesh, 2.0).points) == 0
 
 
 def test_long_triangles_are_cut() -> None:
     surface, mesh = unit_tet()
-    free = np.array([True, True, True, False])
-    fine = free_skin(surface, free, mesh, 0.4)
+    flat, exempt = below(surface)
+    fine = free_skin(exempt, mesh, 0.4)
     ends = np.sqrt(2 * fine.areas.max())
     assert ends < 0.4
-    assert_allclose(fine.areas.sum(), triangle_areas(surface.points, np.array([[0, 1, 2]])).sum(), rtol=1e-14)
+    assert_allclose(fine.areas.sum(), triangle_areas(surface.points, surface.triangles[flat]).sum(), rtol=1e-14)
     assert_allclose(fine.areas @ fine.points[:, 0] ** 2, 1 / 12, rtol=1e-14)
 
 

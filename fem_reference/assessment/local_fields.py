@@ -46,7 +46,7 @@ def _gaps(points: Floats, number: int, context: MeasurementContext) -> Floats:
         return np.full(len(points), np.nan)
     for bone in context.bones:
         gaps = np.minimum(gaps, to_bone(bone, number, points))
-    return np.where(context.free, gaps, np.nan)
+    return np.where(context.exempt.vertices, np.nan, gaps)
 
 
 def to_bone(bone: RigidBody, number: int, points: Floats) -> Floats:

@@ -32,7 +32,7 @@ class CurrentMeasures:
         if reference.fibres is None:
             got, want = "a run without an interior", "a reference that carries the fibres"
             raise InputError(f"{reference.name}: fibres", got, want)
-        context = MeasurementContext.of(reference, reference.fibres, setup.bones, setup.free)
+        context = MeasurementContext.of(reference, reference.fibres, setup.bones, setup.exempt)
         return cls(scene, candidate, reference, metrics.measure(candidate, reference, context), error_bars)
 
     @property

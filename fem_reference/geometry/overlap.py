@@ -1,6 +1,7 @@
-"""The volume of a closed surface's inside that lies within a rigid body, counted at random points."""
+"""The part of a closed surface's inside that lies within a rigid body, looked for at random points."""
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import igl
 import numpy as np
@@ -20,8 +21,15 @@ _PARTINGS = 3
 Distance = Callable[[Floats], Floats]
 
 
-def shared_volume(surface: Surface, counts: NDArray[np.bool_], distance: Distance) -> float:
-    """The volume of what a surface winds round inside a rigid body.
+class Shared(NamedTuple):
+    """The ``volume`` [mm3] within the rigid body, and how deep [mm] the ``deepest`` point drawn there is, 0 without."""
+
+    volume: float
+    deepest: float
+
+
+def shared(surface: Surface, counts: NDArray[np.bool_], distance: Distance, body: Floats) -> Shared:
+    """What a surface winds round inside a rigid body.
 
     Space is cut into cubes, those that may contain a part of it into smaller ones, and 4000 to 8000 random points are drawn in
     these, the same every time. On average the count is exact. Its standard deviation is at most half of what one point stands
@@ -35,20 +43,23 @@ def shared_volume(surface: Surface, counts: NDArray[np.bool_], distance: Distanc
         Triangles (m,) that count: so does a point whose nearest triangle is one of these.
     distance
         Of points (n, 3) [mm] to the rigid body, (n,) [mm], negative inside.
+    body
+        Points (k, 3) [mm] on all sides of the rigid body: where all are inside, it is swallowed.
 
     Returns
     -------
-    float
-        [mm3]; 0 where no triangle that counts comes into the body, as where it is swallowed whole; NaN where the surface has
-        blown up beyond a cubic metre.
+    Shared
+        Nothing where no triangle that counts comes into the body, nor that into the surface as far as its middle; all of a body
+        that is swallowed, whatever counts; a volume of NaN where the surface has blown up beyond a cubic metre.
 
     """
     extent = np.ptp(surface.points, axis=0)
-    if extent.max() == 0 or not _touches(surface, counts, distance):
-        return 0.0
+    within = _within(surface, body)
+    if extent.max() == 0 or not (within.any() or _touches(surface, counts, distance)):
+        return Shared(0.0, 0.0)
     if np.prod(extent / _FIRST_EDGE) > _TOO_MANY:
-        return np.nan
-    sides = _Sides(surface, counts)
+        return Shared(np.nan, 0.0)
+    sides = _Sides(surface, counts | (len(body) > 0 and within.all()))
     centres, edge = _first_cubes(surface.points)
     for _ in range(_ROUNDS):
         centres = centres[distance(centres) < _reach(edge)]
@@ -61,7 +72,15 @@ def shared_volume(surface: Surface, counts: NDArray[np.bool_], distance: Distanc
     points = np.repeat(centres, each, axis=0)
     points += edge * np.random.default_rng(0).uniform(-0.5, 0.5, points.shape)
     points = points[distance(points) < 0]
-    return float(edge**3 / each * sides.count(points).sum())
+    points = points[sides.count(points)]
+    return Shared(float(edge**3 / each * len(points)), float(-distance(points).min(initial=0.0)))
+
+
+def _within(surface: Surface, body: Floats) -> NDArray[np.bool_]:
+    """Which of the points (k, 3) of a body are inside; none where their middle is not in the surface's box."""
+    middle, low, high = body.sum(axis=0) / max(1, len(body)), surface.points.min(axis=0), surface.points.max(axis=0)
+    boxed = len(body) > 0 and bool(((middle > low) & (middle < high)).all())
+    return _inside(surface, body) if boxed else np.zeros(len(body), bool)
 
 
 def _touches(surface: Surface, counts: NDArray[np.bool_], distance: Distance) -> bool:
@@ -100,20 +119,15 @@ class _Sides:
         counting, other = self._distances(centres)
         found = counting - other <= 2 * reach
         deep = found & (np.minimum(counting, other) > reach)
-        found[deep] = self._inside(centres[deep])
+        found[deep] = _inside(self.surface, centres[deep])
         return np.asarray(found)
 
     def count(self, points: Floats) -> NDArray[np.bool_]:
         """Which of ``points`` (n, 3) are inside and nearest to a triangle that counts, (n,)."""
-        found = self._inside(points)
+        found = _inside(self.surface, points)
         counting, other = self._distances(points[found])
         found[found] = counting <= other
         return found
-
-    def _inside(self, points: Floats) -> NDArray[np.bool_]:
-        if len(points) == 0:
-            return np.zeros(0, bool)
-        return np.asarray(igl.fast_winding_number(self.surface.points, self.surface.triangles, points) > 0.5)
 
     def _distances(self, points: Floats) -> list[Floats]:
         """Distance (n,) [mm] of ``points`` (n, 3) to the triangles that count, and to the others; infinite where there are none."""
@@ -123,6 +137,12 @@ class _Sides:
             else np.full(len(points), np.inf)
             for tree, triangles in self.trees
         ]
+
+
+def _inside(surface: Surface, points: Floats) -> NDArray[np.bool_]:
+    if len(points) == 0:
+        return np.zeros(0, bool)
+    return np.asarray(igl.fast_winding_number(surface.points, surface.triangles, points) > 0.5)
 
 
 def _first_cubes(points: Floats) -> tuple[Floats, float]:

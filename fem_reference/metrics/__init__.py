@@ -13,10 +13,10 @@ from functools import singledispatch
 from typing import Any, Protocol, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, vertex_areas
+from fem_reference.geometry.exemption import Exemption
 from fem_reference.geometry.extension import Extension
 from fem_reference.problems.muscle import RigidBody, Setup
 from fem_reference.problems.scalar import FieldProblem
@@ -45,8 +45,8 @@ class Measure:
 class MeasurementContext:
     """What every run of a scene is measured with, the same for all: ``areas`` (n,) [mm2] around the surface's vertices at rest,
     the ``fibres`` at rest and the ``extension`` that carries a surface's displacement to their points, ``travel`` [mm], the
-    greatest displacement of the reference's surface over its frames, and the ``bones``, with the vertices that are ``free`` (n,)
-    of them.
+    greatest displacement of the reference's surface over its frames, the ``bones``, and what is
+    ``exempt`` from contact with them.
     """
 
     areas: Floats
@@ -54,13 +54,13 @@ class MeasurementContext:
     extension: Extension
     travel: float
     bones: tuple[RigidBody, ...]
-    free: NDArray[np.bool_]
+    exempt: Exemption
 
     @classmethod
     def of(
-        cls, reference: Run, fibres: Polylines, bones: tuple[RigidBody, ...], free: NDArray[np.bool_] | None = None
+        cls, reference: Run, fibres: Polylines, bones: tuple[RigidBody, ...], exempt: Exemption | None = None
     ) -> "MeasurementContext":
-        """The measurement context of a reference run; without ``free`` (n,), every vertex is free."""
+        """The measurement context of a reference run; without ``exempt``, nothing is."""
         rest = reference.surface
         return cls(
             areas=vertex_areas(rest.points, rest.triangles),
@@ -68,7 +68,7 @@ class MeasurementContext:
             extension=Extension.to(fibres.points, rest),
             travel=float(np.nanmax(np.linalg.norm(reference.positions - rest.points, axis=2))),
             bones=bones,
-            free=np.ones(len(rest.points), bool) if free is None else free,
+            exempt=Exemption.of(rest) if exempt is None else exempt,
         )
 
 
@@ -98,7 +98,7 @@ def _(setup: Setup, reference: Run) -> MeasurementContext:
         raise InputError(
             f"{reference.name}: fibres", "a run without an interior", "a reference that carries the fibres"
         )
-    return MeasurementContext.of(reference, reference.fibres, setup.bones, setup.free)
+    return MeasurementContext.of(reference, reference.fibres, setup.bones, setup.exempt)
 
 
 @context_of.register

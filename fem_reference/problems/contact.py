@@ -1,14 +1,22 @@
 """Contact with rigid bodies: the obstacles of a body, and the law of the contact pressure."""
 
-from collections.abc import Callable
+import logging
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats, Surface
+from fem_reference.geometry.exemption import Exemption
 from fem_reference.geometry.rigid_bodies import Obstacle
-from fem_reference.geometry.signed_distance import FAR
+from fem_reference.geometry.signed_distance import FAR, signed_distances
 from fem_reference.geometry.skins import Skin
+
+# Of what is not attached of a surface no more than this share may be exempt from contact; half of that is worth a word.
+_LOST = 0.5
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,3 +91,19 @@ def nearest_on_path(obstruction: Obstruction, starts: Floats, paths: Floats, lea
         walked[going] += np.where(gaps < FAR, np.maximum(0.9 * np.abs(gaps), least), 1.0)
         going = going[walked[going] < lengths[going]]
     return smallest
+
+
+def check_outside(bones: Mapping[str, Surface], muscle: Surface) -> None:
+    """InputError where a bone, by its place in a scene, is wholly inside the muscle: nothing moves it out."""
+    for place, bone in bones.items():
+        if signed_distances(bone.points, muscle).max() < 0:
+            raise InputError(place, "a bone wholly inside the muscle", "one that is not")
+
+
+def check_exempt(exempt: Exemption, place: str) -> None:
+    """InputError where the greater part of what is not attached is exempt from contact, a warning where much of it is."""
+    got = f"attachments within {exempt.reach:.2g} mm of {100 * exempt.lost:.0f} % of what is not attached, where no contact is felt"
+    if not exempt.lost <= _LOST:
+        raise InputError(place, got, f"at most {100 * _LOST:.0f} %: larger or fewer pieces, or no effect contact")
+    if exempt.lost > _LOST / 2:
+        log.warning("%s: %s", place, got)

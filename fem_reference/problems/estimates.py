@@ -4,7 +4,6 @@ import logging
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fem_reference.effects import (
     Effect,
@@ -48,6 +47,7 @@ STRESS_TOLERANCE, ROUNDING = 0.005, 1e-6
 _DOUBT = 1.0
 # So many frames, evenly spread, and so many vertices are looked at.
 _FRAMES, _VERTICES = 9, 1500
+_PLACES = 6000  # where contact is felt, of which it is looked how near they come to bones
 _ALONG = 0.7  # of a direction lies in triangles that are asked for the stretch along it
 _STILL = 1e-6  # [mm], what rounding moves
 _FELT = 1.0  # [mm] from a bone, more than any smoothing of contact
@@ -111,13 +111,13 @@ def decision(effect: Effect, found: Indicator | None, known: Estimates) -> Decis
 
 def solved(known: Estimates, rest: Setup, bones: tuple[RigidBody, ...], number: int, at: Floats) -> Estimates:
     """What was ``known`` before, with where the surface is ``at`` (n, 3) in a frame that was solved, beside those ``bones``."""
-    chosen = _chosen(rest)
+    chosen, felt = _chosen(rest), rest.exempt.places(_PLACES)
     points, moved = rest.surface.points[chosen], at[chosen]
     return replace(
         known,
         travel=float(np.linalg.norm(moved - points, axis=1).max()),
         stretch=stretched(rest, at),
-        near={bone.name: _near(bone, points, {number: moved}, rest.free[chosen], 0.0) for bone in bones},
+        near={bone.name: _near(bone, felt @ rest.surface.points, {number: felt @ at}, 0.0) for bone in bones},
     )
 
 
@@ -129,13 +129,13 @@ def _chosen(rest: Setup) -> Ints:
 def estimates(scene: MuscleCase, rest: Setup) -> Estimates:
     """What effects ask of a scene: by a guess of where the surface goes, each point with the bones that it is nearest to."""
     frames, chosen = _sampled(scene.numbers), _chosen(rest)
-    points = rest.surface.points[chosen]
-    guess = Guess.of(points, rest)
-    moved = {frame: guess.at(frame) if rest.attached else points for frame in frames}
+    points, places = rest.surface.points[chosen], rest.exempt.places(_PLACES) @ rest.surface.points
+    guess, felt = Guess.of(points, rest), Guess.of(places, rest)
+    moved = {frame: felt.at(frame) if rest.attached else places for frame in frames}
     travel = max(float(np.linalg.norm(guess.at(frame) - points, axis=1).max()) for frame in frames)
     speed, sideways, jump, acceleration = motion(guess, axis_of(rest), scene.numbers)
     size, shear = scene.muscle.tet_size / 2**scene.muscle.refinements, _shear(scene)
-    most = max(strain(points, at) for at in moved.values())
+    most = max(strain(points, guess.at(frame)) for frame in frames) if rest.attached else 0.0
     (low, high), taut = _stretch(rest, frames), _taut(scene)
     return Estimates(
         length=length_of(rest),
@@ -155,7 +155,7 @@ def estimates(scene: MuscleCase, rest: Setup) -> Estimates:
         frames=_instants(scene),
         tolerance=TOLERANCE * (min(size, travel) if travel > _STILL else size),
         stress_tolerance=STRESS_TOLERANCE * shear * max(most, ROUNDING),
-        near={bone.name: _near(bone, points, moved, rest.free[chosen], _DOUBT) for bone in rest.bones},
+        near={bone.name: _near(bone, places, moved, _DOUBT) for bone in rest.bones},
     )
 
 
@@ -238,11 +238,11 @@ def _combined(edges: Floats, parts: Floats) -> Floats:
     return np.asarray(np.einsum("tij,tj->ti", edges, parts))
 
 
-def _near(bone: RigidBody, points: Floats, moved: dict[int, Floats], free: NDArray[np.bool_], doubt: float) -> Near:
-    """How near the free points come to a ``bone``, which may be wrong by ``doubt`` of the way that they go past it."""
+def _near(bone: RigidBody, points: Floats, moved: dict[int, Floats], doubt: float) -> Near:
+    """How near ``points`` (n, 3) that are ``moved`` come to a ``bone``; it may be wrong by ``doubt`` of the way past it."""
     low, high = bone.surface.points.min(axis=0), bone.surface.points.max(axis=0)
-    local = np.stack([apply(np.linalg.inv(bone.pose(frame)), at)[free] for frame, at in moved.items()])
-    off = doubt * np.linalg.norm(local - points[free], axis=2)
+    local = np.stack([apply(np.linalg.inv(bone.pose(frame)), at) for frame, at in moved.items()])
+    off = doubt * np.linalg.norm(local - points, axis=2)
     gap = np.maximum(np.maximum(low - local, local - high), 0).max(axis=2) - off  # to its box
     some = gap < _FELT
     if some.any():

@@ -32,19 +32,21 @@ from fem_reference.foundations.motion import RigidMotion
 from fem_reference.foundations.records import join
 from fem_reference.geometry import block
 from fem_reference.geometry.distance import distances
+from fem_reference.geometry.exemption import Exemption, free_skin
 from fem_reference.geometry.fibres import Directions
 from fem_reference.geometry.intersections import self_intersections
 from fem_reference.geometry.kept_meshes import cached as cached_mesh
 from fem_reference.geometry.nested import refined
 from fem_reference.geometry.rigid_bodies import CLOSED_FORMS, Obstacle
 from fem_reference.geometry.sectors import attached_area, attached_shares
-from fem_reference.geometry.signed_distance import Grid, cached, signed_distances
-from fem_reference.geometry.skins import Skin, attached_skin, free_skin, spacing
+from fem_reference.geometry.signed_distance import Grid, cached
+from fem_reference.geometry.skins import Skin, attached_skin, spacing
 from fem_reference.geometry.tessellation import tessellated
 from fem_reference.geometry.tetrahedra import tetrahedralise
 from fem_reference.io import files
 from fem_reference.problems import fibre_field
 from fem_reference.problems.attachments import facets_under, pick
+from fem_reference.problems.contact import check_exempt, check_outside
 from fem_reference.scenes.bones import Bone
 from fem_reference.scenes.muscle import MuscleCase
 
@@ -126,16 +128,15 @@ class Setup:
         return np.concatenate([np.zeros(0, np.int64), *(entry.vertices for entry in self.attached)])
 
     @cached_property
+    def exempt(self) -> Exemption:
+        """Where the surface is exempt from contact with bones."""
+        attached = ((one.bone.name, attached_shares(self.surface, one.vertices)) for one in self.attached)
+        return Exemption.of(self.surface, attached)
+
+    @cached_property
     def free(self) -> NDArray[np.bool_]:
-        """Which vertices (n,) of the surface may be in contact with bones: those that are not attached, nor any of their
-        neighbours.
-        """
-        triangles = self.surface.triangles
-        attached = np.zeros(len(self.surface.points), bool)
-        attached[self.attached_vertices] = True
-        free = ~attached
-        free[triangles[attached[triangles].any(axis=1)]] = False
-        return free
+        """Which vertices (n,) of the surface may be in contact with bones."""
+        return ~self.exempt.vertices
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +183,11 @@ def build(scene: MuscleCase, rest: Setup) -> Problem:
     contact = among(scene.effects)
     distances_known = {} if contact is None else _distance_facts(rest)
     if contact is not None:
-        _check_outside(scene, rest, contact)
+        outside = {join(scene.place, f"bone[{i}]"): bone for i, bone in enumerate(rest.bones)}
+        check_outside(
+            {place: bone.surface for place, bone in outside.items() if contact.is_by(bone.name)}, rest.surface
+        )
+        check_exempt(rest.exempt, join(scene.place, "attachment"))
     mesh = _filled(scene, rest, scene.muscle.tet_size)
     exact = tuple(attached.attachment for attached in rest.attached if attached.stiffness is None)
     for _ in range(scene.muscle.refinements):
@@ -205,7 +210,7 @@ def build(scene: MuscleCase, rest: Setup) -> Problem:
         mesh_facts=_mesh_facts(rest, mesh, scene.muscle.tet_size / 2) | distances_known,
         seconds=time.perf_counter() - begin,
         fibre=fibre if any("fibre" in effect.needs for effect in asked) else None,
-        skin=None if contact is None else free_skin(rest.surface, rest.free, mesh, apart),
+        skin=None if contact is None else free_skin(rest.exempt, mesh, apart),
         attached_skins={
             attached.attachment: attached_skin(
                 rest.surface, attached_shares(rest.surface, attached.vertices), mesh, apart
@@ -214,13 +219,6 @@ def build(scene: MuscleCase, rest: Setup) -> Problem:
             if attached.stiffness is not None
         },
     )
-
-
-def _check_outside(scene: MuscleCase, rest: Setup, contact: ContactEffect) -> None:
-    """InputError where a bone in contact is wholly inside the muscle: nothing moves it out."""
-    for i, bone in enumerate(rest.bones):
-        if contact.is_by(bone.name) and signed_distances(bone.surface.points, rest.surface).max() < 0:
-            raise InputError(join(scene.place, f"bone[{i}]"), "a bone wholly inside the muscle", "one that is not")
 
 
 def _distance_facts(rest: Setup) -> dict[str, float | str]:

@@ -41,6 +41,8 @@ def stored(folder: Path, identity: dict[str, Any]) -> dict[str, Any] | None:
         whole = parse(Contents, state | {"status": "crashed"}, f"{place}: run")
         wanted = json.loads(json.dumps(identity))
         same = (whole.solver, list(whole.frames)) == (wanted["solver"], wanted["frames"])
+        if wanted["origin"].get("settings", {}).get("store_state") and "state" not in whole.parts:
+            return None  # its frames lack what is asked for
         if same and whole.origin.versions == wanted["origin"].get("versions", {}):
             for part in folder.rglob(".*"):  # what was being written
                 part.unlink()

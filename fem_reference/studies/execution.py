@@ -5,40 +5,32 @@ import math
 import os
 import platform
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache, singledispatch
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from filelock import FileLock, Timeout
 
 from fem_reference import __version__, solvers
+from fem_reference.assessment import second_check
 from fem_reference.foundations.records import Record, join
 from fem_reference.foundations.usage import forget_peak_memory, peak_memory
-from fem_reference.io import files
 from fem_reference.problems import of_case
 from fem_reference.problems.muscle import Problem, Setup
 from fem_reference.problems.scalar import FieldProblem
-from fem_reference.runs import cut_off, store
+from fem_reference.runs import cut_off, states, store
 from fem_reference.runs.fields import VALUES, NodalField
 from fem_reference.runs.key import code_hash, key, versions
 from fem_reference.runs.store import Frame, Outcome, Run
-from fem_reference.scenes.case import Case, SolverChoice
+from fem_reference.scenes.case import MACHINE_ONLY, Case, SolverChoice
 from fem_reference.solvers import recorded
 from fem_reference.solvers.common.protocol import MuscleSolver
-from fem_reference.studies import watched
+from fem_reference.studies import expected_cost, taken, watched
 
 log = logging.getLogger(__name__)
-
-MACHINE_ONLY = {
-    "ranks",
-    "time_limit",
-    "linear_solver",
-    "precision",
-}  # settings that change the time and not the answer
 
 
 class Bench[C: Case]:
@@ -62,19 +54,59 @@ class Bench[C: Case]:
         solvers.check(choice.solver, settings, self.scene.effects, where, task)
         return settings
 
+    def check(self, chosen: Sequence[tuple[SolverChoice, str]] = ()) -> None:
+        """InputError where settings of the reference, of a candidate of the case (but frames that are only made later) or of what
+        is ``chosen`` do not suit the case. What is made of it is looked at where there is something to solve.
+        """
+        named = [(one, f"candidate[{i}]") for i, one in enumerate(self.scene.candidate) if one.solver != "recorded"]
+        wanted = [(self.scene.reference, "reference"), *chosen]
+        settings = [(one, place, self.settings(one, place)) for one, place in [*wanted, *named]]
+        solved = [(one, place) for one, place in wanted if one.solver != "recorded"]
+        if all(store.finished(self.folder(*one), self._ended(one[0].solver)) for one in solved):
+            return
+        for one, place, own in settings:
+            offer = solvers.find(one.solver, place, self.scene.task)
+            if offer.check_problem:
+                offer.check_problem(own, self.made_for(one.solver, own), join(self.scene.place, place))
+
     def obtain(self, name: str, choice: SolverChoice, place: str) -> Run:
         """The run of a solver of our own, by the name that pages give it; ``place`` is where the scene chooses it."""
         if choice.solver == "recorded":  # files may change behind a name; they are read anew each time
             return self.read(name, choice, place)
         settings, folder = self.settings(choice, place), self.folder(choice, place)
-        ended = ("converged", "stopped") if self._watches(choice.solver) else ("converged",)
-        if (stored := _stored(folder, name, ended)) is not None:
-            return self._with_all_that_matters(stored, choice, place)
+        ended = self._ended(choice.solver)
+        if (stored := _stored(folder, name, ended, settings)) is not None:
+            return self._with_all_that_matters(self._checked(stored), choice, place)
         solvers.require(choice.solver, settings, place, self.scene.task)
-        self.made_for(choice.solver, settings)  # what is wrong with the input shows before anything is written
-        with _alone(folder):
-            run = _stored(folder, name, ended) or self._solve(name, choice.solver, settings, folder)
+        if choice == self.scene.reference:
+            self.check()
+        built = self.made_for(choice.solver, settings)  # what is wrong with the input shows before anything is written
+        takes = expected_cost.seconds(choice.solver, built, settings)
+        long = "" if takes is None else f", about {takes:.2g} s of processor time"
+        log.info("%s: no stored run of it in %s; solving%s", name, folder.parent.resolve(), long)
+        with taken.alone(folder), taken.bars_kept(folder):
+            run = _stored(folder, name, ended, settings) or self._solve(name, choice.solver, settings, folder)
+            run = self._checked(run)
         return self._with_all_that_matters(run, choice, place)
+
+    def _ended(self, solver: str) -> tuple[str, ...]:
+        """How stored runs ended that are taken again."""
+        return ("converged", "denied", *(("stopped",) if self._watches(solver) else ()))
+
+    def known(self, name: str, choice: SolverChoice, place: str) -> Run | None:
+        """The stored run that ``obtain`` takes up, None where it would solve one."""
+        shelf = _Shelf(self.scene, self.store, self.ranks)
+        shelf.setup = self.setup
+        with suppress(_UnsolvedError):
+            return shelf.obtain(name, choice, place)
+        return None
+
+    def _checked(self, run: Run) -> Run:
+        """The ``run``; that of a muscle by a solver of effects with the second check of it, which is stored with it."""
+        asked = self.scene.task == "solve" and solvers.takes_effects(run.solver)
+        if not asked or run.outcome.status not in ("converged", "denied"):
+            return run
+        return second_check.confirmed_run(self.problem, run)
 
     def _watches(self, solver: str) -> bool:
         """Whether the case left effects out that may turn out to matter."""
@@ -94,7 +126,7 @@ class Bench[C: Case]:
         self.watch.cache_clear()  # type: ignore[attr-defined]
         assert run.folder is not None  # from the store
         folder = self.folder(choice, place)
-        with _alone(folder):
+        with taken.alone(folder):
             cut_off.pass_on(run.folder, folder)
         return self.obtain(run.name, choice, place)
 
@@ -150,6 +182,18 @@ class Bench[C: Case]:
             "versions": versions(),
             "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
         }
+
+
+class _UnsolvedError(Exception):
+    """A run is not there yet."""
+
+
+class _Shelf(Bench[Any]):
+    """A bench that takes up what is stored, and solves nothing."""
+
+    def made_for(self, solver: str, settings: Record) -> Any:
+        """Nothing: what would be solved is not there."""
+        raise _UnsolvedError(f"{solver}-{self.key(solver, settings)}")
 
 
 @singledispatch
@@ -223,25 +267,9 @@ def _(built: FieldProblem, solver: Any, settings: Record, folder: Path, identity
     writer.close(solution.outcome, form=solution.form or built.form)
 
 
-@contextmanager
-def _alone(folder: Path) -> Iterator[None]:
-    """Nobody else makes the run in ``folder`` meanwhile: whoever comes second waits, and then finds it made."""
-    files.make_folder(folder.parent)
-    lock = FileLock(folder.parent / f".{folder.name}.lock")
-    try:
-        lock.acquire(timeout=0)
-    except Timeout:
-        log.info("%s: another process is making this run; waiting for it", folder)
-        lock.acquire()
-    try:
-        yield
-    finally:
-        lock.release()
-
-
-def _stored(folder: Path, name: str, ended: tuple[str, ...]) -> Run | None:
-    """The run in ``folder`` that ``ended`` so, under the name that it has here; None where there is none, or other packages made
-    it.
+def _stored(folder: Path, name: str, ended: tuple[str, ...], settings: Record) -> Run | None:
+    """The run in ``folder`` that ``ended`` so, under the name that it has here; None where there is none, other packages made
+    it, or it lacks states that the ``settings`` ask for.
     """
     run = store.finished(folder, ended)
     if run is None:
@@ -251,27 +279,8 @@ def _stored(folder: Path, name: str, ended: tuple[str, ...]) -> Run | None:
     if other:
         log.info("%s: solved before, but with another %s; solving again", name, other[0])
         return None
+    if getattr(settings, "store_state", None) and not states.are_kept(folder, run.numbers):
+        log.info("%s: solved before without its states; solving again", name)
+        return None
     log.info("%s: solved before, taken from %s", name, folder)
     return replace(run, name=name)
-
-
-def complete(run: Run, numbers: tuple[int, ...]) -> Run:
-    """The run over exactly the frames ``numbers``; frames that it did not reach are not-a-number, so they never pass."""
-    if run.numbers == numbers:
-        return run
-    rows = [run.numbers.index(number) if number in run.numbers else None for number in numbers]
-
-    def pick(values: Any) -> Any:
-        if values is None:
-            return None
-        blank = np.full(values.shape[1:], np.nan)
-        return np.stack([blank if row is None else values[row] for row in rows])
-
-    return replace(
-        run,
-        numbers=numbers,
-        positions=pick(run.positions),
-        fibre_positions=pick(run.fibre_positions),
-        scalars={name: pick(values) for name, values in run.scalars.items()},
-        fields={name: pick(values) for name, values in run.fields.items()},
-    )

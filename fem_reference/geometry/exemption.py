@@ -1,0 +1,157 @@
+"""The part of a surface where contact is not asked: what is attached, and what is near to that on the same side."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh
+from fem_reference.geometry.distance import distances
+from fem_reference.geometry.pieces import Pieces, corner_areas, cut
+from fem_reference.geometry.skins import Skin, embedded, points, spacing
+
+# Facing more than 120 degrees away from what is attached is the other side of a thin body.
+_SAME_SIDE = -0.5
+# Corners are looked at this share of the way to the middle of their piece: on an edge it has one side.
+_INWARD = 1e-3
+
+
+class Corners(NamedTuple):
+    """The different corners (k,) of the pieces of a surface: the matrix ``carried`` (k, n) that gives their places by those of the
+    vertices, how far ``away`` (k,) [mm] they are from what is attached, 0 on it, and the number ``by`` (k,) of that attachment;
+    which corners ``at`` (p, 3) a piece has, and which of them the ``vertices`` (n,) are.
+    """
+
+    carried: csr_array
+    away: Floats
+    by: Ints
+    at: Ints
+    vertices: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Exemption:
+    """Where contact of a ``surface`` is not asked: on its ``part`` (r, 3, 3) that is attached, as triangles, each ``by`` (r,) the
+    number of an attachment, to what the ``names`` say, and within ``reach`` [mm] of that on the same side.
+
+    The reach is the distance of the points at which contact is felt, ``spacing``: nearer to what is attached, a point stands for
+    area that is attached too. It depends on the size of the surface and not on its triangles.
+    """
+
+    surface: Surface
+    part: Floats
+    by: Ints
+    names: tuple[str, ...]
+    reach: float
+
+    @classmethod
+    def of(cls, surface: Surface, attached: Iterable[tuple[str, Floats]] = ()) -> "Exemption":
+        """Of a surface with, by attachment, the name of what it is ``attached`` to, and the shares (m, 3) of the corners of its
+        triangles, 1 or 0; the part is where shares, linear in triangles, are a half and more.
+        """
+        names, shares = zip(*attached, strict=True) if (attached := tuple(attached)) else ((), ())
+        quarters = Pieces.whole(np.arange(len(surface.triangles))).quartered()
+        corners = quarters.of(surface.points[surface.triangles])
+        some = [np.flatnonzero((quarters.of(one[:, :, None])[:, :, 0] >= 1 / 2).all(axis=1)) for one in shares]
+        by = np.repeat(np.arange(len(some)), [len(one) for one in some])
+        return cls(surface, corners[np.concatenate([np.zeros(0, np.int64), *some])], by, names, spacing(surface))
+
+    def away(self, triangles: Ints, points: Floats) -> tuple[Floats, Ints]:
+        """How far (k,) [mm] ``points`` (k, 3) of the ``triangles`` (k,) are from what is attached, infinite where that faces away,
+        and by which attachment (k,).
+        """
+        if len(self.part) == 0:
+            return np.full(len(points), np.inf), np.full(len(points), -1)
+        part = Surface(self.part.reshape(-1, 3), np.arange(3 * len(self.part)).reshape(-1, 3))
+        nearest = distances(points, part)
+        own = _normals(self.surface.points[self.surface.triangles])[triangles]
+        facing = np.einsum("ki,ki->k", own, _normals(self.part)[nearest.triangle])
+        return np.where(facing > _SAME_SIDE, nearest.distance, np.inf), self.by[nearest.triangle]
+
+    @cached_property
+    def pieces(self) -> Pieces:
+        """The whole surface, cut as fine as contact is felt."""
+        return cut(self.surface, np.arange(len(self.surface.triangles)), self.reach)
+
+    @cached_property
+    def corners(self) -> Corners:
+        """The corners of the pieces, each as the piece sees it that is nearest to what is attached."""
+        triangles, pieces, count = self.surface.triangles, self.pieces, len(self.surface.points)
+        weights = pieces.corners.reshape(-1, 3)
+        named = np.where(weights > 0, np.repeat(triangles[pieces.parents], 3, axis=0), count)
+        order = np.argsort(named, axis=1)
+        rows = np.take_along_axis(named, order, axis=1), np.take_along_axis(weights, order, axis=1)
+        different, at = np.unique(np.hstack(rows), axis=0, return_inverse=True)
+        names, shares = different[:, :3].astype(np.int64), different[:, 3:]
+        row, column = np.nonzero(names < count)
+        carried = csr_array((shares[row, column], (row, names[row, column])), shape=(len(different), count))
+        away, by = self._seen()
+        nearest = np.lexsort((away, at.ravel()))
+        nearest = nearest[np.unique(at.ravel()[nearest], return_index=True)[1]]
+        single = np.flatnonzero(names[:, 1] == count)
+        vertices = single[np.argsort(names[single, 0])]
+        return Corners(carried, away[nearest], by[nearest], at.reshape(-1, 3), vertices)
+
+    def _seen(self) -> tuple[Floats, Ints]:
+        """As ``away`` of each corner of each piece (3 p,), 0 on what is attached."""
+        inward = self._places + _INWARD * (self._places.mean(axis=1, keepdims=True) - self._places)
+        away, by = self.away(np.repeat(self.pieces.parents, 3), inward.reshape(-1, 3))
+        return np.where(away > _INWARD / 10 * self.reach, away, 0.0), by
+
+    @property
+    def vertices(self) -> NDArray[np.bool_]:
+        """Which vertices (n,) are exempt, as seen from any triangle around them."""
+        return np.asarray(self.corners.away[self.corners.vertices] <= self.reach)
+
+    @cached_property
+    def felt(self) -> NDArray[np.bool_]:
+        """In the middle of which pieces (p,) contact is felt."""
+        return np.asarray(self.away(self.pieces.parents, self._places.mean(axis=1))[0] > self.reach)
+
+    def places(self, count: int) -> csr_array:
+        """About so many places where contact is felt, evenly chosen: the matrix that gives them by those of the vertices."""
+        felt = np.flatnonzero(self.corners.away > self.reach)
+        return self.corners.carried[felt[:: max(1, len(felt) // count)]]
+
+    @cached_property
+    def lost(self) -> float:
+        """The share of what is not attached where contact is not felt; 1 where all is attached."""
+        areas = corner_areas(self._places)
+        loose = areas.sum() - corner_areas(self.part).sum()
+        return float(1 - areas[self.felt].sum() / loose) if loose > 0 else 1.0
+
+    @cached_property
+    def _places(self) -> Floats:
+        """The corners (p, 3, 3) of the pieces at rest."""
+        return self.pieces.of(self.surface.points[self.surface.triangles])
+
+
+def free_skin(exempt: Exemption, mesh: TetMesh, apart: float) -> Skin:
+    """The material points of a surface where contact is felt.
+
+    Parameters
+    ----------
+    exempt
+        What is exempt of the surface.
+    mesh
+        The tetrahedra that carry the points.
+    apart
+        The distance of points [mm], on average and at most.
+
+    """
+    surface = exempt.surface
+    pieces = cut(surface, np.arange(len(surface.triangles)), apart)
+    places, areas = points(pieces.of(surface.points[surface.triangles]), np.ones(pieces.corners.shape[:2]))
+    felt = exempt.away(np.repeat(pieces.parents, 3), places)[0] > exempt.reach
+    return embedded(places[felt], areas[felt], mesh)
+
+
+def _normals(corners: Floats) -> Floats:
+    """Unit normals (m, 3) of triangles with ``corners`` (m, 3, 3); zero where they have no area."""
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.asarray(np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0))

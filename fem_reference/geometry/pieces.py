@@ -1,0 +1,81 @@
+"""Triangles of a surface cut small: places on it that are everywhere about as dense, however large its triangles are."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem_reference.foundations.mesh import Floats, Ints, Surface
+
+# No edge of a piece is longer than this many times what its edges are on average at most.
+_LONGEST = 2.0
+# A triangle cut in four: the barycentric coordinates (3, 3) of the corners of each part.
+_QUARTERS = np.array(
+    [
+        [[2, 0, 0], [1, 1, 0], [1, 0, 1]],
+        [[1, 1, 0], [0, 2, 0], [0, 1, 1]],
+        [[1, 0, 1], [0, 1, 1], [0, 0, 2]],
+        [[1, 1, 0], [0, 1, 1], [1, 0, 1]],
+    ]
+) / 2  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """Pieces of the triangles of a surface: the ``parents`` (k,), the triangle that each is cut from, and the barycentric
+    coordinates in it of the ``corners`` (k, 3, 3) of the piece.
+    """
+
+    parents: Ints
+    corners: Floats
+
+    @classmethod
+    def whole(cls, triangles: Ints) -> "Pieces":
+        """Uncut, those with the numbers ``triangles`` (k,)."""
+        return cls(triangles, np.broadcast_to(np.eye(3), (len(triangles), 3, 3)))
+
+    def __getitem__(self, some: NDArray[np.bool_]) -> "Pieces":
+        return Pieces(self.parents[some], self.corners[some])
+
+    def __add__(self, others: "Pieces") -> "Pieces":
+        parents, corners = ((self.parents, others.parents), (self.corners, others.corners))
+        return Pieces(np.concatenate(parents), np.concatenate(corners))
+
+    def of(self, values: Floats) -> Floats:
+        """What is linear in triangles, with ``values`` (m, 3, d) at their corners, at the corners of the pieces (k, 3, d)."""
+        return self.corners @ values[self.parents]
+
+    def quartered(self) -> "Pieces":
+        """Each cut in four at the middles of its edges."""
+        parts = np.einsum("qcj,kji->qkci", _QUARTERS, self.corners)
+        return Pieces(np.tile(self.parents, 4), parts.reshape(-1, 3, 3))
+
+    def halved(self, lengths: Floats) -> "Pieces":
+        """Each cut in two in the middle of the longest of its edges of ``lengths`` (k, 3), the first of which leaves corner 0."""
+        order = (lengths.argmax(axis=1)[:, None] + np.arange(3)) % 3
+        a, b, c = np.swapaxes(np.take_along_axis(self.corners, order[:, :, None], axis=1), 0, 1)
+        halves = [np.stack([a, (a + b) / 2, c], axis=1), np.stack([(a + b) / 2, b, c], axis=1)]
+        return Pieces(np.tile(self.parents, 2), np.concatenate(halves))
+
+
+def edge_lengths(corners: Floats) -> Floats:
+    """Those of triangles with ``corners`` (k, 3, 3): of the edge that leaves each corner (k, 3) [mm]."""
+    return np.asarray(np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2))
+
+
+def corner_areas(corners: Floats) -> Floats:
+    """Those of triangles with ``corners`` (k, 3, 3): (k,) [mm2]."""
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return np.asarray(np.linalg.norm(normals, axis=1) / 2)
+
+
+def cut(surface: Surface, triangles: Ints, apart: float) -> Pieces:
+    """The ``triangles`` (k,) of a ``surface`` in pieces, the edges of each of which are on average at most ``apart`` [mm] long, and
+    none twice that: long ones in two, then what is large yet in four.
+    """
+    corners, pieces = surface.points[surface.triangles], Pieces.whole(triangles)
+    while (long := (lengths := edge_lengths(pieces.of(corners))).max(axis=1, initial=0.0) > _LONGEST * apart).any():
+        pieces = pieces[~long] + pieces[long].halved(lengths[long])
+    while (large := edge_lengths(pieces.of(corners)).mean(axis=1) > apart).any():
+        pieces = pieces[~large] + pieces[large].quartered()
+    return pieces
