@@ -77,7 +77,7 @@ interval = "{interval:.4g} s"
 solver = "fenicsx"
 element = "P2"
 first_step = 4
-store_state = true
+store_state = {states}
 
 [[expect]]
 of = "reference"
@@ -187,6 +187,7 @@ def text(seed: int, choice: str = "auto") -> tuple[str, Polylines]:
         "drag": mu * between(1e-7, 1e-3),
         "contact": 50 * mu,
         "interval": between(0.01, 1),
+        "states": "true",
         "every": 2 if kind in ("moved", "shaken") else 4,
     }
     values["effects"] = "".join(EFFECTS[name] for name in KINDS[kind]).format(**values)

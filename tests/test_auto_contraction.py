@@ -43,6 +43,7 @@ STILL = {
     "bulk": 10_000,
     "every": 1,
     "interval": 1.0,
+    "states": "false",
     "slack": 1.1,
     "passive": 300,
 }

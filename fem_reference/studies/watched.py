@@ -37,7 +37,7 @@ def again(watch: Watch, run: Run) -> tuple[Decision, ...]:
     for number in run.numbers:
         if found := watch.see(number, *cut_off.places(run.folder, number)):
             return found
-    return watch.end() if run.outcome.status in ("converged", "stopped") else ()
+    return watch.end()
 
 
 def _stop(found: Sequence[Decision]) -> None:
