@@ -95,7 +95,9 @@ def test_attached_vertices_are_exempt_from_contact(tmp_path) -> None:
     assert [type(effect).__name__ for effect in body.effects] == ["NeoHooke", "Incompressible"]
     heights = body.contact.on.points[:, 2]
     reach = np.linalg.norm(np.ptp(rest.surface.points, axis=0)) / 80
-    assert reach < heights.min() < 1.0 < 39.0 < heights.max() < 40 - reach  # the ends are attached; pieces are 0.5 mm high
+    assert (
+        reach < heights.min() < 1.0 < 39.0 < heights.max() < 40 - reach
+    )  # the ends are attached; pieces are 0.5 mm high
     turned = body.obstructions[1].pose(10)
     assert apply(turned, np.array([[5.0, 5, 30]])) == pytest.approx(np.array([[5, 5, 30]]))
 
