@@ -20,7 +20,7 @@ from fem_reference import effects, solvers
 from fem_reference.assessment.baseline import Baseline
 from fem_reference.cli._parser import parser
 from fem_reference.foundations.records import Record, keys
-from fem_reference.foundations.units import length_unit, unit_of
+from fem_reference.foundations.units import LENGTH_UNITS, length_unit, unit_of
 from fem_reference.problems import of_case
 from fem_reference.report import gallery as gallery_of_runs
 from fem_reference.runs.contents import Contents
@@ -179,7 +179,7 @@ def _value(annotation: Any, metadata: Any = ()) -> str:
     """What may stand as the value of a key, in words."""
     unit, origin, inside = unit_of(metadata), get_origin(annotation), get_args(annotation)
     if any(getattr(entry, "func", None) is length_unit for entry in metadata):
-        return 'unit of length, such as `"mm"`'
+        return f"unit of length: {', '.join(f'`"{unit}"`' for unit in LENGTH_UNITS)}"
     bounds = [
         f"{sign} {getattr(one, key):g}" for one in metadata for of, (key, sign) in _BOUNDS.items() if type(one) is of
     ]

@@ -13,6 +13,7 @@
 Importing it does nothing. Units are mm, N, MPa, s and rad everywhere; only scene files carry other units, as text.
 """
 
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -38,6 +39,10 @@ if TYPE_CHECKING:
         solve_body,
         write_report,
     )
+
+if sys.version_info[:2] < (3, 12):  # noqa: UP036 - who imports a checkout has not been asked by pip
+    wanted = "fem_reference needs Python 3.12 or newer: python3.12 -m venv .venv, and install it there"
+    raise ImportError(f"this is Python {sys.version.split()[0]} ({sys.executable}); {wanted}")
 
 __version__ = "0.1.0"
 __all__ = [

@@ -13,16 +13,22 @@ import sys
 import tempfile
 import time
 import traceback
+import warnings
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import calls
 import hostile
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 
+from fem_reference.solvers import fenicsx
+
 # Of one input: processor time [s], the time that passes on a machine that is shared, and memory [bytes].
 SECONDS, PATIENCE, MEMORY = 10, 120, 2 * 2**30
+KINDS = [*hostile.KINDS, *calls.KINDS]
 
 
 @dataclass
@@ -118,6 +124,67 @@ def fuzz(name: str, inputs: int, number: int, kept: Path) -> Tried:
     return tried
 
 
+def fuzz_calls(name: str, inputs: int, number: int) -> Tried:
+    """Try so many calls of a kind, in this process; what failed is said by what was called with."""
+    tried = Tried()
+    with tempfile.TemporaryDirectory(prefix="fuzz-") as place, fenicsx.shared():
+        world = calls.World(Path(place))
+
+        @seed(number)
+        @settings(
+            max_examples=inputs,
+            deadline=None,
+            database=None,
+            phases=[Phase.generate],
+            suppress_health_check=list(HealthCheck),
+        )
+        @given(calls.KINDS[name](world))
+        def attempt(call: Callable[[], object]) -> None:
+            began = time.perf_counter()
+            came = called(call)
+            tried.slowest = max(tried.slowest, time.perf_counter() - began)
+            tried.count[came if came in ("accepted", "refused", "wrong signature") else "failed"] += 1
+            if came not in ("accepted", "refused", "wrong signature"):
+                tried.failed.append(f"{name}: {came}: {_closure(call)}")
+
+        attempt()
+    return tried
+
+
+def called(call: Callable[[], object]) -> str:
+    """What came of a call: accepted, refused, or why it failed."""
+
+    def late(*_: object) -> None:
+        raise TimeoutError(f"more than {PATIENCE} s")
+
+    signal.signal(signal.SIGALRM, late)
+    signal.alarm(PATIENCE)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of the caller's own functions
+            call()
+    except hostile.REFUSED as error:
+        text = str(error)
+        return "refused" if ": got " in text and ", want " in text else f"a message without place: {text}"
+    except Exception as error:
+        frames = traceback.extract_tb(error.__traceback__)[-3:]
+        if isinstance(error, TypeError) and len(traceback.extract_tb(error.__traceback__)) <= 2 + (
+            "argument" not in str(error)
+        ):
+            return "wrong signature"
+        places = " < ".join(f"{Path(frame.filename).name}:{frame.lineno}" for frame in reversed(frames))
+        return f"{type(error).__name__}: {str(error)[:150]} ({places})"
+    finally:
+        signal.alarm(0)
+    return "accepted"
+
+
+def _closure(call: Callable[[], object]) -> str:
+    """What a call is made with."""
+    inside = call.__closure__ or ()
+    return "; ".join(repr(cell.cell_contents)[:200] for cell in inside)
+
+
 def _copied(source: Path, target: Path) -> Path:
     shutil.rmtree(target, ignore_errors=True)
     shutil.copytree(source, target)
@@ -127,15 +194,20 @@ def _copied(source: Path, target: Path) -> Path:
 def main() -> int:
     """Try every kind, or those named; the exit status."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("kinds", nargs="*", metavar="KIND", help=f"of {', '.join(hostile.KINDS)} (default: all)")
+    parser.add_argument("kinds", nargs="*", metavar="KIND", help=f"of {', '.join(KINDS)} (default: all)")
     parser.add_argument("--inputs", type=int, default=10_000, help="in all")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--kept", type=Path, default=Path(tempfile.gettempdir()) / "fuzz", help="where failures go")
     options = parser.parse_args()
-    names = options.kinds or list(hostile.KINDS)
+    names = options.kinds or KINDS
     failed, total = [], 0
     for name in names:
-        tried = fuzz(name, -(-options.inputs // len(names)), options.seed, options.kept)
+        count = -(-options.inputs // len(names))
+        tried = (
+            fuzz(name, count, options.seed, options.kept)
+            if name in hostile.KINDS
+            else fuzz_calls(name, count, options.seed)
+        )
         total += sum(tried.count.values())
         failed += tried.failed
         counts = ", ".join(f"{count} {word}" for word, count in sorted(tried.count.items()))

@@ -399,7 +399,8 @@ def read_bars(folder: Path) -> None:
 
 
 def _make_study(folder: Path) -> None:
-    case = cost_study.CaseStudy("ball", "A ball", "closed form", (), {"a.b": "mm"}, {"a.b": 0.1}, (), 320, 2.0)
+    like = dict.fromkeys(cost_study.FEATURES, 1.0)
+    case = cost_study.CaseStudy("ball", "A ball", "closed form", (), {"a.b": "mm"}, {"a.b": 0.1}, (), 320, 2.0, like)
     (folder / "study.json").write_text(json.dumps(cost_study.facts(case, {"machine": "x"})))
 
 

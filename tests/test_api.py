@@ -185,12 +185,68 @@ def test_what_cannot_be_compared_is_refused_by_name(tmp_path) -> None:
         fr.compare(case, reference, [other])
 
 
+def test_runs_of_another_case_are_refused(tmp_path) -> None:
+    folder = small.write(tmp_path / "bar")
+    case = fr.load_case(folder, {"frames.every": 10})
+    other = fr.load_case(folder, {"frames.every": 10, "bone[1].motion.keyframes[1].angle": "0.3 rad"})
+    run = fr.solve(case, "pbd", store=tmp_path / "runs")
+    of_other = replace(fr.solve(other, "pbd", store=tmp_path / "runs"), name="other")
+    inside = {"name": "reference", "fibres": small_fibres(), "fibre_positions": np.zeros((3, 2, 3))}
+    reference, strange = replace(run, **inside), replace(of_other, **inside)
+    assert fr.compare(case, reference, [run]).word
+    with pytest.raises(
+        fr.InputError, match=r'candidate "other": got a run of another case \("bar"\), want one of "bar" with all'
+    ):
+        fr.compare(case, reference, [of_other])
+    with pytest.raises(fr.InputError, match='reference "reference": got a run of another case'):
+        fr.compare(case, strange, [run])
+    with pytest.raises(fr.InputError, match='reference "reference": got a run of another case'):
+        fr.error_bars(case, strange)
+    # What somebody else's program wrote says of no case; it is checked when it is read.
+    assert fr.compare(case, reference, [replace(of_other, origin={})]).word
+
+
+def test_calls_with_what_they_do_not_want_are_refused(tmp_path) -> None:
+    case = fr.load_case(small.write(tmp_path / "bar"), {"frames.every": 10})
+    run = fr.solve(case, "pbd", store=tmp_path / "runs")
+    (tmp_path / "file").write_text("")
+    calls = {
+        'settings nonsense: got no solver, want the name of the solver that they are of, such as solver="fenicsx"': (
+            lambda: fr.solve(case, nonsense=3)
+        ),
+        "solver: got int 3, want the name of a solver": lambda: fr.solve(case, 3),
+        "case: got str 'bar', want a Case": lambda: fr.solve("bar"),
+        "progress: got int 3, want a function of a line": lambda: fr.solve(case, "pbd", progress=3),
+        "store: got int 3, want a path": lambda: fr.solve(case, "pbd", store=3),
+        "store: got .*, while .*file is a file, want a folder": lambda: fr.solve(
+            case, "pbd", store=tmp_path / "file" / "x"
+        ),
+        "case: got int 3, want a path": lambda: fr.load_case(3),
+        "changes: got list": lambda: fr.load_case("hip_flexion", ["frames.last"]),
+        "changes: got dict": lambda: fr.load_case("hip_flexion", {3: 4}),
+        "reference: got NoneType None, want a Run": lambda: fr.compare(case, None),
+        "candidates: got Run": lambda: fr.compare(case, run, run),
+        "candidate: got int 3": lambda: fr.compare(case, run, [3]),
+        "error_bars: got int 3, want ErrorBars": lambda: fr.compare(case, run, [], error_bars=3),
+        "form: got 'abaqus', want one of open, febio": lambda: fr.export_case(case, tmp_path / "new", "abaqus"),
+        "comparison: got Run": lambda: fr.write_report(run, tmp_path / "new"),
+        "comparison: got int 3": lambda: fr.export_runs(3, tmp_path / "new"),
+        "body: got Run": lambda: fr.solve_body(run),
+        'effect: got "3", want one of': lambda: fr.make_effect(3),
+    }
+    for message, call in calls.items():
+        with pytest.raises(fr.InputError, match=message):
+            call()
+
+
 def test_a_body_with_a_path_or_setting_that_cannot_be_is_refused_before_it_is_solved() -> None:
     block = fr.box((1, 1, 1), (10.0, 10.0, 10.0), "tetrahedron")
     wrong = fr.Prescribed("top", "z1", (2,), lambda points, _: points[:, 0])
     body = fr.Body(block, (fr.make_effect("neo_hooke", mu=0.01),), (wrong,), frames=(0.0, 1.0))
-    with pytest.raises(fr.InputError, match=r'prescribed "top": path: got displacements \(2,\) of points \(2, 3\)'):
-        fr.solve_body(body)
+    with pytest.raises(
+        fr.InputError, match=r'prescribed "top": path at frame 0: got displacements \(4,\) of points \(4, 3\)'
+    ):
+        fr.solve_body(body, element="P1")
     still = fr.Prescribed("top", "z1", (2,), lambda points, _: 0 * points)
     with pytest.raises(
         fr.InputError, match=r"settings\.elemnt: got an unknown key, want element, or another one of element"

@@ -27,6 +27,7 @@ SCENE = Estimates(
     tension=0.0,
     fixed=2,
     sag=10.0,
+    lean=0.0,
     travel=50.0,
     stretch=(0.8, 1.3),
     interval=0.01,
@@ -36,6 +37,7 @@ SCENE = Estimates(
     acceleration=0.01,
     frames=(0.0, 10.0, 20.0),
     tolerance=0.05,
+    stress_tolerance=1e-5,
     near={"femur": Near(-3.0, 1.0, 10.0)},
 )
 # Of these a scene may do without; all others are the material.
@@ -86,9 +88,15 @@ def test_the_sag_of_a_beam_is_that_of_timoshenko() -> None:
     assert SCENE.bend(force) == pytest.approx(0.3 * by_hand)
 
 
+def test_rates_are_by_second() -> None:
+    assert SCENE.in_time(2.0) == pytest.approx(200.0), "2 by frame number, of which there is one each 10 ms"
+    assert replace(SCENE, interval=None).in_time(2.0) == 0.0
+
+
 def test_tension_between_fixed_ends_straightens_and_makes_stiff() -> None:
     assert SCENE.straighten(1e3) == pytest.approx(0.6 * SCENE.sag, rel=1e-3)
     assert replace(SCENE, sag=0.0).straighten(1.0) == 0, "a straight muscle between fixed ends cannot shorten"
+    assert replace(SCENE, sag=0.0, lean=0.5).straighten(1e3) == pytest.approx(0.15 * SCENE.length, rel=1e-3)
     assert replace(SCENE, fixed=1).straighten(1e3) == pytest.approx(0.3 * SCENE.length, rel=1e-3)
     assert replace(SCENE, tension=SCENE.shear).bend(1e-5) < SCENE.bend(1e-5) / 3
 
@@ -226,9 +234,9 @@ def test_fibres_that_were_stretched_after_all_are_added(tmp_path) -> None:
     rest = muscle.setup(scene)
     assert ["FibrePassive: left out" in str(one) for one in scene.decisions] == [False, False, True]
     still, longer = rest.surface.points, rest.surface.points * 1.6
-    missed = of_case.watch(scene, rest)
-    assert missed((0, 10), np.stack([still, still])) == ()
-    (late,) = missed((0, 10), np.stack([still, longer]))
+    watch = of_case.watch(scene, rest, lambda: None)
+    assert watch.see(0, still, None) == ()
+    (late,) = watch.see(10, longer, None)
     assert "FibrePassive: needed as it turned out at frame 10" in str(late)
 
 

@@ -239,3 +239,15 @@ def test_an_unsolved_case_says_where_and_why_and_keeps_what_it_reached(name, tmp
     assert "contact is deepest" in facts["message"]
     reached = [frame for frame, value in rows(facts, "volume", "deviation").items() if value is not None]
     assert reached[:2] == list(scene.frames.numbers[:2])
+
+
+@pytest.mark.usefixtures("without_page")
+def test_a_negative_control_that_turns_nothing_says_so(tmp_path, capsys) -> None:
+    # It changes a candidate, which run does not judge.
+    words = ["rod", "--negative-control", "--out", str(tmp_path), "--quiet"]
+    said = "negative control: the verdict is pass and was to be fail"
+    assert cli.main(["run", *words]) == cli.DONE
+    assert said in capsys.readouterr().out
+    for verb in (["compare"], ["run", "--solver", "listing"]):
+        assert cli.main([*verb, *words]) == cli.VERDICT_FAIL
+        assert said not in capsys.readouterr().out

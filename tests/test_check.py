@@ -1,6 +1,7 @@
 """The verb ``check`` on a small case: exit statuses, files, what is bad input, and the example of the page."""
 
 import json
+import logging
 import shutil
 import sys
 from pathlib import Path
@@ -202,3 +203,23 @@ def test_the_example_of_the_readme_passes_and_fails(work, monkeypatch) -> None:
         names["test_hip_flexion_is_as_good_as_it_was"](work.root / "second")
     assert Path("check.md").read_text().startswith("### fail: my_solver on bar")
     assert ElementTree.parse("check.xml").getroot().get("failures") != "0"
+
+
+def test_from_another_folder_it_says_that_nothing_is_stored_there(made: Path, tmp_path, monkeypatch, caplog) -> None:
+    caplog.set_level(logging.INFO, logger="fem_reference")
+    stand_ins.solve_by(monkeypatch, fenicsx, swell)
+    words = [
+        "check",
+        str(made / "bar"),
+        "--candidate",
+        str(made / "mine"),
+        "--baseline",
+        str(made / "baselines" / "mine.json"),
+    ]
+    for folder, solves in ((made, False), (tmp_path, True), (tmp_path, False)):
+        caplog.clear()
+        monkeypatch.chdir(folder)
+        assert cli.main([*words, *(["--update"] if solves else [])]) == cli.DONE
+        said = f"reference: no stored run of it in {tmp_path / 'reports' / 'runs'}; solving, about "
+        assert (said in caplog.text) == solves
+        assert ("reference: solved before, taken from" in caplog.text) != solves

@@ -8,7 +8,8 @@ from test_stability import LENGTH, STILL, THIN, column, critical, effect, flesh,
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.problems import shapes
-from fem_reference.problems.body import Body, Prescribed, check
+from fem_reference.problems.body import Body, Prescribed
+from fem_reference.problems.checks import check
 from fem_reference.problems.paths import Affine, Rest
 from fem_reference.scenes import casefile
 from fem_reference.solvers.fenicsx import BodySettings

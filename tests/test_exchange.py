@@ -129,6 +129,21 @@ def test_the_scene_says_units_and_values(exported: Path, built: Problem) -> None
     assert facts["mesh"]["tets"] == len(built.mesh.tets)
 
 
+def test_springs_are_stated_in_the_unit_that_they_have(scene: MuscleCase, built: Problem) -> None:
+    soft = casefile.read_muscle(scene.folder, changes={"attachment[0].stiffness": "250 kPa/mm"})
+    facts = open_formats.facts(soft, replace(built, attached=muscle.setup(soft).attached))
+    assert facts["attachments"] == [
+        {"name": "origin", "bone": "floor", "stiffness": 0.25, "unit": "MPa/mm"},
+        {"name": "insertion", "bone": "lid", "stiffness": None, "unit": "MPa/mm"},
+    ]
+
+
+def test_bones_that_contact_names_are_obstacles(scene: MuscleCase, built: Problem) -> None:
+    contact = parse(acting.effects.find("contact"), acting.PARAMETERS["contact"] | {"bones": ["lid"]}, "test")
+    facts = open_formats.facts(scene, replace(built, effects=(*built.effects, contact)))
+    assert [bone["obstacle"] for bone in facts["bones"]] == [False, True]
+
+
 @pytest.mark.parametrize("name", sorted(acting.PARAMETERS))
 def test_every_effect_can_be_stated(scene: MuscleCase, built: Problem, name: str) -> None:
     effect = parse(acting.effects.find(name), acting.PARAMETERS[name], "test")

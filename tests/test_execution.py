@@ -12,11 +12,12 @@ import small
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.runs import key
+from fem_reference.runs.complete import complete
 from fem_reference.runs.store import Outcome, Run
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.studies import execution
-from fem_reference.studies.execution import Bench, complete
+from fem_reference.studies.execution import Bench
 
 pytestmark = pytest.mark.slow
 

@@ -1,5 +1,6 @@
 """The reference solver: exact where the answer is exact, of the right stiffness, independent of ranks, and honest when it fails."""
 
+import json
 import signal
 import sys
 import time
@@ -201,9 +202,32 @@ def test_a_process_that_dies_is_a_status() -> None:
 
 
 def test_a_time_limit_is_a_status() -> None:
-    command = [sys.executable, "-c", "import time; time.sleep(60)"]
+    command = [sys.executable, "-c", "while True: pass"]
     outcome = fenicsx._run(command, Settings(time_limit="0.5 s"), lambda _: None)
     assert outcome.status == "timed out"
+    assert "stopped after 0.5 s of processor time, the time limit" in outcome.message
+
+
+@pytest.mark.usefixtures("all_cores")
+def test_a_time_limit_is_of_each_process(tmp_path) -> None:
+    (tmp_path / "busy.py").write_text("from mpi4py import MPI\nwhile MPI.COMM_WORLD.rank < 9: pass")
+    (*start, _) = fenicsx._command(Settings(ranks=2), tmp_path)
+    outcome = fenicsx._run([*start[:-2], str(tmp_path / "busy.py")], Settings(time_limit="1 s"), lambda _: None)
+    assert outcome.status == "timed out"
+
+
+def test_a_machine_that_is_busy_is_no_time_limit(monkeypatch) -> None:
+    """A process that waits for three times its limit, as one does that gets no processor, goes on; at last it says nothing."""
+    report = json.dumps({"status": "converged", "message": "done", "cost": {}})
+    waits = f"import time; time.sleep(1.5); print({MARK + report!r}, flush=True)"
+    outcome = fenicsx._run([sys.executable, "-c", waits], Settings(time_limit="0.5 s"), lambda _: None)
+    assert outcome.status == "converged"
+    monkeypatch.setattr(processes, "CLOCK", 2)
+    outcome = fenicsx._run(
+        [sys.executable, "-c", waits.replace("1.5", "60")], Settings(time_limit="0.5 s"), lambda _: None
+    )
+    assert outcome.status == "stalled"
+    assert "the machine was busy, or something waited; that says nothing of what was solved" in outcome.message
 
 
 @pytest.mark.usefixtures("all_cores")
@@ -222,7 +246,7 @@ def deaf(monkeypatch):
     """The command line of a process that does not listen to signals, once it has reported 1."""
     monkeypatch.setattr(processes, "_PATIENCE", 0.3)
     ignore = "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN)"
-    return [sys.executable, "-c", f"{ignore}; print({MARK!r} + '1', flush=True); time.sleep(60)"]
+    return [sys.executable, "-c", f"{ignore}; print({MARK!r} + '1', flush=True)\nwhile True: pass"]
 
 
 def test_an_interrupt_kills_a_process_that_does_not_listen(deaf) -> None:
@@ -241,7 +265,10 @@ def test_a_time_limit_kills_a_process_that_does_not_listen(deaf) -> None:
         with started.limited(0.2):
             assert list(started.events()) == []
         ended = started.ending("nothing is kept")
-    assert (ended.status, ended.message) == ("timed out", "stopped after 0.2 s, the time limit; nothing is kept")
+    assert (ended.status, ended.message) == (
+        "timed out",
+        "stopped after 0.2 s of processor time, the time limit; nothing is kept",
+    )
     assert started.process.returncode == -signal.SIGKILL
 
 

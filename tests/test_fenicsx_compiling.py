@@ -26,6 +26,76 @@ for size in (1.0, 2.0):
 """
 
 
+ONE = """
+import sys
+import numpy
+from fem_reference.solvers.fenicsx import dolfinx_door
+from fem_reference.solvers.fenicsx import compiling
+import ufl
+from dolfinx import fem, mesh
+from mpi4py import MPI
+
+box = mesh.create_unit_interval(MPI.COMM_SELF, 2)
+x = ufl.SpatialCoordinate(box)
+sys.stdin.readline()
+for power in range(int(sys.argv[1])):
+    compiling.form(x[0] ** (power + 2) * ufl.dx)
+    compiling.expression(x[0] ** (power + 2), numpy.array([[0.5]]))
+print("done", flush=True)
+"""
+# On a machine on which compiling takes longer than anybody waits: what is under way looks as if it had been left.
+CLEANER = """
+import time
+from fem_reference.solvers.fenicsx import dolfinx_door
+from fem_reference.solvers.fenicsx import compiling
+compiling.PATIENCE = -1
+print("ready", flush=True)
+while True:
+    compiling.prepare()
+    time.sleep(0.05)
+"""
+
+
+def started(program: str, folder: Path, *words: str) -> subprocess.Popen:
+    return subprocess.Popen(
+        [sys.executable, "-c", program, *words],
+        env=os.environ | {"XDG_CACHE_HOME": str(folder)},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+@pytest.mark.usefixtures("fem_lab")
+def test_many_processes_compile_the_same_at_once(tmp_path: Path) -> None:
+    cleaner = started(CLEANER, tmp_path)
+    try:
+        assert cleaner.stdout.readline() == "ready\n"
+        several = [started(ONE, tmp_path, "5") for _ in range(3)]
+        for one in several:
+            one.stdin.write("go\n")
+            one.stdin.flush()
+        for one in several:
+            out, errors = one.communicate(timeout=300)
+            assert (out, one.returncode) == ("done\n", 0), errors[-2000:]
+    finally:
+        cleaner.kill()
+        cleaner.communicate()
+    # Each once: a form and an expression for each of the five powers.
+    assert len(list(tmp_path.rglob("*.so"))) == len(list(tmp_path.rglob("*.c.cached"))) == 10
+    assert not list(tmp_path.rglob("*.c.failed"))
+
+
+@pytest.mark.usefixtures("fem_lab")
+def test_what_says_that_it_is_compiled_and_is_not_stops_nobody(tmp_path: Path) -> None:
+    for missing in ("", "*.c", "*.so"):
+        for path in tmp_path.rglob(missing) if missing else ():
+            path.unlink()
+        out, errors = started(ONE, tmp_path, "1").communicate("go\n", timeout=300)
+        assert out == "done\n", errors[-2000:]
+
+
 @pytest.mark.usefixtures("fem_lab")
 def test_a_second_body_of_the_same_effects_compiles_nothing(tmp_path: Path) -> None:
     environment = os.environ | {"XDG_CACHE_HOME": str(tmp_path)}

@@ -139,7 +139,7 @@ def test_a_run_keeps_its_states_where_it_was_asked_to(fem_lab, tmp_path) -> None
     assert plain.key == scene.key
     bench, other = (Bench(case, tmp_path / "runs", ranks=1) for case in (scene, plain))
     keys = {made.key("fenicsx", made.settings(made.scene.reference, "reference")) for made in (bench, other)}
-    assert len(keys) == 2
+    assert len(keys) == 1  # what is kept of a run is no part of what determines it
     run = bench.obtain("reference", scene.reference, "reference")
     assert "state" in json.loads((run.folder / "run.json").read_text())["parts"]
     made = results.of_run(run.folder, scene)

@@ -258,9 +258,9 @@ within = 1.0
 kind = "property"
 because = "it cannot be"
 [negative_control]
-key = "title"
-value = "another"
-because = "none"
+key = "boundary[0].value"
+value = 2.0
+because = "what is fixed is another value"
 """
 
 

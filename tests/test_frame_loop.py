@@ -2,7 +2,8 @@
 
 import pytest
 
-from fem_reference.runs.store import Frame, Outcome
+from fem_reference.problems.muscle import Setup
+from fem_reference.runs.store import NO_SURFACE, Frame, Outcome
 from fem_reference.solvers.common.frame_loop import each, follow, refused
 from fem_reference.solvers.common.state_checks import Trouble
 
@@ -29,10 +30,14 @@ class Counting:
         return Outcome("out of steps", "nearly")
 
 
-@pytest.mark.parametrize(("loop", "visited"), [(follow, [3, 4, 5, 6]), (each, [2, 4, 6])])
-def test_wanted_frames_are_given_on_and_every_iteration_counts(loop, visited) -> None:
+NUMBERS = (2, 4, 6)
+SETUP = Setup(NO_SURFACE, (), (), NUMBERS, None)
+
+
+@pytest.mark.parametrize(("loop", "given", "visited"), [(follow, SETUP, [3, 4, 5, 6]), (each, NUMBERS, [2, 4, 6])])
+def test_wanted_frames_are_given_on_and_every_iteration_counts(loop, given, visited) -> None:
     model, frames = Counting(), list[Frame]()
-    outcome = loop(model, (2, 4, 6), frames.append)
+    outcome = loop(model, given, frames.append)
     assert model.visited == visited
     assert [frame.number for frame in frames] == [2, 4, 6]
     assert (outcome.status, outcome.message) == ("out of steps", "nearly")
@@ -43,7 +48,7 @@ def test_wanted_frames_are_given_on_and_every_iteration_counts(loop, visited) ->
 
 def test_it_ends_where_the_state_is_lost_and_keeps_what_it_reached() -> None:
     model, frames = Counting(lost=5), list[Frame]()
-    outcome = follow(model, (2, 4, 6), frames.append)
+    outcome = follow(model, SETUP, frames.append)
     assert (outcome.status, outcome.message) == ("inverted", "frame 5: lost; another model")
     assert [frame.number for frame in frames] == [2, 4]
     assert outcome.cost["iterations"] == 3

@@ -70,6 +70,8 @@ def test_solvers_are_compared_at_most_at_what_is_asked() -> None:
     points = [point(8, 1), point(2, 4), point(1, 100), point(3, 3, "arap"), point(0.5, 50, "fem")]
     at_five = at_same_cost(points, ERROR, COST, 5)
     assert {name: one.errors[ERROR] for name, one in at_five.best.items()} == {"pbd": 2, "arap": 3}
+    at_four = at_same_cost(points, ERROR, COST, 4)  # what costs just as much is within it
+    assert at_four.best["pbd"].errors[ERROR] == 2
     within_two = at_same_error(points, ERROR, COST, 2)
     assert {name: one.costs[COST] for name, one in within_two.best.items()} == {"pbd": 4, "fem": 50}
     assert solvers(points) == ("pbd", "arap", "fem")
@@ -95,6 +97,19 @@ def test_settings_chosen_on_other_cases_lose_what_is_best_on_this_one() -> None:
     assert found["c"].chosen.endswith("sweeps = 8")
     assert found["c"].loss == pytest.approx(1.0)
     assert found["a"].loss == pytest.approx(0.0)
+
+
+def test_a_case_left_out_has_no_say_in_what_is_chosen_for_it() -> None:
+    # On a and b eight sweeps are a little better, on c two are a hundred times: with a say, c would have two.
+    table = {"a": (1.0, 0.9), "b": (1.0, 0.9), "c": (0.01, 1.0)}
+    points = [
+        point(error, 1, case=case, value=value)
+        for case, errors in table.items()
+        for value, error in zip("28", errors, strict=True)
+    ]
+    (found,) = (one for one in transfers(studies(points), ERROR) if one.left_out == "c")
+    assert found.chosen.endswith("sweeps = 8")
+    assert found.loss == pytest.approx(99.0)
 
 
 def test_settings_that_failed_on_a_case_are_not_chosen() -> None:

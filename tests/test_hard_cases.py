@@ -1,10 +1,12 @@
 """Hard cases: every folder is whole, runs become verdicts and never tracebacks, and what explodes is found out."""
 
 import json
+import time
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import stand_ins
 
 from fem_reference import cli
 from fem_reference.assessment import health, stress
@@ -51,6 +53,25 @@ def test_blocks_are_whole(hard) -> None:
 def test_at_rest_stays_at_rest(solver) -> None:
     found = cell("at_rest.millimetres", solver)
     assert found.verdict == ("refused" if solver == "line_of_action" else "ok")
+
+
+def test_holds_that_would_tear_an_edge_are_refused() -> None:
+    """Whichever came last would win at the vertices that faces share."""
+    hard = CASES["twist.whole_turn"]
+    bottom, top = hard.hold
+    for other in ("x0", "y1"):
+        torn = hard.model_copy(update={"hold": (top, bottom.model_copy(update={"face": other}))})
+        with pytest.raises(
+            InputError, match=rf"hold\[1\]\.face: got {other}, which shares 4 vertices with z1 and moves other"
+        ):
+            blocks.problem(torn)
+        found = running.cell(running.Posed(torn), choosing.choices()["pbd"])
+        assert (found.verdict, "moves otherwise" in found.sentence) == ("refused", True)
+    # Faces that move alike may meet, as may the middle of one.
+    alike = (top, top.model_copy(update={"face": "x0"}))
+    assert len(blocks.problem(hard.model_copy(update={"hold": alike})).attached) == 2
+    middle = (top, bottom.model_copy(update={"face": "x0", "middle": True}))
+    assert len(blocks.problem(hard.model_copy(update={"hold": middle})).attached) == 2
 
 
 @pytest.mark.slow
@@ -170,6 +191,46 @@ def test_a_solver_that_raises_has_failed(monkeypatch) -> None:
     found = cell("at_rest.millimetres", "pbd")
     assert (found.verdict, found.status) == ("failed", "crashed")
     assert "ZeroDivisionError" in found.sentence
+
+
+def test_a_busy_machine_turns_no_verdict(monkeypatch) -> None:
+    """A solver that waits longer than it may work, and then solves, is judged as if it had not; one that works longer failed."""
+    solve, waits, works = running._solved, [3.0], [0.0]
+
+    def slow(*given):
+        time.sleep(waits[0])
+        until = time.process_time() + works[0]
+        while time.process_time() < until:
+            pass
+        return solve(*given)
+
+    monkeypatch.setattr(running, "_solved", slow)
+    monkeypatch.setattr(running, "LIMIT", 1.0)  # twice that, of processor time
+    assert cell("at_rest.millimetres", "pbd").verdict == "ok"
+    waits[0], works[0] = 0.0, 10.0
+    found = cell("at_rest.millimetres", "pbd")
+    assert (found.verdict, found.status) == ("failed", "timed out")
+    monkeypatch.setattr(running, "CLOCK", 0.5)
+    waits[0], works[0] = 10.0, 0.0
+    found = cell("at_rest.millimetres", "pbd")
+    assert (found.verdict, found.status) == ("inconclusive", "stalled")
+    assert "by the clock, and not 2 s of processor time" in found.sentence
+    assert (
+        running.signal.getitimer(running.signal.ITIMER_PROF)
+        == running.signal.getitimer(running.signal.ITIMER_REAL)
+        == (0, 0)
+    )
+
+
+def test_a_reference_that_stalls_is_inconclusive_in_every_part(monkeypatch) -> None:
+    stalled = Outcome("stalled", "the machine was busy")
+    hard = CASES["at_rest.millimetres"]
+    stand_ins.solve_by(monkeypatch, fenicsx, lambda *_: stalled)
+    monkeypatch.setattr(fenicsx, "solve", lambda *_: stalled)
+    found = running.cell(running.Posed(hard), choosing.choices()["fenicsx"])
+    assert (found.verdict, found.status, found.sentence) == ("inconclusive", "stalled", "stalled: the machine was busy")
+    with pytest.raises(steps.StalledError, match="the machine was busy"):
+        steps.compare(blocks.problem(hard), choosing.choices()["fenicsx"], records.Steps(until=2))
 
 
 def test_what_a_case_is_not_about_is_refused_with_the_reason() -> None:
@@ -315,7 +376,7 @@ def test_runs_of_the_reference_that_nobody_would_make_are_refused(words, got, tm
 def test_the_verb_and_its_page(tmp_path, capsys) -> None:
     words = ["stress", "at_rest.millimetres", "--solver", "pbd", "--solver", "xpbd", "--out", str(tmp_path)]
     assert cli.main([*words, "--json", str(tmp_path / "facts.json"), "--quiet"]) == cli.DONE
-    assert "1 hard cases by 2 solvers: 2 ok, 0 degraded, 0 failed, 0 refused" in capsys.readouterr().out
+    assert "1 hard cases by 2 solvers: 2 ok, 0 degraded, 0 failed, 0 refused, 0 inconclusive" in capsys.readouterr().out
     page = (tmp_path / "stress-at_rest.millimetres-pbd-xpbd.html").read_text(encoding="utf-8")
     assert page.count('class="cell"') == 2
     assert page.count('src="data:image/webp') == 2

@@ -1,5 +1,6 @@
 """The head of the page says what was asked: whether a candidate was judged, and the reference's own checks beside it."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import small
 import stand_ins
 
 from fem_reference import cli
+from fem_reference.foundations.limits import ENERGY_GAP
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import fenicsx, pbd
 
@@ -55,6 +57,36 @@ def test_a_candidate_that_nobody_judged_says_so_and_its_numbers(words, tmp_path:
         "unstable equilibrium in 1 of 5 frames; det F falls to 0.0500; cells are outside the range that a law " in found
     )
     assert "is meant for in 2 of 5 frames, first in 15" in found
+
+
+@pytest.mark.parametrize("lost", [-0.135, 0.04])
+def test_energy_that_came_from_nowhere_is_judged_where_it_stands(
+    lost, words, tmp_path: Path, monkeypatch, capsys
+) -> None:
+    def leaking(problem, _settings, sink) -> Outcome:
+        for number in problem.frames:
+            scalars = {"energy": 1.0 * number, "energy_gap": lost * (number == 10)}
+            sink(Frame(number, problem.surface.points, problem.fibres.points, scalars=scalars))
+        return Outcome("converged", "done", {"seconds": 1.0})
+
+    stand_ins.solve_by(monkeypatch, fenicsx, leaking)
+    target = tmp_path / "facts.json"
+    assert cli.main([*words, "--json", str(target)]) == cli.DONE
+    doubts, printed = json.loads(target.read_text())["doubts"], capsys.readouterr().out
+    page = (tmp_path / "out" / "bar" / "report.html").read_text()
+    if abs(lost) < ENERGY_GAP:
+        assert doubts == []
+        assert "doubtful" not in head(tmp_path) + printed
+        assert "Doubtful:" not in page
+    else:
+        (why,) = doubts
+        assert why.startswith(
+            "-13.5 % of the energy without work at frame 10: the body jumped, or the load steps are too large"
+        )
+        assert f"reference: doubtful, {why}" in printed
+        assert '<span class="badge doubtful">doubtful pass</span> <b>reference</b>' in head(tmp_path)
+        assert "Doubtful: \N{MINUS SIGN}13.5 % of the energy came or went without work" in page
+    assert "by Simpson's, with a state halfway" in page
 
 
 def test_limits_judge_candidates_without_a_change_of_the_case(words, tmp_path: Path, capsys) -> None:

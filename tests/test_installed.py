@@ -55,3 +55,24 @@ def test_finds_its_truths_outside_the_checkout(installed, tmp_path) -> None:
     done = call(installed, tmp_path, "verify", "nobody")
     assert done.returncode == 2, done.stderr
     assert 'got "nobody", want an entry' in done.stderr
+
+
+def test_pip_is_told_which_python_is_wanted(installed) -> None:
+    (metadata,) = installed.glob("fem_reference-*.dist-info/METADATA")
+    # Of this pip makes "requires a different Python: 3.11.7 not in '>=3.12'".
+    assert "\nRequires-Python: >=3.12\n" in metadata.read_text()
+
+
+def test_another_python_is_named_with_the_one_that_is_wanted() -> None:
+    older = "import sys; sys.version_info = (3, 11, 7, 'final', 0); sys.version = '3.11.7 (main)'; import fem_reference"
+    done = subprocess.run([sys.executable, "-c", older], cwd=ROOT, capture_output=True, text=True, check=False)
+    said = f"ImportError: this is Python 3.11.7 ({sys.executable}); fem_reference needs Python 3.12 or newer: python3.12 -m venv"
+    assert said in done.stderr
+
+
+def test_a_package_that_is_missing_is_no_mistake_of_ours() -> None:
+    without = "import sys; sys.modules['numpy'] = None; from fem_reference import cli; sys.exit(cli.main(['list']))"
+    done = subprocess.run([sys.executable, "-c", without], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 70
+    assert f"the Python package numpy is not installed for {sys.executable}: pip install" in done.stderr
+    assert "a mistake of fem-reference itself" not in done.stderr

@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -22,6 +23,7 @@ from fem_reference.problems.muscle import Problem, RigidBody
 from fem_reference.report import gallery
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import line_of_action
+from fem_reference.studies import execution, workflow
 
 pytestmark = pytest.mark.slow
 
@@ -231,6 +233,11 @@ def scene(folder: Path) -> Path:
     return folder
 
 
+SPHERE = 'name = "line"\nsphere = {{ bone = "{}", centre = "{}", radius = "6 mm" }}\n'
+MULTIGRID_ON_TWO_RANKS = 'name = "line"\nsolver = "fenicsx"\nranks = 2\nlinear_solver = "multigrid"'
+SPHERE_ON_NOTHING, SPHERE_AROUND_THE_END = SPHERE.format("skull", "5, 5, 20 mm"), SPHERE.format("lid", "5, 5, 40 mm")
+
+
 @pytest.fixture(scope="module")
 def compared(tmp_path_factory) -> tuple[dict, Path]:
     folder = tmp_path_factory.mktemp("lines")
@@ -287,6 +294,34 @@ def test_the_page_shows_a_dash_and_says_that_there_is_no_surface(compared) -> No
     assert "Surface of springs: distance to the reference" in text
     assert "Surface of line: distance to the reference" not in text
     assert "has no frame whose coordinates" not in text
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('name = "line"\n', 'name = "line"\nvia = [{ at = 0.5, bone = "skull" }]\n', 'via[0].bone: got "skull", want one of'),
+        ('name = "line"\n', SPHERE_ON_NOTHING, 'sphere.bone: got "skull", want one of floor, lid'),
+        ('name = "line"\n', SPHERE_AROUND_THE_END, "an obstacle with all of them outside"),
+        ('name = "line"\nsolver = "line_of_action"', MULTIGRID_ON_TWO_RANKS, "ranks: got 2, want 1"),
+    ],
+)  # fmt: skip
+def test_what_a_candidate_cannot_have_is_refused_before_the_reference_is_solved(
+    old, new, message, tmp_path, capsys, monkeypatch
+) -> None:
+    case, out = scene(tmp_path / "bar"), tmp_path / "out"
+    monkeypatch.setattr(execution, "_solved", lambda *_: pytest.fail("something was solved"))
+    text = (case / "case.toml").read_text()
+    assert old in text
+    (case / "case.toml").write_text(text.replace(old, new, 1))
+    for verb in ("validate", "run", "compare"):
+        words = [verb, str(case), "--out", str(out), "--quiet"]
+        assert main(words) == 2
+        printed = capsys.readouterr().err
+        assert message in printed, verb
+        assert "case.toml: candidate[0]." in printed, verb
+    with pytest.raises(InputError, match=re.escape(message)):
+        workflow.solve(workflow.load_case(case), store=out)
+    assert not out.exists()
 
 
 def test_a_reference_of_lines_alone_is_refused(tmp_path, capsys) -> None:

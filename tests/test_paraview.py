@@ -26,6 +26,7 @@ from fem_reference.io import files
 from fem_reference.problems import muscle
 from fem_reference.problems.body import reference_nodes
 from fem_reference.runs import store
+from fem_reference.runs.results import Results
 from fem_reference.runs.states import NodalState
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
@@ -243,3 +244,36 @@ def test_paraview_itself_opens_the_collection(exported) -> None:
     )
     done = subprocess.run(["pvpython", "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split()[-1] == "True"
+
+
+def test_contact_pressure_is_that_of_the_bones_that_contact_names(tmp_path_factory: pytest.TempPathFactory) -> None:
+    # A screen as deep in the muscle as the wall, from the other side, which contact leaves alone: it presses nothing.
+    folder = small.write(tmp_path_factory.mktemp("case") / "bar")
+    screen = 'name = "screen"\nhalf_space = { point = "5, 0, 0 mm", normal = [1, 0, 0] }\n'
+    text = (folder / "case.toml").read_text()
+    text = text.replace("[[attachment]]", f"[[bone]]\n{WALL}\n[[bone]]\n{screen}\n[[attachment]]", 1)
+    (folder / "case.toml").write_text(text.replace("[fibres]", f"{CONTACT}\n[fibres]"))
+    scene = casefile.read(folder)
+    setup, mesh = muscle.setup(scene), shapes.box((2, 2, 4), (10, 10, 40))
+    fibres = Polylines(np.column_stack([np.full((8, 2), 5.0), [1, 5, 10, 20, 2, 3, 4, 8]]), [0, 4, 8])
+    run = written(folder / "run", scene, setup, TetMesh(mesh.points, mesh.tets), fibres)
+    paraview.write(comparing.compare(scene, setup, run, (), None), folder / "out")
+    pressure = np.asarray(frame(folder / "out", 2)["reference"]["muscle"].point_data["contact_pressure"])
+    depth = run.positions[2][:, 0] - 5.0
+    in_wall, in_screen = setup.free & (depth > 0.1), setup.free & (depth < -0.1)
+    assert in_screen.sum() > 20
+    assert pressure[in_wall] == pytest.approx(STIFFNESS * depth[in_wall])
+    assert not pressure[in_screen].any()
+
+
+def test_the_worst_corner_of_a_bent_tetrahedron_is_the_least() -> None:
+    # u = c x^2 along x on nodes of degree 2: det F = 1 + 2 c x exactly, from 1 in the corner at 0 to 1 - 0.8 at x = 2.
+    mesh = TetMesh(np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 0, 2]]), np.array([[0, 1, 2, 3]]))
+    weights = reference_nodes("tetrahedron", 2)
+    nodes = np.column_stack([1 - weights.sum(axis=1), weights]) @ mesh.points
+    moved = np.zeros((1, 10, 3))
+    moved[0, :, 0] = -0.2 * nodes[:, 0] ** 2
+    state = NodalState(moved, np.zeros((1, 0)), np.zeros((0, 0, 3)))
+    block = paraview._interior(Results(mesh, (), {0: state}), 0)
+    assert block.of_cells["det_F_at_worst_corner"] == pytest.approx([0.2])
+    assert block.of_cells["det_F"] == pytest.approx([1 - 0.4 * 0.5])  # its middle is at x = 0.5

@@ -123,6 +123,41 @@ def test_a_case_that_errs_more_than_the_others_widens_the_margin() -> None:
     assert found.margins.error == pytest.approx(2.0, rel=0.1)
 
 
+def changed(one: CaseStudy, *, errors: float = 1.0, times: float = 1.0) -> CaseStudy:
+    """The study with so many times the errors and times."""
+    points = tuple(
+        replace(point, errors={RMS: errors * point.errors[RMS]}, costs={TIME: times * point.costs[TIME]})
+        for point in one.points
+    )
+    return replace(one, points=points)
+
+
+def test_a_case_that_errs_less_than_the_others_widens_no_margin() -> None:
+    # Left out, it has half of what the others let expect; of these each has exactly that, as the worst of the others counts.
+    for better in (changed(study("d", 50), errors=0.5), changed(study("d", 50), times=0.5)):
+        found = recommend(features(60), "new", [*STUDIES, better], RMS, {"error": 1e9})
+        assert (found.margins.error, found.margins.time) == pytest.approx((1.0, 1.0))
+
+
+def test_a_case_that_takes_longer_than_the_others_widens_the_margin_of_time() -> None:
+    found = recommend(features(60), "new", [*STUDIES, changed(study("d", 50), times=3.0)], RMS, {"error": 1e9})
+    assert (found.margins.error, found.margins.time) == pytest.approx((1.0, 3.0), rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("metric", "factor"),
+    [("fibre_length.rms_percent", 1), ("volume.deviation", 1), ("fibre_length.rms", 2), ("surface_deviation.max", 2)],
+)
+def test_shares_are_as_they_are_on_another_case_and_lengths_go_with_the_motion(metric: str, factor: int) -> None:
+    points = tuple(replace(one, errors={metric: 3.0}) for one in STUDIES[0].points)
+    known = [replace(STUDIES[0], points=points, units={metric: "mm"}, bars={}) for _ in range(2)]
+    known = [replace(one, case=name) for one, name in zip(known, "ab", strict=True)]
+    # The cases move 50 mm, and the new one twice as far; those two agree, so that no margin is added.
+    found = recommend(features(100), "new", known, metric, {"error": 1e9})
+    assert found.margins.error == 1.0
+    assert found.best.error == pytest.approx(3.0 * factor)
+
+
 def test_none_is_recommended_where_none_meets_what_is_asked() -> None:
     assert recommend(features(50), "a", STUDIES, RMS, {"error": 0.01}).best is None
     assert recommend(features(50), "new", STUDIES, RMS, {"time": 1e-9}).best is None

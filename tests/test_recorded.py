@@ -7,7 +7,9 @@ import meshio
 import numpy as np
 import pytest
 import shapes
+import small
 
+import fem_reference as fr
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Surface
 from fem_reference.foundations.records import parse
@@ -348,7 +350,7 @@ def test_a_candidate_may_say_nothing(tmp_path: Path) -> None:
         ('name = ""', r"candidate\.toml: name: got"),
         ("version = 2", r"candidate\.toml: version: got 2, want a valid string"),
         ('unit = "furlong per day"', r'candidate\.toml: unit: got "furlong per day", want a unit of length'),
-        ('unit = "s"', r'candidate\.toml: unit: got "s", want a length with its unit'),
+        ('unit = "s"', r'candidate\.toml: unit: got "s", want a unit of length'),
         ("seconds_per_frame = 0", r"candidate\.toml: seconds_per_frame: got 0, want greater than 0"),
         ('seconds_per_frame = "0.1"', r'candidate\.toml: seconds_per_frame: got "0\.1", want a valid number'),
         ("threads = -1", r"candidate\.toml: threads: got -1, want greater than 0"),
@@ -358,3 +360,15 @@ def test_a_candidate_may_say_nothing(tmp_path: Path) -> None:
 )
 def test_what_a_candidate_says_wrongly(tmp_path: Path, text: str, match: str) -> None:
     refuse(sequence(said(tmp_path, text)), match)
+
+
+def test_frames_that_python_reads_are_in_the_unit_that_is_said(tmp_path: Path) -> None:
+    case = fr.load_case(small.write(tmp_path / "bar"), {"frames.last": 5})
+    rest = small.body()
+    (tmp_path / "frames").mkdir()
+    for number, away in ((0, 0.0), (5, 3.0)):
+        files.write_surface(tmp_path / "frames" / f"frame_{number}.ply", rest, (rest.points + [0, 0, away]) / 25.4)
+    run = fr.read_run(tmp_path / "frames", case, unit="in")
+    assert run.positions[1] == pytest.approx(rest.points + [0, 0, 3.0], abs=1e-4)  # mm
+    with pytest.raises(fr.InputError, match=r"frame_0\.ply"):
+        fr.read_run(tmp_path / "frames", case)

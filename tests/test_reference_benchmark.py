@@ -10,7 +10,8 @@ import pytest
 import small
 
 from fem_reference import cli
-from fem_reference.problems.body import ByCell, check
+from fem_reference.problems.body import ByCell
+from fem_reference.problems.checks import check
 from fem_reference.scenes.case import DATA_SETTING
 from fem_reference.studies.benchmark import checkout, reference, reference_table, timing
 from fem_reference.studies.benchmark.checkout import Commit

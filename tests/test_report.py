@@ -175,6 +175,8 @@ def test_summary_has_the_documented_keys_and_survives_json(comparison):
         "status",
         "message",
         "verdict",
+        "doubts",
+        "second_check",
         "cost",
         "measures",
         "from_rest",
@@ -399,6 +401,7 @@ def test_how_well_the_reference_is_known_is_reported(comparison):
         pytest.approx(3 / 70),
         None,
     ]
+    assert [row["frame"] for row in found] == list(comparison.reference.numbers)
     assert (found[1]["model"], found[1]["unit"]) == (pytest.approx(3 / 70), "%")
 
 

@@ -2,11 +2,13 @@
 
 from pathlib import Path
 
+import numpy as np
+import shapes
 import small
 
 from fem_reference.problems import muscle
 from fem_reference.scenes import casefile
-from fem_reference.studies.resampled_scenes import resample
+from fem_reference.studies.resampled_scenes import _nearest, resample
 
 
 def test_it_can_be_set_up_from_a_folder_outside_the_case(tmp_path: Path) -> None:
@@ -15,3 +17,10 @@ def test_it_can_be_set_up_from_a_folder_outside_the_case(tmp_path: Path) -> None
     coarse = muscle.setup(resample(scene, rest, -1, tmp_path / "elsewhere"))
     assert len(coarse.surface.triangles) < 0.5 * len(rest.surface.triangles)
     assert [one.attachment for one in coarse.attached] == [one.attachment for one in rest.attached]
+
+
+def test_a_vertex_is_attached_where_the_nearest_is() -> None:
+    """Points beside the vertices of a ball, each nearer to one of them than to any other."""
+    ball = shapes.sphere(1, 10.0)
+    beside = ball.points * 1.02 + np.random.default_rng(5).uniform(-0.3, 0.3, ball.points.shape)
+    assert np.array_equal(_nearest(ball, beside), np.arange(len(ball.points)))

@@ -109,6 +109,7 @@ because = "it is compressible then"
 OPTIONAL = ("interval", "newton_iterations", "stretch", "statistic", 'frame = "any"')
 NEEDED = list(dict.fromkeys(line for line in SCENE.splitlines() if " = " in line and not line.startswith(OPTIONAL)))
 FILES = ("bar.ply", "wall.ply", "lever.ply", "end.csv")
+TITLE = {"key": "title", "value": "another", "because": "it is another"}
 ROD = {"start": "0, 0, 0 mm", "end": "0, 3, 4 cm", "radius": "2 mm"}
 TURN = {
     "axis": [0, 0, 2],
@@ -428,6 +429,17 @@ WRONG = [
         5,
         "negative_control.value: got 5, want a value that can be read (effect[1].bulk: got 5, want a pressure",
     ),
+    ("negative_control", TITLE, 'negative_control.key: got "title", want a key that changes what is solved'),
+    (
+        "negative_control",
+        TITLE | {"key": "expect[0].truth", "value": "9 %"},
+        'key: got "expect[0].truth", want a key that',
+    ),
+    (
+        "negative_control",
+        TITLE | {"key": "candidate[0].stretch", "value": 0.5},
+        'key: got "candidate[0].stretch", want a',
+    ),
     ("negative_control.value", True, "negative_control.value: got True, want"),
     ("negative_control.value", NAN, "negative_control.value: got nan, want"),
 ]
@@ -439,6 +451,21 @@ def test_wrong_value_names_file_and_key(bar: Path, key: str, value: object, mess
         casefile.read(bar, changes={key: value})
     assert str(caught.value).startswith(str(bar.resolve() / "case.toml") + ": ")
     assert message in str(caught.value)
+
+
+def test_a_negative_control_changes_what_is_judged(bar: Path) -> None:
+    # What changes the time only, or a run that nothing is expected of, turns no verdict.
+    control = {"key": "reference.ranks", "value": 2, "because": "it is faster"}
+    with pytest.raises(InputError, match=r'negative_control\.key: got "reference\.ranks", want a key that changes'):
+        casefile.read(bar, changes={"reference.ranks": 1, "negative_control": control})
+    edited(bar, 'key = "effect[1].bulk"\nvalue = "40 kPa"', 'key = "title"\nvalue = "another"')
+    for wrong in (True, False):
+        with pytest.raises(InputError, match=r'negative_control\.key: got "title"'):
+            casefile.read(bar, with_negative_control=wrong)
+    control = {"key": "candidate[0].stretch", "value": 0.5, "because": "it is softer"}
+    for of in ("fast", "candidates"):
+        read = casefile.read(bar, changes={"expect[0].of": of, "negative_control": control})
+        assert read.negative_control.key == control["key"]
 
 
 @pytest.mark.parametrize("line", NEEDED)

@@ -54,6 +54,26 @@ def test_half_an_error_that_no_setting_reached_would_cost() -> None:
     assert study_page.sentences(some)[0].startswith("To halve the error of pbd would cost 4.00 times the time")
 
 
+def test_the_nearest_of_the_other_solvers_is_named() -> None:
+    said = study_page.sentences(study("hip", *points("arap", 0.5, 6.0)))
+    assert said[-1] == "Below 4 mm, the best of pbd, only the reference gets."
+
+
+def test_each_drawing_has_the_front_of_its_own_statistic() -> None:
+    # The faster setting is the nearer one by the surface, and not by the fibres: two points are on the front of these alone.
+    def made(name: str, surface: float, fibres: float, seconds: float) -> Point:
+        errors = {"surface_deviation.rms": surface, "fibre_length.rms_percent": fibres, "volume.deviation": 1.0}
+        return Point("hip", "pbd", "pbd", "n", name, {}, "converged", "", errors, {"seconds_per_frame": seconds})
+
+    case = replace(study(), points=(made("fast", 1.0, 5.0, 1.0), made("slow", 2.0, 1.0, 2.0)), bars={})
+    lengths = {
+        curve.title: max(path.count("L") for path in re.findall(r'<path d="([^"]*)"[^>]*stroke-width: 1.2', curve.svg))
+        for curve in study_page.fronts(case)
+        if "stroke-width: 1.2" in curve.svg
+    }
+    assert lengths == {"Surface deviation, rms": 0, "Fibre length, rms percent": 1, "Volume, deviation": 0}
+
+
 def test_what_is_within_the_bar_from_the_fastest_setting_on_is_said_to_be_so() -> None:
     said = study_page.sentences(replace(study(), bars={"surface_deviation.rms": 1.0}))
     assert (

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -191,6 +192,15 @@ def test_what_is_not_a_number_stands_on_the_page_and_not_in_the_drawing() -> Non
     assert "not a number" in html
     assert "lost at &lt;frame&gt; 3" in html
     json.dumps(ranking_page.facts(made), allow_nan=False)
+
+
+def test_times_are_drawn_in_the_unit_that_their_axis_names() -> None:
+    made = table(solver_result("case0", 3.0, seconds=0.02), solver_result("case1", 4.0, seconds=0.05))
+    drawing = re.search("<svg.*?</svg>", ranking_page.render(made), re.DOTALL)
+    assert drawing is not None
+    texts = re.findall(r"<text[^>]*>([^<]*)<", drawing[0])
+    assert texts[:3] == ["20", "50", "time for a frame number, ms"]  # 0.02 and 0.05 s
+    assert ranking_page.per_second(0.02) == pytest.approx(50)
 
 
 def test_of_a_reference_that_failed_one_sentence_stands_there_and_no_table() -> None:

@@ -148,11 +148,13 @@ def test_types_say_their_unit() -> None:
 
 
 def test_length_unit() -> None:
-    assert [length_unit(unit) for unit in ("mm", "cm", "m")] == pytest.approx([1.0, 10.0, 1000.0], rel=1e-14)
+    for unit in units.LENGTH_UNITS:
+        assert length_unit(unit) == pytest.approx(quantity(f"1 {unit}", "a length"), rel=1e-14)
 
 
 @pytest.mark.parametrize(
-    ("text", "want"), [("2 mm", "a unit of length"), (1.0, "a unit of length"), ("kPa", "a length with its unit")]
+    ("text", "want"),
+    [("2 mm", "a unit of length"), (1.0, "a unit of length"), ("kPa", "a unit of length"), ("Mm", "a unit of length")],
 )
 def test_length_unit_refuses_what_is_none(text: object, want: str) -> None:
     with pytest.raises(ValueError, match=f"^{want}"):

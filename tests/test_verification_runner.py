@@ -17,6 +17,8 @@ import pytest
 from fem_reference import cli, report
 from fem_reference.assessment.catalogue import Entry, Finding, Kind, order
 from fem_reference.foundations.errors import InputError, MissingSoftware
+from fem_reference.runs.solved import Solved
+from fem_reference.runs.store import Outcome
 from fem_reference.verification import runner, truths
 
 
@@ -365,11 +367,11 @@ def test_a_body_of_the_catalogue_has_a_time_limit() -> None:
 
     class Noted:
         def solve(self, _, settings):
-            return settings.time_limit
+            return Solved((), Outcome("timed out", f"{settings.time_limit:g}"))
 
     lab = FemLab(Noted())
-    assert lab.solve(None, "P2/P1") == 1800
-    assert lab.solve(None, "P2/P1", time_limit="5 s") == 5
+    assert lab.solve(None, "P2/P1").outcome.message == "1800"
+    assert lab.solve(None, "P2/P1", time_limit="5 s").outcome.message == "5"
 
 
 def test_the_order_is_the_slope_of_the_last_two_errors() -> None:

@@ -10,7 +10,8 @@ from test_stability import STILL, THIN, column, critical, effect, flesh, session
 from fem_reference.effects import total_energy
 from fem_reference.foundations.errors import InputError
 from fem_reference.problems import shapes
-from fem_reference.problems.body import Body, Prescribed, check
+from fem_reference.problems.body import Body, Prescribed
+from fem_reference.problems.checks import check
 from fem_reference.problems.paths import Affine, Turn
 from fem_reference.scenes import casefile
 from fem_reference.solvers.fenicsx import BodySettings

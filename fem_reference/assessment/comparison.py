@@ -1,6 +1,6 @@
 """A reference and its candidates, measured and judged: what reports are written from."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from fem_reference.assessment.convergence import Ladder
@@ -86,8 +86,10 @@ class Comparison:
 
     @property
     def word(self) -> Word:
-        """The verdict of the case."""
-        return overall(verdict.word for verdict in self.verdicts)
+        """The verdict of the case: none that rests on a reference which was denied."""
+        return (
+            "fail" if self.reference.outcome.status == "denied" else overall(verdict.word for verdict in self.verdicts)
+        )
 
 
 def compare(
@@ -124,6 +126,10 @@ def compare(
         for name in (deviations if expectation.of == "candidates" else [expectation.of])
         if _is_measured(expectation, measured.get(name, ()))
     )
+    if reference.outcome.status == "denied":  # no truth
+        verdicts = tuple(
+            replace(one, word="fail" if one.expectation.of == "reference" else "inconclusive") for one in verdicts
+        )
     error = extension_error(reference, context) if "lines" in reference.carries else None
     return Comparison(scene, setup, reference, candidates, context, deviations, changes, error, verdicts, error_bars)
 

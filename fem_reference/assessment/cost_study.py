@@ -4,15 +4,20 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from pydantic import TypeAdapter
+from pydantic import TypeAdapter, ValidationError
 
+from fem_reference import metrics
 from fem_reference.assessment.claims import Claim
-from fem_reference.assessment.fronts import Point
+from fem_reference.assessment.fronts import TETRAHEDRA, Amount, Point
 from fem_reference.assessment.growth import Growth
 from fem_reference.foundations.errors import InputError
 from fem_reference.io import texts
 
 FORMAT = 1
+# What recommendations compare cases by; what they divide by is above zero.
+FEATURES = ("size", "triangles", "motion", "contact", "bulk_to_shear", "fibres_to_shear", "tet_size", "refinements")
+_ABOVE_ZERO = ("size", "triangles", "tet_size")
+_WANT = "a study as the verb study writes it"
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,11 +33,11 @@ class CaseStudy:
     truth: str
     points: tuple[Point, ...]
     units: dict[str, str]
-    bars: dict[str, float]
+    bars: dict[str, Amount]
     claims: tuple[Claim, ...]
     triangles: int
-    travel: float
-    features: dict[str, float] = field(default_factory=dict)
+    travel: Amount
+    features: dict[str, Amount] = field(default_factory=dict)
 
     @property
     def counted(self) -> tuple[Point, ...]:
@@ -44,6 +49,20 @@ class CaseStudy:
         return tuple(
             replace(point, errors=own if point.is_truth else self._at_least_bars(point.errors)) for point in self.points
         )
+
+    @property
+    def certain(self) -> tuple[Point, ...]:
+        """The points with errors that are at most so great whatever the truth is within its bar, which is added to each; of the
+        truth itself its bar.
+        """
+        found = zip(self.points, self.counted, strict=True)
+        return tuple(
+            counted if point.is_truth else replace(point, errors=self._with_bars(point.errors))
+            for point, counted in found
+        )
+
+    def _with_bars(self, errors: dict[str, float]) -> dict[str, float]:
+        return {name: value + self.bars.get(name, 0.0) for name, value in errors.items()}
 
     def _at_least_bars(self, errors: dict[str, float]) -> dict[str, float]:
         return {name: max(value, self.bars.get(name, 0.0)) for name, value in errors.items()}
@@ -72,12 +91,66 @@ def facts(case: CaseStudy, origin: dict[str, str]) -> dict[str, Any]:
 
 
 def load(path: Path) -> CaseStudy:
-    """The study of a case from the file that :func:`facts` went into; InputError where it is none."""
+    """The study of a case from the file that :func:`facts` went into; InputError with the key where it is none."""
+    return _read(texts.read_json(path, _WANT), f"{path}")
+
+
+def load_all(path: Path) -> list[CaseStudy]:
+    """The study of a case, or those of several, from a file; InputError as of :func:`load`."""
+    found = texts.read_json(path, _WANT)
+    if isinstance(found, list):
+        return [_read(one, f"{path}: [{i}]") for i, one in enumerate(found)]
+    return [_read(found, f"{path}")]
+
+
+def _read(table: Any, place: str) -> CaseStudy:
+    if not isinstance(table, dict):
+        raise InputError(place, repr(table), _WANT)
+    if table.get("format") != FORMAT:
+        raise InputError(f"{place}: format", table.get("format", "nothing"), str(FORMAT))
     try:
-        found = texts.read_json(path, "a study as the verb study writes it")
-        if found.pop("format") != FORMAT:
-            raise InputError(f"{path}: format", "another one", str(FORMAT))
-        del found["origin"]
-        return TypeAdapter(CaseStudy).validate_python(found)
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(path, repr(error), "a study as the verb study writes it") from error
+        study = TypeAdapter(CaseStudy).validate_python(table)
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in first["loc"])
+        got = f'"{first["input"]}"' if isinstance(first["input"], str) else repr(first["input"])
+        missing = first["type"].startswith("missing")
+        want = "this key" if missing else first["msg"].removeprefix("Input should be ")
+        raise InputError(f"{place}: {key.lstrip('.')}", "nothing" if missing else got, want) from error
+    _check(study, place)
+    return study
+
+
+def _check(study: CaseStudy, place: str) -> None:
+    """InputError below ``place`` where a study lacks a feature, has a unit that is none of ours, or points that are of no use."""
+    for name in FEATURES:
+        if name not in study.features:
+            raise InputError(f"{place}: features.{name}", "nothing", "this number: the verb study makes it anew")
+        if name in _ABOVE_ZERO and not study.features[name] > 0:
+            raise InputError(f"{place}: features.{name}", f"{study.features[name]:g}", "more than 0")
+    known = metrics.units()
+    for name, unit in study.units.items():
+        if unit != known.get(name, unit) or unit not in known.values():
+            raise InputError(
+                f"{place}: units.{name}", f'"{unit}"', known.get(name) or f"one of {', '.join({*known.values()})}"
+            )
+    for i, point in enumerate(study.points):
+        for name in point.errors:
+            if name not in study.units:
+                raise InputError(f"{place}: points[{i}].errors.{name}", "an error without a unit", f"units.{name}")
+        _check_scene(point.choice.get("scene", {}), f"{place}: points[{i}].choice.scene")
+
+
+def _check_scene(scene: Any, place: str) -> None:
+    """InputError where the keys of a scene that a point changes are no table, or its tetrahedra have no size."""
+    if not isinstance(scene, dict):
+        raise InputError(place, repr(scene), "a table of keys")
+    for key in TETRAHEDRA if {*TETRAHEDRA} & {*scene} else ():
+        if key not in scene:
+            raise InputError(f"{place}.{key}", "nothing", f"this key beside the other of {' and '.join(TETRAHEDRA)}")
+        try:
+            good = float(str(scene[key]).removesuffix(" mm")) >= 0
+        except ValueError:
+            good = False
+        if not good:
+            raise InputError(f"{place}.{key}", f'"{scene[key]}"', 'a size such as "8 mm", or how often it is refined')

@@ -15,6 +15,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from fem_reference.assessment.differences import carried, typical, typical_changes
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.io import files, texts
@@ -28,10 +29,11 @@ FORMAT = 2
 SAFETY = 1.25
 # What is left of an error of first order, when halving its cause changes the result by 1.
 VARIATION = 2.0
-# Of which order in the size of tetrahedra an error is, on meshes graded towards the rims of attachments, where displacement goes
-# with the root of the distance: in general, and of the worst place or fibre alone. Of fibres, which end there, it is between.
-ORDER, ORDER_OF_FIBRES, ORDER_OF_WORST = 2.0, 1.5, 1.0
-TETRAHEDRA = "tetrahedra"
+# Of which order in the size of tetrahedra an error is: in general, and of the worst place or fibre alone. From rims of attachments,
+# where displacement goes with the root of the distance, order 1 comes, and 2 only where a mesh that resolves them is graded towards
+# them; from elsewhere 2 or more: in general it is between, as three sizes in a row show too (docs/accuracy.md).
+ORDER, ORDER_OF_WORST = 1.5, 1.0
+TETRAHEDRA, CARRIED = "tetrahedra", "surface in tetrahedra"
 # The measures of a run against another or (None) its rest.
 _Measured = Callable[[Run, Run | None], tuple[Measure, ...]]
 # By what a bar is of, by how much (f,) each statistic differs between two runs.
@@ -101,9 +103,12 @@ class Pair:
     exact: Run | None = None
     safety: float = SAFETY
 
-    def share(self, of: Of, metric: str, statistic: str) -> float:
-        """The error of the fine run over what the two differ by, with the safety of a grid convergence index."""
-        return float(self.safety / ((self.sizes[1] / self.sizes[0]) ** _order(of, metric, statistic) - 1))
+    def share(self, metric: str, statistic: str) -> float:
+        """The error of the fine run over what the two differ by, with the safety of a grid convergence index. The volume, which is
+        nearly kept, says as little of what is left as the worst place does.
+        """
+        order = ORDER_OF_WORST if metric == "volume" or is_local(statistic) else ORDER
+        return float(self.safety / ((self.sizes[1] / self.sizes[0]) ** order - 1))
 
 
 def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
@@ -123,14 +128,18 @@ def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
         return {"change": changes, "deviation": _of_deviations(surface(run), surface(other), measured)}
 
     statistics = measured(surface(pair.fine), surface(pair.fine))
-    sizes = {TETRAHEDRA: _sizes(differences(pair.coarse, pair.fine), statistics)}
+    moved = _rms_of_surface(statistics, [one.values for one in measured(surface(pair.fine), None)])
+    sizes = {TETRAHEDRA: _sizes(differences(pair.coarse, pair.fine), statistics, moved)}
     sizes |= {name: _sizes(differences(run, pair.coarse), statistics) for name, run in pair.varied.items()}
+    outside = carried(pair.fine, moved)
     exact = None if pair.exact is None else differences(pair.exact, pair.coarse)
     bars = []
     for of in get_args(Of):
         for i, one in enumerate(statistics):
-            left = dict.fromkeys(sizes, VARIATION) | {TETRAHEDRA: pair.share(of, one.metric, one.statistic)}
+            left = dict.fromkeys(sizes, VARIATION) | {TETRAHEDRA: pair.share(one.metric, one.statistic)}
             parts = {name: left[name] * size[of][i] for name, size in sizes.items()}
+            if one.metric == "volume" and one.statistic in outside:
+                parts[CARRIED] = SAFETY * outside[one.statistic]
             greatest = {name: float(part.max()) for name, part in parts.items()}
             model = None if exact is None else np.abs(exact[of][i])
             total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))  # of causes that are independent
@@ -143,65 +152,17 @@ def is_local(statistic: str) -> bool:
     return statistic.startswith(("max", "hausdorff"))
 
 
-def _order(of: Of, metric: str, statistic: str) -> float:
-    """The order of the error of a statistic. The volume is nearly kept, so that it says as little of what is left as the worst
-    place does. Of changes, and of deviations on average, the errors of fibres cancel in part: the rms of deviations alone adds up
-    what is wrong where they end.
-    """
-    if metric == "volume" or is_local(statistic):
-        return ORDER_OF_WORST
-    return ORDER_OF_FIBRES if (of, metric) == ("deviation", "fibre_length") and statistic.startswith("rms") else ORDER
-
-
-def ratio(differences: Floats, scale: Floats) -> float:
-    """The root mean square of ``differences`` (f,) over that of ``scale`` (f,), of the frames where both are known; NaN where the
-    scale is 0.
-    """
-    known = np.isfinite(differences) & np.isfinite(scale)
-    squares = float(scale[known] @ scale[known])
-    return math.sqrt(float(differences[known] @ differences[known]) / squares) if squares > 0 else math.nan
-
-
-def typical(differences: Floats, apart: Floats) -> Floats:
-    """The size (f,) of signed ``differences`` (f,) of a statistic between two runs whose surfaces are ``apart`` (f,) [mm]: at least
-    what it is for surfaces so far apart on average over the frames. A difference that crosses zero says nothing about the error
-    there; where the surfaces are the same it is 0.
-    """
-    return np.maximum(np.abs(differences), np.nan_to_num(ratio(differences, apart)) * apart)
-
-
-def typical_changes(changes: list[Floats], deviations: list[Floats], metrics: list[str]) -> list[Floats]:
-    """The sizes (f,) of signed differences of ``changes`` (f,) from rest between two runs, by statistic: at least the share of the
-    ``deviations`` (f,) of these runs from each other that they are on average, over the frames and the statistics of their metric.
-
-    By the triangle inequality a change of the same places differs by no more than their deviation, and by less as most of that is
-    not along the displacement or cancels. How much less, one statistic alone does not show: its difference may be small by chance,
-    that of the worst place above all.
-    """
-    shares = [ratio(found, deviation) for found, deviation in zip(changes, deviations, strict=True)]
-    means = {name: _rms_of_known(zip(metrics, shares, strict=True), name) for name in set(metrics)}
-    return [
-        np.maximum(np.abs(found), means[metric] * deviation)
-        for metric, found, deviation in zip(metrics, changes, deviations, strict=True)
-    ]
-
-
-def _rms_of_known(shares: Iterable[tuple[str, float]], wanted: str) -> float:
-    """The root mean square of the shares of the metric ``wanted`` that are known, 0 without any."""
-    known = [share for metric, share in shares if metric == wanted and math.isfinite(share)]
-    return math.sqrt(sum(share**2 for share in known) / len(known)) if known else 0.0
-
-
-def _sizes(differences: _Differences, statistics: tuple[Measure, ...]) -> _Differences:
-    """The sizes of the signed ``differences`` of these ``statistics`` between two runs."""
-    (apart,) = (
-        found
-        for one, found in zip(statistics, differences["deviation"], strict=True)
-        if (one.metric, one.statistic) == ("surface_deviation", "rms")
-    )
-    deviations = [typical(found, apart) for found in differences["deviation"]]
+def _sizes(differences: _Differences, statistics: tuple[Measure, ...], moved: Floats | None = None) -> _Differences:
+    """The sizes of the signed ``differences`` of these ``statistics`` between two runs, whose surfaces have ``moved`` (f,) [mm]."""
+    apart = _rms_of_surface(statistics, differences["deviation"])
+    deviations = [typical(found, apart, moved) for found in differences["deviation"]]
     metrics = [one.metric for one in statistics]
     return {"change": typical_changes(differences["change"], deviations, metrics), "deviation": deviations}
+
+
+def _rms_of_surface(statistics: tuple[Measure, ...], values: list[Floats]) -> Floats:
+    """Those of the ``values`` by statistic that are of the surface's distance, rms (f,) [mm]."""
+    return values[[(one.metric, one.statistic) for one in statistics].index(("surface_deviation", "rms"))]
 
 
 def _surface(run: Run) -> Run:

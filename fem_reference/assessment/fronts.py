@@ -7,9 +7,10 @@ Wanner 1993, Solving Ordinary Differential Equations I, II.10).
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field
 
 # What a point may cost: by name a title and its unit. The first is what is meant by cost where nothing else is said.
 COSTS: dict[str, tuple[str, str]] = {
@@ -24,6 +25,10 @@ COSTS: dict[str, tuple[str, str]] = {
     "projections": ("projections of a constraint", ""),
     "peak_memory_mb": ("peak memory", "MB"),
 }
+# The keys of a scene that say its tetrahedra.
+TETRAHEDRA = ("muscle.tet_size", "muscle.refinements")
+# What an error, a bar or a cost can be.
+Amount = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 # A slope needs so many points, whose errors span so much.
 _LEAST_POINTS, _LEAST_SPAN = 2, 1.3
 
@@ -45,8 +50,8 @@ class Point:
     choice: dict[str, Any]
     status: str
     message: str
-    errors: dict[str, float] = field(default_factory=dict)
-    costs: dict[str, float] = field(default_factory=dict)
+    errors: dict[str, Amount] = field(default_factory=dict)
+    costs: dict[str, Amount] = field(default_factory=dict)
 
     @property
     def is_default(self) -> bool:

@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fem_reference.assessment.cost_study import CaseStudy
-from fem_reference.assessment.fronts import Point
-from fem_reference.assessment.settings import TETRAHEDRA, is_elsewhere, setting, tetrahedra
+from fem_reference.assessment.fronts import TETRAHEDRA, Point
+from fem_reference.assessment.settings import is_elsewhere, setting, tetrahedra
+from fem_reference.foundations.errors import InputError
 
 TIME = "seconds_per_frame"
 # Of other cases so many are asked, those most alike.
@@ -24,13 +25,24 @@ _COMPARED = ("motion_to_size", "contact", "bulk_to_shear", "fibres_to_shear")
 @dataclass(frozen=True)
 class Expected:
     """A setting with the ``error`` and the ``time`` of a frame [s] that are expected of it; ``of``: the cases it was
-    measured on.
+    measured on. Where that is the case itself, ``bar`` is the part of the error that is the bar of the truth, as far as known.
     """
 
     point: Point
     error: float
     time: float
     of: tuple[str, ...]
+    bar: float = 0.0
+
+    @property
+    def counted(self) -> float:
+        """The error as it ranks: what is measured below the bar of the truth is not better than that."""
+        return max(self.error - self.bar, self.bar)
+
+    def misses(self, limits: Mapping[str, float]) -> float:
+        """How many times as great as allowed by ``limits`` it is, the worse of its error and its time."""
+        own = {"error": self.error, "time": self.time}
+        return max(own[name] / limit for name, limit in limits.items())
 
 
 @dataclass(frozen=True)
@@ -44,10 +56,11 @@ class Margins:
 @dataclass(frozen=True, eq=False)
 class Recommendation:
     """What is recommended (None: no setting meets what is asked), out of ``count`` settings, with the ``margins`` that are
-    in it; ``measured``: whether on the case itself.
+    in it; ``measured``: whether on the case itself. ``nearest``: where none meets it, the one that misses it least.
     """
 
     best: Expected | None
+    nearest: Expected | None
     count: int
     margins: Margins
     of: tuple[str, ...]
@@ -58,17 +71,36 @@ def recommend(
     features: Mapping[str, float], case: str, studies: Sequence[CaseStudy], metric: str, limits: Mapping[str, float]
 ) -> Recommendation:
     """The setting for a ``case``: the cheapest whose ``metric`` is at most ``limits["error"]``, or the nearest whose time
-    for a frame [s] is at most ``limits["time"]``; both where both are given (the cheapest then).
+    for a frame [s] is at most ``limits["time"]``; both where both are given (the cheapest then). Only studies that have the metric
+    count. An error is at most what was measured and the bar of the truth, as in the tables of a study.
     """
+    studies = [study for study in studies if metric in study.units]
     own = [study for study in studies if study.case == case and _is_same(features, study.features)]
-    margins = Margins() if own else _margins(studies, metric)
-    known = _measured(own[0], metric) if own else list(_expected(features, studies, metric, margins))
-    of = (case,) if own else tuple(study.case for study in alike(features, studies))
+    others = [] if own else _comparable(features, case, studies, metric)
+    margins = Margins() if own else _margins(others, metric)
+    known = _measured(own[0], metric) if own else list(_expected(features, others, metric, margins))
+    of = (case,) if own else tuple(study.case for study in alike(features, others))
     fitting = [
         one for one in known if one.error <= limits.get("error", math.inf) and one.time <= limits.get("time", math.inf)
     ]
-    rank = (lambda one: (one.time, one.error)) if "error" in limits else (lambda one: (one.error, one.time))
-    return Recommendation(min(fitting, key=rank, default=None), len(known), margins, of, bool(own))
+    rank = (lambda one: (one.time, one.error)) if "error" in limits else (lambda one: (one.counted, one.time))
+    best = min(fitting, key=rank, default=None)
+    nearest = None if best else min(known, key=lambda one: one.misses(limits), default=None)
+    return Recommendation(best, nearest, len(known), margins, of, bool(own))
+
+
+def _comparable(
+    features: Mapping[str, float], case: str, studies: Sequence[CaseStudy], metric: str
+) -> Sequence[CaseStudy]:
+    """The studies that say something of a case with these features: lengths count by the motion of bones, which there must be."""
+    if _is_share(metric):
+        return studies
+    if not features["motion"] > 0:
+        raise InputError(case, "bones that do not move", "a study of the case itself: fem-reference study makes one")
+    found = [study for study in studies if study.features["motion"] > 0]
+    if not found:
+        raise InputError("studies", "none of a case whose bones move", f"one, or a study of {case} itself")
+    return found
 
 
 def _is_same(one: Mapping[str, float], other: Mapping[str, float]) -> bool:
@@ -95,10 +127,9 @@ def _compared(features: Mapping[str, float], name: str) -> float:
 
 def _measured(study: CaseStudy, metric: str) -> list[Expected]:
     """The settings measured on a case, the truth itself among them; what is not known of it counts as error."""
-    bar = study.bars.get(metric, 0.0)
-    pairs = zip(study.points, study.counted, strict=True)
-    known = [(point, pair[1]) for point, counted in pairs if (pair := counted.at(metric, TIME))]
-    return [Expected(point, point.errors.get(metric, 0.0) + bar, time, (study.case,)) for point, time in known]
+    bar, pairs = study.bars.get(metric, 0.0), zip(study.points, study.certain, strict=True)
+    known = [(point, pair) for point, certain in pairs if (pair := certain.at(metric, TIME))]
+    return [Expected(point, error, time, (study.case,), bar) for point, (error, time) in known]
 
 
 def _expected(
@@ -126,7 +157,11 @@ def _expected(
 
 def scale(features: Mapping[str, float], other: Mapping[str, float], metric: str) -> float:
     """By how much an error on the ``other`` case counts here: lengths by the motion, shares as they are."""
-    return 1.0 if metric.startswith("volume.") or metric.endswith("_percent") else features["motion"] / other["motion"]
+    return 1.0 if _is_share(metric) else features["motion"] / other["motion"]
+
+
+def _is_share(metric: str) -> bool:
+    return metric.startswith("volume.") or metric.endswith("_percent")
 
 
 def _translated(point: Point, study: CaseStudy, features: Mapping[str, float]) -> Point:

@@ -1,10 +1,7 @@
 """Settings of solvers as they are the same on several cases, whose tetrahedra differ in size."""
 
 from fem_reference.assessment.cost_study import CaseStudy
-from fem_reference.assessment.fronts import Point
-
-# The keys of a scene that say its tetrahedra.
-TETRAHEDRA = ("muscle.tet_size", "muscle.refinements")
+from fem_reference.assessment.fronts import TETRAHEDRA, Point
 
 
 def setting(point: Point, study: CaseStudy) -> str:

@@ -11,8 +11,8 @@ from pydantic import Field
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.records import Record
 
-Verdict = Literal["ok", "degraded", "failed", "refused"]
-VERDICTS: tuple[Verdict, ...] = ("ok", "degraded", "failed", "refused")
+Verdict = Literal["ok", "degraded", "failed", "refused", "inconclusive"]
+VERDICTS: tuple[Verdict, ...] = ("ok", "degraded", "failed", "refused", "inconclusive")
 
 
 class Bound(Record):
@@ -103,7 +103,7 @@ class Stress:
         return Counter(cell.verdict for cell in self.cells if cell.solver == solver)
 
 
-_OTHER_REASONS = ("timed out", "crashed")  # that a run may have to end than that there is no solution
+_OTHER_REASONS = ("timed out", "crashed", "denied")  # that a run may have to end than that there is no solution
 Weighed = Sequence[tuple[Bound, Course]]
 
 

@@ -68,6 +68,11 @@ def _why_broken(error: BaseException) -> str:
     """The sentence on an exception that nobody expected: what, where, and what to do."""
     if isinstance(error, MemoryError):
         return "there is not enough memory for this; nothing was judged. Smaller input, or larger tetrahedra, need less"
+    if isinstance(error, ModuleNotFoundError) and not (error.name or "").startswith("fem_reference"):
+        return (
+            f"the Python package {error.name} is not installed for {sys.executable}: pip install fem_reference there, which brings "
+            "all that it needs"
+        )
     frames = traceback.extract_tb(error.__traceback__)
     places = [f"{Path(frame.filename).name}:{frame.lineno}" for frame in frames[-3:]]
     what = " ".join(f"{type(error).__name__}: {error}".split())[:300]

@@ -12,13 +12,14 @@ from fem_reference.cli._pages import Asked, Part, candidates, case_part, changes
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import against_page
+from fem_reference.runs.complete import complete
 from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Candidate, Case
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import recorded
 from fem_reference.studies import refinement
-from fem_reference.studies.execution import Bench, complete
+from fem_reference.studies.execution import Bench
 
 PAGE = "against"
 

@@ -101,6 +101,5 @@ def checked_bench(scene: Case, options: argparse.Namespace, chosen: list[tuple[C
     """The bench of a scene whose expectations, reference and ``chosen`` candidates can all be read."""
     judge.check(scene)
     bench: Bench[Any] = Bench(scene, out(options) / "runs", options.ranks)
-    for choice, place in [(scene.reference, "reference"), *chosen]:
-        bench.settings(choice, place)
+    bench.check(chosen)
     return bench

@@ -31,10 +31,20 @@ def _judge(scene: Case, options: argparse.Namespace, chosen: list[tuple[Candidat
     result = judging.compare(bench, reference, [(read | solved)[entry.name] for entry, _ in chosen], bars)
     asked = _asked(scene, options, [entry for entry, _ in chosen])
     _, lines = written(options, asked, lambda folder, _, command: report.write(result, folder, command))
-    write_output(report.summary(result), "\n".join([comparison_text(result), *lines]), options)
+    write_output(
+        report.summary(result), "\n".join([comparison_text(result), *unturned(options, result.word), *lines]), options
+    )
     if any(run.outcome.status != "converged" for run in result.runs):
         return SOLVER_FAILED
     return VERDICT_FAIL if result.word == "fail" else DONE
+
+
+def unturned(options: argparse.Namespace, word: str) -> list[str]:
+    """A line where the negative control was to turn the verdict, and did not."""
+    if not options.negative_control or word == "fail":
+        return []
+    why = "what it changes is not judged here (compare judges candidates too), or matters too little"
+    return [f"negative control: the verdict is {word} and was to be fail: {why}"]
 
 
 def _asked(scene: Case, options: argparse.Namespace, chosen: list[Candidate]) -> Asked:

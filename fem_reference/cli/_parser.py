@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Protocol, cast
 
 from fem_reference import __version__
+from fem_reference.foundations.errors import InputError
 
 RANKS = "MPI processes of the reference (default: 1, or 2 for large bodies where cores are free)"
 _FOLDER = Path(__file__).parent
@@ -64,6 +65,7 @@ def _help(name: str) -> str:
 
 def _add(verb: Verb, sub: argparse.ArgumentParser) -> None:
     """The options of a verb."""
+    sub.register("action", None, _Once)
     sub.set_defaults(verb=verb.run, ranks=None, error_bar=False, negative_control=False, writes=True, page_name=None)
     verb.add_options(sub)
     sub.add_argument("--out", type=Path, metavar="DIR", help="where pages and stored runs go (default: reports)")
@@ -110,6 +112,25 @@ def positive(text: str) -> int:
     if not text.isdecimal() or not 0 < len(text.lstrip("0")) < 10:
         raise argparse.ArgumentTypeError(f'got "{text[:20]}", want a number from 1 to 999999999')
     return int(text)
+
+
+class _Once(argparse.Action):
+    """The value of an option that has one, given once: a second one would silently take the place of the first."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        option_string: str | None = None,
+    ) -> None:
+        """Take it."""
+        del parser
+        given = namespace.__dict__.setdefault("given", {})
+        if option_string and self.dest in given:
+            raise InputError(option_string, f'"{given[self.dest]}" and "{values}"', "one of them")
+        given[self.dest] = values
+        setattr(namespace, self.dest, values)
 
 
 class Distinct(argparse.Action):

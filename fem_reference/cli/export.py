@@ -10,7 +10,9 @@ from fem_reference.cli._printing import DONE, SOLVER_FAILED, lines, out, write_o
 from fem_reference.export import paraview
 from fem_reference.export.folders import check
 from fem_reference.foundations.errors import InputError
-from fem_reference.runs import store
+from fem_reference.report.words import duration
+from fem_reference.runs import states
+from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import judging, refinement
@@ -31,6 +33,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     either = f"for {PARAVIEW}: a candidate of the case, a folder of frames or a solver; may be repeated"
     parser.add_argument("--candidate", action="append", default=[], metavar="NAME|DIR", help=either)
     parser.add_argument("--unit", help=UNIT)
+    again = f"for {PARAVIEW}: solve the reference again where it was solved before without its states"
+    parser.add_argument("--solve", action="store_true", help=again)
     add_ranks(parser)
 
 
@@ -39,8 +43,9 @@ def run(options: argparse.Namespace) -> int:
     scene = casefile.muscle(scene_of(options))
     if options.format == PARAVIEW:
         return _runs(scene, options)
-    if options.candidate or options.unit:
-        raise InputError("export", f"--candidate or --unit for {options.format}", f"them for {PARAVIEW} only")
+    if options.candidate or options.unit or options.solve:
+        got = f"--candidate, --unit or --solve for {options.format}"
+        raise InputError("export", got, f"them for {PARAVIEW} only")
     bench = Bench(scene, out(options) / "runs")
     written = export.export(scene, bench.problem, options.to, options.format)
     facts = {"case": scene.name, "folder": str(options.to), "files": written}
@@ -49,22 +54,35 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _runs(scene: MuscleCase, options: argparse.Namespace) -> int:
-    """The reference, with its states where it can keep them, and candidates."""
+    """The reference, with its states, and candidates."""
     check(options.to)
     chosen = [choose(scene, text, options.unit) for text in options.candidate]
     check_names([entry.name for entry, _ in chosen])
     bench = checked_bench(scene, options, chosen)
-    with_states = scene.reference
-    if hasattr(bench.settings(scene.reference, "reference"), "store_state"):
-        with_states = scene.reference.model_copy(update={"store_state": True})
-    reference = bench.obtain("reference", with_states, "reference")
+    reference = _reference(bench, scene, solve=options.solve)
     runs = [bench.obtain(entry.name, entry, place) for entry, place in chosen]
-    plain = store.finished(
-        bench.folder(scene.reference, "reference")
-    )  # the same frames, beside which error bars may be
-    bars = refinement.stored(reference) or (None if plain is None else refinement.stored(plain))
-    result = judging.compare(bench, reference, runs, bars)
+    result = judging.compare(bench, reference, runs, refinement.stored(reference))
     written = paraview.write(result, options.to)
     facts = {"case": scene.name, "index": str(options.to / paraview.INDEX), "files": len(written)}
     write_output(facts, "\n".join(lines(facts)), options)
     return DONE if all(one.outcome.status == "converged" for one in result.runs) else SOLVER_FAILED
+
+
+def _reference(bench: Bench[MuscleCase], scene: MuscleCase, *, solve: bool) -> Run:
+    """The reference with its states, where its solver has any; InputError where it was solved without them, and nobody asked to
+    ``solve`` it again.
+    """
+    choice = scene.reference
+    if not hasattr(bench.settings(choice, "reference"), "store_state"):
+        return bench.obtain("reference", choice, "reference")
+    known = bench.known("reference", choice.model_copy(update={"store_state": None}), "reference")
+    if (
+        known is not None
+        and known.folder is not None
+        and not solve
+        and not states.are_kept(known.folder, known.numbers)
+    ):
+        took = duration(known.outcome.cost.get("seconds"))
+        got = f"a reference that was solved before without its states ({known.folder}), which stress and pressure follow from"
+        raise InputError("export", got, f"--solve, which solves it again (that took {took})")
+    return bench.obtain("reference", choice.model_copy(update={"store_state": True}), "reference")

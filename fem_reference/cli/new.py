@@ -2,10 +2,12 @@
 
 import argparse
 import os
+import shlex
 from pathlib import Path
 
 from fem_reference.cli._printing import DONE, write_output
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.units import LENGTH_UNITS
 from fem_reference.studies import new_scene
 
 HELP = "write a scene to begin with: a copy of a case, or one of your own muscle and bones"
@@ -21,8 +23,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     bones = "triangles of a bone, whose name is that of the file; at least two, each with its --bone"
     parser.add_argument("--bone", type=Path, action="append", default=[], metavar="FILE", help=bones)
-    unit = "unit of length of these files (default: by the size of the muscle)"
-    parser.add_argument("--unit", choices=sorted(new_scene.UNITS), help=unit)
+    unit = f"unit of length of these files: {', '.join(LENGTH_UNITS)} (default: guessed by the sizes of all of them, and said)"
+    parser.add_argument("--unit", metavar="UNIT", help=unit)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -31,12 +33,15 @@ def run(options: argparse.Namespace) -> int:
         raise InputError("--bone", "a bone without --muscle", "the muscle too")
     if options.muscle is not None and options.case is not None:
         raise InputError("--from", f'"{options.case}" beside --muscle', "one of the two")
+    folder, unit, said = options.name, {}, ""
     if options.muscle is None:
-        folder = new_scene.copied(options.case or "hip_flexion", options.name)
+        new_scene.copied(options.case or "hip_flexion", folder)
     else:
-        folder = new_scene.of_surfaces(options.name, options.muscle, options.bone, options.unit)
-    place = folder if len(folder.parts) > 1 else f"./{folder}"
+        found = new_scene.of_surfaces(folder, options.muscle, options.bone, options.unit)
+        unit = {"unit": found.name} | ({"unit_guessed": found.why} if found.why else {})
+        said = f"lengths are in {found.name}, guessed: {found.why}; --unit says it\n" if found.why else ""
+    place = shlex.quote(str(folder if len(folder.parts) > 1 else f"./{folder}"))
     call = os.environ.get("FEM_REFERENCE_COMMAND", "fem-reference")  # as it was called
-    text = f"{folder / 'case.toml'}: edit it, then\n  {call} validate {place}\n  {call} run {place}"
-    write_output({"folder": str(folder), "scene": str(folder / "case.toml")}, text, options)
+    text = f"{said}{folder / 'case.toml'}: edit it, then\n  {call} validate {place}\n  {call} run {place}"
+    write_output({"folder": str(folder), "scene": str(folder / "case.toml"), **unit}, text, options)
     return DONE

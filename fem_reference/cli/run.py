@@ -4,9 +4,9 @@ import argparse
 
 from fem_reference.assessment import solver_table
 from fem_reference.assessment.comparison import alone
-from fem_reference.assessment.judge import check
+from fem_reference.assessment.judge import check, overall
 from fem_reference.cli._choosing import refuse_error_bar, scene_of
-from fem_reference.cli._judging import judge
+from fem_reference.cli._judging import judge, unturned
 from fem_reference.cli._parser import add_case, add_error_bar, add_name, add_negative_control, add_ranks
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
 from fem_reference.foundations.errors import InputError
@@ -46,7 +46,8 @@ def run(options: argparse.Namespace) -> int:
     bench = Bench(scene, out(options) / "runs", options.ranks)
     solved = bench.obtain(*solver_table.choice(scene, options.solver), f"--solver {options.solver}")
     measures, verdicts = alone(scene, bench.setup(), solved)
-    write_output(of_run(scene, solved, measures, verdicts), run_text(solved, measures, verdicts), options)
+    said = [run_text(solved, measures, verdicts), *unturned(options, overall(one.word for one in verdicts))]
+    write_output(of_run(scene, solved, measures, verdicts), "\n".join(said), options)
     if solved.outcome.status != "converged":
         return SOLVER_FAILED
     return VERDICT_FAIL if any(verdict.word == "fail" for verdict in verdicts) else DONE

@@ -11,16 +11,12 @@ from fem_reference.cli._parser import add_case
 from fem_reference.cli._printing import DONE, lines, write_output
 from fem_reference.problems import guess, of_case
 from fem_reference.problems.muscle import Problem
-from fem_reference.problems.muscle_body import as_body
 from fem_reference.report.words import duration
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Case
-from fem_reference.solvers.fenicsx import resources
+from fem_reference.studies import expected_cost
 
 HELP = "check all of a case that can be checked before it is solved, and say what running it will cost"
-# Measured on hip_flexion: seconds of processor time of one of Newton's iterations with so many unknowns, the exponent by which it
-# grows, and iterations a frame.
-_SECONDS, _UNKNOWNS, _EXPONENT, _ITERATIONS = 0.13, 5456, 1.15, 4
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -54,13 +50,9 @@ def _facts(scene: Case, built: Any, bench: Any) -> dict[str, Any]:
     known["effects"] = {one.effect.title: str(one).partition(": ")[2] for one in found}
     settings: Any = bench.settings(scene.reference, "reference")
     if scene.reference.solver == "fenicsx":
-        count = resources.unknowns(as_body(built).mesh, settings.element)
-        each = _SECONDS * (count / _UNKNOWNS) ** _EXPONENT
-        seconds = each * _ITERATIONS * (len(scene.numbers) - 1)
-        known["unknowns"] = count
-        known["cost"] = (
-            f"about {duration(seconds)} of processor time, within a factor of three, for {len(scene.numbers)} frames"
-        )
+        known["unknowns"] = expected_cost.unknowns(built, settings)
+        seconds = duration(expected_cost.seconds("fenicsx", built, settings))
+        known["cost"] = f"about {seconds} of processor time, within a factor of three, for {len(scene.numbers)} frames"
     return known
 
 

@@ -283,7 +283,7 @@ def make(name: str, **parameters: Any) -> "Effect":
     >>> make("neo_hooke", mu="10 kPa").mu, make("neo_hooke", mu=0.01).mu
     (0.01, 0.01)
     """
-    if name not in names():
+    if not isinstance(name, str) or name not in names():
         raise InputError("effect", f'"{name}"', f"one of {', '.join(names())}")
     record = find(name)
     units = {key: unit_of(field.metadata) for key, field in record.model_fields.items()}

@@ -20,7 +20,9 @@ class ActiveTension(Ramped, Energy):
     def indicator(self, scene: Estimates) -> Indicator:
         """By how far fibres that pull straighten the muscle, or shorten it where they can."""
         pull = scene.greatest(self) * self.tension
-        return Indicator("tension of the fibres over the shear modulus", pull / scene.shear, scene.straighten(pull))
+        return Indicator(
+            "tension of the fibres over the shear modulus", pull / scene.shear, scene.straighten(pull), pull
+        )
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa]."""

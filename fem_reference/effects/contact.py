@@ -22,14 +22,15 @@ class Contact(Interaction):
     bones: tuple[str, ...] | None = Field(default=None, min_length=1)
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """By how deep the surface may get into bones."""
+        """By how deep the surface may get into bones, and the pressure there."""
         near = {name: one for name, one in scene.near.items() if self.is_by(name)}
         gap = min((one.gap for one in near.values()), default=math.inf)
         depth = math.hypot(*(one.depth for one in near.values()))
         reached = "; ".join(
             f"{name}, nearest at frame {one.frame:g}" for name, one in near.items() if one.gap < self.smoothing
         )
-        return Indicator(f"gap to bones that is free for certain [mm] ({reached or 'no bone is reached'})", gap, depth)
+        rule = f"gap to bones that is free for certain [mm] ({reached or 'no bone is reached'})"
+        return Indicator(rule, gap, depth, self.stiffness * max(depth, self.smoothing - gap, 0.0))
 
     def is_by(self, bone: str) -> bool:
         """Whether the bone of this name is in contact."""

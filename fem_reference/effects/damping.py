@@ -28,6 +28,7 @@ class Damping(Energy):
             "drag over the length against the shear modulus",
             force * scene.length / scene.shear,
             scene.lag(scene.bend(sideways) + scene.draw(force)),
+            force * scene.length,
         )
 
     def energy(self, state: State) -> Any:

@@ -31,7 +31,9 @@ class FibreActive(Ramped, Energy):
     def indicator(self, scene: Estimates) -> Indicator:
         """By how far fibres that pull straighten the muscle, or shorten it where they can."""
         pull = scene.greatest(self) * self.stress
-        return Indicator("tension of the fibres over the shear modulus", pull / scene.shear, scene.straighten(pull))
+        return Indicator(
+            "tension of the fibres over the shear modulus", pull / scene.shear, scene.straighten(pull), pull
+        )
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa], zero at rest."""

@@ -40,6 +40,7 @@ class FibrePassive(Energy):
             "tension of the fibres over the shear modulus",
             pull / scene.shear,
             scene.shorten(pull, 0.1 * (scene.stretch[1] - 1)),
+            pull,
         )
 
     def energy(self, state: State) -> Any:

@@ -36,6 +36,7 @@ class FibrePassiveFebio(Energy):
             "tension of the fibres over the shear modulus",
             pull / scene.shear,
             scene.shorten(pull, 0.1 * (scene.stretch[1] - 1)),
+            pull,
         )
 
     def energy(self, state: State) -> Any:

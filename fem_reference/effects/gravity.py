@@ -21,7 +21,10 @@ class Gravity(Ramped, Energy):
         """By the sag of a beam."""
         force = scene.greatest(self) * self.density * math.hypot(*self.acceleration)
         return Indicator(
-            "weight over the length against the shear modulus", force * scene.length / scene.shear, scene.bend(force)
+            "weight over the length against the shear modulus",
+            force * scene.length / scene.shear,
+            scene.bend(force),
+            force * scene.length,
         )
 
     def energy(self, state: State) -> Any:

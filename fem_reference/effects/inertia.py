@@ -30,13 +30,15 @@ class Inertia(Energy):
     spectral_radius: float = Field(default=0.9, ge=0, le=1)
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """By how far a beam lags behind: its first frequency is that of the beam that its own weight bends by as much."""
+        """By how far a beam lags behind: its first frequency is that of the beam that its own weight bends by as much; by the force
+        of its acceleration, and the stress of a wave that a jump of velocity sends through it.
+        """
         square = scene.bend(self.density)  # of one over the frequency
-        lag = max(
-            square * scene.in_time(scene.in_time(scene.acceleration)), math.sqrt(square) * scene.in_time(scene.jump)
-        )
+        acceleration, jump = scene.in_time(scene.in_time(scene.acceleration)), scene.in_time(scene.jump)
+        lag = scene.lag(max(square * acceleration, math.sqrt(square) * jump))
+        stress = max(self.density * acceleration * scene.length, math.sqrt(self.density * scene.shear) * jump)
         cauchy = self.density * scene.in_time(scene.speed) ** 2 / scene.shear
-        return Indicator("Cauchy number, density times speed squared over shear modulus", cauchy, scene.lag(lag))
+        return Indicator("Cauchy number, density times speed squared over shear modulus", cauchy, lag, stress)
 
     def energy(self, state: State) -> Any:
         """The potential of the step per rest volume [MPa]."""

@@ -12,14 +12,19 @@ class Pressure(Ramped, Load):
     """``-amount p J F^-T N``, with N the outward normal at rest: a pressure on the surface as it is now, by Nanson's formula.
 
     ``on``: the part of the surface; ``pressure``: p [MPa], inwards where it is positive.
+
+    All round a body that may shrink freely, with an energy of volume K/2 (J - 1)^2, V/V0 is 1 - p / K exactly. What is attached
+    exactly keeps its size, and the body around it is sheared: a cube of side L with one clamped triangle, whose legs are a, keeps
+    0.15 mu / K (a / L)^3 of p / K more, as 0.9002 instead of 0.9 where a is L/2 and K is 10 mu.
     """
 
     pressure: units.Pressure
 
     def indicator(self, scene: Estimates) -> Indicator:
         """By how far it presses the thickness together."""
-        part = scene.greatest(self) * abs(self.pressure) / scene.shear
-        return Indicator("pressure over the shear modulus", part, part * scene.thickness / 3)
+        load = scene.greatest(self) * abs(self.pressure)
+        part = load / scene.shear
+        return Indicator("pressure over the shear modulus", part, part * scene.thickness / 3, load)
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:
         """Force per rest area [MPa], (3,)."""

@@ -26,9 +26,9 @@ class Prestretch(Ramped, Prestrain):
         return self
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """By how far fibres shorten that are let go."""
+        """By how far fibres shorten that are let go, and the tension of the matrix in them."""
         part = scene.greatest(self) * abs(self.stretch - 1)
-        return Indicator("stretch of the fibres less 1", part, 0.1 * part * scene.length)
+        return Indicator("stretch of the fibres less 1", part, 0.1 * part * scene.length, 3 * scene.shear * part)
 
     def elastic(self, state: State) -> Sequence[Sequence[Any]]:
         """The deformation gradient (3, 3) that the energies see."""

@@ -19,8 +19,9 @@ class Traction(Ramped, Load):
 
     def indicator(self, scene: Estimates) -> Indicator:
         """By how far it pulls the length."""
-        part = scene.greatest(self) * math.hypot(*self.force) / scene.shear
-        return Indicator("traction over the shear modulus", part, part * scene.length / 3)
+        load = scene.greatest(self) * math.hypot(*self.force)
+        part = load / scene.shear
+        return Indicator("traction over the shear modulus", part, part * scene.length / 3, load)
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:  # noqa: ARG002
         """Force per rest area [MPa], (3,)."""

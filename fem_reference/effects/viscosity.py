@@ -28,11 +28,13 @@ class Viscosity(Energy):
 
     def indicator(self, scene: Estimates) -> Indicator:
         """By how much of its travel a body lags behind in the time in which it relaxes."""
-        deborah = self.eta / scene.shear * scene.in_time(scene.speed) / scene.length
+        rate = scene.in_time(scene.speed) / scene.length
+        deborah = self.eta / scene.shear * rate
         return Indicator(
             "Deborah number, relaxation time over the time of the motion",
             deborah,
             scene.lag(0.25 * deborah * scene.travel),
+            2 * self.eta * rate,
         )
 
     def energy(self, state: State) -> Any:

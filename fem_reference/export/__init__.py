@@ -5,8 +5,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Literal, get_args
 
-from fem_reference.export import febio, open_formats, texts
+from fem_reference.export import febio, febio_differences, open_formats, texts
 from fem_reference.export.folders import check, new_folder
+from fem_reference.foundations.errors import InputError
 from fem_reference.io import files
 from fem_reference.problems.muscle import Problem
 from fem_reference.scenes.muscle import MuscleCase
@@ -20,8 +21,11 @@ FORMATS: tuple[Format, ...] = get_args(Format)
 def export(scene: MuscleCase, build: Callable[[], Problem], folder: Path, form: Format) -> list[str]:
     """Write the problem that ``build`` makes of a ``scene`` into ``folder``, whole or not at all; the names of its files.
 
-    ``"febio"`` adds FEBio's own file to the open ones. InputError where the folder is not free, or FEBio has not the same.
+    ``"febio"`` adds FEBio's own file to the open ones, and warns of what is another model there. InputError where the folder is
+    not free, or FEBio has not the same.
     """
+    if not isinstance(form, str) or form not in FORMATS:
+        raise InputError("form", repr(form), f"one of {', '.join(FORMATS)}")
     check(folder)
     if form == "febio":
         febio.check(scene)
@@ -36,6 +40,9 @@ def _write(scene: MuscleCase, problem: Problem, folder: Path, form: Format) -> N
     open_formats.write(scene, problem, folder)
     files.write_text(folder / "candidate.toml", texts.candidate())
     if form == "febio":
+        differences = febio_differences.notes(problem)
+        for difference in differences:
+            log.warning("another model in FEBio: %s", difference)
         febio.write(problem, folder)
-        files.write_text(folder / "FEBIO.md", texts.febio_readme(scene))
+        files.write_text(folder / "FEBIO.md", texts.febio_readme(scene, differences))
     files.write_text(folder / "README.md", texts.readme(scene, febio=form == "febio"))

@@ -7,10 +7,26 @@ its rest area. So it is the springs of an attachment: their stiffness per rest a
 
 from xml.etree.ElementTree import Element, SubElement
 
-from fem_reference.export.febio_mesh import bone_id, by_springs, leaf, obstacles, springs_id
+import numpy as np
+
+from fem_reference.export.febio_material import matrix_constants
+from fem_reference.export.febio_mesh import (
+    EDGES,
+    bone_id,
+    by_springs,
+    free_facets,
+    leaf,
+    obstacles,
+    outward,
+    springs_id,
+)
+from fem_reference.geometry.signed_distance import signed_distances
 from fem_reference.problems.muscle import Problem
 
 SEARCH_RADIUS = 5.0  # [mm]: contact is not looked for deeper than this inside a bone
+# Shear moduli of the matrix with which an overlap at rest may press at once: in gluteus_maximus_anatomical, where it is up to 34 of
+# them, FEBio never took its first step with a search radius of 5 mm, and 0.1 mm, which is 10 of them, helped.
+_AT_ONCE = 10.0
 SPRING_SEARCH_RADIUS = 1.0  # [mm]: at rest the two surfaces of springs coincide
 # By penalty alone, in one pass, the penalty as it is given, with the whole tangent.
 PENALTY = {"laugon": 0, "two_pass": 0, "auto_penalty": 0, "symmetric_stiffness": 0}
@@ -29,9 +45,11 @@ def add_contact(root: Element, problem: Problem) -> None:
     for attached in by_springs(problem):
         settings = {"penalty": attached.stiffness, "search_radius": SPRING_SEARCH_RADIUS}
         _pair(contacts, "tied-elastic", springs_id(attached), settings)
+    deep = overlaps(problem)
     for bone in obstacles(problem):
         assert problem.contact is not None  # or there is no contact
-        settings = {"penalty": problem.contact.stiffness, "search_radius": SEARCH_RADIUS, "fric_coeff": 0.0}
+        radius = search_radius(problem, deep[bone.name])
+        settings = {"penalty": problem.contact.stiffness, "search_radius": radius, "fric_coeff": 0.0}
         _pair(contacts, "sliding-elastic", bone_id(bone), settings)
 
 
@@ -40,3 +58,22 @@ def _pair(contacts: Element, kind: str, name: str, settings: dict[str, float | N
     entry = SubElement(contacts, "contact", name=f"{name}_contact", type=kind, surface_pair=f"{name}_pair")
     for tag, value in (PENALTY | settings).items():
         leaf(entry, tag, value)
+
+
+def overlaps(problem: Problem) -> dict[str, float]:
+    """By bone in contact how deep [mm] the facets of the contact surface are inside at rest: at corners and middles; 0 outside."""
+    corners = problem.mesh.points[free_facets(problem)]
+    middles = corners[:, EDGES[:3]].mean(axis=2)
+    points = np.concatenate([corners, middles, corners.mean(axis=1, keepdims=True)], axis=1).reshape(-1, 3)
+    inside = ((bone.name, -signed_distances(points, outward(bone.surface))) for bone in obstacles(problem))
+    return {name: float(depths.max(initial=0.0)) for name, depths in inside}
+
+
+def search_radius(problem: Problem, deep: float) -> float:
+    """How deep [mm] inside a bone FEBio looks for contact, where the muscle is ``deep`` [mm] in it at rest: less where that would
+    press at once with more than the matrix bears.
+    """
+    assert problem.contact is not None  # or there is no contact
+    matrix = matrix_constants(problem.effects)
+    bears = _AT_ONCE * 2 * (matrix["c1"] + matrix["c2"]) / problem.contact.stiffness
+    return min(SEARCH_RADIUS, bears) if deep > bears else SEARCH_RADIUS

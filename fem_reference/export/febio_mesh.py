@@ -64,6 +64,13 @@ def outward(surface: Surface) -> Surface:
     return Surface(surface.points, surface.triangles[:, ::-1]) if turned else surface
 
 
+def free_facets(problem: Problem) -> Ints:
+    """The facets (m, 3) of the tets that may be in contact: none of what is attached, nor its neighbours."""
+    outer, _ = boundary(problem.mesh.tets)
+    attached = np.concatenate([np.zeros((0, 3), np.int64), *problem.mesh.facets.values()])
+    return outer[~np.isin(outer, attached).any(axis=1)]
+
+
 class Mesh:
     """Nodes, elements, node sets and surfaces; node numbers of FEBio begin at 1, with those of the muscle."""
 
@@ -133,10 +140,8 @@ class Mesh:
             SubElement(mesh, "NodeSet", name=name).text = ",".join(str(node + 1) for node in sorted(nodes))
 
     def _contact_surface(self, mesh: Element, cells: dict[str, Ints]) -> None:
-        """The contact surface: none of what is attached, nor its neighbours."""
-        attached = np.concatenate([np.zeros((0, 3), np.int64), *self.problem.mesh.facets.values()])
-        free = self.outer[~np.isin(self.outer, attached).any(axis=1)]
-        self._surface(mesh, "muscle_free", "tri6", self._curved(free))
+        """The contact surface, and its pairs with the bones."""
+        self._surface(mesh, "muscle_free", "tri6", self._curved(free_facets(self.problem)))
         names = [bone_id(bone) for bone in obstacles(self.problem)]
         for name in names:
             self._surface(mesh, f"{name}_surface", "tri3", cells[name])

@@ -23,9 +23,8 @@ from fem_reference.io import files
 from fem_reference.io.blocks import Block, Tree
 from fem_reference.metrics import MeasurementContext
 from fem_reference.problems.contact import Contact
-from fem_reference.runs import results
+from fem_reference.runs import results, states
 from fem_reference.runs.results import Results
-from fem_reference.runs.states import FOLDER as STATES
 from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
 
@@ -173,8 +172,10 @@ def _at_nodes(mesh: TetMesh, displacement: Floats) -> Floats:
 
 def _states(comparison: Comparison) -> Results | None:
     """The results of the reference, None where it keeps no states."""
-    folder = comparison.reference.folder
-    if folder is None or not (folder / STATES).is_dir():
+    run = comparison.reference
+    folder = run.folder
+    if folder is None or not states.are_kept(folder, run.numbers):
+        log.info("%s keeps no states: without stress, pressure, det F and fibre stretch", run.name)
         return None
     return results.of_run(folder, comparison.scene)
 

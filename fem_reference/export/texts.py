@@ -1,5 +1,6 @@
 """The texts beside exported data: how to read it, how to return frames. The texts are files of this folder."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from string import Template
 
@@ -21,9 +22,13 @@ def readme(scene: MuscleCase, *, febio: bool) -> str:
     return _filled("README.md", title=scene.title, name=scene.name, version=__version__, more=more)
 
 
-def febio_readme(scene: MuscleCase) -> str:
-    """What of a scene is the same in FEBio and what is not."""
-    return _filled("FEBIO.md", title=scene.title, first=str(scene.frames.first))
+def febio_readme(scene: MuscleCase, notes: Sequence[str]) -> str:
+    """What of a scene is the same in FEBio and what is not, with the ``notes`` on this one."""
+    here = (
+        "".join(f"- {note}\n" for note in notes)
+        or "- no springs at points of the surface, no bone that overlaps the muscle at rest\n"
+    )
+    return _filled("FEBIO.md", title=scene.title, first=str(scene.frames.first), here=here)
 
 
 def paraview_readme(scene: MuscleCase, unit: str, *, states: bool) -> str:

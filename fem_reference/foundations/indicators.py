@@ -1,8 +1,9 @@
 """Whether a scene needs an effect: what is known before anything is solved, and the number that decides.
 
 Hierarchical modelling decides what a model must have by an indicator of the modelling error (Oden and Prudhomme 2002,
-doi 10.1006/jcph.2002.7183). Here that is an estimate of the displacement [mm] that the effect causes, made of rest geometry, motion
-and parameters, beside the accuracy that is asked for.
+doi 10.1006/jcph.2002.7183). Here that is an estimate of the displacement [mm] that the effect causes and one of the stress [MPa]
+that it makes, of which forces, pressures and stretches follow, made of rest geometry, motion and parameters, beside the accuracy
+that is asked for. An isometric contraction moves nothing and is all the stress that there is.
 """
 
 from collections.abc import Mapping
@@ -12,13 +13,14 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Indicator:
-    """Of an effect: the ``estimate`` [mm] of how far the surface moves by it, root mean square at the worst frame; the ``number``
-    that people know it by, and what that is, the ``rule``.
+    """Of an effect: the ``estimate`` [mm] of how far the surface moves by it, root mean square at the worst frame; the ``stress``
+    [MPa] that it makes, at most, there; the ``number`` that people know it by, and what that is, the ``rule``.
     """
 
     rule: str
     number: float
     estimate: float
+    stress: float
 
 
 @dataclass(frozen=True)
@@ -39,11 +41,12 @@ class Estimates:
 
     ``length`` and ``thickness`` of the muscle, its ``shear`` modulus at rest, and the ``tension`` [MPa] of its
     fibres at their length at rest, the mean over the frames; ``fixed``: to how many bones; ``sag``: how far its
-    axis gets from the straight line between two of them; ``travel``: how far its surface goes at most, by the motion of the bones;
-    ``stretch``: of the line from one attachment to the other, the smallest and the greatest; ``interval``
+    axis gets from the straight line between two of them; ``lean``: by how much fibres lean against that line, from 0 to 1;
+    ``travel``: how far its surface goes at most, by the motion of the bones;
+    ``stretch`` of fibres, by that of the line from one attachment to the other, the smallest and the greatest; ``interval``
     from a frame number to the next, None where the scene does not say it; ``speed``, its part
     ``sideways`` of that line, ``jump`` (of velocity from one instant to the next) and ``acceleration``: the greatest, by frame
-    numbers; ``frames``: all numbers, and knots of ramps; ``tolerance``:
+    numbers; ``frames``: all numbers, and knots of ramps; ``tolerance`` [mm] and ``stress_tolerance`` [MPa]:
     what an effect may change without being needed; ``near``: by bone, how near the surface comes.
     """
 
@@ -53,6 +56,7 @@ class Estimates:
     tension: float
     fixed: int
     sag: float
+    lean: float
     travel: float
     stretch: tuple[float, float]
     interval: float | None
@@ -62,6 +66,7 @@ class Estimates:
     acceleration: float
     frames: tuple[float, ...]
     tolerance: float
+    stress_tolerance: float
     near: Mapping[str, Near] = field(default_factory=dict)
 
     def bend(self, force: float) -> float:
@@ -95,11 +100,12 @@ class Estimates:
 
     def straighten(self, pull: float) -> float:
         """How far the surface moves, root mean square, where fibres ``pull`` [MPa] at a beam with clamped ends: 0.6 of its sag is
-        the most that they can take out, and its stiffness in bending resists. One that has not two ends is free to shorten.
+        the most that they can take out, and its stiffness in bending resists; those that lean shear it. One that has not two ends
+        is free to shorten.
         """
         if self.fixed < 2:
             return self.shorten(pull, 0.3)
-        return 0.6 * self.sag * self.taut(pull) / (1 + self.taut(pull))
+        return 0.6 * self.sag * self.taut(pull) / (1 + self.taut(pull)) + self.shorten(pull, 0.3) * self.lean
 
     def shorten(self, pull: float, share: float) -> float:
         """How far the surface moves, root mean square, where fibres ``pull`` [MPa] against the matrix: by a ``share`` of the length

@@ -1,8 +1,12 @@
-"""The range of deformation in which a law is valid."""
+"""The range of deformation in which a law is valid, and how well energy and work agree."""
 
 from dataclasses import dataclass
 from math import inf
 from typing import Literal
+
+# Energy that grew without work, or was lost, within a load step, as a share of the greatest so far: beyond it a state halfway is
+# looked at, and what then remains makes a run doubtful.
+ENERGY_GAP = 0.05
 
 # V/V0 is det F; the fibre stretch is that of the energies: isochoric, and with what is prestretched.
 Measure = Literal["V/V0", "fibre stretch"]

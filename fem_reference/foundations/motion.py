@@ -6,6 +6,9 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats
 
+# Frame numbers between which a motion is steady, straight or about one axis, and the angle [rad] that it has turned by at each.
+Course = tuple[tuple[float, ...], tuple[float, ...]]
+
 
 @dataclass(frozen=True)
 class Rotation:
@@ -35,6 +38,10 @@ class Rotation:
         pose[:3, 3] = np.asarray(self.centre) - turn @ np.asarray(self.centre)
         return pose
 
+    def course(self, points: Floats) -> Course:  # noqa: ARG002
+        """The keyframes."""
+        return self.frames, self.angles
+
 
 @dataclass(frozen=True)
 class Translation:
@@ -58,6 +65,10 @@ class Translation:
         pose = np.eye(4)
         pose[:3, 3] = distance * np.asarray(self.direction, float) / np.linalg.norm(self.direction)
         return pose
+
+    def course(self, points: Floats) -> Course:  # noqa: ARG002
+        """The keyframes, between which nothing turns."""
+        return self.frames, (0.0,) * len(self.frames)
 
 
 RigidMotion = Rotation | Translation

@@ -21,7 +21,8 @@ class Record(BaseModel):
     )
 
 
-def _check_name(name: str) -> str:
+def check_name(name: str) -> str:
+    """The ``name``; ValueError where nothing can be called so."""
     if not name.isprintable() or name != name.strip() or not 0 < len(name) <= _LONGEST_NAME:
         raise ValueError(f"a name of 1 to {_LONGEST_NAME} letters, digits and signs, without blanks at its ends")
     return name
@@ -36,7 +37,7 @@ def _check_file_name(name: str) -> str:
 _SHOWN = 12  # errors of one file
 # What pages and messages call something.
 _LONGEST_NAME = 100
-Name = Annotated[str, AfterValidator(_check_name)]
+Name = Annotated[str, AfterValidator(check_name)]
 # A name that a file or folder can have too.
 FileName = Annotated[str, AfterValidator(_check_file_name)]
 

@@ -7,11 +7,15 @@ import math
 import re
 from collections.abc import Sequence
 from functools import cache, partial
+from numbers import Real
 from typing import Annotated, Any
 
 import pint
 from pydantic import BeforeValidator
 
+# The units [mm] that the coordinates of a file may be in, in scenes, beside frames and on the command line. Quantities with a
+# number may have any unit of their kind; here a slip such as "Mm", 1e9 mm, would go unseen.
+LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3, "in": 25.4, "ft": 304.8}
 # What people call each kind of quantity, and the unit that numbers of this kind have inside.
 _INSIDE = {
     "a length": "mm",
@@ -126,10 +130,10 @@ def three(text: object, kind: str) -> tuple[float, float, float]:
 
 
 def length_unit(text: object) -> float:
-    """How many mm a unit of length has: ``"m"`` -> 1000.0."""
-    if not isinstance(text, str) or not text.strip().isalpha():
-        raise ValueError('a unit of length, such as "mm"')
-    return quantity(f"1 {text}", "a length")
+    """How many mm a unit of coordinates has, one of ``LENGTH_UNITS``: ``"m"`` -> 1000.0."""
+    if not isinstance(text, str) or text not in LENGTH_UNITS:
+        raise ValueError(f"a unit of length: {', '.join(LENGTH_UNITS)}")
+    return LENGTH_UNITS[text]
 
 
 def positive(text: object, kind: str) -> float:
@@ -177,7 +181,7 @@ def written(value: Any, unit: str) -> Any:
     >>> written(0.01, "MPa"), written((0, 0, -1), "mm"), written("2 cm", "mm"), written(3, "")
     ('0.01 MPa', '0.0, 0.0, -1.0 mm', '2 cm', 3)
     """
-    if not unit or isinstance(value, str | bool):
-        return value
     numbers = value if isinstance(value, Sequence) else (value,)
+    if not unit or isinstance(value, str | bool) or not all(isinstance(number, Real) for number in numbers):
+        return value
     return f"{', '.join(repr(float(number)) for number in numbers)} {unit}"

@@ -1,5 +1,6 @@
-"""What this process uses: the most memory since it was last reset, and its processor time."""
+"""What processes use: the most memory of this one since it was last reset, and the processor time of those that it started."""
 
+import os
 import resource
 from contextlib import suppress
 from pathlib import Path
@@ -9,6 +10,24 @@ def forget_peak_memory() -> None:
     """Watch the memory of this process anew, which may have been larger before; Linux can."""
     with suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5", encoding="utf-8")
+
+
+def processor_times(process: int) -> dict[int, float]:
+    """By number, the processor time [s] of a ``process`` and of each that descends from it and has not ended; nothing where the
+    system does not say.
+    """
+    parents, times = dict[int, int](), dict[int, float]()
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError, ValueError, IndexError):  # it may end meanwhile
+            fields = path.read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
+            number = int(path.parent.name)
+            parents[number] = int(fields[1])
+            times[number] = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    found, size = {process} & set(times), 0
+    while len(found) > size:
+        size = len(found)
+        found |= {number for number, parent in parents.items() if parent in found}
+    return {number: times[number] for number in found}
 
 
 def peak_memory() -> float:

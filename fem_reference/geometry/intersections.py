@@ -1,60 +1,68 @@
-"""Self-intersections of a triangle surface."""
+"""Intersections of triangle surfaces, with themselves and with each other."""
 
 import numpy as np
+from igl import predicates
 from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface
 
 
 def self_intersections(surface: Surface) -> Ints:
-    """The triangles (k,), sorted, that an edge of another triangle pierces or whose edge pierces another.
+    """The triangles (k,), sorted, that an edge of another triangle pierces or whose edge pierces another."""
+    return np.unique(self_crossings(surface))
+
+
+def self_crossings(surface: Surface) -> Ints:
+    """Pairs (k, 2) of triangles of which an edge of one pierces the other.
 
     An edge that has a vertex in common with the other triangle does not count; nor do triangles that touch or overlap
     in one plane.
     """
-    first, second = _near_pairs(surface.points[surface.triangles])
-    hit = np.zeros(len(first), bool)
+    _, pairs, _ = predicates.find_self_intersections(np.array(surface.points), np.array(surface.triangles))
+    first, second = pairs.T
+    hit = np.zeros(len(pairs), bool)
     for edges, faces in ((first, second), (second, first)):
         for corners in ([0, 1], [1, 2], [2, 0]):
             hit |= _pierces(surface, surface.triangles[edges][:, corners], surface.triangles[faces])
-    return np.unique(np.concatenate([first[hit], second[hit]]))
+    return np.asarray(pairs[hit], np.int64)
 
 
-def _near_pairs(corners: Floats) -> tuple[Ints, Ints]:
-    """Pairs (p,), (p,) of triangles whose bounding boxes overlap, from ``corners`` (m, 3, 3); a pair may come twice."""
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    triangle, cell = _cells(low, high)
-    order = np.argsort(cell, kind="stable")
-    triangle, cell = triangle[order], cell[order]
-    pairs = []
-    for shift in range(1, len(cell)):
-        same = np.flatnonzero(cell[shift:] == cell[:-shift])
-        if len(same) == 0:
-            break
-        one, other = triangle[same], triangle[same + shift]
-        overlap = ((low[one] <= high[other]) & (low[other] <= high[one])).all(axis=1)
-        pairs.append((one[overlap], other[overlap]))
-    if not pairs:
-        return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    first, second = (np.concatenate(side) for side in zip(*pairs, strict=True))
-    return first, second
+def crossings(one: Surface, other: Surface) -> Ints:
+    """Pairs (k, 2) of triangles of two surfaces that intersect or touch, decided exactly, by predicates of Shewchuk 1997."""
+    low = np.maximum(one.points.min(axis=0), other.points.min(axis=0))
+    high = np.minimum(one.points.max(axis=0), other.points.max(axis=0))
+    near = [_reaching(surface, low, high) for surface in (one, other)]
+    if not all(map(len, near)):
+        return np.zeros((0, 2), np.int64)
+    chosen = [np.array(surface.triangles[some]) for surface, some in zip((one, other), near, strict=True)]
+    _, pairs, _ = predicates.find_intersections(np.array(one.points), chosen[0], np.array(other.points), chosen[1])
+    return np.stack([some[pairs[:, i]] for i, some in enumerate(near)], axis=1)
 
 
-def _cells(low: Floats, high: Floats) -> tuple[Ints, Ints]:
-    """Each box from ``low`` to ``high`` (m, 3) with each cell of a uniform grid it reaches: box (p,), cell (p,)."""
-    extent = (high - low).max(axis=1)
-    # Twice the mean box keeps few boxes in a cell; no box may reach more than some 50 cells along an axis.
-    width = max(2 * extent.mean(), extent.max() / 50, np.finfo(float).tiny)
-    begin, end = (np.floor((side - low.min(axis=0)) / width).astype(np.int64) for side in (low, high))
-    span = end - begin + 1
-    count = span.prod(axis=1)
-    box = np.repeat(np.arange(len(low)), count)
-    nth = np.arange(len(box)) - np.repeat(np.cumsum(count) - count, count)
-    along_x, nth = nth % span[box, 0], nth // span[box, 0]
-    along_y, along_z = nth % span[box, 1], nth // span[box, 1]
-    x, y, z = (begin[box] + np.stack([along_x, along_y, along_z], axis=1)).T
-    rows, columns = end.max(axis=0)[1:] + 1
-    return box, (x * rows + y) * columns + z
+def _reaching(surface: Surface, low: Floats, high: Floats) -> Ints:
+    """The triangles (k,) whose bounding boxes reach into the box from ``low`` to ``high``."""
+    found, (a, b, c) = np.ones(len(surface.triangles), bool), surface.triangles.T
+    for axis, values in enumerate(surface.points.T):
+        for side in (values >= low[axis], values <= high[axis]):
+            found &= side[a] | side[b] | side[c]
+    return np.flatnonzero(found)
+
+
+def overlaps(one: Floats, other: Floats) -> Floats:
+    """How far (k,) [mm] triangles ``one`` and ``other`` (k, 3, 3) that cross reach through each other: the shorter of the ways
+    across either that bring the other to one side of it; 0 where either has no area.
+    """
+    ways = np.stack([_reach(one, other), _reach(other, one)])
+    return np.asarray(np.nan_to_num(ways).min(axis=0))
+
+
+def _reach(triangles: Floats, walls: Floats) -> Floats:
+    """How far (k,) ``triangles`` reach through the planes of ``walls`` on the side where it is less; NaN without area."""
+    normals = np.cross(walls[:, 1] - walls[:, 0], walls[:, 2] - walls[:, 0])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        normals = normals / np.linalg.norm(normals, axis=1)[:, None]
+    heights = np.einsum("kci,ki->kc", triangles - walls[:, :1], normals)
+    return np.asarray(np.minimum(heights.max(axis=1), -heights.min(axis=1)))
 
 
 def _pierces(surface: Surface, edges: Ints, triangles: Ints) -> NDArray[np.bool_]:

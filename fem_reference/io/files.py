@@ -96,6 +96,11 @@ def _polylines(path: Path, unit: float, check: Callable[[Floats, list[list[int]]
     return Polylines(points[np.concatenate(lines)] * unit, offsets)
 
 
+def read_points(path: Path) -> Floats:
+    """The points (n, 3) of a VTK file, whatever its cells."""
+    return np.asarray(_attempt(vtk.read_points, path, "a VTK file, whole"), float)
+
+
 def read_xdmf(path: Path, unit: float) -> list[tuple[float, Surface]]:
     """Time and surface of each step of a temporal collection, in units of ``unit`` mm.
 

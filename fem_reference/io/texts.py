@@ -42,6 +42,15 @@ def parse_toml(text: str, place: object, want: str = "TOML") -> dict[str, Any]:
     return table
 
 
+def toml_text(text: str) -> str:
+    r"""``text`` as a basic string of TOML, which has the escapes of JSON's, and one of the last character of ASCII too.
+
+    >>> print(toml_text('a "b"'))
+    "a \"b\""
+    """
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
 def read_json(path: Path, want: str) -> Any:
     """The value of a JSON file, ``want`` of messages; numbers that are not finite are none."""
     text = _text(path, MOST_JSON, want)

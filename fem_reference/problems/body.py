@@ -5,16 +5,18 @@ It knows no solver.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
-from fem_reference.effects import Effect, Load
+from fem_reference.effects import Effect
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.fibres import Directions
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems.contact import Contact, Obstruction
+from fem_reference.problems.courses import Moving, course, moving_ramp, posed, some, stops
 
 Kind = Literal["tetrahedron", "hexahedron"]
 # By element: kind of cell, degree of the displacement, and of the pressure (None: no such unknown; 0: constant in each cell). Where
@@ -42,54 +44,6 @@ def is_stabilised(element: str) -> bool:
     """
     _, displacement, pressure = ELEMENTS[element]
     return displacement == pressure
-
-
-def check(body: "Body", element: str) -> None:
-    """InputError unless ``element`` suits the cells and effects of ``body``, which has every region and fibre direction that it
-    speaks of, and prescribes what can be distinguished and solved.
-    """
-    check_element(element, body.mesh.kind, body.mesh.degree, body.effects, "element")
-    _check_prescribed(body.prescribed)
-    fixed = [entry.on for entry in body.prescribed if isinstance(entry.on, str)]
-    contact = [body.contact.on] if body.contact and isinstance(body.contact.on, str) else []
-    used = dict.fromkeys([*fixed, *contact, *(effect.on for effect in body.effects if isinstance(effect, Load))])
-    for on in used:
-        if on not in body.mesh.facets:
-            raise InputError("on", f'"{on}"', f"a region of the body: {', '.join(body.mesh.facets)}")
-    _check_regions(body.mesh, tuple(used))
-    if body.fibre is None and any("fibre" in effect.needs for effect in body.effects):
-        raise InputError("fibre", "nothing", "fibre directions, which an effect needs")
-    if body.interval is None and any("interval" in effect.needs for effect in body.effects):
-        raise InputError("interval", "nothing", "the time from a frame number to the next, which an effect needs")
-
-
-def _check_prescribed(prescribed: tuple["Prescribed", ...]) -> None:
-    """InputError where two share a name, by which their forces are reported, or springs would repel."""
-    names = [entry.name for entry in prescribed]
-    for entry in prescribed:
-        if names.count(entry.name) > 1:
-            raise InputError("prescribed", f'"{entry.name}" twice', "a name for each")
-        if entry.stiffness is not None and not entry.stiffness > 0:
-            raise InputError(
-                f"prescribed.{entry.name}.stiffness", f"{entry.stiffness:g}", "more than 0, or None: exact"
-            )
-        if entry.stiffness is None and not isinstance(entry.on, str):
-            raise InputError(f"prescribed.{entry.name}.stiffness", "none on a skin", "springs")
-
-
-def _check_regions(mesh: "Cells", names: tuple[str, ...]) -> None:
-    """InputError unless each of the regions ``names`` has facets, all of them on the boundary of the cells."""
-    boundary = set(map(tuple, boundary_facets(mesh).tolist()))
-    for name in names:
-        facets = set(map(tuple, np.sort(mesh.facets[name], axis=1).tolist()))
-        lost = sorted(facets - boundary)
-        if not facets:
-            raise InputError(f"facets.{name}", "none", "facets of one cell each")
-        if lost:
-            got = (
-                f"facets that are not of one cell each ({len(lost)} of {len(facets)}, the first with corners {lost[0]})"
-            )
-            raise InputError(f"facets.{name}", got, "facets on the boundary of the cells")
 
 
 def boundary_facets(mesh: "Cells") -> Ints:
@@ -203,6 +157,19 @@ class Prescribed:
     path: Callable[[Floats, float], Floats]
     stiffness: float | None = None
 
+    def displacements(self, points: Floats, frame: float) -> Floats:
+        """What the path prescribes for ``points`` (n, 3) [mm] along the components, and 0 along the others; InputError where it
+        has no displacements for them.
+        """
+        place, want = f'prescribed "{self.name}": path at frame {frame:g}', "displacements (n, 3) of points (n, 3)"
+        try:
+            found = np.asarray(self.path(np.array(points), frame), float)
+        except Exception as error:  # whatever a function of the caller's own does wrong
+            raise InputError(place, f"{type(error).__name__}: {error}", want) from error
+        if found.shape != points.shape:
+            raise InputError(place, f"displacements {found.shape} of points {points.shape}", want)
+        return np.asarray(np.where(np.isin(np.arange(3), self.components), found, 0.0))
+
 
 @dataclass(frozen=True, eq=False)
 class ByCell:
@@ -237,3 +204,29 @@ class Body:
         """The first frame that is wanted: what overlaps at rest is relaxed before it."""
         relaxed = self.contact.relaxed if self.contact else None
         return self.frames[0] if relaxed is None else relaxed[1]
+
+    @property
+    def size(self) -> float:
+        """The diagonal of the box around the body [mm]."""
+        return float(np.linalg.norm(np.ptp(self.mesh.points, axis=0)))
+
+    def points_on(self, on: str | Skin) -> Floats:
+        """The corners (n, 3) [mm] of the facets of a region, or the points of a skin, at rest."""
+        return self.mesh.points[np.unique(self.mesh.facets[on])] if isinstance(on, str) else on.points
+
+    @cached_property
+    def stops(self) -> tuple[float, ...]:
+        """Frame numbers at which a load step ends, so that none leaves out what happens within it; InputError where a path cannot
+        be followed.
+        """
+        things = [_moving(entry, some(self.points_on(entry.on))) for entry in self.prescribed]
+        things += [posed(f'obstruction "{one.name}"', one.pose, self.mesh.points) for one in self.obstructions]
+        ramps = (moving_ramp(effect, self.size) for effect in self.effects)
+        return stops([*things, *(ramp for ramp in ramps if ramp)], self.frames, self.size)
+
+
+def _moving(entry: Prescribed, points: Floats) -> Moving:
+    def at(frame: float) -> Floats:
+        return points + entry.displacements(points, frame)
+
+    return Moving(f'prescribed "{entry.name}"', at, course(entry.path, points))

@@ -5,12 +5,32 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fem_reference.effects import Effect, Energy, Interaction, Ramped, State, fibre_tension, total_energy
-from fem_reference.effects.contact import among
+from fem_reference.effects import (
+    Effect,
+    Energy,
+    Interaction,
+    Ramped,
+    State,
+    elastic_state,
+    fibre_tension,
+    total_energy,
+)
 from fem_reference.foundations.indicators import Estimates, Indicator, Near
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.motion import apply
-from fem_reference.problems.guess import Guess, axis_of, distance, length_of, motion, sag, spans, thickness_of, turn
+from fem_reference.problems import fibre_field
+from fem_reference.problems.guess import (
+    Guess,
+    axis_of,
+    distance,
+    length_of,
+    motion,
+    sag,
+    spans,
+    strain,
+    thickness_of,
+    turn,
+)
 from fem_reference.problems.muscle import RigidBody, Setup
 from fem_reference.scenes.muscle import MuscleCase
 
@@ -20,6 +40,9 @@ log = logging.getLogger(__name__)
 # surface where that is less: error bars of the surface, root mean square, are 0.03 to 0.14 of the former and 0.01 to 0.05 of the
 # latter; those of fibre lengths and volumes are tighter where only these change.
 TOLERANCE = 0.005
+# What an effect may make of stress without being needed, in the stress of what acts otherwise; of which this strain, which rounding
+# makes, is the least.
+STRESS_TOLERANCE, ROUNDING = 0.005, 1e-6
 # By how much of the way that a point goes past a bone the guess of where it is may be wrong. In `hip_flexion` it is by 0.83.
 _DOUBT = 1.0
 # So many frames, evenly spread, and so many vertices are looked at.
@@ -32,57 +55,61 @@ _FELT = 1.0  # [mm] from a bone, more than any smoothing of contact
 
 @dataclass(frozen=True)
 class Decision:
-    """Whether an effect is ``needed``: by its ``indicator`` (None: part of the material) and the ``bound`` [mm] of that;
-    ``turned_out``: the frame whose solution showed it, None where it was known before.
+    """Whether an effect is ``needed``: by its ``indicator`` (None: part of the material) and what is allowed of that, ``bound``
+    [mm] and ``stress_bound`` [MPa]; ``turned_out``: the frame whose solution showed it, None where it was known before;
+    ``listed``: it acts whether needed or not.
     """
 
     effect: Effect
     needed: bool
     indicator: Indicator | None
     bound: float
+    stress_bound: float
     turned_out: int | None = None
+    listed: bool = False
 
     def __str__(self) -> str:
         if self.indicator is None:
             return f"{self.effect.title}: kept, part of the material"
-        word, one = ("needed" if self.needed else "left out"), self.indicator
+        return f"{self.effect.title}: {self._word}, about {self._because}; {self.indicator.rule}: {self.indicator.number:.2g}"
+
+    @property
+    def _word(self) -> str:
+        if self.listed:
+            return "acts, as it is listed" if self.needed else 'acts, as it is listed ("auto" would do without it)'
+        if not self.needed:
+            return "left out"
         if self.turned_out is not None:
-            word += f" as it turned out at frame {self.turned_out}"
-        elif self.needed and isinstance(self.effect, Interaction):
-            word = "watched for, and in the equations where something is pressed"
-        because = f"about {one.estimate:.2g} mm of displacement, {self.bound:.2g} mm allowed"
-        return f"{self.effect.title}: {word}, {because}; {one.rule}: {one.number:.2g}"
+            return f"needed as it turned out at frame {self.turned_out}"
+        pressing = isinstance(self.effect, Interaction)
+        return "watched for, and in the equations where something is pressed" if pressing else "needed"
+
+    @property
+    def _because(self) -> str:
+        """The quantities that decided: those that are more than is allowed, or all where none is."""
+        assert self.indicator is not None
+        estimate, stress, most = self.indicator.estimate, 1e3 * self.indicator.stress, 1e3 * self.stress_bound
+        said = [
+            (f"{estimate:.2g} mm of displacement, {self.bound:.2g} mm allowed", estimate <= self.bound),
+            (f"{stress:.2g} kPa of stress, {most:.2g} kPa allowed", stress <= most),
+        ]
+        over = [text for text, within in said if not within]
+        return ", and ".join(over or [text for text, _ in said])
 
 
 def decisions(scene: MuscleCase, rest: Setup) -> tuple[Decision, ...]:
     """Of each effect of a scene whether that needs it, before it is solved."""
-    known = estimates(scene, rest)
-    return tuple(_decision(effect, known) for effect in scene.effects)
+    known, listed = estimates(scene, rest), scene.choice == "listed"
+    return tuple(replace(decision(effect, effect.indicator(known), known), listed=listed) for effect in scene.effects)
 
 
-def missed(
-    scene: MuscleCase, rest: Setup, known: Estimates, numbers: tuple[int, ...], positions: Floats
-) -> tuple[Decision, ...]:
-    """The effects that a scene left out and should not have, by what was ``known`` before and by where its surface went,
-    ``positions`` (f, n, 3) at frame ``numbers``: those of the first frame that shows one.
-    """
-    left = [one.effect for one in scene.decisions if not one.needed]
-    bones = rest.bones if among(left) else ()
-    for number in _sampled(numbers):
-        now = _solved(known, rest, bones, number, positions[numbers.index(number)])
-        found = tuple(one for one in (_decision(effect, now) for effect in left) if one.needed)
-        if found:
-            return tuple(replace(one, turned_out=number) for one in found)
-    return ()
+def decision(effect: Effect, found: Indicator | None, known: Estimates) -> Decision:
+    """Whether an ``effect`` is needed by what its indicator ``found``."""
+    within = found is not None and found.estimate <= known.tolerance and found.stress <= known.stress_tolerance
+    return Decision(effect, not within, found, known.tolerance, known.stress_tolerance)
 
 
-def _decision(effect: Effect, known: Estimates) -> Decision:
-    found = effect.indicator(known)
-    needed = found is None or not found.estimate <= known.tolerance
-    return Decision(effect, needed, found, known.tolerance)
-
-
-def _solved(known: Estimates, rest: Setup, bones: tuple[RigidBody, ...], number: int, at: Floats) -> Estimates:
+def solved(known: Estimates, rest: Setup, bones: tuple[RigidBody, ...], number: int, at: Floats) -> Estimates:
     """What was ``known`` before, with where the surface is ``at`` (n, 3) in a frame that was solved, beside those ``bones``."""
     chosen, felt = _chosen(rest), rest.exempt.places(_PLACES)
     points, moved = rest.surface.points[chosen], at[chosen]
@@ -107,16 +134,19 @@ def estimates(scene: MuscleCase, rest: Setup) -> Estimates:
     moved = {frame: felt.at(frame) if rest.attached else places for frame in frames}
     travel = max(float(np.linalg.norm(guess.at(frame) - points, axis=1).max()) for frame in frames)
     speed, sideways, jump, acceleration = motion(guess, axis_of(rest), scene.numbers)
-    size = scene.muscle.tet_size / 2**scene.muscle.refinements
+    size, shear = scene.muscle.tet_size / 2**scene.muscle.refinements, _shear(scene)
+    most = max(strain(points, guess.at(frame)) for frame in frames) if rest.attached else 0.0
+    (low, high), taut = _stretch(rest, frames), _taut(scene)
     return Estimates(
         length=length_of(rest),
         thickness=thickness_of(rest),
-        shear=_shear(scene),
+        shear=shear,
         tension=_tension(scene),
         fixed=len(rest.attached),
         sag=sag(rest, frames, travel),
+        lean=fibre_field.lean(scene, axis_of(rest)),
         travel=travel,
-        stretch=_stretch(rest, frames),
+        stretch=(taut * low, taut * high),
         interval=scene.frames.interval,
         speed=speed,
         sideways=sideways,
@@ -124,6 +154,7 @@ def estimates(scene: MuscleCase, rest: Setup) -> Estimates:
         acceleration=acceleration,
         frames=_instants(scene),
         tolerance=TOLERANCE * (min(size, travel) if travel > _STILL else size),
+        stress_tolerance=STRESS_TOLERANCE * shear * max(most, ROUNDING),
         near={bone.name: _near(bone, places, moved, _DOUBT) for bone in rest.bones},
     )
 
@@ -155,6 +186,13 @@ def _tension(scene: MuscleCase) -> float:
     pulling = [one for one in scene.effects if isinstance(one, Energy) and one.stored and "fibre" in one.needs]
     amounts = [np.mean([one.amount(number) for number in scene.numbers]) for one in pulling]
     return float(sum(amount * fibre_tension(one, 1.0) for one, amount in zip(pulling, amounts, strict=True)))
+
+
+def _taut(scene: MuscleCase) -> float:
+    """By how much fibres are stretched at rest, at the most over the frames."""
+    rest, amounts = State(F=np.eye(3).tolist(), fibre=(1.0, 0.0, 0.0)), _instants(scene)
+    found = [elastic_state([(one, one.amount(number)) for one in scene.effects], rest).F[0][0] for number in amounts]
+    return float(max(found))
 
 
 def _stretch(rest: Setup, frames: list[int]) -> tuple[float, float]:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fem_reference.foundations.mesh import Polylines, Surface, TetMesh, enclosed_volume
+from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh, enclosed_volume
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.fibres import Directions, NearestLine, fibre_field, trace
 from fem_reference.geometry.signed_distance import signed_distances
@@ -46,6 +46,20 @@ def of(scene: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh]) ->
     mesh = fill(float(np.cbrt(6 * np.sqrt(2) * volume / TETS)))
     field = fibre_field(mesh, traced.start, traced.end)
     return trace(field, traced.count), field
+
+
+def lean(scene: MuscleCase, axis: Floats) -> float:
+    """By how much fibres that are given lean against the unit vector ``axis`` (3,): the root mean square of ``sin 2 a``, a their
+    angle to it, which is the shear by their tension. 0 of those that are traced from one attachment to the other.
+    """
+    if scene.fibres.polylines is None:
+        return 0.0
+    given = scene.fibres.polylines
+    lines = files.read_polylines(scene.file(given.file, "fibres.polylines.file"), given.unit)
+    pieces = np.delete(np.diff(lines.points, axis=0), lines.offsets[1:-1] - 1, axis=0)
+    lengths, along = np.linalg.norm(pieces, axis=1), np.abs(pieces @ axis)
+    cosine = along / np.maximum(lengths, np.finfo(float).tiny)
+    return float(np.sqrt((4 * cosine**2 * np.maximum(1 - cosine**2, 0)) @ lengths / lengths.sum()))
 
 
 def inside(surface: Surface, fibres: Polylines) -> Polylines:

@@ -65,6 +65,16 @@ def motion(guess: Guess, axis: Floats, numbers: tuple[int, ...]) -> tuple[float,
     return *speeds, float(jumps.max(initial=0.0)), float(smooth.max(initial=0.0)) / (at[1] - at[0])
 
 
+def strain(points: Floats, moved: Floats) -> float:
+    """How much ``points`` (n, 3) are deformed that are ``moved`` (n, 3): what the best rigid motion (Kabsch 1976, doi
+    10.1107/S0567739476001873) leaves, root mean square, over that of the distances from the middle; 1 at most.
+    """
+    rest, now = points - points.mean(axis=0), moved - moved.mean(axis=0)
+    left, _, right = np.linalg.svd(now.T @ rest)
+    turned = rest @ (left @ np.diag((1.0, 1.0, np.linalg.det(left @ right))) @ right).T
+    return float(min(1.0, np.linalg.norm(now - turned) / np.linalg.norm(rest)))
+
+
 def _size(vectors: Floats) -> Floats:
     """The root mean square (f,) of ``vectors`` (f, n, 3) over n."""
     return np.asarray(np.sqrt((vectors**2).sum(axis=2).mean(axis=1)))

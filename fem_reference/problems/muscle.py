@@ -197,7 +197,7 @@ def build(scene: MuscleCase, rest: Setup) -> Problem:
             place = join(scene.place, f"attachment[{i}]")
             raise InputError(place, "an area smaller than the tetrahedra resolve", "a smaller muscle.tet_size")
     fibres, fibre = fibre_field.of(scene, rest.surface, partial(_filled, scene, rest))
-    apart = spacing(rest.surface)
+    apart, asked = spacing(rest.surface), (*scene.effects, *(one.effect for one in scene.decisions))
     return Problem(
         rest.surface,
         rest.bones,
@@ -209,7 +209,7 @@ def build(scene: MuscleCase, rest: Setup) -> Problem:
         fibres=fibres,
         mesh_facts=_mesh_facts(rest, mesh, scene.muscle.tet_size / 2) | distances_known,
         seconds=time.perf_counter() - begin,
-        fibre=fibre if any("fibre" in effect.needs for effect in scene.effects) else None,
+        fibre=fibre if any("fibre" in effect.needs for effect in asked) else None,
         skin=None if contact is None else free_skin(rest.exempt, mesh, apart),
         attached_skins={
             attached.attachment: attached_skin(

@@ -1,7 +1,6 @@
 """The muscle of a problem as a body that finite elements deform: attached to bones, and in contact with them."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -9,10 +8,11 @@ from fem_reference.effects import Interaction
 from fem_reference.effects.contact import Contact as ContactEffect
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, TetMesh, boundary, tet_volumes
-from fem_reference.foundations.motion import apply
 from fem_reference.problems.body import Body, Cells, Prescribed
+from fem_reference.problems.checks import check_agreement
 from fem_reference.problems.contact import Contact, Obstruction
 from fem_reference.problems.muscle import Problem, RigidBody
+from fem_reference.problems.paths import Follows, From
 
 # Frame numbers before the first one over which an overlap at rest is removed.
 RELAXING = 10.0
@@ -22,32 +22,9 @@ _MIDDLE = 0.95
 _THINNEST = 1e6
 
 
-@dataclass(frozen=True)
-class From:
-    """A ``pose`` by frame number that begins at the ``first``, whatever motion it has before."""
-
-    first: float
-    pose: Callable[[float], Floats]
-
-    def __call__(self, frame: float) -> Floats:
-        """The 4 x 4 matrix at ``frame``."""
-        return self.pose(max(frame, self.first))
-
-
-@dataclass(frozen=True)
-class Follows:
-    """The displacement of what is attached to a bone that has a ``pose`` by frame number."""
-
-    pose: Callable[[float], Floats]
-
-    def __call__(self, points: Floats, frame: float) -> Floats:
-        """The displacement (n, 3) [mm] of rest points (n, 3) at a frame number."""
-        return apply(self.pose(frame), points) - points
-
-
 def as_body(problem: Problem) -> Body:
     """The muscle as a body: its bones prescribe where exactly attached facets are, or pull by springs;
-    the rest of its skin is ``"free"``.
+    the rest of its skin is ``"free"``. InputError where two of them prescribe different things, or one moves as nothing can follow.
     """
     mesh = problem.mesh
     _check_thickness(mesh)
@@ -71,7 +48,9 @@ def as_body(problem: Problem) -> Body:
     body = Body(
         cells, acting, prescribed, problem.frames, problem.fibre, interval=problem.interval, start=problem.start
     )
-    return body if problem.contact is None else _among_bones(body, problem, problem.contact)
+    body = body if problem.contact is None else _among_bones(body, problem, problem.contact)
+    check_agreement(body)
+    return body
 
 
 def _among_bones(body: Body, problem: Problem, effect: ContactEffect) -> Body:

@@ -4,9 +4,9 @@ import logging
 from collections.abc import Callable
 from typing import Any
 
-from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import muscle, scalar
-from fem_reference.problems.estimates import Decision, decisions, estimates, missed
+from fem_reference.problems.estimates import Decision, decisions, estimates
+from fem_reference.problems.watch import Watch
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.scenes.scalar import ScalarCase
@@ -36,14 +36,13 @@ def chosen[C: Case](case: C, rest: Callable[[], Any] | None = None) -> C:
     return case.model_copy(update={"choice": "listed", "effect": kept, "decisions": found})
 
 
-def watch(case: Case, rest: Any) -> Callable[[tuple[int, ...], Floats], tuple[Decision, ...]]:
-    """What says of ``positions`` (f, n, 3) of its surface at frame ``numbers`` which effects that the case left out matter, at
-    the first frame at which one does.
+def watch(case: Case, rest: Any, built: Callable[[], Any]) -> Watch | None:
+    """What says of frames that were solved which effects that the case left out matter; None where it left out none. ``rest`` is
+    its setup, ``built`` gives its problem.
     """
     if not isinstance(case, MuscleCase) or all(one.needed for one in case.decisions):
-        return lambda *_: ()
-    known = estimates(case, rest)
-    return lambda numbers, positions: missed(case, rest, known, numbers, positions)
+        return None
+    return Watch(case, rest, estimates(case, rest), built)
 
 
 def with_effects[C: Case](case: C, found: tuple[Decision, ...]) -> C:

@@ -1,11 +1,14 @@
 """Prescribed paths: displacements of rest points over the frames, as callables that can be pickled."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.foundations.motion import Course, apply
+from fem_reference.problems.courses import course
 
 Matrix = tuple[tuple[float, float, float], ...]
 ONCE = ((0.0, 0.0), (1.0, 1.0))  # from rest at frame 0 to all of it at frame 1
@@ -25,6 +28,10 @@ class Rest:
         """Zero, (n, 3) [mm]."""
         return np.zeros_like(points)
 
+    def course(self, points: Floats) -> Course:  # noqa: ARG002
+        """No frames."""
+        return (), ()
+
 
 @dataclass(frozen=True)
 class Affine:
@@ -37,6 +44,10 @@ class Affine:
     def __call__(self, points: Floats, frame: float) -> Floats:
         """The displacement (n, 3) [mm] of rest points (n, 3)."""
         return np.asarray(amount(self.knots, frame) * (points @ np.array(self.gradient).T + np.array(self.shift)))
+
+    def course(self, points: Floats) -> Course:  # noqa: ARG002
+        """The knots, between which every point goes straight on."""
+        return tuple(frame for frame, _ in self.knots), (0.0,) * len(self.knots)
 
 
 @dataclass(frozen=True)
@@ -53,12 +64,22 @@ class Turn:
 
     def __call__(self, points: Floats, frame: float) -> Floats:
         """The displacement (n, 3) [mm] of rest points (n, 3)."""
-        unit = np.array(self.axis) / np.linalg.norm(self.axis)
-        arms = points - np.array(self.centre)
-        along = arms @ unit if self.per_length else np.ones(len(points))
+        unit, arms, along = self._arms(points)
         angles = amount(self.knots, frame) * self.angle * along
         turned = Rotation.from_rotvec(angles[:, None] * unit).apply(arms)
         return np.asarray(turned - arms)
+
+    def course(self, points: Floats) -> Course:
+        """The knots, and the angles of the point that turns most."""
+        _, _, along = self._arms(points)
+        most = abs(self.angle) * float(np.abs(along).max(initial=0.0))
+        return tuple(frame for frame, _ in self.knots), tuple(most * much for _, much in self.knots)
+
+    def _arms(self, points: Floats) -> tuple[Floats, Floats, Floats]:
+        """The unit vector of the axis, (n, 3) from the centre, and by how many times the angle each point turns (n,)."""
+        unit = np.array(self.axis) / np.linalg.norm(self.axis)
+        arms = points - np.array(self.centre)
+        return unit, arms, arms @ unit if self.per_length else np.ones(len(points))
 
 
 @dataclass(frozen=True)
@@ -72,6 +93,45 @@ class Radial:
     def __call__(self, points: Floats, frame: float) -> Floats:
         """The displacement (n, 3) [mm] of rest points (n, 3)."""
         return np.asarray(amount(self.knots, frame) * self.share * points * np.array(self.along))
+
+    def course(self, points: Floats) -> Course:  # noqa: ARG002
+        """The knots, between which every point goes straight on."""
+        return tuple(frame for frame, _ in self.knots), (0.0,) * len(self.knots)
+
+
+@dataclass(frozen=True)
+class From:
+    """A ``pose`` by frame number that begins at the ``first``, whatever motion it has before."""
+
+    first: float
+    pose: Callable[[float], Floats]
+
+    def __call__(self, frame: float) -> Floats:
+        """The 4 x 4 matrix at ``frame``."""
+        return self.pose(max(frame, self.first))
+
+    def course(self, points: Floats) -> Course | None:
+        """That of the pose, and where it begins."""
+        known = course(self.pose, points)
+        if known is None or not known[0]:
+            return known
+        frames = (self.first, *(frame for frame in known[0] if frame > self.first))
+        return frames, tuple(np.interp(frames, *known).tolist())
+
+
+@dataclass(frozen=True)
+class Follows:
+    """The displacement of what is attached to a bone that has a ``pose`` by frame number."""
+
+    pose: Callable[[float], Floats]
+
+    def __call__(self, points: Floats, frame: float) -> Floats:
+        """The displacement (n, 3) [mm] of rest points (n, 3) at a frame number."""
+        return apply(self.pose(frame), points) - points
+
+    def course(self, points: Floats) -> Course | None:
+        """That of the pose."""
+        return course(self.pose, points)
 
 
 @dataclass(frozen=True)

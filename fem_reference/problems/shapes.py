@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import Cells, Kind, reference_nodes
+from fem_reference.problems.checks import check_box
 
 Map = Callable[[Floats], Floats]
 Counts = tuple[int, int, int]
@@ -128,6 +129,7 @@ def box(counts: Counts, size: tuple[float, float, float], kind: Kind, degree: in
         1: straight cells; 2: cells with nodes on their edges too.
 
     """
+    check_box(counts, size, kind, degree)
     return mapped([Block(lambda unit: unit * size, counts, _SIX)], kind, degree)
 
 

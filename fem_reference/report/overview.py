@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from fem_reference.assessment import second_check
 from fem_reference.assessment.comparison import Comparison
+from fem_reference.assessment.doubts import doubts
 from fem_reference.assessment.error_bars import ErrorBar
 from fem_reference.assessment.judge import Verdict
 from fem_reference.assessment.solver_table import Table
@@ -136,6 +138,12 @@ def comparison_text(result: Comparison, page: Path | None = None) -> str:
     runs = [
         f"{run.name}: {run.outcome.status}, {run.outcome.message}" for run in (result.reference, *result.candidates)
     ]
+    runs += [
+        f"reference: doubtful, {why}" for why in doubts(result.reference) if why != result.reference.outcome.status
+    ]
+    answers = second_check.said(result.reference)
+    if answers and result.reference.outcome.status == "converged":
+        runs.append(f"second check: passed, {len(answers)} questions")
     judged = [_judged(verdict) for verdict in result.verdicts]
     asked = {verdict.expectation.of for verdict in result.verdicts}
     unjudged = result.candidates and asked == {"reference"}

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from fem_reference.assessment.comparison import Comparison
+from fem_reference.assessment.doubts import doubts
 from fem_reference.assessment.error_bars import Of
 from fem_reference.assessment.judge import overall
 from fem_reference.metrics import Measure, find
@@ -31,7 +32,6 @@ _HEADLINE = (
     ("difference", "max", "off by up to {}"),
     ("l2_error", "norm", "L2 error {}"),
 )
-_LOW = 0.1  # det F, below which a state is hardly valid
 
 
 def render(comparison: Comparison) -> str:
@@ -59,6 +59,8 @@ def _failed(comparison: Comparison) -> str:
     why = f"{reference.outcome.message.rstrip('.')}."
     if not len(kept):
         return f"{why} No frame was reached, so that nothing could be measured against it."
+    if reference.outcome.status == "denied":
+        return f"{why} What follows is measured against no truth."
     last = label(comparison.scene, comparison.setup, reference.numbers[kept[-1]])
     return f"{why} {len(kept)} of {wanted} frames were reached, up to {last}: what follows is about these."
 
@@ -133,10 +135,10 @@ def headlines(comparison: Comparison) -> list[tuple[str, str, str]]:
     word: str = overall(words) if words else "not judged"
     if comparison.reference.outcome.status != "converged":  # whatever of it was met
         word = "fail"
-    doubts = _doubts(comparison.reference)
-    if word == "pass" and doubts:
+    doubtful = doubts(comparison.reference)
+    if word == "pass" and doubtful:
         word = "doubtful pass"
-    found.append(("reference", word, "; ".join([checks, *doubts])))
+    found.append(("reference", word, "; ".join([checks, *doubtful])))
     return found
 
 
@@ -156,25 +158,6 @@ def _greatest(comparison: Comparison, run: Run) -> str:
         value = f"{number(value)}{f' ± {number(bar)}' if bar is not None else ''} {one.unit}".strip()
         said.append(words.format(value) + lost)
     return "; ".join(said) or "nothing of it can be measured"
-
-
-def _doubts(reference: Run) -> list[str]:
-    """What makes a reference doubtful: that it did not reach all frames, is unstable, nearly turned inside out, or left the
-    range of its laws.
-    """
-    said = list[str]() if reference.outcome.status == "converged" else [str(reference.outcome.status)]
-    modes = reference.scalars.get("negative_modes")
-    unstable = 0 if modes is None else int((np.nan_to_num(modes) > 0).sum())
-    if unstable:
-        said.append(f"unstable equilibrium in {unstable} of {len(reference.numbers)} frames")
-    smallest = [np.nanmin(values) for name, values in reference.scalars.items() if name.startswith("min_det_F")]
-    if smallest and min(smallest) < _LOW:
-        said.append(f"det F falls to {number(float(min(smallest)))}")
-    outside = np.nan_to_num(reference.scalars.get("outside_law", np.zeros(0))) > 0
-    if outside.any():
-        where = f"in {int(outside.sum())} of {len(outside)} frames, first in {reference.numbers[int(outside.argmax())]}"
-        said.append(f"cells are outside the range that a law is meant for {where}: see Where it comes from")
-    return said
 
 
 def _sentence(comparison: Comparison) -> str:

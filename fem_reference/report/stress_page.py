@@ -11,7 +11,7 @@ from fem_reference.assessment.stress import VERDICTS, Course, Scene, Stress
 from fem_reference.report.templates import template
 from fem_reference.report.words import number
 
-_MARKS = {"ok": "✓", "degraded": "~", "failed": "✗", "refused": "\N{EN DASH}"}
+_MARKS = {"ok": "✓", "degraded": "~", "failed": "✗", "refused": "\N{EN DASH}", "inconclusive": "?"}
 _SIDE, _OVERSAMPLING = 220, 2
 # The camera looks along this direction, from in front, above and to the right.
 _VIEW = np.array([-0.55, 0.7, -0.45])
@@ -53,7 +53,7 @@ def text(stress: Stress) -> str:
     for case in stress.cases:
         found = [stress.at(case.name, solver) for solver in stress.solvers]
         lines.append(f"{case.name:{width}}  " + "  ".join(f"{cell.solver} {cell.verdict}" for cell in found))
-        lines += [f"  {cell.solver}: {cell.sentence}" for cell in found if cell.verdict in ("degraded", "failed")]
+        lines += [f"  {cell.solver}: {cell.sentence}" for cell in found if cell.verdict not in ("ok", "refused")]
     return "\n".join(lines)
 
 

@@ -55,6 +55,7 @@ def render(study: Study) -> str:
         matched=matched,
         left_out=left_out,
         title_of=title_of,
+        as_measured=as_measured,
         data=json.dumps(_data(study)).replace("<", "\\u003c"),
         cover=lambda case: Cover.of(case.claims),
         claims=lambda case: [claims_drawing(case.claims, metric, case.case) for metric in CLAIMED_UNITS],
@@ -112,8 +113,14 @@ def matched(case: CaseStudy, error: str = MAIN) -> list[tuple[str, str, list[Mat
         (cost, error, [at_same_cost(points, error, cost, at) for at in levels(points, error, cost, of_error=False)])
         for cost in MATCHED
     ]
-    rows = [at_same_error(points, error, TIME, at) for at in levels(points, error, TIME, of_error=True)]
+    certain = case.certain  # what "at most" means of an error here is what it means to the verb recommend
+    rows = [at_same_error(certain, error, TIME, at) for at in levels(certain, error, TIME, of_error=True)]
     return [*tables, (error, TIME, rows)]
+
+
+def as_measured(case: CaseStudy, point: Point, error: str) -> float | None:
+    """The error of one of the points of a table as it was measured, without the bar of the truth; None of the truth itself."""
+    return None if point.is_truth else point.errors[error] - case.bars.get(error, 0.0)
 
 
 def left_out(case: CaseStudy) -> list[Point]:

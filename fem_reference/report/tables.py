@@ -6,9 +6,10 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
-from fem_reference.assessment import ranking
+from fem_reference.assessment import ranking, second_check
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.convergence import Ladder
+from fem_reference.assessment.doubts import doubts
 from fem_reference.assessment.error_bars import ErrorBar
 from fem_reference.assessment.judge import Verdict, overall
 from fem_reference.metrics import Measure
@@ -33,8 +34,9 @@ def summary(comparison: Comparison) -> dict[str, Any]:
     """Everything that was measured, as valid JSON: a number that is not finite is None.
 
     ``measures`` has each candidate's deviation from the reference, and under ``"reference"`` its own change from rest
-    with the inversion numbers that its solver recorded; ``from_rest`` the change from rest of every run; ``error_bars`` how
-    well the reference is known and ``rankings`` whom that separates, empty without any.
+    with the inversion numbers that its solver recorded; ``doubts`` what makes the reference doubtful, in words; ``from_rest`` the
+    change from rest of every run; ``error_bars`` how well the reference is known and ``rankings`` whom that separates, empty
+    without any.
     """
     reference = comparison.reference
     deviations = [row for run in comparison.candidates for row in rows(run, comparison.deviations[run.name])]
@@ -45,6 +47,8 @@ def summary(comparison: Comparison) -> dict[str, Any]:
         "status": reference.outcome.status,
         "message": reference.outcome.message,
         "verdict": comparison.word,
+        "doubts": doubts(reference),
+        "second_check": reference.origin.get(second_check.RECORD, {}),
         "cost": {run.name: {key: finite(value) for key, value in run.outcome.cost.items()} for run in runs(comparison)},
         "measures": from_rest[reference.name] + rows(reference, inversion(reference)) + deviations,
         "from_rest": [row for rows in from_rest.values() for row in rows],

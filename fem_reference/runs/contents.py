@@ -1,15 +1,28 @@
 """What run.json holds, as a record: read strictly, so that a damaged one is refused and not half believed."""
 
+import json
 from itertools import pairwise
-from typing import Annotated, Literal, Self
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from fem_reference.foundations.records import Name, Record
+from fem_reference.io import files, texts
 from fem_reference.scenes.muscle import LAST_FRAME, MOST_FRAMES
 
 Status = Literal[
-    "converged", "diverged", "inverted", "collapsed", "limit point", "out of steps", "timed out", "crashed", "stopped"
+    "converged",
+    "denied",
+    "diverged",
+    "inverted",
+    "collapsed",
+    "limit point",
+    "out of steps",
+    "timed out",
+    "stalled",
+    "crashed",
+    "stopped",
 ]
 FORMAT = 1
 
@@ -49,3 +62,10 @@ class Contents(Record):
         if any(len(values) != len(self.numbers) for values in self.scalars.values()):
             raise ValueError("as many values of each of the scalars as there are numbers of frames")
         return self
+
+
+def amend(folder: Path, **changes: Any) -> None:
+    """Write other values of some keys into the run.json in ``folder``."""
+    place = folder / "run.json"
+    stored = texts.read_json(place, "a run")
+    files.write_text(place, json.dumps(stored | changes, indent=1, allow_nan=False))

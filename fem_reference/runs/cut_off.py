@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import parse
-from fem_reference.io import texts
+from fem_reference.io import files, texts
 from fem_reference.runs.contents import Contents
 
 FOLDER = "restart"
@@ -40,6 +41,8 @@ def stored(folder: Path, identity: dict[str, Any]) -> dict[str, Any] | None:
         whole = parse(Contents, state | {"status": "crashed"}, f"{place}: run")
         wanted = json.loads(json.dumps(identity))
         same = (whole.solver, list(whole.frames)) == (wanted["solver"], wanted["frames"])
+        if wanted["origin"].get("settings", {}).get("store_state") and "state" not in whole.parts:
+            return None  # its frames lack what is asked for
         if same and whole.origin.versions == wanted["origin"].get("versions", {}):
             for part in folder.rglob(".*"):  # what was being written
                 part.unlink()
@@ -52,6 +55,15 @@ def truncate(state: dict[str, Any], number: int) -> None:
     kept = sum(stored < number for stored in state["numbers"])
     state["numbers"] = state["numbers"][:kept]
     state["scalars"] = {name: values[:kept] for name, values in state["scalars"].items()} if kept else {}
+
+
+def places(folder: Path, number: int) -> tuple[Floats, Floats | None]:
+    """Where the surface (n, 3) and the points of the tets (k, 3), if there are any, are [mm] in a stored frame of the run in
+    ``folder``.
+    """
+    tets = folder / "tets" / f"frame_{number:04d}.vtu"
+    surface = files.read_surface(folder / "surface" / f"frame_{number:04d}.vtp", 1.0).points
+    return surface, files.read_points(tets) if tets.is_file() else None
 
 
 def pass_on(folder: Path, to: Path) -> None:

@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.effects import Effect, State, total_energy
+from fem_reference.effects import Effect, State
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.jets import Jet, JetFunctions, variables
+from fem_reference.foundations.jets import JetFunctions, variables
 from fem_reference.foundations.mesh import Floats, Ints, TetMesh
 from fem_reference.geometry.embedding import Locator
 from fem_reference.problems.body import reference_nodes
+from fem_reference.problems.stresses import first_piola
 from fem_reference.runs import states, store
 from fem_reference.runs.states import NodalState
 from fem_reference.scenes.case import Case
@@ -220,11 +221,8 @@ class _Places:
         """``sigma = 1/J dW/dF F^T`` (n, 3, 3) [MPa], W the sum of the energies per rest volume at the pressure unknown that there
         is (Holzapfel 2000, Nonlinear Solid Mechanics, eq. 6.10 and 3.8).
         """
-        n = len(self.tets)
         with np.errstate(all="ignore"):  # where det F is not above 0
-            energy = total_energy(acting, self._state())
-            slope = energy.slope if isinstance(energy, Jet) else np.zeros((9, 1))
-            first = np.broadcast_to(slope.reshape(9, -1), (9, n)).T.reshape(n, 3, 3)
+            first = first_piola(acting, self._state(), len(self.tets))
             stress = np.einsum("nik,njk->nij", first, self.F) / self.det_F[:, None, None]
         stress[~(self.det_F > 0)] = np.nan
         return np.asarray(stress)

@@ -3,6 +3,8 @@
 from dataclasses import dataclass, field
 
 from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.records import Record
+from fem_reference.problems.body import Body
 from fem_reference.runs.states import NodalState
 from fem_reference.runs.store import Outcome
 
@@ -31,10 +33,14 @@ class Reached:
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """The states of a body that a solver reached, the rest state first, and how it ended."""
+    """The states of a body that a solver reached, the rest state first, and how it ended; of which ``body`` and with what
+    ``settings``, where error bars may be asked for.
+    """
 
     states: tuple[Reached, ...]
     outcome: Outcome
+    body: Body | None = None
+    settings: Record | None = None
 
     @property
     def last(self) -> Reached:

@@ -71,6 +71,11 @@ def write(folder: Path, frame: int, state: NodalState) -> None:
     write_arrays(_place(folder, frame), state.arrays)
 
 
+def are_kept(folder: Path, frames: tuple[int, ...]) -> bool:
+    """Whether the run in ``folder`` keeps its states at all ``frames``."""
+    return all(path.is_file() for path in (folder / FOLDER / "rest.npz", *(_place(folder, frame) for frame in frames)))
+
+
 def read_rest(folder: Path) -> tuple[TetMesh, Floats | None]:
     """The mesh and the fibre directions (m, 3) of the states in a run's ``folder``; InputError where there are none."""
     place = folder / FOLDER / "rest.npz"

@@ -204,7 +204,7 @@ class Writer:
             write(self.folder / part / f"frame_{frame.number:04d}{suffix}")
             names = [(number, f"{part}/frame_{number:04d}{suffix}") for number in self.state["numbers"]]
             files.write_pvd(self.folder / f"{part}.pvd", names)
-        for name, value in frame.scalars.items():
+        for name, value in (dict.fromkeys(self.state["scalars"], math.nan) | frame.scalars).items():
             unknown: list[float | None] = [None] * (len(self.state["numbers"]) - 1)  # of effects that were added since
             self.state["scalars"].setdefault(name, unknown).append(value if math.isfinite(value) else None)
         self._write_state()

@@ -23,6 +23,8 @@ DATA_SETTING = "FEM_REFERENCE_DATA"
 # Further folders, divided as those of PATH are, that files which a scene file names may be in.
 ALLOWED_SETTING = "FEM_REFERENCE_FILES"
 DELAUNAY = "delaunay"  # where a file of triangles may stand: no file
+# Settings of solvers that change the time and not the answer.
+MACHINE_ONLY = frozenset({"ranks", "time_limit", "linear_solver", "precision", "store_state"})
 
 
 # What a run is measured against: the reference (of itself, its rest state), the exact solution, or nothing else.
@@ -188,13 +190,26 @@ class Case(Record):
             raise InputError(place, f'"{text}", which is at {path.resolve()}', want)
 
     @property
+    def decides(self) -> list[Any]:
+        """What verdicts follow from: the keys that determine the solution, the effects, and the solvers whose runs are judged, with
+        the settings that change their answer.
+        """
+        judged = {entry.of for entry in self.expect}
+        others = [one for one in self.candidate if judged & {one.name, "candidates"}]
+        solved = [
+            (one.solver, {key: value for key, value in one.settings.items() if key not in MACHINE_ONLY})
+            for one in (self.reference, *others)
+        ]
+        return [self.model_dump(include={*self.determined_by, "choice"}), self.effects, solved]
+
+    @property
     def key(self) -> str:
         """A hash over everything that determines the solution: the keys of ``determined_by``, the effects, and the content of
-        the files that they name and that effects from outside the package are.
+        the files that they name (not where these are) and that effects from outside the package are.
         """
         tables = self.model_dump(mode="json", include=set(self.determined_by))
         tables["effect"] = [[type(effect).__name__, effect.model_dump(mode="json")] for effect in self.effects]
-        digest = hashlib.sha256(json.dumps(tables, sort_keys=True).encode())
+        digest = hashlib.sha256(json.dumps(_unnamed(tables, self.naming_files), sort_keys=True).encode())
         for key, text in _files(tables, self.naming_files):
             digest.update(self.file(text, key).read_bytes())
         for effect in self.effects:
@@ -213,6 +228,18 @@ def _exists(path: Path) -> bool:
 def is_inside(path: Path, folders: Iterable[Path]) -> bool:
     """Whether ``path``, links followed, is in one of the ``folders``."""
     return any(path.resolve().is_relative_to(folder.resolve()) for folder in folders)
+
+
+def _unnamed(tables: Any, names: Collection[str]) -> Any:
+    """The ``tables``, of the files that they name the suffix alone, which says how they are read."""
+    if isinstance(tables, dict):
+        return {
+            name: Path(value).suffix
+            if name in names and isinstance(value, str) and value != DELAUNAY
+            else _unnamed(value, names)
+            for name, value in tables.items()
+        }
+    return [_unnamed(value, names) for value in tables] if isinstance(tables, list) else tables
 
 
 def _files(tables: Any, names: Collection[str], key: str = "") -> list[tuple[str, str]]:

@@ -44,13 +44,14 @@ def read(case: str | Path, *, with_negative_control: bool = False, changes: dict
     table = texts.toml(path)
     for key, value in (changes or {}).items():
         _change(table, key, value, str(path))
-    if with_negative_control:
-        return _with_negative_control(table, path)
     scene = _scene(table, path)
-    given = "negative_control" in table
-    if given and (not changes or any(key.startswith("negative_control") for key in changes)):
-        _check_negative_control(scene, _with_negative_control(table, path))
-    return scene
+    asked = not changes or any(key.startswith("negative_control") for key in changes)
+    if not with_negative_control and not (asked and "negative_control" in table):
+        return scene
+    changed = _with_negative_control(table, path)
+    if asked:
+        _check_negative_control(scene, changed)
+    return changed if with_negative_control else scene
 
 
 def _scene_file(case: str | Path) -> Path:
@@ -153,9 +154,13 @@ def _with_negative_control(table: dict[str, Any], path: Path) -> Case:
 
 def _check_negative_control(scene: Case, changed: Case) -> None:
     control = scene.negative_control
-    if control is not None and changed.model_copy(update={"negative_control": control}) == scene:
+    if control is None or changed.decides != scene.decides:
+        return
+    if changed.model_copy(update={"negative_control": control}) == scene:
         place = join(scene.place, "negative_control.value")
         raise InputError(place, _value_text(control), f"a value that changes {control.key}")
+    want = "a key that changes what is solved, which alone can turn a verdict: of an effect, say"
+    raise InputError(join(scene.place, "negative_control.key"), f'"{control.key}"', want)
 
 
 def _value_text(control: NegativeControl) -> str:

@@ -5,6 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from fem_reference.effects import find, names
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.given import path, said
 from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import unit_of, written
 from fem_reference.scenes.case import Case
@@ -32,12 +34,14 @@ def make_case(table: Mapping[str, Any], folder: str | Path = ".", name: str = "c
         Where a key is missing, unknown or wrong; it names the key, what was got and what is wanted.
 
     """
-    given = dict(table)
+    if not isinstance(table, Mapping) or not all(isinstance(key, str) for key in table):
+        raise InputError("case", said(table), "keys and tables, as a case.toml has them")
+    given, place = dict(table), path(folder, "folder").resolve()
     if "domain" not in given:
         given = _with_units(MuscleCase, given)
     if isinstance(effects := given.get("effect"), list | tuple):
         given["effect"] = [_effect(entry) for entry in effects]
-    return made(given, {"name": name, "folder": Path(folder).resolve(), "place": "case"})
+    return made(given, {"name": name, "folder": place, "place": "case"})
 
 
 def _effect(entry: Any) -> Any:

@@ -221,7 +221,7 @@ def alternate(
         why = f"vertex {system.loose[0]}: nothing but triangles without area or weight ties it to a attached vertex"
         hint = "kirchhoff weights feel no areas"
         return refused(model, setup.frames[0], sink, Trouble("diverged", f"{why}; {hint}"))
-    return follow(model, setup.frames, sink)
+    return follow(model, setup, sink)
 
 
 def scaled(points: Floats, triangles: Ints, free: Ints, volume: float) -> Floats:

@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines
 from fem_reference.foundations.motion import apply
-from fem_reference.foundations.records import Record
+from fem_reference.foundations.records import Record, join
 from fem_reference.geometry.wrapping import Cylinder, Obstacle, Paths, Sphere, straight
 from fem_reference.problems.muscle import Problem, RigidBody
 from fem_reference.runs.store import Frame, Outcome, Sink
@@ -106,17 +106,15 @@ class Shortest:
 
     def __init__(self, problem: Problem, settings: Settings) -> None:
         self.problem, self.vias = problem, len(settings.via)
-        self.lines, self.wrap = _lines(problem, settings), _wrap(problem, settings)
+        self.lines, self.wrap = _made(problem, settings, "line_of_action")
         self.cost = {"seconds_compile": 0.0}
         self.inside: Trouble | None = None
         self.found = Frame(problem.frames[0], None)
 
     def move(self, number: int) -> None:
-        """Find the paths at a frame; InputError where a fixed point is inside the obstacle at the first."""
+        """Find the paths at a frame."""
         fixed = self.lines.at(number)
         if self.wrap is not None and (inside := _inside(self.wrap, fixed, number)):
-            if number == self.problem.frames[0]:
-                raise InputError(f"line_of_action: {self.wrap.name}", inside, "an obstacle with all of them outside")
             self.inside = Trouble("diverged", inside)
         else:
             self.found = _frame(self.lines, self.wrap, fixed, number, self.problem.fibres)
@@ -139,6 +137,21 @@ class Shortest:
 def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
     """The lines at every frame wanted, up to one with a fixed point inside the obstacle; InputError where that is the first."""
     return each(Shortest(problem, settings), problem.frames, sink)
+
+
+def check(settings: Settings, problem: Problem, place: str) -> None:
+    """InputError below ``place`` where lines cannot go through and around what the settings say."""
+    _made(problem, settings, place)
+
+
+def _made(problem: Problem, settings: Settings, place: str) -> tuple[Lines, Wrap | None]:
+    """The lines and the obstacle; InputError below ``place`` where the case has not what they need, or a fixed point is inside the
+    obstacle at the first frame.
+    """
+    lines, wrap, first = _lines(problem, settings, place), _wrap(problem, settings, place), problem.frames[0]
+    if wrap is not None and (inside := _inside(wrap, lines.at(first), first)):
+        raise InputError(join(place, wrap.name), inside, "an obstacle with all of them outside")
+    return lines, wrap
 
 
 def _frame(lines: Lines, wrap: Wrap | None, fixed: Floats, number: int, fibres: Polylines) -> Frame:
@@ -168,30 +181,29 @@ def _inside(wrap: Wrap, fixed: Floats, number: int) -> str:
     return "" if depths[line] <= _TOUCHES else f"a fixed point of line {line} {depths[line]:.3g} mm inside"
 
 
-def _wrap(problem: Problem, settings: Settings) -> Wrap | None:
+def _wrap(problem: Problem, settings: Settings, place: str) -> Wrap | None:
     """The obstacle of the settings, None without one."""
     if (ball := settings.sphere) is not None:
-        bone = problem.bones[_index(problem.bones, ball.bone, "sphere.bone")]
+        bone = problem.bones[_index(problem.bones, ball.bone, join(place, "sphere.bone"))]
         return Wrap(Sphere(ball.centre, ball.radius), bone, "sphere")
     if (roll := settings.cylinder) is not None:
         x, y, z = (float(entry) for entry in np.subtract(roll.end, roll.start))
-        bone = problem.bones[_index(problem.bones, roll.bone, "cylinder.bone")]
+        bone = problem.bones[_index(problem.bones, roll.bone, join(place, "cylinder.bone"))]
         return Wrap(Cylinder(roll.start, (x, y, z), roll.radius), bone, "cylinder")
     return None
 
 
-def _lines(problem: Problem, settings: Settings) -> Lines:
+def _lines(problem: Problem, settings: Settings, place: str) -> Lines:
     fibres, places = problem.fibres, [0.0, *(via.at for via in settings.via), 1.0]
-    vias = [_index(problem.bones, via.bone, f"via[{i}].bone") for i, via in enumerate(settings.via)]
+    vias = [_index(problem.bones, via.bone, join(place, f"via[{i}].bone")) for i, via in enumerate(settings.via)]
     parts, count = len(places) - 1, len(fibres)
     sizes = np.diff(fibres.offsets)
     if sizes.min() <= parts:
         got = f"fibre {sizes.argmin()} of {sizes.min()} points"
-        raise InputError(
-            "line_of_action: via", got, f"fibres of at least {parts + 1} points for {parts - 1} via-points"
-        )
+        want = f"fibres of at least {parts + 1} points for {parts - 1} via-points"
+        raise InputError(join(place, "via"), got, want)
     fixed = np.array([_along(fibres.points[low:high], places) for low, high in pairwise(fibres.offsets)])
-    ends = [_nearest(problem, fixed[:, end]) for end in (0, -1)]
+    ends = [_nearest(problem, fixed[:, end], place) for end in (0, -1)]
     on = np.column_stack([ends[0], *(np.full(count, via) for via in vias), ends[1]])
     part, share = zip(*(_spread(int(size), places) for size in sizes), strict=True)
     return Lines(
@@ -221,25 +233,25 @@ def _spread(count: int, places: list[float]) -> tuple[Ints, Floats]:
     return part, (np.arange(count) - at[part]) / np.diff(at)[part]
 
 
-def _nearest(problem: Problem, points: Floats) -> Ints:
+def _nearest(problem: Problem, points: Floats, place: str) -> Ints:
     """The index of the bone (n,) whose attachment has the vertex nearest to each of ``points`` (n, 3)."""
     if not problem.attached:
-        raise InputError("line_of_action", "a muscle without attachments", "attachments that lines are fixed to")
+        raise InputError(place, "a muscle without attachments", "attachments that lines are fixed to")
     away = np.array(
         [
             np.linalg.norm(points[:, None] - problem.surface.points[attached.vertices], axis=2).min(axis=1)
             for attached in problem.attached
         ]
     )
-    found = [_index(problem.bones, attached.bone.name, "attachment") for attached in problem.attached]
+    found = [_index(problem.bones, attached.bone.name, place) for attached in problem.attached]
     return np.array(found)[np.argmin(away, axis=0)]
 
 
-def _index(bodies: tuple[RigidBody, ...], name: str, key: str) -> int:
+def _index(bodies: tuple[RigidBody, ...], name: str, place: str) -> int:
     names = [body.name for body in bodies]
     if name not in names:
-        raise InputError(f"line_of_action: {key}", f'"{name}"', f"one of {', '.join(names)}")
+        raise InputError(place, f'"{name}"', f"one of {', '.join(names)}")
     return names.index(name)
 
 
-SOLVES = (MuscleSolver(settings=Settings, solve=solve, moves="lines", example={}),)
+SOLVES = (MuscleSolver(settings=Settings, solve=solve, moves="lines", check_problem=check, example={}),)

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.records import Record
+from fem_reference.foundations.records import Record, join
 from fem_reference.problems.scalar import FieldProblem, at
 from fem_reference.runs.scalar import Solution
 from fem_reference.runs.store import Outcome
@@ -27,14 +27,10 @@ def solve_field(problem: FieldProblem, settings: FieldSettings) -> Solution:
     """
     begin = time.perf_counter()
     mesh = problem.mesh
+    check(settings, problem, "listing")
     if mesh.cells.shape[1] == 2:
-        _check_ends(problem)
         values, components = listing_kernels.fem1d(mesh.points[:, 0], settings.peclet or 1.0), None
     else:
-        if settings.peclet is not None:
-            raise InputError("listing: peclet", settings.peclet, "no peclet: listing 4.5 has none")
-        if problem.fluxes:
-            raise InputError("listing: boundary", "a slope", "values only: listing 4.5 has no slopes")
         fixed = np.flatnonzero(~np.isnan(problem.fixed[: len(mesh.points)]))
         bounds = np.array([fixed, problem.fixed[fixed]])
         norms, components = listing_kernels.fem2d(mesh.cells, mesh.points, bounds)
@@ -48,14 +44,23 @@ def solve_field(problem: FieldProblem, settings: FieldSettings) -> Solution:
     return Solution(values, Outcome("converged", "as listed", cost), components, form="as listed")
 
 
-def _check_ends(problem: FieldProblem) -> None:
+def check(settings: FieldSettings, problem: FieldProblem, place: str) -> None:
+    """InputError at ``place`` where the listing for the problem's domain has not what the case or the settings ask for."""
+    if problem.mesh.cells.shape[1] == 2:
+        _check_ends(problem, place)
+    elif settings.peclet is not None:
+        raise InputError(join(place, "peclet"), settings.peclet, "no peclet: listing 4.5 has none")
+    elif problem.fluxes:
+        raise InputError(join(place, "boundary"), "a slope", "values only: listing 4.5 has no slopes")
+
+
+def _check_ends(problem: FieldProblem, place: str) -> None:
     """InputError where the scene wants other conditions than listing 4.1 has: 0 at the first node, slope -1 at the last."""
     points, fixed = problem.mesh.points, problem.fixed[: len(problem.mesh.points)]
     slopes = [(point, at(flux.slope, points[[point]])[0]) for flux in problem.fluxes for point in flux.facets[:, 0]]
     if not (fixed[0] == 0 and np.isnan(fixed[1:]).all() and slopes == [(len(points) - 1, -1.0)]):
-        raise InputError(
-            "listing: boundary", "other conditions", "value 0 on the left and slope -1 on the right, as listing 4.1 has"
-        )
+        want = "value 0 on the left and slope -1 on the right, as listing 4.1 has"
+        raise InputError(join(place, "boundary"), "other conditions", want)
 
 
-SOLVES = (FieldSolver(settings=FieldSettings, solve_field=solve_field, example={}),)
+SOLVES = (FieldSolver(settings=FieldSettings, solve_field=solve_field, check_problem=check, example={}),)

@@ -253,7 +253,7 @@ def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
     if wanted > _MOST_STEPS:
         why = Trouble("out of steps", _too_many(wanted, settings, model.network))
         return refused(motion, problem.frames[0], sink, why)
-    return follow(motion, problem.frames, sink)
+    return follow(motion, problem, sink)
 
 
 def _too_many(steps: float, settings: Settings, network: Network) -> str:

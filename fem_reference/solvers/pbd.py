@@ -150,7 +150,7 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
 
     sweep = len(constraints.edges) + len(constraints.hinges) + 1
     projections = sweep * settings.solver_iterations * settings.sub_iterations
-    return follow(MovingSurface(setup, iterate, cost, projections), setup.frames, sink)
+    return follow(MovingSurface(setup, iterate, cost, projections), setup, sink)
 
 
 def _constraints(setup: Setup, settings: Settings) -> Constraints:

@@ -203,7 +203,7 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
         return points, velocity
 
     projections = (len(constraints.edges) + len(constraints.hinges) + 1) * settings.sub_iterations
-    return follow(MovingSurface(setup, iterate, cost, projections), setup.frames, sink)
+    return follow(MovingSurface(setup, iterate, cost, projections), setup, sink)
 
 
 def project(points: Floats, at: Constraints, bending: float) -> None:

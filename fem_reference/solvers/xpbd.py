@@ -217,7 +217,7 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
 
     sweep = len(constraints.edges) + len(constraints.hinges) + (settings.volume is not None)
     projections = sweep * settings.sweeps * settings.sub_steps
-    outcome = follow(MovingSurface(setup, iterate, cost, projections), setup.frames, sink)
+    outcome = follow(MovingSurface(setup, iterate, cost, projections), setup, sink, settings.sub_steps)
     return replace(outcome, message=outcome.message + other_clock(setup, settings.frame_time))
 
 

@@ -22,6 +22,7 @@ from fem_reference.runs.store import Run
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies.execution import Bench
 from fem_reference.studies.ladders import Trial
+from fem_reference.studies.taken import without_states
 
 log = logging.getLogger(__name__)
 
@@ -77,7 +78,7 @@ def solve(trial: Trial, store: Path) -> Run:
     folder = bench.folder(trial.choice, trial.name)
     if runs.status(folder) in _LASTING:
         return replace(runs.load(folder), name=trial.name)
-    return bench.obtain(trial.name, trial.choice, trial.name)
+    return bench.obtain(trial.name, without_states(trial.choice), trial.name)
 
 
 @lru_cache(maxsize=2)

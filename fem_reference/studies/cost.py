@@ -17,13 +17,14 @@ from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.assessment.fronts import COSTS, Point
 from fem_reference.foundations.errors import InputError
 from fem_reference.metrics import MeasurementContext, measure
+from fem_reference.runs.complete import complete
 from fem_reference.runs.cost import seconds_per_frame
 from fem_reference.runs.key import versions
 from fem_reference.runs.store import Run
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import refinement
 from fem_reference.studies.campaign import Made, Workers, carry_out
-from fem_reference.studies.execution import Bench, complete
+from fem_reference.studies.execution import Bench
 from fem_reference.studies.features import features
 from fem_reference.studies.ladders import TETRAHEDRA, Trial, candidate_trials, reference_trials
 from fem_reference.studies.resampled_scenes import carried, resample
@@ -110,7 +111,7 @@ def known(bars: ErrorBars | None) -> dict[str, float]:
 
 def _point(scene: MuscleCase, one: Made, truth: Run, context: MeasurementContext) -> Point:
     trial, run = one.trial, one.run
-    choice = {"solver": trial.choice.solver, **_chosen(trial)}
+    choice = {"solver": trial.choice.solver, **settings_of(trial)}
     if trial.changed:
         choice["scene"] = trial.changed
     point = Point(
@@ -129,7 +130,7 @@ def _point(scene: MuscleCase, one: Made, truth: Run, context: MeasurementContext
     return replace(point, status=status, message=message, errors=errors(run, truth, context), costs=costs(run))
 
 
-def _chosen(trial: Trial) -> dict[str, object]:
+def settings_of(trial: Trial) -> dict[str, object]:
     """The settings of a trial without those that are their solver's own anyway: a case may name them, and another not."""
     given = trial.choice.settings
     try:

@@ -5,43 +5,32 @@ import math
 import os
 import platform
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache, singledispatch
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from filelock import FileLock, Timeout
 
 from fem_reference import __version__, solvers
+from fem_reference.assessment import second_check
 from fem_reference.foundations.records import Record, join
 from fem_reference.foundations.usage import forget_peak_memory, peak_memory
-from fem_reference.io import files
 from fem_reference.problems import of_case
 from fem_reference.problems.muscle import Problem, Setup
 from fem_reference.problems.scalar import FieldProblem
-from fem_reference.runs import cut_off, store
+from fem_reference.runs import cut_off, states, store
 from fem_reference.runs.fields import VALUES, NodalField
 from fem_reference.runs.key import code_hash, key, versions
-from fem_reference.runs.store import Frame, Outcome, Run, Sink
-from fem_reference.scenes.case import Case, SolverChoice
+from fem_reference.runs.store import Frame, Outcome, Run
+from fem_reference.scenes.case import MACHINE_ONLY, Case, SolverChoice
 from fem_reference.solvers import recorded
 from fem_reference.solvers.common.protocol import MuscleSolver
+from fem_reference.studies import expected_cost, taken, watched
 
 log = logging.getLogger(__name__)
-
-MACHINE_ONLY = {
-    "ranks",
-    "time_limit",
-    "linear_solver",
-    "precision",
-}  # settings that change the time and not the answer
-
-
-class StoppedError(Exception):
-    """A run that goes on with other effects, and why."""
 
 
 class Bench[C: Case]:
@@ -51,7 +40,7 @@ class Bench[C: Case]:
         self.setup: Callable[[], Any] = cache(lambda: of_case.setup(scene))
         self.scene, self.store, self.ranks = of_case.chosen(scene, self.setup), store, ranks
         self.problem: Callable[[], Any] = cache(lambda: of_case.problem(self.scene, self.setup()))
-        self.watch: Callable[[], Any] = cache(lambda: of_case.watch(self.scene, self.setup()))
+        self.watch: Callable[[], Any] = cache(lambda: of_case.watch(self.scene, self.setup(), self.problem))
 
     def settings(self, choice: SolverChoice, place: str) -> Record:
         """The settings of ``choice``, checked; a folder that the scene names is found as its files are, and only there."""
@@ -65,29 +54,71 @@ class Bench[C: Case]:
         solvers.check(choice.solver, settings, self.scene.effects, where, task)
         return settings
 
+    def check(self, chosen: Sequence[tuple[SolverChoice, str]] = ()) -> None:
+        """InputError where settings of the reference, of a candidate of the case (but frames that are only made later) or of what
+        is ``chosen`` do not suit the case. What is made of it is looked at where there is something to solve.
+        """
+        named = [(one, f"candidate[{i}]") for i, one in enumerate(self.scene.candidate) if one.solver != "recorded"]
+        wanted = [(self.scene.reference, "reference"), *chosen]
+        settings = [(one, place, self.settings(one, place)) for one, place in [*wanted, *named]]
+        solved = [(one, place) for one, place in wanted if one.solver != "recorded"]
+        if all(store.finished(self.folder(*one), self._ended(one[0].solver)) for one in solved):
+            return
+        for one, place, own in settings:
+            offer = solvers.find(one.solver, place, self.scene.task)
+            if offer.check_problem:
+                offer.check_problem(own, self.made_for(one.solver, own), join(self.scene.place, place))
+
     def obtain(self, name: str, choice: SolverChoice, place: str) -> Run:
         """The run of a solver of our own, by the name that pages give it; ``place`` is where the scene chooses it."""
         if choice.solver == "recorded":  # files may change behind a name; they are read anew each time
             return self.read(name, choice, place)
         settings, folder = self.settings(choice, place), self.folder(choice, place)
-        ended = ("converged", "stopped") if self._watches(choice.solver) else ("converged",)
-        if (stored := _stored(folder, name, ended)) is not None:
-            return self._with_all_that_matters(stored, choice, place)
+        ended = self._ended(choice.solver)
+        if (stored := _stored(folder, name, ended, settings)) is not None:
+            return self._with_all_that_matters(self._checked(stored), choice, place)
         solvers.require(choice.solver, settings, place, self.scene.task)
-        self.made_for(choice.solver, settings)  # what is wrong with the input shows before anything is written
-        with _alone(folder):
-            run = _stored(folder, name, ended) or self._solve(name, choice.solver, settings, folder)
+        if choice == self.scene.reference:
+            self.check()
+        built = self.made_for(choice.solver, settings)  # what is wrong with the input shows before anything is written
+        takes = expected_cost.seconds(choice.solver, built, settings)
+        long = "" if takes is None else f", about {takes:.2g} s of processor time"
+        log.info("%s: no stored run of it in %s; solving%s", name, folder.parent.resolve(), long)
+        with taken.alone(folder), taken.bars_kept(folder):
+            run = _stored(folder, name, ended, settings) or self._solve(name, choice.solver, settings, folder)
+            run = self._checked(run)
         return self._with_all_that_matters(run, choice, place)
+
+    def _ended(self, solver: str) -> tuple[str, ...]:
+        """How stored runs ended that are taken again."""
+        return ("converged", "denied", *(("stopped",) if self._watches(solver) else ()))
+
+    def known(self, name: str, choice: SolverChoice, place: str) -> Run | None:
+        """The stored run that ``obtain`` takes up, None where it would solve one."""
+        shelf = _Shelf(self.scene, self.store, self.ranks)
+        shelf.setup = self.setup
+        with suppress(_UnsolvedError):
+            return shelf.obtain(name, choice, place)
+        return None
+
+    def _checked(self, run: Run) -> Run:
+        """The ``run``; that of a muscle by a solver of effects with the second check of it, which is stored with it."""
+        asked = self.scene.task == "solve" and solvers.takes_effects(run.solver)
+        if not asked or run.outcome.status not in ("converged", "denied"):
+            return run
+        return second_check.confirmed_run(self.problem, run)
 
     def _watches(self, solver: str) -> bool:
         """Whether the case left effects out that may turn out to matter."""
-        return bool(self.scene.decisions) and solvers.takes_effects(solver)
+        return solvers.takes_effects(solver) and self.watch() is not None
 
     def _with_all_that_matters(self, run: Run, choice: SolverChoice, place: str) -> Run:
         """The ``run``; where an effect that the case left out turns out to matter in it, one with that effect, which goes on from
         what is kept of a run that was stopped for it.
         """
-        found = self.watch()(run.numbers, run.positions) if self._watches(choice.solver) else ()
+        if not self._watches(choice.solver) or run.origin.get("watched") == self.watch().names:
+            return run
+        found = watched.again(self.watch(), run)
         if not found:
             return run
         self.scene = of_case.with_effects(self.scene, found)
@@ -95,15 +126,9 @@ class Bench[C: Case]:
         self.watch.cache_clear()  # type: ignore[attr-defined]
         assert run.folder is not None  # from the store
         folder = self.folder(choice, place)
-        with _alone(folder):
+        with taken.alone(folder):
             cut_off.pass_on(run.folder, folder)
         return self.obtain(run.name, choice, place)
-
-    def _check(self, frame: Frame) -> None:
-        """StoppedError where an effect that the case left out matters in a ``frame`` that was solved."""
-        if frame.surface is not None and (found := self.watch()((frame.number,), frame.surface[None])):
-            titles = " and ".join(one.effect.title for one in found)
-            raise StoppedError(f"{titles}, left out, turned out to matter at frame {frame.number}")
 
     def folder(self, choice: SolverChoice, place: str) -> Path:
         """Where the run of a solver of our own is stored, once there is one."""
@@ -118,7 +143,7 @@ class Bench[C: Case]:
             settings,
             folder,
             identity,
-            self._check if self._watches(solver) else lambda _: None,
+            self.watch() if self._watches(solver) else None,
         )
         return store.load(folder)
 
@@ -159,40 +184,57 @@ class Bench[C: Case]:
         }
 
 
+class _UnsolvedError(Exception):
+    """A run is not there yet."""
+
+
+class _Shelf(Bench[Any]):
+    """A bench that takes up what is stored, and solves nothing."""
+
+    def made_for(self, solver: str, settings: Record) -> Any:
+        """Nothing: what would be solved is not there."""
+        raise _UnsolvedError(f"{solver}-{self.key(solver, settings)}")
+
+
 @singledispatch
-def _solved(built: object, solver: Any, settings: Record, folder: Path, identity: dict[str, Any], check: Sink) -> None:  # noqa: ARG001
-    """Solve what was ``built`` of a case, and write the run into ``folder`` as it goes; ``check`` sees each frame of a muscle, and
+def _solved(built: object, solver: Any, settings: Record, folder: Path, identity: dict[str, Any], watch: Any) -> None:  # noqa: ARG001
+    """Solve what was ``built`` of a case, and write the run into ``folder`` as it goes; ``watch`` sees each frame of a muscle, and
     may stop it.
     """
     raise TypeError(f"{type(built).__name__} is no problem of a case")
 
 
 @_solved.register
-def _(built: Problem, solver: Any, settings: Record, folder: Path, identity: dict[str, Any], check: Sink) -> None:
+def _(built: Problem, solver: Any, settings: Record, folder: Path, identity: dict[str, Any], watch: Any) -> None:
     identity["origin"]["mesh"] = built.mesh_facts
     writer = store.Writer(folder, identity, built.surface, built.fibres, built.mesh, built.directions)
-    _write(writer, built, solver, settings, Frame(built.frames[0], built.surface.points, built.fibres.points), check)
+    _write(writer, built, solver, settings, Frame(built.frames[0], built.surface.points, built.fibres.points), watch)
 
 
 @_solved.register
-def _(built: Setup, solver: Any, settings: Record, folder: Path, identity: dict[str, Any], check: Sink) -> None:
+def _(built: Setup, solver: Any, settings: Record, folder: Path, identity: dict[str, Any], watch: Any) -> None:
     writer = store.Writer(folder, identity, built.surface)
-    _write(writer, built, solver, settings, Frame(built.frames[0], built.surface.points), check)
+    _write(writer, built, solver, settings, Frame(built.frames[0], built.surface.points), watch)
 
 
-def _write(writer: store.Writer, built: Setup, solver: Any, settings: Record, rest: Frame, check: Sink) -> None:
+def _write(writer: store.Writer, built: Setup, solver: Any, settings: Record, rest: Frame, watch: Any) -> None:
     """The run of a muscle, with what it cost; of one that failed before its first frame that frame, which is ``rest``."""
 
     def add(frame: Frame) -> None:
         writer.add(frame)
-        check(frame)
+        if watch is not None:
+            watched.see(watch, frame)
 
+    if watch is not None:
+        watched.begin(watch, writer)
     forget_peak_memory()
     began = time.process_time()
     go_on = solver.go_on
     try:
         outcome = go_on(built, settings, add, writer.cut_off) if go_on else solver.solve(built, settings, add)
-    except StoppedError as why:
+        if watch is not None and outcome.status == "converged":
+            watched.end(watch)
+    except watched.StoppedError as why:
         outcome = Outcome("stopped", str(why))
     processor, cost = time.process_time() - began, outcome.cost
     if "seconds_compile" in cost:  # which does not count: what is left takes no more processor time than time
@@ -201,7 +243,8 @@ def _write(writer: store.Writer, built: Setup, solver: Any, settings: Record, re
     outcome = replace(outcome, cost=used | outcome.cost)  # a solver with processes of its own says what those used
     if not writer.frames:
         writer.add(rest)
-    writer.close(outcome, **_contact(writer.state))
+    names = {"watched": watch.names} if watch is not None and outcome.status == "converged" else {}
+    writer.close(outcome, **_contact(writer.state), **names)
 
 
 def _contact(state: dict[str, Any]) -> dict[str, str]:
@@ -214,7 +257,7 @@ def _contact(state: dict[str, Any]) -> dict[str, str]:
 
 
 @_solved.register
-def _(built: FieldProblem, solver: Any, settings: Record, folder: Path, identity: dict[str, Any], check: Sink) -> None:  # noqa: ARG001
+def _(built: FieldProblem, solver: Any, settings: Record, folder: Path, identity: dict[str, Any], watch: Any) -> None:  # noqa: ARG001
     identity["origin"]["mesh"] = built.mesh_facts
     writer = store.Writer(folder, identity)
     solution = solver.solve_field(built, settings)
@@ -224,25 +267,9 @@ def _(built: FieldProblem, solver: Any, settings: Record, folder: Path, identity
     writer.close(solution.outcome, form=solution.form or built.form)
 
 
-@contextmanager
-def _alone(folder: Path) -> Iterator[None]:
-    """Nobody else makes the run in ``folder`` meanwhile: whoever comes second waits, and then finds it made."""
-    files.make_folder(folder.parent)
-    lock = FileLock(folder.parent / f".{folder.name}.lock")
-    try:
-        lock.acquire(timeout=0)
-    except Timeout:
-        log.info("%s: another process is making this run; waiting for it", folder)
-        lock.acquire()
-    try:
-        yield
-    finally:
-        lock.release()
-
-
-def _stored(folder: Path, name: str, ended: tuple[str, ...]) -> Run | None:
-    """The run in ``folder`` that ``ended`` so, under the name that it has here; None where there is none, or other packages made
-    it.
+def _stored(folder: Path, name: str, ended: tuple[str, ...], settings: Record) -> Run | None:
+    """The run in ``folder`` that ``ended`` so, under the name that it has here; None where there is none, other packages made
+    it, or it lacks states that the ``settings`` ask for.
     """
     run = store.finished(folder, ended)
     if run is None:
@@ -252,27 +279,8 @@ def _stored(folder: Path, name: str, ended: tuple[str, ...]) -> Run | None:
     if other:
         log.info("%s: solved before, but with another %s; solving again", name, other[0])
         return None
+    if getattr(settings, "store_state", None) and not states.are_kept(folder, run.numbers):
+        log.info("%s: solved before without its states; solving again", name)
+        return None
     log.info("%s: solved before, taken from %s", name, folder)
     return replace(run, name=name)
-
-
-def complete(run: Run, numbers: tuple[int, ...]) -> Run:
-    """The run over exactly the frames ``numbers``; frames that it did not reach are not-a-number, so they never pass."""
-    if run.numbers == numbers:
-        return run
-    rows = [run.numbers.index(number) if number in run.numbers else None for number in numbers]
-
-    def pick(values: Any) -> Any:
-        if values is None:
-            return None
-        blank = np.full(values.shape[1:], np.nan)
-        return np.stack([blank if row is None else values[row] for row in rows])
-
-    return replace(
-        run,
-        numbers=numbers,
-        positions=pick(run.positions),
-        fibre_positions=pick(run.fibre_positions),
-        scalars={name: pick(values) for name, values in run.scalars.items()},
-        fields={name: pick(values) for name, values in run.fields.items()},
-    )

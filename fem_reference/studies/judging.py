@@ -7,9 +7,10 @@ from typing import Any
 from fem_reference.assessment import comparison
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import ErrorBars
+from fem_reference.runs.complete import complete
 from fem_reference.runs.store import Run
 from fem_reference.studies import convergence
-from fem_reference.studies.execution import Bench, complete
+from fem_reference.studies.execution import Bench
 
 
 def compare(

@@ -1,8 +1,10 @@
 """New scenes: a copy of a case, or one made of the surfaces of a muscle and its bones."""
 
+import re
 import shutil
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from string import Template
 
@@ -11,16 +13,31 @@ from scipy.spatial import cKDTree
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Surface, check_closed, enclosed_volume
+from fem_reference.foundations.records import check_name
+from fem_reference.foundations.units import LENGTH_UNITS, length_unit
 from fem_reference.geometry.distance import distances
 from fem_reference.io import files
+from fem_reference.io.texts import toml_text
 from fem_reference.scenes import casefile
 
-UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0}
-# Muscles are so long [mm]; where only one unit makes a length one of these, it is taken for that.
-_LONG = (20.0, 700.0)
+# The units that are guessed among: those of LENGTH_UNITS that scanners and modellers write.
+_GUESSED = ("mm", "cm", "m", "in")
+# So long are muscles and bones [mm]: what is shorter or longer in a unit is not in that.
+_LONG = {"muscle": (20.0, 700.0), "bone": (5.0, 2500.0)}
+# No muscle is further from a bone that it is attached to than this share of its length; else they were scaled or moved apart.
+_APART = 0.5
 # Attached are so many of the vertices, those nearest to a bone; fewer where two attachments would share some.
 _ATTACHED = (0.06, 0.04, 0.025, 0.015, 0.008)
 _TETS, _REFINEMENTS = 5000, 1
+_LONGEST = 60  # characters of what is written of a name that a scene cannot have, or that a file cannot
+
+
+@dataclass(frozen=True)
+class Unit:
+    """The unit of length of surfaces, by ``name``, and ``why``: empty where it was given, and not guessed."""
+
+    name: str
+    why: str = ""
 
 
 @dataclass(frozen=True)
@@ -32,15 +49,14 @@ class _Attached:
     vertices: Ints
 
 
-def copied(case: str, folder: Path) -> Path:
-    """A copy of a case, with the files beside it, in a new ``folder``; returns that."""
+def copied(case: str, folder: Path) -> None:
+    """A copy of a case, with the files beside it, in a new ``folder``."""
     scene = casefile.read(case)
     shutil.copytree(scene.folder, _new(folder))
-    return folder
 
 
-def of_surfaces(folder: Path, muscle: Path, bones: Sequence[Path], unit: str | None) -> Path:
-    """A scene in a new ``folder`` that can be run, with the surfaces in mm; returns the folder.
+def of_surfaces(folder: Path, muscle: Path, bones: Sequence[Path], unit: str | None) -> Unit:
+    """A scene in a new ``folder`` that can be run, with the surfaces in mm; returns the unit that they were read in.
 
     Parameters
     ----------
@@ -49,7 +65,7 @@ def of_surfaces(folder: Path, muscle: Path, bones: Sequence[Path], unit: str | N
     muscle, bones
         Files of triangles. The muscle is attached to the two bones that it is nearest to, and the second of these moves.
     unit
-        Of all of them, ``"mm"``, ``"cm"`` or ``"m"``; None: by the size of the muscle.
+        Of all of them, one of ``LENGTH_UNITS``; None: the only one in which all are as long as muscles and bones are.
 
     Raises
     ------
@@ -62,50 +78,112 @@ def of_surfaces(folder: Path, muscle: Path, bones: Sequence[Path], unit: str | N
     names = [path.stem for path in bones]
     if len({*names, "muscle"}) <= len(names):
         raise InputError("--bone", f"the names {', '.join(names)}", "files of different names, none of them muscle")
-    factor = UNITS[unit] if unit else _unit(files.read_surface(muscle, 1.0))
-    body = check_closed(_welded(files.read_surface(muscle, factor)))
-    around = {name: _welded(files.read_surface(path, factor)) for name, path in zip(names, bones, strict=True)}
-    attached = _attachments(body, around)
-    text = _text(folder.name, muscle, body, around, attached)
-    _new(folder).mkdir(parents=True)
-    for name, surface in {"muscle": body, **around}.items():
-        files.write_surface(folder / f"{name}.ply", surface, surface.points)
+    _new(folder)
+    body, *others = (files.read_surface(path, 1.0) for path in (muscle, *bones))
+    used = _unit(body, others) if unit is None else Unit(unit)
+    factor = _factor(used.name)
+    ends = {name: _welded(one, factor) for name, one in zip(names, others, strict=True)}
+    write(folder, check_closed(_welded(body, factor)), ends)
+    return used
+
+
+def write(folder: Path, muscle: Surface, bones: dict[str, Surface]) -> None:
+    """Write the scene of a ``muscle`` and ``bones`` by name, all in mm, into a new ``folder``; no name is too odd for that."""
+    around, paths = dict[str, Surface](), {"muscle": "muscle.ply"}
+    for name, surface in bones.items():
+        clean = _distinct(name if is_name(name) else _cleaned(name), {"muscle", *around})
+        around[clean] = surface
+        taken = {path.removesuffix(".ply") for path in paths.values()}
+        paths[clean] = f"{_distinct(_cleaned(re.sub(r'[^a-z0-9_.-]', '_', clean.lower())), taken)}.ply"
+    text = _text(_new(folder).name, muscle, around, paths)
+    folder.mkdir(parents=True)
+    for name, surface in {"muscle": muscle, **around}.items():
+        files.write_surface(folder / paths[name], surface, surface.points)
     files.write_text(folder / "case.toml", text)
-    return folder
+
+
+def is_name(name: str) -> bool:
+    """Whether a scene can call something so."""
+    try:
+        return bool(check_name(name))
+    except ValueError:
+        return False
+
+
+def _cleaned(name: str) -> str:
+    """What a ``name`` comes to on one line, without what is not printed, and not too long."""
+    shown = "".join(letter if letter.isprintable() else "_" for letter in name)[:_LONGEST].strip()
+    return shown.lstrip(".") or "bone"
+
+
+def _distinct(name: str, taken: Container[str]) -> str:
+    """The ``name``, with a number where it is ``taken``."""
+    numbered = (f"{name}_{i}" for i in count(2))
+    return name if name not in taken else next(one for one in numbered if one not in taken)
 
 
 def _new(folder: Path) -> Path:
+    if not is_name(folder.name):
+        raise InputError(
+            "NAME",
+            f'"{folder.name}"',
+            "what a scene can be called: at most 100 printable characters, no blanks at the ends",
+        )
     if folder.exists():
         raise InputError("NAME", f'"{folder}", which is there already', "the name of a folder that is not there yet")
     return folder
 
 
-def _unit(surface: Surface) -> float:
-    """The unit [mm] of a muscle's coordinates, by its size."""
-    size = float(np.linalg.norm(np.ptp(surface.points, axis=0)))
-    fitting = [name for name, factor in UNITS.items() if _LONG[0] <= size * factor <= _LONG[1]]
-    if len(fitting) != 1:
-        got = f"none, with a muscle of length {size:.3g}, which may be in {' or '.join(fitting or UNITS)}"
-        raise InputError("--unit", got, f"one of {', '.join(UNITS)}")
-    return UNITS[fitting[0]]
+def _factor(unit: str) -> float:
+    """How many mm a unit of the command line has."""
+    try:
+        return length_unit(unit)
+    except ValueError as error:
+        raise InputError("--unit", f'"{unit}"', str(error)) from error
 
 
-def _welded(surface: Surface) -> Surface:
-    """The surface with one point where several are the same: STL files have three points a triangle."""
-    rounded = np.round(surface.points, 6)
+def _unit(muscle: Surface, bones: Sequence[Surface]) -> Unit:
+    """The unit of coordinates of which each surface, by its own size, may be; InputError where that leaves none or several."""
+    fitting, said = list[set[str]](), list[str]()
+    for surface, kind in ((muscle, "muscle"), *((bone, "bone") for bone in bones)):
+        size, (least, most) = _length(surface), _LONG[kind]
+        units = [unit for unit in _GUESSED if least <= size * LENGTH_UNITS[unit] <= most]
+        fitting.append(set(units))
+        name = _cleaned(Path(surface.place).name)
+        said.append(f'"{name}" is {size:.3g} long, a {kind} in {" or ".join(units) or "no unit"}')
+    shared, why = set.intersection(*fitting), "; ".join(said)
+    if len(shared) != 1:
+        what = "several units are" if shared else "no unit is"
+        raise InputError("--unit", f"none, where {why}: {what} one of all of them", f"one of {', '.join(LENGTH_UNITS)}")
+    return Unit(shared.pop(), why)
+
+
+def _length(surface: Surface) -> float:
+    """The diagonal of its box."""
+    return float(np.linalg.norm(np.ptp(surface.points, axis=0)))
+
+
+def _welded(surface: Surface, unit: float) -> Surface:
+    """The surface in mm, with one point where several are the same: STL files have three points a triangle."""
+    points = surface.points * unit
+    rounded = np.round(points, 6)
     _, first, which = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)  # as they come
     place = np.empty_like(order)
     place[order] = np.arange(len(order))
     triangles = place[which.ravel()[surface.triangles]]
     whole = np.array([len({*corners}) == 3 for corners in triangles.tolist()], bool)
-    return Surface(surface.points[np.sort(first)], triangles[whole], surface.place)
+    return Surface(points[np.sort(first)], triangles[whole], surface.place)
 
 
 def _attachments(muscle: Surface, bones: dict[str, Surface]) -> tuple[_Attached, _Attached]:
     """Where the muscle is nearest to the two bones that it is nearest to, without a vertex that both would have."""
     away = {name: distances(muscle.points, bone).distance for name, bone in bones.items()}
     first, second = sorted(away, key=lambda name: float(np.quantile(away[name], _ATTACHED[-1])))[:2]
+    for name in (first, second):
+        if (gap := float(away[name].min())) > _APART * _length(muscle):
+            got = f'the bone "{name}" {gap:.3g} mm from it, which is {_length(muscle):.3g} mm long'
+            raise InputError(muscle.place, got, "surfaces in one unit (--unit) that are beside each other")
     for share in _ATTACHED:
         ends = [_nearest(name, away[name], share) for name in (first, second)]
         if not set(ends[0].vertices.tolist()) & set(ends[1].vertices.tolist()):
@@ -120,29 +198,31 @@ def _nearest(bone: str, away: Floats, share: float) -> _Attached:
     return _Attached(bone, within, np.flatnonzero(away <= within))
 
 
-def _text(
-    name: str, source: Path, muscle: Surface, bones: dict[str, Surface], ends: tuple[_Attached, _Attached]
-) -> str:
+def _text(name: str, muscle: Surface, bones: dict[str, Surface], paths: dict[str, str]) -> str:
+    """The scene file, the surfaces by name being at these ``paths`` beside it."""
+    ends = _attachments(muscle, bones)
     volume = enclosed_volume(muscle.points, muscle.triangles)
     wanted = np.cbrt(6 * np.sqrt(2) * volume / _TETS * 8**_REFINEMENTS)
     size = min(float(wanted), float(np.ptp(muscle.points, axis=0).min()) / 2)
-    moving = ends[1].bone
+    source, moving = _cleaned(Path(muscle.place).name), ends[1].bone
     others = [bone for bone in bones if bone != moving]  # the motion follows the last bone
     axis, centre = _joint(muscle, bones, ends)
     surfaces = "\n".join(
-        f'[[bone]]\nname = "{bone}"\nsurface = "{bone}.ply"\nunit = "mm"\n' for bone in (*others, moving)
+        f'[[bone]]\nname = {toml_text(bone)}\nsurface = {toml_text(paths[bone])}\nunit = "mm"\n'
+        for bone in (*others, moving)
     )
     attachments = "\n".join(
         f"[[attachment]] # {len(end.vertices)} vertices of the muscle, those nearest to {end.bone}\n"
-        f'name = "{which}"\nbone = "{end.bone}"\nwithin = "{end.within:g} mm"\n'
+        f'name = "{which}"\nbone = {toml_text(end.bone)}\nwithin = "{end.within:g} mm"\n'
         for which, end in zip(("origin", "insertion"), ends, strict=True)
     )
     return Template(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")).substitute(
         name=name,
-        title=name.replace("_", " "),
-        muscle=source.name,
+        title=toml_text(name.replace("_", " ").strip() or name),
+        proves=toml_text(f"How the muscle of {source} goes with {moving}."),
+        muscle=source,
         triangles=len(muscle.triangles),
-        length=f"{np.linalg.norm(np.ptp(muscle.points, axis=0)):.0f}",
+        length=f"{_length(muscle):.0f}",
         volume=f"{volume / 1000:.3g}",
         size=f"{size:.3g}",
         tets=_TETS,

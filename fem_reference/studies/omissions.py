@@ -19,15 +19,16 @@ from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.metrics import MeasurementContext, measure
 from fem_reference.problems import of_case
 from fem_reference.problems.body import ELEMENTS
+from fem_reference.runs.complete import complete
 from fem_reference.runs.key import versions
 from fem_reference.runs.store import Run
-from fem_reference.scenes.case import SolverChoice
+from fem_reference.scenes.case import MACHINE_ONLY, SolverChoice
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx
 from fem_reference.studies import refinement
 from fem_reference.studies.campaign import Made, Workers, carry_out, shared_bench
 from fem_reference.studies.cost import known
-from fem_reference.studies.execution import MACHINE_ONLY, Bench, complete
+from fem_reference.studies.execution import Bench
 from fem_reference.studies.ladders import Trial
 
 log = logging.getLogger(__name__)

@@ -3,6 +3,7 @@
 import hashlib
 import logging
 import math
+import sys
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from fem_reference import metrics, solvers
-from fem_reference.assessment import error_bars
+from fem_reference.assessment import differences, error_bars
 from fem_reference.assessment.error_bars import SAFETY, ErrorBars, Pair
 from fem_reference.effects import Effect
 from fem_reference.effects.contact import Contact, among
@@ -19,15 +20,19 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record
 from fem_reference.geometry.sectors import attached_area, attached_shares
 from fem_reference.metrics import MeasurementContext
+from fem_reference.runs.complete import complete
 from fem_reference.runs.store import Run
 from fem_reference.scenes.bones import Bone
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx
-from fem_reference.studies.execution import Bench, complete
+from fem_reference.studies.execution import Bench
+from fem_reference.studies.taken import without_states
 
 log = logging.getLogger(__name__)
 
 _EXACT = "exact attachments"
+# The modules that bars are made by, beside the metrics.
+_MAKING = (differences, error_bars, sys.modules[__name__])
 
 # A scene whose tetrahedra are refined has the coarse member of its pair in them, before the last refinement; another has a mesh of
 # its own for it, larger by so much.
@@ -212,7 +217,7 @@ def _solved(bench: Bench[MuscleCase], scene: MuscleCase, name: str, reference: R
     """The reference's run of a changed scene, over the frames of ``reference``."""
     other = Bench(scene, bench.store, bench.ranks)
     try:
-        run = other.obtain(f"reference, {name}", scene.reference, "reference")
+        run = other.obtain(f"reference, {name}", without_states(scene.reference), "reference")
     except InputError as error:
         raise InputError(
             f"error bar, {name}", f"a scene that cannot be set up ({error})", "a finer reference"
@@ -232,7 +237,7 @@ def _of(reference: Run) -> dict[str, str]:
 def _measuring_hash() -> str:
     """A hash over the source files that measure the runs."""
     digest = hashlib.sha256()
-    for path in (*sorted(Path(metrics.__file__).parent.glob("*.py")), Path(error_bars.__file__), Path(__file__)):
+    for path in (*sorted(Path(metrics.__file__).parent.glob("*.py")), *(Path(str(one.__file__)) for one in _MAKING)):
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 

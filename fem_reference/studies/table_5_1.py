@@ -8,13 +8,14 @@ from pathlib import Path
 from fem_reference.assessment.solver_table import Scenario, SolverKind, SolverResult, Table, solver_kinds
 from fem_reference.foundations.errors import InputError
 from fem_reference.metrics import Measure, MeasurementContext, measure
+from fem_reference.runs.complete import complete
 from fem_reference.runs.cost import seconds_per_frame
 from fem_reference.runs.key import versions
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Candidate
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import refinement
-from fem_reference.studies.execution import Bench, complete
+from fem_reference.studies.execution import Bench
 
 log = logging.getLogger(__name__)
 

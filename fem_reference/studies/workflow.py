@@ -1,19 +1,19 @@
 """The steps from a case to a page, one call each: what the package offers to Python."""
 
-import logging
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
-
-import numpy as np
+from typing import Any, overload
 
 from fem_reference import export, report
-from fem_reference.assessment import judge, solver_table
+from fem_reference.assessment import judge, second_check, solver_table
+from fem_reference.assessment.body_bars import BodyBars
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.export import paraview
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.given import path
+from fem_reference.foundations.progress import Progress, reported
 from fem_reference.foundations.records import parse
 from fem_reference.problems import of_case
 from fem_reference.problems.body import Body
@@ -22,10 +22,9 @@ from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Case, SolverChoice
 from fem_reference.solvers import fenicsx, recorded
-from fem_reference.studies import judging, refinement
+from fem_reference.studies import arguments, body_refinement, judging, refinement
 from fem_reference.studies.execution import Bench
 
-Progress = Callable[[str], object]
 STORE = Path("reports/runs")
 
 
@@ -45,6 +44,8 @@ def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Cas
         Where a key is missing, unknown or wrong; it names file, key, what was got and what is wanted.
 
     """
+    arguments.check_changes(changes)
+    path(case, "case")
     return of_case.chosen(casefile.read(case, changes=dict(changes or {})))
 
 
@@ -78,12 +79,16 @@ def solve(
         Where physics fails, the status says so and the frames that were reached are there.
 
     """
+    arguments.check_case(case)
+    arguments.check_solver(solver, settings)
+    arguments.check_progress(progress)
+    folder = arguments.free_folder(store, "store")
     choice: SolverChoice = case.reference
     if solver is not None:
         choice = SolverChoice(solver=solver, **settings) if settings else solver_table.choice(case, solver)[1]
     name = "reference" if solver is None else solver
-    with _reported(progress):
-        return Bench(case, Path(store)).obtain(name, choice, f'solver "{choice.solver}"')
+    with reported(progress):
+        return Bench(case, folder).obtain(name, choice, f'solver "{choice.solver}"')
 
 
 def read_run(folder: str | Path, case: Case, *, unit: str | None = None) -> Run:
@@ -109,34 +114,57 @@ def read_run(folder: str | Path, case: Case, *, unit: str | None = None) -> Run:
         Where a file cannot be read whole, or its vertices or its first frame are not those of the case.
 
     """
-    choice = recorded.choice(Path(folder), unit)
+    arguments.check_case(case)
+    choice = recorded.choice(path(folder, "folder"), unit)
     return Bench(case, STORE).read(choice.name, choice, "folder")
 
 
+@overload
 def error_bars(
     case: Case, reference: Run, *, store: str | Path = STORE, progress: Progress | None = None
-) -> ErrorBars | None:
-    """Estimate how far each statistic of a reference may be from the truth, from runs on larger tetrahedra and with finer contact.
+) -> ErrorBars | None: ...
+
+
+@overload
+def error_bars(
+    case: Body, reference: Solved, *, store: str | Path = STORE, progress: Progress | None = None
+) -> BodyBars | None: ...
+
+
+def error_bars(
+    case: Case | Body, reference: Run | Solved, *, store: str | Path = STORE, progress: Progress | None = None
+) -> ErrorBars | BodyBars | None:
+    """Estimate how far each statistic of a reference may be from the truth, from runs on larger tetrahedra and with finer contact;
+    or how far a body may be from it on cells of its shape, from a solution on smaller cells or with more unknowns in each.
 
     Parameters
     ----------
     case
-        The case of the reference.
+        The case of the reference, or the body.
     reference
-        What :func:`solve` returned without a ``solver``.
+        What :func:`solve` returned without a ``solver``, or what :func:`solve_body` returned.
     store
-        The folder that runs are stored in; bars are kept beside the reference's run.
+        The folder that runs are stored in; bars are kept beside the reference's run. Those of a body are not stored.
     progress
         Called with each line of progress.
 
     Returns
     -------
-    ErrorBars or None
-        By statistic a bar for each frame, in the unit of the statistic; None where the reference did not converge.
+    ErrorBars, BodyBars or None
+        By statistic a bar for each frame, in the unit of the statistic; of a body, of its points, forces, moments and energy. None
+        where the reference did not converge.
 
     """
-    with _reported(progress):
-        bench = Bench(casefile.muscle(case), Path(store))
+    arguments.check_progress(progress)
+    with reported(progress):
+        if isinstance(case, Body) and isinstance(reference, Solved):
+            return body_refinement.obtain(case, reference)
+        if isinstance(case, Body) or isinstance(reference, Solved):
+            want = "what solve_body returned of a body, or what solve returned of a case"
+            raise InputError("reference", f"a {type(reference).__name__} of a {type(case).__name__}", want)
+        arguments.check_case(case)
+        arguments.check_run(reference, case, "reference")
+        bench = Bench(casefile.muscle(case), arguments.free_folder(store, "store"))
         return refinement.stored(reference) or refinement.obtain(bench, reference)
 
 
@@ -162,20 +190,11 @@ def compare(
         ``comparison["pbd", "surface_deviation", "rms"]`` is a measure: ``values`` (f,), ``unit``, ``worst`` frame.
 
     """
+    arguments.check_case(case)
+    arguments.check_runs(reference, candidates, case)
+    arguments.check_error_bars(error_bars, case)
     judge.check(case)
-    _check_runs(reference, candidates)
     return judging.compare(Bench(case, STORE), reference, candidates, error_bars)
-
-
-def _check_runs(reference: Run, candidates: Sequence[Run]) -> None:
-    """InputError where runs cannot be compared: two of one name, or with other vertices than the reference."""
-    names = [run.name for run in (reference, *candidates)]
-    for run in candidates:
-        if names.count(run.name) > 1:
-            raise InputError("candidates", f'the name "{run.name}" twice', "runs of different names")
-        if run.positions.shape[1:] != reference.positions.shape[1:]:
-            got, want = (f"{one.positions.shape[1]} vertices" for one in (run, reference))
-            raise InputError(f'candidate "{run.name}"', got, f"the {want} of the reference: a run of the same case")
 
 
 def export_case(case: Case, folder: str | Path, form: export.Format = "open") -> list[str]:
@@ -201,8 +220,9 @@ def export_case(case: Case, folder: str | Path, form: export.Format = "open") ->
         Where ``folder`` is not empty, or FEBio has not the same effects.
 
     """
+    arguments.check_case(case)
     muscle = casefile.muscle(case)
-    return export.export(muscle, Bench(muscle, STORE).problem, Path(folder), form)
+    return export.export(muscle, Bench(muscle, STORE).problem, arguments.free_folder(folder, "folder"), form)
 
 
 def export_runs(comparison: Comparison, folder: str | Path) -> list[str]:
@@ -226,12 +246,14 @@ def export_runs(comparison: Comparison, folder: str | Path) -> list[str]:
         Where ``folder`` is not empty.
 
     """
-    return paraview.write(comparison, Path(folder))
+    arguments.check_comparison(comparison)
+    return paraview.write(comparison, arguments.free_folder(folder, "folder"))
 
 
 def write_report(comparison: Comparison, folder: str | Path) -> Path:
     """Write ``report.html``, ``measures.json`` and ``measures.csv`` into ``folder``; the path of the page."""
-    return report.write(comparison, Path(folder))
+    arguments.check_comparison(comparison)
+    return report.write(comparison, arguments.free_folder(folder, "folder"))
 
 
 def solve_body(body: Body, *, progress: Progress | None = None, **settings: Any) -> Solved:
@@ -251,40 +273,11 @@ def solve_body(body: Body, *, progress: Progress | None = None, **settings: Any)
     -------
     Solved
         ``states``, each with ``points`` (n, 3) [mm] of the nodes and ``forces`` (3,) [N] by name of what is prescribed; the
-        ``outcome``.
+        ``outcome``. How far they are from the truth on cells of this size, :func:`error_bars` says.
 
     """
-    for entry in body.prescribed:
-        if (shape := np.shape(entry.path(body.mesh.points[:2], body.frames[0]))) != (2, 3):
-            got = f"displacements {shape} of points (2, 3)"
-            raise InputError(f'prescribed "{entry.name}": path', got, "one (3,) for each point, as (n, 3)")
-    with _reported(progress):
-        return fenicsx.solve_body(body, parse(fenicsx.BodySettings, settings, "settings"))
-
-
-@contextmanager
-def _reported(progress: Progress | None) -> Iterator[None]:
-    """Meanwhile each line of progress goes to ``progress``."""
-    if progress is None:
-        yield
-        return
-    log = logging.getLogger("fem_reference")
-    handler, level = _Calling(progress), log.level
-    log.addHandler(handler)
-    log.setLevel(logging.INFO)
-    try:
-        yield
-    finally:
-        log.removeHandler(handler)
-        log.setLevel(level)
-
-
-class _Calling(logging.Handler):
-    """Calls a function with each line."""
-
-    def __init__(self, progress: Progress) -> None:
-        super().__init__()
-        self.progress = progress
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self.progress(record.getMessage())
+    arguments.check_progress(progress)
+    with reported(progress):
+        chosen = parse(fenicsx.BodySettings, settings, "settings")
+        solved = second_check.confirmed_body(body, fenicsx.solve_body(body, chosen))
+        return replace(solved, body=body, settings=chosen)

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from fem_reference.assessment import second_check
 from fem_reference.problems.body import Body
 from fem_reference.runs.solved import Solved
 from fem_reference.solvers import fenicsx, scikit_fem
@@ -21,7 +22,8 @@ class FemLab:
     def solve(self, body: Body, element: str, **settings: Any) -> Solved:
         """The states of ``body`` by the reference, FEniCSx; none may take for ever."""
         limited = {"time_limit": _TIME_LIMIT} | settings
-        return self.session.solve(body, fenicsx.BodySettings(element=element, **limited))
+        solved = self.session.solve(body, fenicsx.BodySettings(element=element, **limited))
+        return second_check.confirmed_body(body, solved)
 
     def second(self, body: Body, element: str, **settings: Any) -> Solved:
         """The states of ``body`` by the second opinion, scikit-fem."""

@@ -56,7 +56,7 @@ def _times(share: float) -> Matrix:
 @dataclass(frozen=True, eq=False)
 class Turned:
     """A warped box, at frame 1 at rest or contracted, as its material is; from 1 to 2 its ``faces`` are turned by 1 rad about an
-    oblique axis, but z1 by ``further`` times as much: the whole surface in one step, two ends in as many as it takes.
+    oblique axis, z1 or the whole surface by ``further`` times as much: this in one step, two ends in as many as it takes.
     """
 
     material: Material
@@ -67,8 +67,9 @@ class Turned:
     def states(self, lab: Lab) -> tuple[Reached, Reached]:
         """Before and after the turn."""
         mesh = shapes.warped_box(COUNTS, SIZE, ELEMENTS[self.element][0], 1, BUMP)
+        moved = SURFACE if self.faces == SURFACE else ("z1",)
         prescribed = tuple(
-            Prescribed(face, face, (0, 1, 2), _turn(self.further if face == "z1" else 1.0)) for face in self.faces
+            Prescribed(face, face, (0, 1, 2), _turn(self.further if face in moved else 1.0)) for face in self.faces
         )
         acting = (*self.material.effects, resistance(self.element, BULK))
         steps = AT_ONCE if self.faces == SURFACE else STEPS
@@ -124,7 +125,7 @@ _BLOCK = Entry(
     kind="property",
     source="Objectivity: a law sees C = F^T F only.",
     measure=Turned(NEO, "Q2/Q1", SURFACE).error,
-    negative_control="One face is turned 1 % further.",
+    negative_control="The surface is turned 1 % further.",
     with_negative_control=Turned(NEO, "Q2/Q1", SURFACE, 1.01).error,
 )
 _ENERGY = replace(

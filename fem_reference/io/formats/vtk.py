@@ -43,6 +43,11 @@ def _read_lines(path: Path) -> Lines:
     return points, joined(cells)
 
 
+def read_points(path: Path) -> Any:
+    """The points (n, 3) of a file."""
+    return _data(path).points
+
+
 def _data(path: Path) -> DataSet:
     """The data set of a VTK file."""
     data = path.read_bytes()

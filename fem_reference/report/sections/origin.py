@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from fem_reference.assessment.comparison import Comparison
+from fem_reference.assessment.second_check import RECORD
 from fem_reference.foundations.errors import InputError
 from fem_reference.report.sections import Section
 from fem_reference.report.tables import runs
@@ -15,7 +16,9 @@ from fem_reference.scenes.case import Case
 def _facts(comparison: Comparison) -> dict[str, Any]:
     """Origins as one table each, and the scene."""
     scene = comparison.scene
-    origins = [(run, _flat(run.origin)) for run in runs(comparison)]
+    origins = [
+        (run, _flat({key: value for key, value in run.origin.items() if key != RECORD})) for run in runs(comparison)
+    ]
     return {"origins": origins, "scene_text": _scene_text(scene)}
 
 

@@ -5,7 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from fem_reference.assessment import second_check
 from fem_reference.assessment.comparison import Comparison
+from fem_reference.foundations.limits import ENERGY_GAP
 from fem_reference.metrics import Measure
 from fem_reference.report.sections import Section
 from fem_reference.report.tables import inversion
@@ -14,7 +16,8 @@ from fem_reference.runs.store import Run
 
 def _facts(_: Comparison) -> dict[str, Any]:
     """What its alarms are made of."""
-    return {"inversion": inversion, "least": least, "greatest": greatest, "gap": gap}
+    found = {"inversion": inversion, "least": least, "greatest": greatest, "gap": gap}
+    return found | {"energy_gap_limit": ENERGY_GAP, "second_check": second_check.said}
 
 
 def greatest(run: Run, scalar: str) -> float:

@@ -10,10 +10,13 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.motion import apply
+from fem_reference.problems.courses import posed, skipped
 from fem_reference.problems.muscle import Setup
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers.common.state_checks import Trouble, trouble
 
+# Parts of a frame in which motions are looked at; what is seen in these is seen in more.
+_PARTS = 16
 # Positions (n, 3) [mm], what is kept of their velocities (n, 3), and the frame number -> both after its iteration.
 Iterate = Callable[[Floats, Floats, int], tuple[Floats, Floats]]
 
@@ -42,10 +45,36 @@ class Model(Protocol):
         """How a run ended that reached every frame."""
 
 
-def follow(model: Model, frames: tuple[int, ...], sink: Sink) -> Outcome:
-    """Take ``model`` from rest at the first of ``frames`` through every frame number to the last; ``sink`` gets ``frames``."""
+def follow(model: Model, setup: Setup, sink: Sink, per_frame: int = 1) -> Outcome:
+    """Take ``model`` from rest at the first frame of ``setup`` through every frame number to the last, each in ``per_frame`` parts
+    at whose ends it sees where bones are; ``sink`` gets the frames. Out of steps where bones do what nobody sees in between.
+    """
+    frames = setup.frames
+    if _unseen(setup, 1) and (why := _unseen(setup, min(per_frame, _PARTS))):
+        return refused(model, frames[0], sink, why)
     sink(model.frame(frames[0]))
     return _go(model, range(frames[0] + 1, frames[-1] + 1), frames, sink)
+
+
+def _unseen(setup: Setup, per_frame: int) -> Trouble | None:
+    """Which bone turns too far from where it is seen to where it is seen next, or there and back; None where none does."""
+    if all(bone.motion is None for bone in setup.bones):
+        return None
+    points, count = setup.surface.points, (setup.frames[-1] - setup.frames[0]) * per_frame
+    seen = np.linspace(setup.frames[0], setup.frames[-1], count + 1)
+    bones = [
+        bone for bone in setup.bones if np.isfinite([bone.pose(frame) for frame in seen]).all()
+    ]  # else its loop says so
+    things = [posed(f'bone "{bone.name}"', bone.pose, points) for bone in bones]
+    found = skipped(things, seen.tolist(), float(np.linalg.norm(np.ptp(points, axis=0))))
+    if found is None:
+        return None
+    thing, early, late = found
+    return Trouble(
+        "out of steps",
+        f"{thing.place} turns by more than a right angle, goes farther than the muscle is long, or goes there and back, "
+        f"between frames {early:g} and {late:g}, where this solver does not look; a slower motion, over more frames, helps",
+    )
 
 
 def each(model: Model, frames: tuple[int, ...], sink: Sink) -> Outcome:

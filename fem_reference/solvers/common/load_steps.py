@@ -38,11 +38,17 @@ class Step:
 
 @dataclass(frozen=True)
 class Steps:
-    """The ``first`` load step, and between which sizes they may be, in frame numbers."""
+    """The ``first`` load step, and between which sizes they may be, in frame numbers; one ends at each of ``stops``, in order."""
 
     first: float
     smallest: float
     largest: float | None = None
+    stops: tuple[float, ...] = ()
+
+    def goals(self, at: float, frame: float) -> tuple[float, ...]:
+        """The stops on the way from ``at`` to a ``frame``, and this."""
+        near = 1e-9 * max(1.0, abs(at), abs(frame))
+        return (*(stop for stop in self.stops if at + near < stop < frame - near), float(frame))
 
 
 def march(
@@ -61,24 +67,29 @@ def march(
     at, step = float(frames[0]), min(steps.first, largest)
     for frame in frames[1:]:
         taken = iterations = cutbacks = 0
-        if recall(frame):
-            at = frame
-        while at < frame:
-            left = frame - at
-            count = max(1, round(left / step + 0.3), math.ceil(left / largest - 1e-9))
-            size = left / count  # equal steps to the frame, none a sliver
-            result = attempt(frame if size == left else at + size)
-            iterations += result.iterations
-            if result.failure is not None:
-                cutbacks += 1
-                step = size / 2
-                if step < steps.smallest and last_resort():
-                    step = min(steps.first, largest)
-                elif step < steps.smallest:
-                    yield Step(frame, taken, iterations, cutbacks, result.failure, result.sentence, at)
-                    return
-                continue
-            at = frame if size == left else at + size
-            taken += 1
-            step = step * GROWTH if result.iterations <= EASY else size
+        for goal in steps.goals(at, frame):
+            if goal == frame and recall(frame):
+                at = goal
+            while at < goal:
+                size = _size(goal - at, step, largest)
+                then = goal if size == goal - at else at + size
+                result = attempt(then)
+                iterations += result.iterations
+                if result.failure is not None:
+                    cutbacks += 1
+                    step = size / 2
+                    if step < steps.smallest and last_resort():
+                        step = min(steps.first, largest)
+                    elif step < steps.smallest:
+                        yield Step(frame, taken, iterations, cutbacks, result.failure, result.sentence, at)
+                        return
+                    continue
+                at = then
+                taken += 1
+                step = step * GROWTH if result.iterations <= EASY else size
         yield Step(frame, taken, iterations, cutbacks, at=at, size=step)
+
+
+def _size(left: float, step: float, largest: float) -> float:
+    """That of a load step near to ``step``, of equal ones over what is ``left``: none is a sliver."""
+    return left / max(1, round(left / step + 0.3), math.ceil(left / largest - 1e-9))

@@ -57,6 +57,13 @@ class CheckEffects[S: Record](Protocol):
         """InputError below ``place`` where the settings do not suit the effects of a scene."""
 
 
+class CheckProblem[S: Record](Protocol):
+    """Checks settings against what is made of a case."""
+
+    def __call__(self, settings: S, problem: Any, place: str, /) -> None:
+        """InputError below ``place`` where the settings do not suit the bones, attachments, fibres or boundary of a case."""
+
+
 def _nothing(_: Record) -> None:
     """Nothing but what this package needs itself."""
 
@@ -71,8 +78,8 @@ class Solver[S: Record]:
     """What a solver's file offers for one task.
 
     ``settings``: the record of its own settings. ``example``: some of them, as scene files write them, which contract tests solve
-    with. ``require``: MissingSoftware where what it needs under such settings is not installed. ``slow``: it takes more than a few
-    seconds on a small problem.
+    with. ``require``: MissingSoftware where what it needs under such settings is not installed. ``check_problem`` of one whose
+    settings speak of what a case has. ``slow``: it takes more than a few seconds on a small problem.
     """
 
     task: ClassVar[Task]
@@ -81,6 +88,7 @@ class Solver[S: Record]:
     settings: type[S]
     example: Mapping[str, Any]
     require: Callable[[S], None] = _nothing
+    check_problem: CheckProblem[S] | None = None
     slow: bool = False
 
 

@@ -64,7 +64,8 @@ def require(settings: BodySettings | FieldSettings) -> None:
 
 
 def check_effects(settings: Settings, effects: tuple[Effect, ...], place: str) -> None:
-    """InputError below ``place`` unless the element suits tetrahedra and the effects."""
+    """InputError below ``place`` unless the element suits tetrahedra and the effects, and the ranks how systems are solved."""
+    _check_ranks(settings, join(place, "ranks"))
     check_element(settings.element, "tetrahedron", 1, effects, join(place, "element"))
     check_quadrature(settings.element, settings.quadrature_degree, join(place, "quadrature_degree"))
 
@@ -95,7 +96,7 @@ def go_on(problem: Problem, settings: Settings, sink: Sink, cut_off: CutOff) -> 
 
 
 def _solve(problem: Problem, body: Body, settings: Settings, sink: Sink, folder: Path, kept: Kept | None) -> Outcome:
-    settings = _planned(settings, body)
+    settings = _planned(_with_states(problem, body, settings), body)
     job = folder.resolve() / "job.pickle"  # a process that is shared may have been started elsewhere
     job.write_bytes(pickle.dumps(Job(body, settings, _samples(problem), kept)))
     passed: list[int] = list(kept.frames) if kept else []
@@ -177,12 +178,26 @@ def _command(settings: Settings, job: Path) -> list[str]:
 def _planned(settings: Settings, body: Body) -> Settings:
     """The settings with what the size of ``body`` and the machine ask for where they leave it open."""
     chosen = resources.planned(settings, body.mesh, resources.available())
-    if chosen.linear_solver == "multigrid" and (chosen.ranks or 1) > 1:
-        raise InputError("ranks", chosen.ranks, "1, on which multigrid works")
+    _check_ranks(chosen, "ranks")
     if chosen.ranks:
         return chosen
     count = resources.unknowns(body.mesh, chosen.element)
     return chosen.model_copy(update={"ranks": resources.ranks(chosen, count) if _mpiexec() else 1})
+
+
+def _check_ranks(settings: Settings, place: str) -> None:
+    """InputError at ``place`` where multigrid is to work on more than one rank."""
+    if settings.linear_solver == "multigrid" and (settings.ranks or 1) > 1:
+        raise InputError(place, settings.ranks, "1, on which multigrid works")
+
+
+def _with_states(problem: Problem, body: Body, settings: Settings) -> Settings:
+    """The settings with whether states are kept: as asked for, else where those of all frames are small."""
+    if settings.store_state is not None:
+        return settings
+    steps = any("interval" in effect.needs for effect in body.effects)
+    size = len(problem.frames) * resources.state(body.mesh, settings.element, steps=steps)
+    return settings.model_copy(update={"store_state": size <= resources.MOST_STATES})
 
 
 def _mpiexec() -> str | None:
@@ -217,6 +232,9 @@ def _frame(event: dict[str, Any]) -> Frame:
             for name in arrays
             if name.startswith("force ")
         }
+        for kind in ("force", "moment"):  # of all that keeps the muscle where it is
+            sums = [arrays[name] for name in arrays if name.startswith(f"{kind} ")]
+            pulls[f"net_{kind}"] = float(np.linalg.norm(np.sum(sums, axis=0)))
         places = arrays["surface"], arrays["fibres"], arrays["nodes"]
         return Frame(event["frame"], *places, scalars | pulls, note, stored_state(arrays))
 

@@ -24,7 +24,7 @@ from fem_reference.solvers.fenicsx.known import Known, State
 from fem_reference.solvers.fenicsx.linear import Factorised
 from fem_reference.solvers.fenicsx.newton import Newton
 from fem_reference.solvers.fenicsx.nodal import Nodal
-from fem_reference.solvers.fenicsx.path import Path, on_the_way
+from fem_reference.solvers.fenicsx.path import Path, on_the_way, settle
 from fem_reference.solvers.fenicsx.reactions import Reactions
 from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.spent import Spent
@@ -33,7 +33,7 @@ from fem_reference.solvers.fenicsx.system import System
 from fem_reference.solvers.fenicsx.tabulated import Displacement
 from fem_reference.solvers.fenicsx.validity import Validity
 
-_SAME = 1e-9  # [mm], rounding of a motion that comes back
+_NO_ENERGY = "to a state in which the energy is no number: a law is beyond where it has a value"
 
 
 class AssembledBody:
@@ -118,8 +118,6 @@ class AssembledBody:
         quadrature point or a vertex, is inverted whatever Newton's method says, and one in which cells have lost most of their
         volume is collapsed.
         """
-        if self._comes_back(frame):
-            return Attempt("diverged", 0, "what is prescribed turns, or comes back, within the load step")
         before = np.array(self.unknowns.x.array)
         if self.clock.begins():
             self._begin(before)
@@ -130,26 +128,29 @@ class AssembledBody:
         smallest = self.determinants.smallest()
         with self.spent.on("contact"):
             through = self.contact.lost(self.comm) if self.contact and failure is None else None
-        lost = self.validity.collapsed() if failure is None and smallest.value > 0 else None
-        jump = self.path.jumped(before) if failure is None and smallest.value > 0 else None
-        if failure is None and smallest.value > 0 and through is None and lost is None and jump is None:
-            self.at = frame
-            self.clock.settle(frame, self.unknowns.x.array)
-            self.path.settle(self.energy())
-            if self.contact:
-                self.contact.settle()
+        good = failure is None and smallest.value > 0
+        lost, energy = (self.validity.collapsed(), self.energy()) if good else (None, 0.0)
+        jump = self.path.jumped(before) if good else None
+        if good and through is None and lost is None and jump is None and np.isfinite(energy):
+            settle(self, before, frame)
             return Attempt(None, iterations)
-        self.unknowns.x.array[:] = before
-        if self.contact:
-            self.contact.go_back()
+        self.go_back(before)
         if through is not None:
             return Attempt("diverged", iterations, f"Newton's method converged, but {through}")
         if lost is not None:
             return Attempt("collapsed", iterations, f"Newton's method converged, but {lost}")
         if jump is not None:
             return Attempt("diverged", iterations, f"Newton's method converged, but {on_the_way(jump)}")
+        if not np.isfinite(energy):
+            return Attempt("diverged", iterations, f"Newton's method converged, but {_NO_ENERGY}")
         how = failure or f"converged, but det F fell to {smallest}"
         return Attempt("diverged" if smallest.value > 0 else "inverted", iterations, f"Newton's method {how}")
+
+    def go_back(self, before: Floats) -> None:
+        """Take up the last good state again, whose unknowns are those of ``before``."""
+        self.unknowns.x.array[:] = before
+        if self.contact:
+            self.contact.go_back()
 
     def _begin(self, before: Floats) -> None:
         """Find with what acceleration the body leaves its rest at ``before``: by a step in which nothing moves."""
@@ -157,15 +158,13 @@ class AssembledBody:
         self.set_frame(self.clock.at)
         self.newton.solve(self.clock.at)  # of a tangent that is all mass: what it cannot do, the first step will show
         self.clock.begin(self.unknowns.x.array)
-        self.unknowns.x.array[:] = before
-        if self.contact:
-            self.contact.go_back()
+        self.go_back(before)
 
     def recall(self, frame: float) -> bool:
         """Take up the state that was solved before under what acts at ``frame``, if there is one and it is on the path: after a
         whole turn what acts is as at rest, and the body is not. Its residual proves it.
         """
-        if self.clock.matters or not self.reuse or self._comes_back(frame):
+        if self.clock.matters or not self.reuse:
             return False
         before, self.system.contact = np.array(self.unknowns.x.array), self.contact
         self.set_frame(frame)
@@ -204,21 +203,6 @@ class AssembledBody:
         if not recalled and self.stability is not None:  # an old factorisation serves on
             with self.clock.slow(np.array(self.unknowns.x.array)):
                 self.stability.negative_modes()
-
-    def _comes_back(self, frame: float) -> bool:
-        """Whether what is prescribed is farther from the straight way halfway from the last good state to ``frame`` than it moves
-        in all: a step through a turn by 250 degrees or more, or there and back, would leave it out.
-        """
-        values = []
-        for number in (self.at, (self.at + frame) / 2, frame):
-            self.set_frame(number)
-            values.append(np.concatenate([np.zeros(0), *(one.prescribed for one in self.conditions)]))
-        start, halfway, end = values
-        aside, moved = (
-            float(self.comm.allreduce(np.abs(away).max(initial=0.0), MPI.MAX))
-            for away in (halfway - (start + end) / 2, end - start)
-        )
-        return aside > moved + _SAME
 
     def _acting(self, frame: float) -> Floats:
         """All numbers that determine the state at ``frame``, beside the body itself."""

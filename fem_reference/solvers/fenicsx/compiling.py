@@ -1,4 +1,4 @@
-"""Compilation of forms for this machine: it waits where another process compiles the same, and removes what one left half-done."""
+"""Compilation of forms for this machine: each by one process at a time, which removes what another left half-done."""
 
 import hashlib
 import os
@@ -8,19 +8,25 @@ import subprocess
 import sysconfig
 import tempfile
 import time
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
 from ctypes import CDLL
-from functools import cache
+from functools import cache, wraps
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
+import ffcx.codegeneration.jit as generator
 import ufl
 from dolfinx import fem, jit
+from ffcx import naming
+from filelock import FileLock, Timeout
 from ufl.algorithms import expand_derivatives
 from ufl.corealg.map_dag import map_expr_dag
 from ufl.corealg.multifunction import MultiFunction
 
-PATIENCE = 300  # [s] that a process waits for another's compilation
+PATIENCE = 300  # [s] that a process waits for the compilation of one that takes no lock
+_LOCKS = 64  # forms share them; one that is held says that something is compiled
 
 
 @cache
@@ -50,6 +56,33 @@ OPTIONS: dict[str, Any] = {
     "timeout": PATIENCE,
     "cffi_extra_compile_args": [*FLAGS, f"-DFEM_REFERENCE_MACHINE={machine()}"],
 }
+
+
+def _lock(folder: Path, number: int) -> FileLock:
+    return FileLock(folder / f".fem_reference_{number}.lock")
+
+
+def _alone[R](compiled: Callable[..., R]) -> Callable[..., R]:
+    """FFCx's way to compile, by one process at a time for what is the same: it takes for granted that nothing of a form is there
+    when it has compiled it, and ends with an error where an interrupted process, or one that was taken for dead, left some.
+    """
+
+    @wraps(compiled)
+    def waiting(objects: list[Any], *given: Any, **options: Any) -> R:
+        folder = Path(str(options["cache_dir"]))
+        folder.mkdir(parents=True, exist_ok=True)
+        with _lock(folder, int(naming.compute_signature(objects, "")[:8], 16) % _LOCKS):
+            try:
+                return compiled(objects, *given, **options)
+            except (FileExistsError, ModuleNotFoundError, TimeoutError):
+                _remove_broken(folder)
+            return compiled(objects, *given, **options)
+
+    return waiting
+
+
+generator.compile_forms = _alone(generator.compile_forms)
+generator.compile_expressions = _alone(generator.compile_expressions)
 
 
 def form(expression: Any, entity_maps: Any = None) -> Any:
@@ -112,14 +145,27 @@ def prepare() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # ours to end is the parent's business
     signal.signal(signal.SIGTERM, _stop)
     folder = Path(jit.get_options()["cache_dir"])
-    for source in folder.glob("*.c") if folder.is_dir() else ():
-        done = source.with_suffix(".c.cached").exists()
-        if not done and time.time() - source.stat().st_mtime > PATIENCE:
+    with ExitStack() as held:
+        try:
+            for path in folder.glob(".fem_reference_*.lock"):
+                held.enter_context(FileLock(path).acquire(timeout=0))
+        except Timeout:  # what looks half-done may be on its way
+            return
+        _remove_broken(folder)
+
+
+def _remove_broken(folder: Path) -> None:
+    """Remove what was begun ``PATIENCE`` ago and not ended, and what says that it is there and of which a part is missing."""
+    for source in folder.glob("*.c"):
+        with suppress(FileNotFoundError):
+            done = source.with_suffix(".c.cached").exists()
+            if not done and time.time() - source.stat().st_mtime > PATIENCE:
+                source.unlink()
+    libraries = {path.name.partition(".")[0] for path in folder.glob("*.so")}
+    for ready in folder.glob("*.c.cached"):
+        source = ready.with_suffix("")
+        if not source.exists() or source.stem not in libraries:
             source.unlink(missing_ok=True)
-    for ready in folder.glob("*.c.cached") if folder.is_dir() else ():
-        if not ready.with_suffix(
-            ""
-        ).exists():  # of a compilation that took longer than that: it would stop the next one
             ready.unlink(missing_ok=True)
 
 

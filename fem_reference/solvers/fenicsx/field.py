@@ -17,7 +17,7 @@ from fem_reference.solvers.fenicsx.session import present, session
 
 
 class FieldSettings(Record):
-    """``time_limit``: when to give up, by default never."""
+    """``time_limit``: of processor time, when to give up, by default never."""
 
     time_limit: Time | None = None
 

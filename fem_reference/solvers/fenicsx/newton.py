@@ -63,7 +63,9 @@ class Newton:
         best, since = np.inf, 0
         smallest = self.determinants.values_now()
         norm = self._begin(frame)
-        while norm > self.residual or self.system.lacking():
+        while not norm <= self.residual or self.system.lacking():
+            if not np.isfinite(norm):
+                return f"went where a law, or what is prescribed, has no value in {iterations} iterations", iterations
             if iterations == self.most:
                 return f"did not converge in {iterations} iterations", iterations
             best, since = (norm, 0) if norm < _PROGRESS * best else (best, since + 1)
@@ -82,8 +84,6 @@ class Newton:
             norm = self.system.residual()
             if norm > self.residual:
                 norm = self._linearise()
-            if not np.isfinite(norm):
-                return f"went where a law has no value in {iterations} iterations", iterations
         return None, iterations
 
     def _begin(self, frame: float) -> float:

@@ -1,12 +1,19 @@
 """Whether the states that a body took one after the other belong to one path: signs of a jump that ask for no other solution."""
 
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
 import numpy as np
 from dolfinx import la
 from mpi4py import MPI
 
+from fem_reference.foundations.limits import ENERGY_GAP
 from fem_reference.foundations.mesh import Floats
 from fem_reference.solvers.fenicsx.determinants import Determinants, Smallest
 from fem_reference.solvers.fenicsx.system import System
+
+if TYPE_CHECKING:
+    from fem_reference.solvers.fenicsx.body import AssembledBody
 
 # On the straight line from one state to the next det F, a cubic of the share of the way, keeps this share of the less of both ends.
 # A turn by 143 degrees within a step takes it to a tenth; half a turn, or a way through a mirrored state, to 0 or below.
@@ -37,23 +44,35 @@ class Path:
         found = self.determinants.smallest_of(least(np.array(values)) / np.where(ends > 0, ends, np.nan))
         return None if found.value > KEPT else found
 
-    def settle(self, energy: float, *, connected: bool = True) -> None:
+    def settle(self, energy: float, halfway: Callable[[], bool] | None = None, *, connected: bool = True) -> None:
         """The state at present, with an ``energy`` [N mm] of what acts inside, is the next one; where it is ``connected`` with the
         one before, what the energy grew by is compared with the work of the forces inside, by the trapezoidal rule.
 
         The rule is exact where forces change in proportion to the displacement, and its error falls with the square of the
-        step; of a body that jumped, the energy has fallen without work. ``gap`` is the greatest difference since it was
-        taken, over the greatest energy so far.
+        step: a law that stiffens, or a turn, is off by tenths of the energy in the first step from rest. So beyond ``ENERGY_GAP``
+        a state ``halfway`` is found (whether it could be; the unknowns are those of it then, and as they were afterwards), and the
+        rule is Simpson's, whose error falls with the fourth power. Of a body that jumped, the energy has fallen without work, by
+        any rule. ``gap`` is the greatest difference since it was taken, over the greatest energy so far.
         """
-        forces, unknowns = self._forces(), np.array(self.system.unknowns.x.array)
-        own = self.system.owned
-        work = float(np.dot((self.forces + forces)[:own] / 2, (unknowns - self.unknowns)[:own]))
-        work = float(self.system.unknowns.function_space.mesh.comm.allreduce(work, MPI.SUM))
+        states = [(self.unknowns, self.forces), (np.array(self.system.unknowns.x.array), self._forces())]
         self.greatest = max(self.greatest, energy)
         if connected and self.greatest > 0:
-            gap = (energy - self.energy - work) / self.greatest
+            gap = self._gap(energy, states)
+            if halfway and abs(gap) > ENERGY_GAP and halfway():
+                states.insert(1, (np.array(self.system.unknowns.x.array), self._forces()))
+                gap = self._gap(energy, states)
+            self.system.unknowns.x.array[:] = states[-1][0]
             self.gap = gap if abs(gap) > abs(self.gap) else self.gap
-        self.energy, self.forces, self.unknowns = energy, forces, unknowns
+        self.energy, (self.unknowns, self.forces) = energy, states[-1]
+
+    def _gap(self, energy: float, states: list[tuple[Floats, Floats]]) -> float:
+        """What the energy grew by up to the last of ``states`` (unknowns and forces) without work, over the greatest so far; they
+        are two, or three at equal distances of time.
+        """
+        own = self.system.owned
+        work = sum(float(np.dot(forces[:own], moves[:own])) for forces, moves in _products(states))
+        work = float(self.system.unknowns.function_space.mesh.comm.allreduce(work, MPI.SUM))
+        return (energy - self.energy - work) / self.greatest
 
     def take_gap(self) -> float:
         """The gap, which is 0 from now on."""
@@ -66,6 +85,44 @@ class Path:
         self.system.cells.add_residual(self.system.work.array)
         self.system.work.scatter_reverse(la.InsertMode.add)
         return np.array(self.system.work.array)
+
+
+def settle(body: "AssembledBody", before: Floats, frame: float) -> None:
+    """Take the present state of a ``body`` as that of ``frame``; ``before`` (n,) are the unknowns of the one that it was solved
+    from, as one halfway is where work and energy do not agree.
+    """
+    after, contact, looked = np.array(body.unknowns.x.array), body.system.contact, list[float]()
+
+    def halfway() -> bool:
+        looked.append((body.at + frame) / 2)
+        body.go_back(before)
+        body.set_frame(looked[0])
+        failure, iterations = body.newton.solve_among(body.contact, looked[0])
+        body.newton.thrown += iterations
+        return failure is None and body.determinants.smallest().value > 0
+
+    body.path.settle(body.energy(), halfway if body.conserves and not body.clock.matters else None)
+    if looked:
+        body.set_frame(frame)
+        body.system.contact = contact
+        if body.contact:
+            body.contact.update(frame)
+    if body.contact:
+        body.contact.settle()
+    body.clock.settle(frame, after)
+    body.at = frame
+
+
+def _products(states: list[tuple[Floats, Floats]]) -> list[tuple[Floats, Floats]]:
+    """Forces, and the displacements along which they work: of straight lines between two ``states``, or of parabolas over time
+    through three, along which the integral is that of Simpson's rule, which is exact for them.
+    """
+    if len(states) == 2:
+        (start, first), (end, last) = states
+        return [((first + last) / 2, end - start)]
+    (start, first), (between, middle), (end, last) = states
+    bend = 4 * between - start - end  # the rates at the ends, times the whole time, are bend - 2 start and 2 end - bend
+    return [(first / 6, bend - 2 * start), (4 * middle / 6, end - start), (last / 6, 2 * end - bend)]
 
 
 def least(values: Floats) -> Floats:

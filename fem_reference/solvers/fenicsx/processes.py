@@ -13,6 +13,8 @@ from typing import Any
 
 from fem_reference.foundations.errors import MissingSoftware
 from fem_reference.foundations.subprocesses import environment
+from fem_reference.foundations.usage import processor_times
+from fem_reference.runs.contents import Status
 from fem_reference.runs.store import Outcome
 
 # One thread a rank. Open MPI, where it is used, refuses root and more ranks than cores unless set otherwise.
@@ -24,6 +26,8 @@ _SETTINGS = {
     "OMPI_MCA_rmaps_base_oversubscribe": "1",
 }
 _PATIENCE = 5.0  # [s] until a process that was asked to end is killed
+CLOCK = 20  # times a limit of processor time that the clock may show: longer than that a machine is too busy to say anything
+_GLANCE = 0.02  # [s]
 MARK = "@fem_reference "  # begins each line of the worker's output that is meant for us
 
 
@@ -45,7 +49,7 @@ class Process:
 
     def __init__(self, process: subprocess.Popen[str]) -> None:
         self.process = process
-        self.overran: float | None = None  # the time limit [s] that ended it
+        self.overran: tuple[Status, str] | None = None  # what ended it, where that was a time limit
         self.errors: list[str] = []
         self.listener = threading.Thread(target=self._listen)
         self.listener.start()
@@ -66,7 +70,8 @@ class Process:
         code = self.process.wait()
         self.listener.join(timeout=5)  # its last lines may still arrive
         if self.overran is not None:
-            return Outcome("timed out", f"stopped after {self.overran:g} s, the time limit; {kept}")
+            status, why = self.overran
+            return Outcome(status, f"{why}; {kept}")
         return Outcome("crashed", f"the FEniCSx process ended with exit status {code} ({self._reason()}); {kept}")
 
     def _reason(self) -> str:
@@ -83,19 +88,35 @@ class Process:
 
     @contextmanager
     def limited(self, time_limit: float | None) -> Iterator[None]:
-        """End it where what is done meanwhile takes longer than ``time_limit`` [s]."""
-        seconds = threading.TIMEOUT_MAX if time_limit is None else time_limit
-        timer = threading.Timer(seconds, self._overrun, [seconds])
-        timer.daemon = True
-        timer.start()
+        """End it where what is done meanwhile takes any process of it longer than ``time_limit`` [s] of processor time, whatever
+        else the machine does; ``CLOCK`` times that by the clock ends it too, which says nothing of what was done.
+        """
+        if time_limit is None:
+            yield
+            return
+        done = threading.Event()
+        watching = threading.Thread(target=self._watch, args=(time_limit, done), daemon=True)
+        watching.start()
         try:
             yield
         finally:
-            timer.cancel()
-            timer.join()  # where it has begun to end the process, that is over after this
+            done.set()
+            watching.join()  # where it has begun to end the process, that is over after this
 
-    def _overrun(self, time_limit: float) -> None:
-        self.overran = time_limit
+    def _watch(self, time_limit: float, done: threading.Event) -> None:
+        begin, before = time.monotonic(), processor_times(self.process.pid)
+        while True:
+            passed = time.monotonic() - begin
+            now = processor_times(self.process.pid) if before else {0: passed}
+            used = max((seconds - before.get(number, 0.0) for number, seconds in now.items()), default=0.0)
+            if used >= time_limit:
+                self.overran = "timed out", f"stopped after {time_limit:g} s of processor time, the time limit"
+                break
+            if passed >= CLOCK * time_limit:
+                self.overran = "stalled", _stalled(passed, used, time_limit)
+                break
+            if done.wait(max(min(time_limit - used, CLOCK * time_limit - passed), _GLANCE)):
+                return
         self.end()
 
     def end(self) -> None:
@@ -106,6 +127,13 @@ class Process:
             self.process.send_signal(signal.SIGTERM if patient else signal.SIGKILL)
             with suppress(subprocess.TimeoutExpired):
                 self.process.wait(timeout=0.5)
+
+
+def _stalled(passed: float, used: float, time_limit: float) -> str:
+    return (
+        f"stopped after {passed:.3g} s in which it had {used:.3g} s of processor time, of the {time_limit:g} s that it may take: "
+        "the machine was busy, or something waited; that says nothing of what was solved"
+    )
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.problems.body import ELEMENTS, Cells
+from fem_reference.problems.body import ELEMENTS, Cells, reference_nodes
 from fem_reference.solvers.fenicsx.settings import BodySettings
 
 # Unknowns below which a factorisation costs no more than a few iterations of anything else.
@@ -20,6 +20,8 @@ LARGE = 350_000
 # of 16 000 unknowns, which grow by a power: measured on gluteus_maximus from 16 000 to 560 000 unknowns. MUMPS allocates more
 # than it uses.
 _EMPTY, _EACH, _EACH_MULTIGRID, _FACTORS, _POWER = 250.0, 6.5e-3, 9.5e-3, 60.0, 1.38
+# The most bytes of states, of all frames, that a run keeps without being asked to.
+MOST_STATES = 2**26
 # From so many unknowns on a second rank pays, where a core is free for it.
 _WORTH_RANKS = 20_000
 _GLANCE = 0.2  # [s] for which is looked how busy the cores are
@@ -38,6 +40,14 @@ def unknowns(cells: Cells, element: str) -> int:
             pairs = np.concatenate([np.sort(corners[:, pair], axis=1) for pair in combinations(range(4), 2)])
             count += len(np.unique(pairs[:, 0].astype(np.int64) * (corners.max() + 1) + pairs[:, 1]))
     return 3 * count + pressures
+
+
+def state(cells: Cells, element: str, *, steps: bool) -> int:
+    """Bytes of the state of ``cells`` at a frame; ``steps``: with what the last load step started from."""
+    kind, degree, pressure = ELEMENTS[element]
+    nodes, corners = (len(reference_nodes(kind, order)) for order in (degree, 1))
+    pressures = {None: 0, 0: 1, 1: corners}[pressure]
+    return 8 * len(cells.cells) * (3 * nodes * (1 + steps) + pressures)
 
 
 def memory(count: int, solver: str, precision: str) -> float:

@@ -11,7 +11,8 @@ import numpy as np
 
 from fem_reference.foundations import scratch
 from fem_reference.foundations.subprocesses import command
-from fem_reference.problems.body import Body, check, check_quadrature
+from fem_reference.problems.body import Body, check_quadrature
+from fem_reference.problems.checks import check
 from fem_reference.runs.solved import Reached, Solved
 from fem_reference.runs.store import Outcome
 from fem_reference.solvers.fenicsx.jobs import Job, stored_state
@@ -30,7 +31,7 @@ class Session:
 
     def solve(self, body: Body, settings: BodySettings) -> Solved:
         """The states of ``body``; a process that dies is the status *crashed*, and one that takes longer than the time limit is
-        ended and *timed out*, not an exception. RuntimeError once it is closed.
+        ended and *timed out* or *stalled*, not an exception. RuntimeError once it is closed.
         """
         if self.closed:
             raise RuntimeError("the session is closed")
@@ -98,7 +99,9 @@ def session() -> Iterator[Session]:
 
 
 def solve_body(body: Body, settings: BodySettings) -> Solved:
-    """The states of ``body`` by a session of its own."""
+    """The states of ``body`` by the session that is shared now, or else by one of its own."""
+    if (shared_now := present()) is not None:
+        return shared_now.solve(body, settings)
     with session() as own:
         return own.solve(body, settings)
 

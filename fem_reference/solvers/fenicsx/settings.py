@@ -26,8 +26,10 @@ class BodySettings(Record):
     negative modes are counted, the body is moved along its lowest mode by a ``perturbation``, a share of its size (up to eight
     times that, in both directions, until there are fewer), and solved anew.
     ``reuse``: whether a frame under the same load as an earlier one takes up the state of then.
-    ``time_limit``: when to give up, by default never. ``store_state``: whether each frame also carries the unknowns of every cell,
-    from which ``results`` evaluates stress, pressure, det F and fibre stretch.
+    ``time_limit``: of processor time of a rank, when to give up, by default never; twenty times that by the clock is the status
+    *stalled*, which says nothing. ``store_state``: whether each frame also carries the unknowns of every cell, from which
+    ``results`` evaluates stress, pressure, det F and fibre stretch; by default where those of all frames of a muscle take at most
+    64 MB, and never of a body.
     """
 
     element: Annotated[str, Trade(tuple(ELEMENTS))] = "P2/P1"
@@ -43,7 +45,7 @@ class BodySettings(Record):
     perturbation: float = Field(default=0.01, gt=0, lt=1)
     reuse: bool = True
     time_limit: Time | None = None
-    store_state: bool = False
+    store_state: bool | None = None
 
 
 class Settings(BodySettings):

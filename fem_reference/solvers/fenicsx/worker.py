@@ -67,7 +67,7 @@ class Worker:
             if facts["exact"]:
                 self.solve_exactly()
             frames = tuple(frame for frame in frames if frame >= good[-1])
-        return frames, Steps(first, settings.smallest_step, settings.largest_step)
+        return frames, Steps(first, settings.smallest_step, settings.largest_step, self.job.body.stops)
 
     def run(self) -> None:
         """March through the frames and report how it ended."""
@@ -179,6 +179,7 @@ class Worker:
         arrays |= {f"moment {name}": moment for name, moment in moments.items()}
         arrays |= {f"state {name}": array for name, array in self.body.state().items()}
         counts = {"newton_iterations": float(reached.iterations), "cut_backs": float(reached.cutbacks)}
+        counts["load_steps"] = float(reached.steps)
         counts["seconds_processor"] = self.body.comm.allreduce(self.solving_processor - self.reported)
         self.reported = self.solving_processor
         path = self.folder / f"frame_{reached.frame}.npz"

@@ -12,7 +12,8 @@ from scipy.sparse.linalg import splu
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.records import Record
-from fem_reference.problems.body import ELEMENTS, Body, Prescribed, check, check_quadrature
+from fem_reference.problems.body import ELEMENTS, Body, Prescribed, check_quadrature
+from fem_reference.problems.checks import check
 from fem_reference.runs.solved import Reached, Solved
 from fem_reference.runs.store import Outcome
 from fem_reference.solvers.common.load_steps import Attempt, Step, Steps, march
@@ -67,7 +68,9 @@ def solve_body(body: Body, settings: BodySettings) -> Solved:
     def cost() -> dict[str, float]:
         return counts | {"seconds": time.perf_counter() - begin, "unknowns": float(march_of.equations.space.size)}
 
-    for step in march(march_of.attempt, body.frames, Steps(settings.first_step, settings.smallest_step)):
+    for step in march(
+        march_of.attempt, body.frames, Steps(settings.first_step, settings.smallest_step, stops=body.stops)
+    ):
         for name, count in zip(counts, (step.iterations, step.steps, step.cutbacks), strict=True):
             counts[name] += count
         if step.status != "converged":
@@ -116,6 +119,11 @@ class _March:
         if not smallest > 0:
             why = f"Newton's method converged, but det F fell to {smallest:.3g}"
             return Attempt("inverted", attempt.iterations, why)
+        with np.errstate(all="ignore"):
+            energy = self.equations.energy(unknowns, frame)
+        if not np.isfinite(energy):
+            why = "Newton's method converged, but to a state in which the energy is no number"
+            return Attempt("diverged", attempt.iterations, why)
         self.unknowns = unknowns
         return attempt
 

@@ -1,6 +1,7 @@
 """Blocks as problems: an axis-aligned lattice of tetrahedra whose skin is the surface that solvers get."""
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -8,6 +9,7 @@ from fem_reference import effects
 from fem_reference.effects.contact import among
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh, tet_volumes
+from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import join
 from fem_reference.geometry.block import kuhn, lattice_skin
 from fem_reference.geometry.exemption import free_skin
@@ -25,6 +27,7 @@ MATERIAL = (effects.make("neo_hooke", mu="10 kPa"), effects.make("incompressible
 _LINES, _POINTS = 4, 9  # measured lines of each block, and points of each
 # The bones of held faces are balls of this share of the block's size, so far away that nothing meets them.
 _BALL, _AWAY = 0.01, 50.0
+_SAME = 1e-9  # of the block's size: rounding of what two holds do alike
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +53,7 @@ def problem(hard: Hard) -> Problem:
     index = _index(block, skin_nodes)
     surface = Surface(points[index], triangles, f"the block of {hard.name}")
     ends = [_held(block, hold, skin_nodes, surface) for hold in hard.hold]
+    _check_held(hard, ends, surface)
     bones = tuple(end.bone for end in ends) + tuple(_bone(hard, i, surface) for i in range(len(hard.bone)))
     start = _start(block, hard.start)
     setup = Setup(surface, bones, tuple(ends), frames.numbers, frames.interval, start=start)
@@ -170,6 +174,20 @@ def _held(block: Block, hold: Hold, nodes: Ints, surface: Surface) -> AttachedVe
     motion = hold.motion.poses() if hold.motion else None
     bone = RigidBody(f"bone of {hold.face}", tessellated(ball, surface.points, "hold"), motion, solid=ball)
     return AttachedVertices(hold.face, bone, vertices, hold.stiffness)
+
+
+def _check_held(hard: Hard, ends: list[AttachedVertices], surface: Surface) -> None:
+    """InputError where two holds would take the vertices that they share to different places: for most solvers one of them wins."""
+    assert hard.frames is not None  # beside a block
+    keyframes = (key.frame for hold in hard.hold if hold.motion for key in hold.motion.keyframes)
+    frames = sorted({*hard.frames.numbers, *keyframes})
+    for (_, one), (j, other) in combinations(enumerate(ends), 2):
+        both = np.intersect1d(one.vertices, other.vertices)
+        shared = surface.points[both]
+        off = [np.ptp([apply(end.bone.pose(frame), shared) for end in (one, other)], axis=0) for frame in frames]
+        if np.max(off, initial=0.0) > _SAME * max(hard.block.size if hard.block else (1.0,)):
+            got = f"{other.attachment}, which shares {len(both)} vertices with {one.attachment} and moves otherwise"
+            raise InputError(join(hard.place, f"hold[{j}].face"), got, "a face without a common edge, or one motion")
 
 
 def _bone(hard: Hard, i: int, surface: Surface) -> RigidBody:

@@ -7,7 +7,7 @@ from fem_reference.assessment.solver_table import solver_kinds
 from fem_reference.scenes.case import SolverChoice
 
 REFERENCE, SECOND = "fenicsx", "scikit_fem"
-LIMIT = 120.0  # [s] of a run
+LIMIT = 120.0  # [s] of processor time of a run
 _OWN: dict[str, dict[str, Any]] = {
     REFERENCE: {"ranks": 1, "time_limit": f"{LIMIT:g} s", "residual": 1e-8},
     SECOND: {},

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from fem_reference import __version__, solvers
-from fem_reference.assessment import health, stress
+from fem_reference.assessment import health, second_check, stress
 from fem_reference.assessment.health import Followed
 from fem_reference.assessment.stress import Cell, HardCase, Scene, Stress
 from fem_reference.foundations.errors import InputError, MissingSoftware
@@ -29,20 +29,22 @@ from fem_reference.runs.store import NO_SURFACE, Frame, Outcome
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.scenes.scalar import ScalarCase
 from fem_reference.solvers import fenicsx
+from fem_reference.solvers.fenicsx.processes import CLOCK
 from fem_reference.studies.hard import blocks, jitters, steps
 from fem_reference.studies.hard.choosing import LIMIT, REFERENCE, SECOND, choices
 from fem_reference.studies.hard.records import Hard
+from fem_reference.studies.hard.steps import StalledError
 
 log = logging.getLogger(__name__)
 
-LONGER = 600.0  # [s] of all runs of a case, in several numbers of load steps or on several meshes
+LONGER = 600.0  # [s] of processor time of all runs of a case, in several numbers of load steps or on several meshes
 _MOST_FOR_SECOND = 200  # tetrahedra, for which it takes seconds
 # How messages name a place at rest [mm].
 _PLACE = re.compile(r"cell \d+ at \((-?[\d.]+), (-?[\d.]+), (-?[\d.]+)\) mm")
 
 
 class _Late(Exception):  # noqa: N818 - it is what happened to a run, and caught beside it
-    """A run took too long."""
+    """A run took too much processor time."""
 
 
 class Posed:
@@ -115,7 +117,9 @@ def cell(posed: Posed, choice: SolverChoice) -> Cell:
     except (InputError, MissingSoftware) as error:
         found = Cell(hard.name, solver, "refused", str(error))
     except _Late:
-        found = Cell(hard.name, solver, "failed", "timed out: it took too long", "timed out")
+        found = Cell(hard.name, solver, "failed", "timed out: it took too much processor time", "timed out")
+    except StalledError as why:
+        found = Cell(hard.name, solver, "inconclusive", f"stalled: {why}", "stalled")
     except Exception as error:  # whatever a solver does wrong is what this measures
         log.info("%s, %s: %r", hard.name, solver, error, exc_info=True)
         found = Cell(hard.name, solver, "failed", f"crashed: {type(error).__name__}: {error}", "crashed")
@@ -124,22 +128,32 @@ def cell(posed: Posed, choice: SolverChoice) -> Cell:
 
 @contextmanager
 def _limited(seconds: float) -> Iterator[None]:
-    """_Late where what is done meanwhile takes longer, as far as it is in the main thread and lets itself be interrupted."""
+    """_Late where what is done meanwhile takes longer of this process's processor time, StalledError where it takes many times that
+    by the clock, as far as it is in the main thread and lets itself be interrupted; processes of the reference have a limit of
+    their own.
+    """
 
     def late(*_: object) -> None:
         raise _Late
 
+    def stalled(*_: object) -> None:
+        raise StalledError(f"more than {CLOCK * seconds:g} s by the clock, and not {seconds:g} s of processor time")
+
+    timers = ((signal.ITIMER_PROF, signal.SIGPROF, late, 1), (signal.ITIMER_REAL, signal.SIGALRM, stalled, CLOCK))
     try:
-        before = signal.signal(signal.SIGALRM, late)
+        before = [signal.signal(number, handler) for _, number, handler, _ in timers]
     except ValueError:  # in another thread
         yield
         return
-    signal.setitimer(signal.ITIMER_REAL, seconds)
     try:
+        for timer, _, _, longer in timers:
+            signal.setitimer(timer, longer * seconds)
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
+        for timer, *_ in timers:
+            signal.setitimer(timer, 0)
+        for (_, number, _, _), handler in zip(timers, before, strict=True):
+            signal.signal(number, handler)
 
 
 def _solved(posed: Posed, choice: SolverChoice) -> Cell:
@@ -198,8 +212,11 @@ def _muscle(built: Problem, choice: SolverChoice) -> tuple[Outcome, Followed]:
     solvers.require(choice.solver, settings, choice.solver)
     frames = list[Frame]()
     outcome = offer.solve(built, settings, frames.append)
+    steps.told(outcome)
     if not frames:
         frames.append(Frame(built.frames[0], np.array(built.surface.points)))
+    if solvers.takes_effects(choice.solver):
+        outcome = second_check.confirmed_frames(built, frames, outcome, settings)
     return outcome, _followed(built, frames)
 
 
@@ -260,6 +277,7 @@ def _field(posed: Posed, built: FieldProblem, choice: SolverChoice) -> tuple[Out
     changes = posed.hard.settings.get(choice.solver, {})
     settings = solvers.settings(SolverChoice(solver=choice.solver, **changes), choice.solver, "solve_field")
     solution = offer.solve_field(built, settings)
+    steps.told(solution.outcome)
     nothing = np.zeros((1, 0, 3))
     return solution.outcome, Followed((0,), NO_SURFACE, nothing, values=solution.values[None], range=posed.range)
 

@@ -7,13 +7,17 @@ import numpy as np
 from fem_reference.assessment.health import Followed
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.muscle import Problem
-from fem_reference.runs.store import Frame
+from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.solvers import fenicsx
 from fem_reference.studies.hard.records import Steps
 
 SAME = 0.01  # [%] of the body's size: states that differ by more are different
 _CUTS = 64  # a load step is cut to this part of itself before it is given up
+
+
+class StalledError(Exception):
+    """The machine was too busy to say anything of a run, and why."""
 
 
 @dataclass(frozen=True)
@@ -59,4 +63,11 @@ def _end(built: Problem, choice: SolverChoice, until: int, count: int) -> tuple[
     settings = fenicsx.Settings(**{**choice.settings, **step})
     frames = list[Frame]()
     outcome = fenicsx.solve(replace(built, frames=(built.frames[0], until)), settings, frames.append)
+    told(outcome)
     return outcome.status, frames[-1].tets if outcome.status == "converged" else None
+
+
+def told(outcome: Outcome) -> None:
+    """StalledError where an ``outcome`` says nothing of the run."""
+    if outcome.status == "stalled":
+        raise StalledError(outcome.message)

@@ -1,0 +1,271 @@
+"""What is asked of the states that a solver calls converged: by positions and forces that it recorded, and nothing of its loop.
+
+Every frame is asked; each answer stands beside what is allowed, at the frame and place where it comes nearest to that, or goes
+farthest beyond.
+"""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from itertools import chain, pairwise
+
+import numpy as np
+
+from fem_reference.effects import Effect, Load
+from fem_reference.effects.damping import Damping
+from fem_reference.effects.gravity import Gravity
+from fem_reference.effects.inertia import Inertia
+from fem_reference.foundations.mesh import Floats, Surface, vertex_areas
+from fem_reference.foundations.motion import Rotation, apply
+from fem_reference.geometry.distance import distances
+from fem_reference.geometry.intersections import overlaps, self_crossings
+from fem_reference.geometry.penetrations import Body as Within
+from fem_reference.geometry.penetrations import depths
+from fem_reference.geometry.signed_distance import Grid
+from fem_reference.geometry.skins import spacing
+from fem_reference.problems.body import Body
+from fem_reference.problems.checks import SAME
+from fem_reference.problems.muscle import AttachedVertices, Problem, RigidBody
+from fem_reference.runs.solved import Solved
+from fem_reference.runs.store import Run
+
+# What is in place to this share of the size of a body is in place: rounding of what is stored is a thousandth of it.
+_ROUNDING = 1e-9
+# Attached vertices go astray from their bone by strain times how far they are from the facets that hold them: stretch up to 4.
+_STRAIN = 3.0
+# By how much more than the recorded force says springs may have yielded on average: they pull at other points of the surface.
+_SPRINGS = 1.5
+# What bones turn by within a load step at most, on average between two frames: beyond it nothing says which way round it was.
+_TURN = 1.01 * math.pi / 2
+# Between points of contact, half a spacing apart, a right-angled edge gets in by a quarter of it; of self-contact there is none,
+# and what a surface may reach through itself is what its creases do.
+_BETWEEN, _CREASE = 0.25, 0.1
+# Contact gives way where bones are deeper than this share of half their thickness, whatever its stiffness.
+_GIVEN_WAY = 0.75
+# Forces are in balance to so many times the residual of all unknowns together.
+_BALANCE = 10.0
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What was ``asked``: the ``value`` at a ``frame`` and ``place``, which may be ``allowed`` at most, both in ``unit``."""
+
+    asked: str
+    value: float
+    allowed: float
+    unit: str
+    frame: float
+    place: str = ""
+
+    @property
+    def met(self) -> bool:
+        """Whether it is as it should be; never of what is not a number."""
+        return self.value <= self.allowed
+
+    def __str__(self) -> str:
+        value, allowed = (
+            "not a number" if number is None else f"{number:.3g}" for number in (self.value, self.allowed)
+        )
+        where = f" at {self.place}" if self.place else ""
+        return f"{self.asked}: {value}{self.unit and f' {self.unit}'} in frame {self.frame:g}{where}, allowed {allowed}"
+
+
+Answers = tuple[Answer, ...]
+
+
+def of_body(body: Body, solved: Solved) -> Answers:
+    """All states there and finite, and what is prescribed exactly met at its nodes."""
+    numbers, points = tuple(state.frame for state in solved.states), [state.points for state in solved.states]
+    found = (_complete(body.frames, numbers), _finite(numbers, points))
+    if not all(one.met for one in found):
+        return found
+    size = float(np.linalg.norm(np.ptp(body.mesh.points, axis=0)))
+    return (*found, *_worst(_prescribed(body, solved, size)))
+
+
+def _prescribed(body: Body, solved: Solved, size: float) -> Iterator[Answer]:
+    begun = body.start is not None  # its first state is where it is put
+    for state in solved.states[1:] if begun else solved.states:
+        for entry in body.prescribed:
+            if entry.stiffness is None and isinstance(entry.on, str):
+                nodes = np.unique(body.mesh.facets[entry.on])
+                rest, along = body.mesh.points[nodes], list(entry.components)
+                wanted = entry.path(rest, state.frame)
+                off = np.abs((state.points[nodes] - rest - wanted)[:, along]).max(axis=1)
+                allowed = SAME * (size + float(np.abs(wanted).max()))  # by which regions may contradict where they meet
+                yield _at(f"prescribed at {entry.name}", off, np.full(len(off), allowed), state.frame, rest)
+
+
+def of_muscle(problem: Problem, run: Run) -> Answers:
+    """All frames there, in order and finite; attachments where their bones are; load steps small enough; forces in balance; and no
+    bone and no surface crossed.
+    """
+    fibres = [] if run.fibre_positions is None else [run.fibre_positions]
+    arrays = [np.concatenate([array[i] for array in (run.positions, *fibres)]) for i in range(len(run.numbers))]
+    found = (_complete(problem.frames, run.numbers), _finite(run.numbers, arrays))
+    if not all(one.met for one in found):
+        return found
+    if problem.start is not None:  # its first state is where it is put
+        scalars = {name: values[1:] for name, values in run.scalars.items()}
+        run = replace(run, numbers=run.numbers[1:], positions=run.positions[1:], scalars=scalars)
+    attached = chain.from_iterable(_attached(problem, run, entry) for entry in problem.attached)
+    crossed = chain(_depths(problem, run), _creases(run))
+    return (*found, *_worst(chain(attached, _steps(problem, run), _balance(problem, run), crossed)))
+
+
+def _worst(answers: Iterable[Answer]) -> Answers:
+    """By what is asked the one of ``answers`` that comes nearest to what is allowed, or is farthest beyond."""
+    found = dict[str, Answer]()
+    for one in answers:
+        if one.asked not in found or not one.value / one.allowed <= found[one.asked].value / found[one.asked].allowed:
+            found[one.asked] = one
+    return tuple(found.values())
+
+
+def _at(asked: str, values: Floats, allowed: Floats, frame: float, places: Floats) -> Answer:
+    """The answer at the point (n, 3) where ``values`` (n,) [mm] are nearest to what is ``allowed`` (n,), or beyond it most."""
+    i = int(np.argmax(values / allowed))
+    x, y, z = places[i]
+    return Answer(asked, float(values[i]), float(allowed[i]), "mm", frame, f"({x:.1f}, {y:.1f}, {z:.1f}) mm")
+
+
+def _complete(wanted: tuple[float, ...], numbers: tuple[float, ...]) -> Answer:
+    """How many frames are missing or not in their place."""
+    lost = sum(one != other for one, other in zip(wanted, numbers, strict=False)) + abs(len(wanted) - len(numbers))
+    first = next((one for one, other in zip(wanted, numbers, strict=False) if one != other), wanted[-1])
+    return Answer("frames that are missing or out of order", float(lost), 0.0, "", first)
+
+
+def _finite(numbers: tuple[float, ...], arrays: list[Floats]) -> Answer:
+    """How many positions are not finite."""
+    lost = [int((~np.isfinite(array)).any(axis=1).sum()) for array in arrays]
+    frame = numbers[int(np.argmax(np.array(lost) > 0))] if lost else 0
+    return Answer("positions that are not finite", float(sum(lost)), 0.0, "", frame)
+
+
+def _attached(problem: Problem, run: Run, entry: AttachedVertices) -> Iterator[Answer]:
+    """Exact: vertices at the pose of their bone, but for strain over how far they are from the facets that are attached. Springs:
+    by their mean extension, which is the force over stiffness and area.
+    """
+    rest, skin = problem.surface.points[entry.vertices], problem.attached_skins.get(entry.attachment)
+    hold = distances(rest, Surface(problem.mesh.points, problem.mesh.facets[entry.attachment])).distance
+    weights = vertex_areas(problem.surface.points, problem.surface.triangles)[entry.vertices]
+    size, forces = _size(problem.surface), run.scalars.get(f"force_{entry.attachment}")
+    for i, number in enumerate(run.numbers):
+        away = run.positions[i][entry.vertices] - apply(entry.bone.pose(number), rest)
+        if entry.stiffness is None:
+            off, allowed = np.linalg.norm(away, axis=1), _ROUNDING * size + _STRAIN * hold
+            yield _at(
+                f"{entry.attachment} off {entry.bone.name}", off, allowed, number, run.positions[i][entry.vertices]
+            )
+        elif forces is not None and skin is not None:
+            mean = float(np.linalg.norm(weights @ away) / weights.sum())
+            said = float(forces[i]) / (entry.stiffness * float(skin.areas.sum()))
+            yield Answer(f"springs of {entry.attachment}, mean", mean, _SPRINGS * said + 1e-4 * size, "mm", number)
+
+
+def _steps(problem: Problem, run: Run) -> Iterator[Answer]:
+    """How far a bone turns or slides in a load step, on average from a frame to the next; not of a frame that needed none."""
+    counts = run.scalars.get("load_steps", np.full(len(run.numbers), np.nan))
+    contact, attached = problem.contact, {entry.bone.name for entry in problem.attached}
+    bones = [bone for bone in problem.bones if bone.name in attached or (contact and contact.is_by(bone.name))]
+    alike = len({bone.motion for bone in bones}) == 1
+    for i, (before, number) in enumerate(pairwise(run.numbers), start=1):
+        for bone in bones if counts[i] > 0 else ():
+            turns = isinstance(bone.motion, Rotation)
+            if bone.motion is None or (alike and not turns):
+                continue
+            way = _way(bone, before, number) / float(counts[i])
+            words, allowed, unit = ("turns", _TURN, "rad") if turns else ("slides", 1.01 * _size(run.surface), "mm")
+            yield Answer(f"{bone.name} {words} by load step", way, allowed, unit, number)
+
+
+def _way(bone: RigidBody, before: float, after: float) -> float:
+    """How far a bone goes between two frames, there and back counted twice: [rad], or of one that slides [mm]."""
+    motion = bone.motion
+    assert motion is not None  # of those that move
+    amounts = motion.angles if isinstance(motion, Rotation) else motion.distances
+    stops = [before, *(frame for frame in motion.frames if before < frame < after), after]
+    return float(np.abs(np.diff(np.interp(stops, motion.frames, amounts))).sum())
+
+
+def _balance(problem: Problem, run: Run) -> Iterator[Answer]:
+    """The sums of forces and of moments of bones on the muscle, by attachments and contact: 0 where nothing acts from outside."""
+    outer = any(isinstance(one, (Load, Gravity, Damping, Inertia)) or _is_foreign(one) for one in problem.effects)
+    residual = _BALANCE * run.origin.get("settings", {}).get("residual", math.nan)
+    allowed = residual * math.sqrt(run.outcome.cost.get("unknowns", math.nan))
+    for kind, unit, arm in (("force", "N", 1.0), ("moment", "N mm", float(np.abs(run.positions).max()))):
+        if not outer and f"net_{kind}" in run.scalars and math.isfinite(allowed):
+            for number, value in zip(run.numbers, run.scalars[f"net_{kind}"], strict=True):
+                yield Answer(f"{kind}s out of balance", float(value), allowed * arm, unit, number)
+
+
+def _is_foreign(effect: Effect) -> bool:
+    """Whether it is somebody's own, of which it is not known what it acts from."""
+    return not type(effect).__module__.startswith("fem_reference.effects.")
+
+
+def _size(surface: Surface) -> float:
+    return float(np.linalg.norm(np.ptp(surface.points, axis=0)))
+
+
+def _states(run: Run, bones: Sequence[RigidBody]) -> Iterator[tuple[int, int]]:
+    """Index and number of the frames at which muscle or ``bones`` are elsewhere than at rest, and at all frames before."""
+    seen, near = [(run.surface.points, *(np.eye(4) for _ in bones))], _ROUNDING * _size(run.surface)
+    for i, number in enumerate(run.numbers):
+        now = (run.positions[i], *(bone.pose(number) for bone in bones))
+        if not any(all(np.abs(a - b).max() <= near for a, b in zip(now, one, strict=True)) for one in seen):
+            seen.append(now)
+            yield i, number
+
+
+def _depths(problem: Problem, run: Run) -> Iterator[Answer]:
+    """How deep each bone in contact and the muscle are in each other; beyond rest, where that is more than contact gives way. Never
+    to the middle of a bone.
+    """
+    contact, rest = problem.contact, Within(run.surface)
+    at_rest = cache(lambda bone: depths(rest, bone.surface, bone.shape, np.eye(4)))
+    pressures = np.nan_to_num(run.scalars.get("contact_pressure", np.zeros(len(run.numbers))))
+    for i, number in _states(run, bones := [one for one in problem.bones if contact and contact.is_by(one.name)]):
+        muscle = Within(run.surface.moved_to(run.positions[i]))
+        for bone in bones:
+            half, allowed = bone.shape.half_thickness, _give(problem, bone, float(pressures[i]))
+            found = depths(muscle, bone.surface, bone.shape, bone.pose(number))
+            deepest, place = found.deepest()
+            if deepest > allowed:
+                deepest, place = found.deepest(at_rest(bone))
+                allowed += _behind(muscle.surface, place) / half if pressures[i] > 0 else 0.0
+            allowed = min(allowed, _GIVEN_WAY * half)
+            yield _at(f"{bone.name} in the muscle", np.array([deepest]), np.array([allowed]), number, place[None])
+
+
+def _give(problem: Problem, bone: RigidBody, pressure: float) -> float:
+    """How deep [mm] a bone may get: by the give of contact under the ``pressure`` [MPa] that was recorded, the error of the
+    distance to it, and what is between points of contact.
+    """
+    assert problem.contact is not None  # asked where there is contact
+    known = bone.shape.error if isinstance(bone.shape, Grid) else 0.0
+    return pressure / problem.contact.stiffness + known + _BETWEEN * spacing(problem.surface)
+
+
+def _behind(surface: Surface, place: Floats) -> float:
+    """How far the middle of the flat triangle at a ``place`` is behind a sphere through its corners, times its radius [mm2]: what
+    is between vertices is curved where a bone presses.
+    """
+    corners = surface.points[surface.triangles[distances(place[None], surface).triangle[0]]]
+    return float((np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1) ** 2).max()) / 6
+
+
+def _creases(run: Run) -> Iterator[Answer]:
+    """How far the muscle's surface reaches through itself where it does not at rest."""
+    triangles, allowed = run.surface.triangles, np.array([_CREASE * spacing(run.surface)])
+    at_rest = cache(lambda: np.unique(triangles[self_crossings(run.surface)]))
+    for i, number in _states(run, ()):
+        pairs = self_crossings(run.surface.moved_to(run.positions[i]))
+        new = pairs[~np.isin(triangles[pairs], at_rest()).any(axis=(1, 2))] if len(pairs) else pairs
+        one, other = np.swapaxes(run.positions[i][triangles[new]], 0, 1)
+        reach = overlaps(one, other)
+        worst = [np.argmax(reach)] if len(reach) else []
+        values, places = (reach[worst], one[worst, 0]) if len(reach) else (np.zeros(1), run.positions[i][:1])
+        yield _at("the muscle through itself", values, allowed, number, places)

@@ -1,0 +1,88 @@
+"""The second check of what a solver calls converged. A run that it denies has the status ``"denied"``: no truth, anywhere."""
+
+import hashlib
+import logging
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fem_reference.assessment import questions
+from fem_reference.assessment.questions import Answer, Answers, of_body, of_muscle
+from fem_reference.foundations.records import Record
+from fem_reference.problems.body import Body
+from fem_reference.problems.muscle import Problem
+from fem_reference.runs.contents import amend
+from fem_reference.runs.solved import Solved
+from fem_reference.runs.store import Frame, Outcome, Run
+
+log = logging.getLogger(__name__)
+
+# Where it stands in the origin of a run.
+RECORD = "second_check"
+
+
+def confirmed(outcome: Outcome, answers: Answers) -> Outcome:
+    """An ``outcome`` that is converged, denied where one of the ``answers`` is not met."""
+    lost = [str(one) for one in answers if not one.met]
+    if not lost or outcome.status != "converged":
+        return outcome
+    return replace(outcome, status="denied", message=f"denied by the second check: {lost[0]}; {outcome.message}")
+
+
+def confirmed_run(problem: Callable[[], Problem], run: Run) -> Run:
+    """A ``run`` that ended as converged with the second check of it in its origin, stored with it; as it is where it has that of
+    this code.
+    """
+    stored, code = run.origin.get(RECORD, {}), _code()
+    if stored.get("code") == code:
+        return run
+    begin, message = time.process_time(), stored.get("message", run.outcome.message)
+    answers = of_muscle(problem(), run)
+    outcome = confirmed(replace(run.outcome, status="converged", message=message), answers)
+    facts = [{name: _known(value) for name, value in asdict(one).items()} | {"met": one.met} for one in answers]
+    seconds = time.process_time() - begin
+    origin = run.origin | {RECORD: {"code": code, "message": message, "seconds": seconds, "answers": facts}}
+    if run.folder is not None:
+        amend(run.folder, status=outcome.status, message=outcome.message, origin=origin)
+    log.info("%s: second check: %s", run.name, "passed" if outcome.status == "converged" else outcome.message)
+    return replace(run, outcome=outcome, origin=origin)
+
+
+def confirmed_frames(problem: Problem, frames: Sequence[Frame], outcome: Outcome, settings: Record) -> Outcome:
+    """The ``outcome`` of ``frames`` of a muscle that are not stored, denied where the check denies that they converged."""
+    if outcome.status != "converged":
+        return outcome
+    names = set.intersection(*(set(frame.scalars) for frame in frames))
+    scalars = {name: np.array([frame.scalars[name] for frame in frames]) for name in names}
+    numbers, positions = tuple(frame.number for frame in frames), np.array([frame.surface for frame in frames])
+    run = Run("", "", outcome, numbers, problem.surface, positions, scalars=scalars)
+    run = replace(run, origin={"settings": settings.model_dump(mode="json")})
+    return confirmed(outcome, of_muscle(problem, run))
+
+
+def _code() -> str:
+    """A hash of what is asked."""
+    return hashlib.sha256(Path(questions.__file__).read_bytes()).hexdigest()[:16]
+
+
+def said(run: Run) -> tuple[str, ...]:
+    """The answers that are stored with a ``run``, first those that deny it; none of one that was not asked."""
+    found = run.origin.get(RECORD, {}).get("answers", [])
+    texts = [str(Answer(**{key: value for key, value in one.items() if key != "met"})) for one in found]
+    return tuple(text for met in (False, True) for text, one in zip(texts, found, strict=True) if one["met"] is met)
+
+
+def _known(value: Any) -> Any:
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def confirmed_body(body: Body, solved: Solved) -> Solved:
+    """What was ``solved`` of a ``body``, denied where the check denies that it converged."""
+    if solved.outcome.status != "converged":
+        return solved
+    return replace(solved, outcome=confirmed(solved.outcome, of_body(body, solved)))

@@ -1,0 +1,35 @@
+"""Lines of progress of the package, given to a caller's own function."""
+
+import logging
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+Progress = Callable[[str], object]
+
+
+@contextmanager
+def reported(progress: Progress | None) -> Iterator[None]:
+    """Meanwhile each line of progress goes to ``progress``."""
+    if progress is None:
+        yield
+        return
+    log = logging.getLogger("fem_reference")
+    handler, level = _Calling(progress), log.level
+    log.addHandler(handler)
+    log.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        log.removeHandler(handler)
+        log.setLevel(level)
+
+
+class _Calling(logging.Handler):
+    """Calls a function with each line."""
+
+    def __init__(self, progress: Progress) -> None:
+        super().__init__()
+        self.progress = progress
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.progress(record.getMessage())

@@ -1,0 +1,103 @@
+"""How deep a closed body and a bone are in each other, wherever their surfaces cross or one is within the other."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import igl
+import numpy as np
+
+from fem_reference.foundations.mesh import Floats, Ints, Surface
+from fem_reference.foundations.motion import apply
+from fem_reference.geometry.distance import distances
+from fem_reference.geometry.intersections import crossings
+from fem_reference.geometry.rigid_bodies import Obstacle
+
+# Points of a triangle that are looked at where it crosses another surface: those of a grid of quarters, its corners among them.
+_GRID = np.array([(i, j, 4 - i - j) for i in range(5) for j in range(5 - i)]) / 4
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A closed ``surface`` that knows what is in it."""
+
+    surface: Surface
+
+    @cached_property
+    def _tree(self) -> igl.FastWindingNumberBVH:
+        tree = igl.FastWindingNumberBVH()
+        tree.init(self.surface.points, self.surface.triangles, 2)
+        return tree
+
+    def depths(self, points: Floats) -> Floats:
+        """How deep (n,) [mm] ``points`` (n, 3) are in it, 0 outside."""
+        found = np.zeros(len(points))
+        low, high = self.surface.points.min(axis=0), self.surface.points.max(axis=0)
+        some = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
+        if len(some):
+            winding = self._tree.winding_number(np.ascontiguousarray(points[some]))
+            inside = some[np.ravel(winding) > 0.5]
+            found[inside] = distances(points[inside], self.surface).distance
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Depths:
+    """How deep [mm] in each other the vertices and the triangles of a body and then those of a bone are, 0 outside, and the
+    ``places`` [mm] where; of triangles only those that cross the other surface are looked at, where they are deepest.
+    """
+
+    values: Floats
+    places: Floats
+
+    def deepest(self, rest: "Depths | None" = None) -> tuple[float, Floats]:
+        """The greatest depth [mm] beyond that at ``rest``, and where (3,) [mm]."""
+        beyond = self.values if rest is None else np.maximum(self.values - rest.values, 0.0)
+        worst = int(np.argmax(beyond))
+        return float(beyond[worst]), self.places[worst]
+
+
+def depths(body: Body, bone: Surface, shape: Obstacle, pose: Floats) -> Depths:
+    """How deep a ``body`` and a ``bone`` at a ``pose`` (4, 4), whose ``shape`` knows the distance to it, are in each other.
+
+    Depth in the bone is as exact as its distance field, depth in the body exact.
+    """
+    posed, back = bone.moved_to(apply(pose, bone.points)), np.linalg.inv(pose)
+    pairs = crossings(body.surface, posed)
+
+    def into_bone(points: Floats) -> Floats:
+        return np.maximum(-shape.sample(apply(back, points)).distance, 0.0)
+
+    parts = [
+        *_of_surface(body.surface, np.unique(pairs[:, 0]), into_bone),
+        *_of_surface(posed, np.unique(pairs[:, 1]), body.depths),
+    ]
+    values, places = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    return Depths(values, places)
+
+
+def _of_surface(surface: Surface, crossing: Ints, depth: Callable[[Floats], Floats]) -> list[tuple[Floats, Floats]]:
+    """The ``depth`` of the vertices and of the triangles of a surface, and where: of the triangles ``crossing`` another surface
+    where they are deepest, and of the vertices that it reaches from their corners inside, or from one of each of its parts.
+    """
+    triangles, points = surface.triangles, surface.points
+    inside = np.zeros(len(points), bool)
+    corners = np.union1d(triangles[crossing], _tips(triangles.tobytes()))
+    inside[corners] = depth(points[corners]) > 0
+    goes_on = np.delete(triangles, crossing, axis=0)
+    while (grown := inside[goes_on].any(axis=1) & ~inside[goes_on].all(axis=1)).any():
+        inside[goes_on[grown]] = True
+    vertices, deepest, places = np.zeros(len(points)), np.zeros(len(triangles)), points[triangles[:, 0]]
+    vertices[inside] = depth(points[inside])
+    grid = np.einsum("gc,tci->tgi", _GRID, points[triangles[crossing]])
+    found = depth(grid.reshape(-1, 3)).reshape(len(crossing), len(_GRID))
+    deepest[crossing] = found.max(axis=1)
+    places[crossing] = grid[np.arange(len(crossing)), found.argmax(axis=1)]
+    return [(vertices, points), (deepest, places)]
+
+
+@lru_cache(maxsize=8)
+def _tips(triangles: bytes) -> Ints:
+    """A vertex of each part of a surface of ``triangles``, 64 bit integers: a part that crosses nothing is where this is."""
+    parts = np.asarray(igl.vertex_components(np.frombuffer(triangles, np.int64).reshape(-1, 3)))
+    return np.unique(parts, return_index=True)[1]

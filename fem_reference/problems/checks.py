@@ -1,0 +1,264 @@
+"""Whether a body is one that can be solved: every part of it is looked at before anything is, and named where it is wrong."""
+
+from collections.abc import Sequence
+from itertools import combinations, pairwise
+from typing import Any
+
+import numpy as np
+
+from fem_reference.effects import Effect, Load
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.given import said
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.geometry.skins import Skin
+from fem_reference.problems.body import Body, Cells, Prescribed, boundary_facets, check_element, reference_nodes
+from fem_reference.problems.contact import Contact
+
+SAME = 1e-6  # of the body's size, by which two regions may prescribe what is meant to be the same
+_UNIT = 1e-6  # by which a unit vector may be longer or shorter
+_FLAT = 1e-9  # of the cube of its longest edge: a cell of less volume has none
+_FARTHEST = 1e9  # [mm] from the origin
+_MOST = 100_000  # frames
+_MOST_CELLS = 10_000_000  # of a box
+_SHORTEST, _LONGEST = 1e-6, 1e6  # edges of a box, in mm and of each other
+
+
+def check(body: Body, element: str) -> None:
+    """InputError unless ``body`` is one, ``element`` suits its cells and effects, it has every region and fibre direction that it
+    speaks of, and prescribes what can be distinguished, followed and solved.
+    """
+    if not isinstance(body, Body):
+        raise InputError("body", said(body), "a Body")
+    _check_cells(body.mesh)
+    _check_many("effects", body.effects, Effect, "effects")
+    _check_many("prescribed", body.prescribed, Prescribed, "what is prescribed where")
+    check_frames(body.frames, "frames")
+    _check_rest(body)
+    check_element(element, body.mesh.kind, body.mesh.degree, body.effects, "element")
+    _check_prescribed(body.prescribed)
+    fixed = [entry.on for entry in body.prescribed if isinstance(entry.on, str)]
+    contact = [body.contact.on] if body.contact and isinstance(body.contact.on, str) else []
+    used = dict.fromkeys([*fixed, *contact, *(effect.on for effect in body.effects if isinstance(effect, Load))])
+    for on in used:
+        if on not in body.mesh.facets:
+            raise InputError("on", f'"{on}"', f"a region of the body: {', '.join(map(str, body.mesh.facets))}")
+    _check_regions(body.mesh, tuple(used))
+    _check_needs(body)
+    check_agreement(body)
+
+
+def check_box(counts: Any, size: Any, kind: Any, degree: Any) -> None:
+    """InputError unless a box has numbers of cells, lengths, a kind of cell and a degree."""
+    many = isinstance(counts, tuple | list) and len(counts) == 3
+    if not many or not all(_is_integer(one) and one > 0 for one in counts):
+        raise InputError("counts", said(counts), "numbers of cells along x, y, z, from 1 on")
+    if int(counts[0]) * int(counts[1]) * int(counts[2]) > _MOST_CELLS:
+        raise InputError("counts", said(counts), f"{_MOST_CELLS} cells at most")
+    many = isinstance(size, tuple | list | np.ndarray) and len(np.shape(size)) == 1 and len(size) == 3
+    if not many or not all(_is_number(one) and one > _SHORTEST for one in size):
+        raise InputError("size", said(size), f"lengths along x, y, z, from {_SHORTEST:g} to {_FARTHEST:g} mm")
+    if not max(size) < _LONGEST * min(size):
+        raise InputError("size", said(size), f"an edge less than {_LONGEST:g} times as long as another")
+    _check_kind("", kind, degree)
+
+
+def _check_kind(place: str, kind: Any, degree: Any) -> None:
+    if not isinstance(kind, str) or kind not in ("tetrahedron", "hexahedron"):
+        raise InputError(f"{place}kind", said(kind), '"tetrahedron" or "hexahedron"')
+    if not _is_integer(degree) or degree not in (1, 2):
+        raise InputError(f"{place}degree", said(degree), "1 or 2")
+
+
+def check_frames(frames: Any, place: str) -> None:
+    """InputError unless ``frames`` are numbers, each later than the one before."""
+    known = isinstance(frames, Sequence | np.ndarray) and not isinstance(frames, str | bytes)
+    if not known or len(frames) == 0 or not all(_is_number(one) for one in frames):
+        raise InputError(place, said(frames), "frame numbers, at least one")
+    if not all(early < late for early, late in pairwise(frames)):
+        raise InputError(place, said(frames), "frame numbers that are each later than the one before")
+    if len(frames) > _MOST:
+        raise InputError(place, f"{len(frames)} of them", f"{_MOST} at most")
+
+
+def _is_number(value: Any) -> bool:
+    """Whether a value is a number that has a place among others, and is not a truth value."""
+    return (
+        isinstance(value, int | float | np.integer | np.floating)
+        and not _is_truth(value)
+        and abs(float(value)) <= _FARTHEST
+    )
+
+
+def _is_integer(value: Any) -> bool:
+    """Whether a value is an integer, and not a truth value."""
+    return isinstance(value, int | np.integer) and not _is_truth(value)
+
+
+def _is_truth(value: Any) -> bool:
+    return value is True or value is False
+
+
+def _check_many(place: str, given: Any, kind: type, want: str) -> None:
+    if not isinstance(given, tuple | list):
+        raise InputError(place, said(given), f"{want}, in a tuple")
+    for i, one in enumerate(given):
+        if not isinstance(one, kind):
+            raise InputError(f"{place}[{i}]", said(one), f"a {kind.__name__}")
+
+
+def _check_rest(body: Body) -> None:
+    """InputError where an optional part of a body is not what it should be."""
+    if body.interval is not None and not (_is_number(body.interval) and body.interval > 0):
+        raise InputError("interval", said(body.interval), "a time above 0 s, or None")
+    for name in ("fibre", "start"):
+        part = getattr(body, name)
+        if part is not None and not callable(part):
+            raise InputError(name, said(part), "a function, or None")
+    if body.contact is not None and not isinstance(body.contact, Contact):
+        raise InputError("contact", said(body.contact), "a Contact, or None")
+
+
+def _check_cells(mesh: Any) -> None:
+    """InputError unless ``mesh`` has finite points, and cells and facets between them."""
+    if not isinstance(mesh, Cells):
+        raise InputError("mesh", said(mesh), "Cells")
+    _check_kind("mesh.", mesh.kind, mesh.degree)
+    points = mesh.points
+    if not isinstance(points, np.ndarray) or points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind != "f":
+        raise InputError("mesh.points", said(points), "an array (n, 3) of floats")
+    if not (np.abs(points) <= _FARTHEST).all():
+        raise InputError("mesh.points", "a point that is not finite, or too far away", f"up to {_FARTHEST:g} mm away")
+    nodes = len(reference_nodes(mesh.kind, mesh.degree))
+    _check_indices("mesh.cells", mesh.cells, (nodes,), len(points))
+    if not len(mesh.cells):
+        raise InputError("mesh.cells", "none", "at least one")
+    if not isinstance(mesh.facets, dict):
+        raise InputError("mesh.facets", said(mesh.facets), "a dictionary of arrays by region")
+    for name, facets in mesh.facets.items():
+        _check_indices(f"mesh.facets[{name!r}]", facets, (3,) if mesh.kind == "tetrahedron" else (4,), len(points))
+    _check_volumes(mesh)
+
+
+def _check_indices(place: str, given: Any, widths: tuple[int, ...], count: int) -> None:
+    if not isinstance(given, np.ndarray) or given.dtype.kind not in "iu" or given.ndim != 2:
+        raise InputError(place, said(given), f"an array of integers (m, {widths[0]})")
+    if given.shape[1] not in widths:
+        raise InputError(place, said(given), f"an array of integers (m, {widths[0]})")
+    if given.size and not (given.min() >= 0 and given.max() < count):
+        raise InputError(place, f"index {int(given.min())} to {int(given.max())}", f"indices from 0 to {count - 1}")
+
+
+def _check_volumes(mesh: Cells) -> None:
+    """InputError where a cell has no volume."""
+    corners = mesh.points[mesh.cells[:, [0, 1, 2, 3 if mesh.kind == "tetrahedron" else 4]]]
+    edges = corners[:, 1:] - corners[:, :1]
+    longest = np.linalg.norm(edges, axis=2).max(axis=1)
+    flat = np.flatnonzero(~(np.abs(np.linalg.det(edges)) > _FLAT * longest**3))
+    if len(flat):
+        raise InputError(f"mesh.cells[{flat[0]}]", "a cell without volume", "cells that have one")
+
+
+def _check_prescribed(prescribed: Sequence[Prescribed]) -> None:
+    """InputError where two share a name, by which their forces are reported, or springs would repel."""
+    names = [entry.name for entry in prescribed]
+    for entry in prescribed:
+        place = f"prescribed.{entry.name}"
+        if not isinstance(entry.name, str) or not isinstance(entry.on, str | Skin):
+            raise InputError(f"{place}: name and on", f"{said(entry.name)}, {said(entry.on)}", "a text, and a region")
+        if names.count(entry.name) > 1:
+            raise InputError("prescribed", f'"{entry.name}" twice', "a name for each")
+        _check_components(f"{place}.components", entry.components)
+        if not callable(entry.path):
+            raise InputError(f"{place}.path", said(entry.path), "a function of points and a frame number")
+        if entry.stiffness is None and not isinstance(entry.on, str):
+            raise InputError(f"{place}.stiffness", "none on a skin", "springs")
+        if entry.stiffness is not None and not (_is_number(entry.stiffness) and entry.stiffness > 0):
+            raise InputError(f"{place}.stiffness", f"{entry.stiffness}", "more than 0, or None: exact")
+
+
+def _check_components(place: str, components: Any) -> None:
+    axes = isinstance(components, tuple | list) and len(components) > 0
+    axes = axes and all(_is_integer(one) and 0 <= one <= 2 for one in components)
+    if not axes or len(set(components)) < len(components):
+        raise InputError(place, said(components), "axes among 0, 1, 2 for x, y, z, each once")
+
+
+def _check_regions(mesh: Cells, names: tuple[str, ...]) -> None:
+    """InputError unless each of the regions ``names`` has facets, all of them on the boundary of the cells."""
+    boundary = set(map(tuple, boundary_facets(mesh).tolist()))
+    for name in names:
+        facets = set(map(tuple, np.sort(mesh.facets[name], axis=1).tolist()))
+        lost = sorted(facets - boundary)
+        if not facets:
+            raise InputError(f"facets.{name}", "none", "facets of one cell each")
+        if lost:
+            got = (
+                f"facets that are not of one cell each ({len(lost)} of {len(facets)}, the first with corners {lost[0]})"
+            )
+            raise InputError(f"facets.{name}", got, "facets on the boundary of the cells")
+
+
+def _check_needs(body: Body) -> None:
+    """InputError where an effect needs fibre directions or times that a body lacks, or these are no unit vectors."""
+    needs = {need for effect in body.effects for need in effect.needs}
+    if body.interval is None and "interval" in needs:
+        raise InputError("interval", "nothing", "the time from a frame number to the next, which an effect needs")
+    if "fibre" not in needs:
+        return
+    if body.fibre is None:
+        raise InputError("fibre", "nothing", "fibre directions, which an effect needs")
+    cells = np.arange(len(body.mesh.cells))
+    try:
+        found = np.asarray(body.fibre(cells, body.mesh.points[body.mesh.cells].mean(axis=1)), float)
+    except Exception as error:  # whatever a function of the caller's own does wrong
+        raise InputError("fibre", f"{type(error).__name__}: {error}", "directions (n, 3) at points (n, 3)") from error
+    if found.shape != (len(cells), 3):
+        raise InputError("fibre", f"directions {found.shape} at points {(len(cells), 3)}", "one (3,) at each")
+    lengths = np.linalg.norm(found, axis=1)
+    worst = int(np.argmax(np.where(np.isfinite(lengths), np.abs(lengths - 1), np.inf)))
+    if not abs(lengths[worst] - 1) <= _UNIT:
+        raise InputError("fibre", f"a direction of length {lengths[worst]:.6g} in cell {worst}", "unit vectors")
+
+
+def check_agreement(body: Body) -> None:
+    """InputError where two regions prescribe different displacements exactly at places that they share, or a path of what moves
+    cannot be followed.
+    """
+    looked_at = _looked_at(body)
+    exact = [entry for entry in body.prescribed if entry.stiffness is None and isinstance(entry.on, str)]
+    for one, other in combinations(exact, 2):
+        common = sorted(set(one.components) & set(other.components))
+        places = _shared(body.mesh, str(one.on), str(other.on)) if common else np.zeros((0, 3))
+        for frame in looked_at if len(places) else ():
+            found = [entry.displacements(places, frame)[:, common] for entry in (one, other)]
+            off = np.abs(found[0] - found[1]).max(axis=1)
+            if not off.max() <= SAME * (body.size + np.abs(found).max()):
+                x, y, z = places[np.argmax(off)]
+                got = f"displacements {off.max():.4g} mm apart at ({x:.4g}, {y:.4g}, {z:.4g}) mm at frame {frame:g}"
+                raise InputError(f'prescribed "{one.name}" and "{other.name}"', got, "the same at what they share")
+
+
+def _looked_at(body: Body) -> Floats:
+    """Frames, and stops, and the middles between them."""
+    ends = np.unique([*body.frames, *body.stops])
+    return np.unique(np.concatenate([ends, (ends[1:] + ends[:-1]) / 2]))
+
+
+def _shared(mesh: Cells, one: str, other: str) -> Floats:
+    """Corners that two regions share and the middles of edges (n, 3) [mm]."""
+    corners = np.intersect1d(mesh.facets[one], mesh.facets[other])
+    if not len(corners):
+        return np.zeros((0, 3))
+    edges, known = (_edges(mesh.facets[name], corners) for name in (one, other))
+    both = sorted(edges & known)
+    middles = [mesh.points[list(edge)].mean(axis=0) for edge in both]
+    return np.concatenate([mesh.points[corners], np.reshape(middles, (-1, 3))])
+
+
+def _edges(facets: Ints, corners: Ints) -> set[tuple[int, ...]]:
+    """The pairs of ``corners`` that are in one of ``facets``."""
+    some = np.sort(facets[np.isin(facets, corners).sum(axis=1) > 1], axis=1)
+    pairs = combinations(range(facets.shape[1]), 2)
+    found = {edge for i, j in pairs for edge in map(tuple, some[:, [i, j]].tolist())}
+    known = set(corners.tolist())
+    return {edge for edge in found if known.issuperset(edge)}

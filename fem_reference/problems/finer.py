@@ -1,0 +1,145 @@
+"""Bodies on finer cells: each cell cut in eight parts of half its size, which fill the same and have the same regions."""
+
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.geometry.fibres import Directions
+from fem_reference.geometry.skins import Skin
+from fem_reference.problems.body import Body, Cells, Kind, reference_nodes
+from fem_reference.problems.shapes import facet_corners
+
+# Of a tetrahedron's corners and the middles of its edges 01, 02, 03, 12, 13 and 23, called 0 to 9: four parts at its corners, and
+# four around the line from the middle of 03 to that of 12.
+_EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
+_TETRAHEDRA = (
+    *((0, 4, 5, 6), (4, 1, 7, 8), (5, 7, 2, 9), (6, 8, 9, 3)),
+    *((6, 7, 4, 5), (6, 7, 5, 9), (6, 7, 9, 8), (6, 7, 8, 4)),
+)
+# The shares that the corners of a cell have in the nodes of its parts are multiples of one over this.
+_SHARES = 64
+
+
+@dataclass(frozen=True, eq=False)
+class OfParts:
+    """The fibre directions in the parts of cells, of which each cell has eight in a row, from those in the cells."""
+
+    fibre: Directions
+
+    def __call__(self, cells: Ints, points: Floats) -> Floats:
+        """The directions (n, 3) in the parts ``cells`` (n,)."""
+        return self.fibre(np.asarray(cells) // 8, points)
+
+
+def finer(body: Body) -> tuple[Body, Ints]:
+    """The ``body`` with each of its cells cut in eight, and which of its points those of ``body`` (n,) are, -1 of one of no cell.
+    Its shape stays that of the coarser cells: no surface gets smoother.
+    """
+    mesh, shared = _cut(body.mesh)
+
+    def place(on: str | Skin) -> str | Skin:
+        return on if isinstance(on, str) else _in_parts(on, body.mesh)
+
+    return replace(
+        body,
+        mesh=mesh,
+        prescribed=tuple(replace(entry, on=place(entry.on)) for entry in body.prescribed),
+        contact=None if body.contact is None else replace(body.contact, on=place(body.contact.on)),
+        fibre=None if body.fibre is None else OfParts(body.fibre),
+    ), shared
+
+
+def _cut(mesh: Cells) -> tuple[Cells, Ints]:
+    """The mesh with its cells in eight, and which of its points those of ``mesh`` (n,) are."""
+    own = reference_nodes(mesh.kind, mesh.degree)
+    nodes = _linear(mesh.kind, own) @ _parts(mesh.kind)  # (8, k, 3), in the reference cell
+    shares = np.rint(_SHARES * _linear(mesh.kind, nodes)).astype(np.int64)  # (8, k, c)
+    names, first = _named(mesh.cells[:, : shares.shape[2]], shares)
+    places = _shape(mesh.kind, mesh.degree, nodes.reshape(-1, 3)) @ mesh.points[mesh.cells]
+    points = places.reshape(-1, 3)[first]
+    shared = np.full(len(mesh.points), -1)
+    for i, node in enumerate(own):
+        part, j = np.argwhere((nodes == node).all(axis=2))[0]
+        shared[mesh.cells[:, i]] = names[:, part, j]
+    points[shared[shared >= 0]] = mesh.points[shared >= 0]  # not but for rounding
+    facets = _facets(mesh, names, shares)
+    return Cells(points, names.reshape(-1, len(own)), mesh.kind, mesh.degree, facets), shared
+
+
+def _parts(kind: Kind) -> Floats:
+    """The corners (8, c, 3) of the parts of the reference cell, each as upright as that."""
+    corners = reference_nodes(kind, 1)
+    if kind == "hexahedron":
+        return np.stack([(corners + low) / 2 for low in product((0, 1), repeat=3)])
+    ten = np.concatenate([corners, [corners[list(edge)].mean(axis=0) for edge in _EDGES]])
+    parts = ten[np.array(_TETRAHEDRA)]
+    wrong = np.linalg.det(parts[:, 1:] - parts[:, :1]) < 0
+    return np.asarray(np.where(wrong[:, None, None], parts[:, [1, 0, 2, 3]], parts))
+
+
+def _linear(kind: Kind, places: Floats) -> Floats:
+    """The share (..., c) that each corner has in places (..., 3) of the reference cell."""
+    if kind == "tetrahedron":
+        return np.concatenate([1 - places.sum(axis=-1, keepdims=True), places], axis=-1)
+    corners, beside = reference_nodes(kind, 1), places[..., None, :]
+    return np.asarray(np.where(corners > 0, beside, 1 - beside).prod(axis=-1))
+
+
+def _shape(kind: Kind, degree: int, places: Floats) -> Floats:
+    """The share (q, k) that each node has in ``places`` (q, 3) of the reference cell: the polynomials that are 1 there and 0 at the
+    other nodes.
+    """
+    powers = np.array([p for p in product(range(degree + 1), repeat=3) if kind == "hexahedron" or sum(p) <= degree])
+
+    def monomials(points: Floats) -> Floats:
+        return np.asarray((points[:, None, :] ** powers).prod(axis=2))
+
+    return np.asarray(np.linalg.solve(monomials(reference_nodes(kind, degree)).T, monomials(places).T).T)
+
+
+def _named(corners: Ints, shares: Ints) -> tuple[Ints, Ints]:
+    """The number (m, 8, k) of each node of the parts of cells with these ``corners`` (m, c), and which of all is the first of each.
+    Nodes are the same where the same corners have the same ``shares`` (8, k, c): those of bodies that touch stay two.
+    """
+    some = np.where(shares > 0, corners[:, None, None], -1)
+    order = np.argsort(some, axis=-1)
+    rows = np.stack([some, np.broadcast_to(shares, some.shape)], axis=-1)
+    rows = np.take_along_axis(rows, order[..., None], axis=-2).reshape(-1, 2 * shares.shape[-1])
+    _, first, names = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    return names.reshape(some.shape[:-1]), first
+
+
+def _facets(mesh: Cells, names: Ints, shares: Ints) -> dict[str, Ints]:
+    """The regions on the parts: those facets of theirs that lie on a facet of the region."""
+    sides = facet_corners(mesh.kind)
+    every = np.arange(shares.shape[-1])
+    parts = []  # of each side, those facets (part, corners of the part) that lie on it
+    for side in sides:
+        off = shares[:, every[:, None], np.setdiff1d(every, side)].any(axis=2)  # (8, c)
+        parts.append([(part, other) for part in range(8) for other in sides if not off[part, list(other)].any()])
+    at = {
+        tuple(sorted(cell[k] for k in side)): (i, j)
+        for i, cell in enumerate(mesh.cells.tolist())
+        for j, side in enumerate(sides)
+    }
+    found = {}
+    for name, facets in mesh.facets.items():
+        places = [at[tuple(sorted(facet))] for facet in facets.tolist()]
+        cut = [names[i, part, list(corners)] for i, j in places for part, corners in parts[j]]
+        found[name] = np.array(cut, np.int64).reshape(-1, facets.shape[1])
+    return found
+
+
+def _in_parts(skin: Skin, mesh: Cells) -> Skin:
+    """The skin with each point in the nearest part of its cell: that of straight tetrahedra where its least share is greatest."""
+    corners = mesh.points[mesh.cells[skin.cells, :4]]
+    edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+    places = np.linalg.solve(edges, (skin.points - corners[:, 0])[:, :, None])[:, :, 0]
+    parts = _parts("tetrahedron")
+    inside = np.linalg.solve(
+        np.swapaxes(parts[:, 1:] - parts[:, :1], 1, 2)[None], (places[:, None] - parts[None, :, 0])[..., None]
+    )
+    least = _linear("tetrahedron", inside[..., 0]).min(axis=-1)
+    return replace(skin, cells=8 * skin.cells + least.argmax(axis=1))

@@ -1,0 +1,108 @@
+"""Arguments of the calls that the package offers to Python: refused by name before anything is done."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fem_reference.assessment.comparison import Comparison
+from fem_reference.assessment.error_bars import ErrorBars
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.given import path, said
+from fem_reference.runs.store import Run
+from fem_reference.scenes.case import Case
+
+
+def check_case(case: Any) -> None:
+    """InputError unless it is a case."""
+    if not isinstance(case, Case):
+        raise InputError("case", said(case), "a Case, such as load_case returns")
+
+
+def check_changes(changes: Any) -> None:
+    """InputError unless it is keys and values, or None."""
+    known = changes is None or isinstance(changes, Mapping)
+    if not known or not all(isinstance(key, str) for key in changes or ()):
+        raise InputError("changes", said(changes), 'values by key, such as {"frames.last": 10}')
+
+
+def check_solver(solver: Any, settings: Mapping[str, Any]) -> None:
+    """InputError unless ``solver`` is a name, and there where there are ``settings`` of it."""
+    if solver is not None and not isinstance(solver, str):
+        raise InputError("solver", said(solver), "the name of a solver, or None")
+    if solver is None and settings:
+        want = 'the name of the solver that they are of, such as solver="fenicsx"'
+        raise InputError(f"settings {', '.join(settings)}", "no solver", want)
+
+
+def check_progress(progress: Any) -> None:
+    """InputError unless it can be called, or is None."""
+    if progress is not None and not callable(progress):
+        raise InputError("progress", said(progress), "a function of a line, such as print, or None")
+
+
+def free_folder(given: Any, place: str) -> Path:
+    """As ``path``, of a folder that is there or can be made."""
+    folder = path(given, place)
+    above = next(one for one in (folder, *folder.absolute().parents) if one.exists())
+    if not above.is_dir():
+        raise InputError(place, f"{folder}, while {above} is a file", "a folder")
+    return folder
+
+
+def check_comparison(comparison: Any) -> None:
+    """InputError unless it is a comparison."""
+    if not isinstance(comparison, Comparison):
+        raise InputError("comparison", said(comparison), "a Comparison, such as compare returns")
+
+
+def check_error_bars(bars: Any, case: Case) -> None:
+    """InputError unless they are error bars of a reference of the ``case``, or None."""
+    if bars is not None and not isinstance(bars, ErrorBars):
+        raise InputError("error_bars", said(bars), "ErrorBars, such as error_bars returns, or None")
+    if bars is not None and bars.numbers != case.numbers:
+        raise InputError(
+            "error_bars", f"those of frames {bars.numbers}", f"those of frames {case.numbers}, of the case"
+        )
+
+
+def check_run(run: Any, case: Case, place: str) -> None:
+    """InputError unless it is a run of the ``case``, as far as it says of which."""
+    if not isinstance(run, Run):
+        raise InputError(place, said(run), "a Run, such as solve and read_run return")
+    scene = run.origin.get("scene")
+    if scene is not None and scene not in (case.key, _as_solved(run, case).key):
+        got = f'a run of another case ("{run.origin.get("case", "without a name")}")'
+        raise InputError(f'{place} "{run.name}"', got, f'one of "{case.name}" with all its keys as they are')
+    if run.carries.isdisjoint(case.carries):
+        got = f"a run of {', '.join(sorted(run.carries))}"
+        raise InputError(f'{place} "{run.name}"', got, f"one of {', '.join(sorted(case.carries))}")
+
+
+def _as_solved(run: Run, case: Case) -> Case:
+    """The ``case`` with the effects of a ``run``, where it was found out which it needs."""
+    effects = run.origin.get("effects")
+    if not case.decisions or not isinstance(effects, Mapping):
+        return case
+    return case.model_copy(
+        update={"effect": tuple(one.effect for one in case.decisions if one.effect.title in effects)}
+    )
+
+
+def check_runs(reference: Run, candidates: Any, case: Case) -> None:
+    """InputError where runs cannot be compared: they are of another case, two of one name, or have other vertices."""
+    check_run(reference, case, "reference")
+    if not isinstance(candidates, Sequence) or isinstance(candidates, str | bytes):
+        raise InputError("candidates", said(candidates), "a list of runs")
+    for run in candidates:
+        check_run(run, case, "candidate")
+    names = [run.name for run in (reference, *candidates)]
+    for run in candidates:
+        if names.count(run.name) > 1:
+            raise InputError("candidates", f'the name "{run.name}" twice', "runs of different names")
+        if run.positions.shape[1:] != reference.positions.shape[1:]:
+            got, want = (f"{one.positions.shape[1]} vertices" for one in (run, reference))
+            raise InputError(f'candidate "{run.name}"', got, f"the {want} of the reference: a run of the same case")
+        if np.shape(run.points) != np.shape(reference.points):
+            raise InputError(f'candidate "{run.name}"', f"{len(run.points)} points", f"{len(reference.points)} of them")

@@ -1,0 +1,54 @@
+"""The sharper solution that the error bars of a body are made of."""
+
+import logging
+from typing import Any
+
+import numpy as np
+
+from fem_reference.assessment.body_bars import BodyBars, body_bars
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Ints
+from fem_reference.problems.body import Body
+from fem_reference.problems.finer import finer
+from fem_reference.runs.solved import Solved
+from fem_reference.solvers import fenicsx
+
+log = logging.getLogger(__name__)
+
+# What is quadratic has as many unknowns on the same cells as what is linear on cells of half the size, and does not lock.
+_QUADRATIC = {"P1": "P2", "P1/P1": "P2/P1", "Q1": "Q2", "Q1/P0": "Q2/Q1"}
+
+
+def obtain(body: Body, solved: Solved) -> BodyBars | None:
+    """The error bars of what :func:`solve_body` made of ``body``; None where that did not converge."""
+    if solved.body is not body:
+        raise InputError("reference", "a solution of another body", "what solve_body returned for this one")
+    if solved.outcome.status != "converged":
+        log.info("error bars: none, of a body that did not converge")
+        return None
+    settings = solved.settings
+    assert isinstance(settings, fenicsx.BodySettings)  # what solved the body
+    other, shared, changes, sharper = _sharper(body, settings)
+    log.info("error bars: solving with %s", sharper)
+    found = fenicsx.solve_body(other, settings.model_copy(update=changes))
+    if found.outcome.status != "converged":
+        log.info("error bars: with %s: %s, %s", sharper, found.outcome.status, found.outcome.message)
+    bars = body_bars(solved.states, found.states, shared, sharper)
+    log.info("error bars: displacement is known to %.2g %% of itself at the last frame", 100 * bars.displacement[-1])
+    return bars
+
+
+def _sharper(body: Body, settings: fenicsx.BodySettings) -> tuple[Body, Ints, dict[str, Any], str]:
+    """A sharper problem: the body, which of its points those of ``body`` are, what changes of the settings, and that in words."""
+    changes: dict[str, Any] = {"store_state": False}
+    said = ""
+    if any("interval" in effect.needs for effect in body.effects):  # else a state does not depend on load steps
+        largest = min(settings.largest_step or np.inf, float(np.diff(body.frames).max(initial=settings.first_step)))
+        changes |= {"first_step": settings.first_step / 2, "largest_step": largest / 2}
+        said = " and load steps of half the length"
+    quadratic = _QUADRATIC.get(settings.element)
+    if quadratic is not None:
+        changes |= {"element": quadratic, "quadrature_degree": None}
+        return body, np.arange(len(body.mesh.points)), changes, f"{quadratic} on the same cells{said}"
+    other, shared = finer(body)
+    return other, shared, changes, f"{settings.element} on cells of half the size{said}"

@@ -1,0 +1,152 @@
+"""The second check of runs that a solver calls converged: a true run passes, and each of what may be wrong with one denies it."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from fem_reference import effects
+from fem_reference.assessment.catalogue import Entry, Finding, Lab
+from fem_reference.assessment.questions import of_muscle
+from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.records import parse
+from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle_body import as_body
+from fem_reference.runs.store import Run
+from fem_reference.studies.hard import blocks
+from fem_reference.studies.hard.records import Hard
+from fem_reference.verification.parts import zero
+
+Spoilt = Callable[[Problem, Run], tuple[Problem, Run]]
+
+
+def _slides(direction: list[float], distance: str) -> dict[str, object]:
+    stops = [{"frame": 0, "distance": "0 mm"}, {"frame": 10, "distance": distance}]
+    return {"direction": direction, "keyframes": stops}
+
+
+def bar(ball: str = "2 mm") -> Problem:
+    """A bar of 10 x 10 x 40 mm between two bones, one of which moves by 3 mm; a ball of 3 mm is pressed into it by ``ball``."""
+    ball_bone = {"sphere": {"centre": "-3.2, 5, 20 mm", "radius": "3 mm"}, "motion": _slides([1, 0, 0], ball)}
+    hold = [{"face": "z0"}, {"face": "z1", "motion": _slides([0, 1, 0], "3 mm")}]
+    table = {
+        "title": "a bar",
+        "healthy": "it passes",
+        "bound": [{"quantity": "volume", "at_most": 1}],
+        "block": {"size": "10, 10, 40 mm", "cells": [2, 2, 6]},
+        "hold": hold,
+        "bone": [{"name": "ball"} | ball_bone],
+        "frames": {"first": 0, "last": 10, "every": 5},
+    }
+    contact = effects.make("contact", stiffness="100 kPa/mm", bones=("ball",))
+    place = "the bar of the second check"
+    acting = (*blocks.MATERIAL, contact)
+    return blocks.problem(parse(Hard, table | {"name": "bar", "place": place, "effect": acting}, place))
+
+
+_SOLVED = WeakKeyDictionary[Lab, tuple[Problem, Run]]()
+
+
+def solved(lab: Lab) -> tuple[Problem, Run]:
+    """The bar as a muscle, and its run, which a lab makes once."""
+    if lab not in _SOLVED:
+        _SOLVED[lab] = _solve(lab)
+    return _SOLVED[lab]
+
+
+def _solve(lab: Lab) -> tuple[Problem, Run]:
+    problem = bar()
+    found = lab.solve(as_body(problem), "P2/P1", first_step=5.0)
+    _, nodes = cKDTree(problem.mesh.points).query(problem.surface.points)
+    positions = np.array([state.points[nodes] for state in found.states])
+    numbers = tuple(int(state.frame) for state in found.states)
+    pressures = np.array([state.scalars["contact_pressure"] for state in found.states])
+    scalars = {"contact_pressure": pressures}
+    return problem, Run("bar", "fenicsx", found.outcome, numbers, problem.surface, positions, scalars=scalars)
+
+
+def denials(lab: Lab, spoil: Spoilt | None = None) -> Finding:
+    """How many answers are not met of the run, or of one that is spoilt."""
+    problem, run = solved(lab)
+    lost = [str(one) for one in of_muscle(*(spoil(problem, run) if spoil else (problem, run))) if not one.met]
+    return Finding(float(len(lost)), note="; ".join(lost))
+
+
+def _with(run: Run, change: Callable[[Floats], None]) -> Run:
+    positions = np.array(run.positions)
+    change(positions)
+    return replace(run, positions=positions)
+
+
+def swapped(problem: Problem, run: Run) -> tuple[Problem, Run]:
+    """Two frames in each other's place."""
+    return problem, replace(run, positions=run.positions[[0, 2, 1]])
+
+
+def missing(problem: Problem, run: Run) -> tuple[Problem, Run]:
+    """The last frame missing."""
+    return problem, replace(run, positions=run.positions[:2], numbers=run.numbers[:2])
+
+
+def lost(problem: Problem, run: Run) -> tuple[Problem, Run]:
+    """A coordinate that is not a number."""
+
+    def change(positions: Floats) -> None:
+        positions[2, 0, 1] = np.nan
+
+    return problem, _with(run, change)
+
+
+def off(problem: Problem, run: Run) -> tuple[Problem, Run]:
+    """An attached vertex 0.01 mm off its bone."""
+
+    def change(positions: Floats) -> None:
+        positions[1, problem.attached[0].vertices[0]] += [0.01, 0.0, 0.0]
+
+    return problem, _with(run, change)
+
+
+def pushed(problem: Problem, run: Run) -> tuple[Problem, Run]:
+    """The ball 3 mm farther than the bar was pressed: within it."""
+    farther = bar("5 mm")
+    return replace(problem, bones=farther.bones), run
+
+
+def folded(problem: Problem, run: Run) -> tuple[Problem, Run]:
+    """A vertex of one side of the bar 2 mm beyond the other side."""
+    side = np.flatnonzero((run.surface.points == [10.0, 5.0, 20.0]).all(axis=1))
+
+    def change(positions: Floats) -> None:
+        positions[1, side] -= [12.0, 0.0, 0.0]
+
+    return problem, _with(run, change)
+
+
+ENTRIES = tuple(
+    Entry(
+        name=f"second_check_{name}",
+        group="second check",
+        title=f"A run of a bar between two bones, into which a ball is pressed, passes the second check; not with {words}",
+        unit="1",
+        truth=zero,
+        within=0.5,
+        relative=False,
+        because="it counts the answers that are not met",
+        kind="property",
+        source="fem_reference/assessment/questions.py",
+        measure=denials,
+        negative_control=words,
+        with_negative_control=partial(denials, spoil=spoil),
+    )
+    for name, words, spoil in (
+        ("order", "two frames in each other's place", swapped),
+        ("frames", "its last frame missing", missing),
+        ("finite", "a coordinate that is not a number", lost),
+        ("attached", "an attached vertex 0.01 mm off its bone", off),
+        ("bone", "the ball 3 mm farther, within the bar", pushed),
+        ("itself", "a vertex of one side of the bar beyond the other side", folded),
+    )
+)

@@ -1,0 +1,36 @@
+"""Numbers that pages show: which frame of an energy gap speaks, from when on a time is in minutes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fem_reference.report import words
+from fem_reference.report.sections import reference
+from fem_reference.runs.store import Outcome, Run
+
+RUN = Run("reference", "fenicsx", Outcome("converged", "", {}), (0, 1, 2, 3))
+
+
+@pytest.mark.parametrize(
+    ("values", "wanted"),
+    [([np.nan, 0.02, -0.135, 0.1], -13.5), ([0.0, 0.02, 0.1, -0.05], 10.0), ([np.nan] * 4, np.nan)],
+)
+def test_the_energy_gap_is_that_which_is_farthest_from_0_in_per_cent(values: list[float], wanted: float) -> None:
+    assert reference.gap(replace(RUN, scalars={"energy_gap": np.array(values)})) == pytest.approx(wanted, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (0.0, "0 s"),
+        (0.25, "250 ms"),
+        (1.0, "1 s"),
+        (61.0, "61 s"),
+        (599.0, "599 s"),
+        (600.0, "10 min"),
+        (None, "\N{EN DASH}"),
+    ],
+)
+def test_a_time_reads_as_people_say_it(seconds: float | None, text: str) -> None:
+    assert words.duration(seconds) == text
