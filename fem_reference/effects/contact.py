@@ -1,4 +1,4 @@
-"""Frictionless contact of bones with the muscle, with any sliding; attached vertices are exempt."""
+"""Frictionless contact of bones with the muscle, with any sliding; what is attached is exempt, and what is near to it."""
 
 import math
 from collections.abc import Iterable

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface
 
-# No edge of a piece is longer than this many times what its edges are on average at most.
-_LONGEST = 2.0
+# Thin is a triangle the square of whose longest edge is more than so many times its area: of half a square it is 4 times that.
+_THIN = 5.0
 # A triangle cut in four: the barycentric coordinates (3, 3) of the corners of each part.
 _QUARTERS = np.array(
     [
@@ -70,12 +70,11 @@ def corner_areas(corners: Floats) -> Floats:
 
 
 def cut(surface: Surface, triangles: Ints, apart: float) -> Pieces:
-    """The ``triangles`` (k,) of a ``surface`` in pieces, the edges of each of which are on average at most ``apart`` [mm] long, and
-    none twice that: long ones in two, then what is large yet in four.
+    """The ``triangles`` (k,) of a ``surface`` in pieces, the edges of each of which are on average at most ``apart`` [mm] long: the
+    large ones in four, or in two where they are thin.
     """
     corners, pieces = surface.points[surface.triangles], Pieces.whole(triangles)
-    while (long := (lengths := edge_lengths(pieces.of(corners))).max(axis=1, initial=0.0) > _LONGEST * apart).any():
-        pieces = pieces[~long] + pieces[long].halved(lengths[long])
-    while (large := edge_lengths(pieces.of(corners)).mean(axis=1) > apart).any():
-        pieces = pieces[~large] + pieces[large].quartered()
+    while (large := (lengths := edge_lengths(pieces.of(corners))).mean(axis=1) > apart).any():
+        thin = large & (lengths.max(axis=1) ** 2 > _THIN * corner_areas(pieces.of(corners)))
+        pieces = pieces[~large] + pieces[thin].halved(lengths[thin]) + pieces[large & ~thin].quartered()
     return pieces

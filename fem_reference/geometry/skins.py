@@ -6,7 +6,7 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh
 from fem_reference.geometry.embedding import Locator
-from fem_reference.geometry.pieces import corner_areas, cut
+from fem_reference.geometry.pieces import Pieces, corner_areas, edge_lengths
 
 _RULE = np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6
 # Points on a surface are so many to its diagonal, or more: on muscles of the hip, 3 mm apart.
@@ -44,9 +44,10 @@ def attached_skin(surface: Surface, shares: Floats, mesh: TetMesh, apart: float)
         The distance of points [mm], on average and at most.
 
     """
-    pieces = cut(surface, np.flatnonzero(shares.any(axis=1)), apart)
-    corners = pieces.of(surface.points[surface.triangles])
-    return embedded(*points(corners, pieces.of(shares[:, :, None])[:, :, 0]), mesh)
+    pieces, corners = Pieces.whole(np.flatnonzero(shares.any(axis=1))), surface.points[surface.triangles]
+    while len(pieces.parents) and edge_lengths(pieces.of(corners)).mean() > apart:
+        pieces = pieces.quartered()
+    return embedded(*points(pieces.of(corners), pieces.of(shares[:, :, None])[:, :, 0]), mesh)
 
 
 def points(corners: Floats, shares: Floats) -> tuple[Floats, Floats]:

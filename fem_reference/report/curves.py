@@ -94,7 +94,9 @@ def curves(comparison: Comparison) -> list[Curve]:
     drawn.append(_of_runs(comparison, "edges", "Extension of the surface's edges from rest, mean by area", edges))
     drawn.append(_of_runs(comparison, "angles", "Bending at the edges from rest, mean magnitude by area", angles))
     drawn.append(
-        _of_runs(comparison, "depth", "Depth inside a bone of the deepest vertex that is not attached", depths)
+        _of_runs(
+            comparison, "depth", "Depth of the muscle inside a bone, beside attachments beyond that at rest", depths
+        )
     )
     drawn.append(_of_runs(comparison, "inside", "Volume inside bones, without attached parts", inside))
     return [curve for curve in drawn if curve is not None]

@@ -21,7 +21,7 @@ def test_pieces_cover_their_triangles_and_none_is_long(apart: float) -> None:
     areas = np.bincount(found.parents, corner_areas(places))
     assert_allclose(areas, triangle_areas(bar.points, bar.triangles), rtol=1e-12)
     assert edge_lengths(places).mean(axis=1).max() <= apart
-    assert edge_lengths(places).max() <= 2 * apart
+    assert edge_lengths(places).max() <= 1.5 * apart
     assert_allclose(found.corners.sum(axis=2), 1, rtol=1e-15)
 
 
@@ -37,10 +37,10 @@ def test_a_large_triangle_among_small_ones_is_cut_too() -> None:
 
 
 def test_long_thin_triangles_become_fewer_pieces_than_by_quarters() -> None:
-    # 80 mm by 0.1 mm, as long as a surface has any, in edges of 2 mm at most: three for each half, and 4^6 by quarters.
+    # 80 mm by 0.1 mm, as long as a surface has any, in edges of 1.5 mm at most: three for each half, where quarters make 4^6.
     strip = Surface(np.array([[0.0, 0, 0], [80, 0, 0], [80, 0.1, 0]]), np.array([[0, 1, 2]]))
     found, _ = pieces_of(strip, 1.0)
-    assert 40 <= len(found.parents) <= 3**7
+    assert 53 <= len(found.parents) <= 3**6
 
 
 def test_what_is_linear_in_triangles_is_carried_over() -> None:
