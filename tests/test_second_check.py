@@ -202,6 +202,14 @@ def test_a_ball_that_goes_through_a_bar_that_does_not_move_is_denied(tmp_path) -
     assert denied.message.startswith("denied by the second check: ball in the muscle: ")
 
 
+def test_what_large_triangles_pass_through_and_tetrahedra_do_not_is_not_crossed(tmp_path) -> None:
+    problem = coarse(tmp_path)
+    aside = problem.mesh.points + [0.0, 0.0, 100.0]
+    for nodes, met in ((aside, True), (problem.mesh.points, False)):
+        answers = {one.asked: one.met for one in of_muscle(problem, resting(problem), lambda _, nodes=nodes: nodes)}
+        assert answers["ball in the muscle"] is met
+
+
 def test_no_verdict_rests_on_a_denied_reference(tmp_path) -> None:
     problem = coarse(tmp_path)
     case, run = casefile.read(tmp_path), resting(problem)
@@ -215,6 +223,8 @@ def test_no_verdict_rests_on_a_denied_reference(tmp_path) -> None:
         words[status] = (result.word, *((one.expectation.of, one.word) for one in result.verdicts))
     assert words["converged"] == ("pass", ("reference", "pass"), ("mine", "pass"))
     assert words["denied"] == ("fail", ("reference", "fail"), ("mine", "inconclusive"))
+    alone = case.model_copy(update={"expect": case.expect[1:]})
+    assert comparison.compare(alone, problem, reference, (mine,)).word == "fail"
 
 
 def test_what_is_no_number_is_never_met() -> None:
@@ -234,10 +244,11 @@ def test_what_is_so_at_rest_is_no_crossing(tmp_path) -> None:
     problem = replace(problem, bones=(*still[:2], inside))
     run = resting(problem)
     assert lost(problem, run) == []
-    moved = np.array(run.positions)
     free = np.setdiff1d(np.arange(len(BLOCK.points)), problem.attached_vertices)
-    moved[2, free] -= [2.0, 0.0, 0.0]  # 2 mm farther into it
-    assert lost(problem, replace(run, positions=moved)) == ["ball in the muscle"]
+    for farther, found in ((0.1, []), (2.0, ["ball in the muscle"])):  # into the ball, which is 2 mm in the bar at rest
+        moved = np.array(run.positions)
+        moved[2, free] -= [farther, 0.0, 0.0]
+        assert lost(problem, replace(run, positions=moved)) == found
 
 
 def test_bones_that_are_not_in_contact_may_cross(tmp_path) -> None:

@@ -5,9 +5,9 @@ farthest beyond.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache, partial
 from itertools import chain, pairwise
 
 import numpy as np
@@ -16,12 +16,12 @@ from fem_reference.effects import Effect, Load
 from fem_reference.effects.damping import Damping
 from fem_reference.effects.gravity import Gravity
 from fem_reference.effects.inertia import Inertia
-from fem_reference.foundations.mesh import Floats, Surface, vertex_areas
+from fem_reference.foundations.mesh import Floats, Surface, boundary, vertex_areas
 from fem_reference.foundations.motion import Rotation, apply
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.intersections import overlaps, self_crossings
 from fem_reference.geometry.penetrations import Body as Within
-from fem_reference.geometry.penetrations import depths
+from fem_reference.geometry.penetrations import Depths, depths
 from fem_reference.geometry.signed_distance import Grid
 from fem_reference.geometry.skins import spacing
 from fem_reference.problems.body import Body
@@ -72,6 +72,8 @@ class Answer:
 
 
 Answers = tuple[Answer, ...]
+# Positions (n, 3) [mm] by frame number.
+Nodes = Callable[[int], Floats | None]
 
 
 def of_body(body: Body, solved: Solved) -> Answers:
@@ -97,9 +99,9 @@ def _prescribed(body: Body, solved: Solved, size: float) -> Iterator[Answer]:
                 yield _at(f"prescribed at {entry.name}", off, np.full(len(off), allowed), state.frame, rest)
 
 
-def of_muscle(problem: Problem, run: Run) -> Answers:
+def of_muscle(problem: Problem, run: Run, nodes: Nodes = lambda _: None) -> Answers:
     """All frames there, in order and finite; attachments where their bones are; load steps small enough; forces in balance; and no
-    bone and no surface crossed.
+    bone and no surface crossed. ``nodes``: where the points of the tetrahedra are, where that is known.
     """
     fibres = [] if run.fibre_positions is None else [run.fibre_positions]
     arrays = [np.concatenate([array[i] for array in (run.positions, *fibres)]) for i in range(len(run.numbers))]
@@ -110,7 +112,7 @@ def of_muscle(problem: Problem, run: Run) -> Answers:
         scalars = {name: values[1:] for name, values in run.scalars.items()}
         run = replace(run, numbers=run.numbers[1:], positions=run.positions[1:], scalars=scalars)
     attached = chain.from_iterable(_attached(problem, run, entry) for entry in problem.attached)
-    crossed = chain(_depths(problem, run), _creases(run))
+    crossed = chain(_depths(problem, run, nodes), _creases(run))
     return (*found, *_worst(chain(attached, _steps(problem, run), _balance(problem, run), crossed)))
 
 
@@ -220,24 +222,44 @@ def _states(run: Run, bones: Sequence[RigidBody]) -> Iterator[tuple[int, int]]:
             yield i, number
 
 
-def _depths(problem: Problem, run: Run) -> Iterator[Answer]:
-    """How deep each bone in contact and the muscle are in each other; beyond rest, where that is more than contact gives way. Never
-    to the middle of a bone.
+def _depths(problem: Problem, run: Run, nodes: Nodes) -> Iterator[Answer]:
+    """How deep each bone in contact and the muscle are in each other. Where its surface, whose triangles may be large, is deeper
+    than is allowed, that of its tetrahedra is asked too: the muscle is crossed where both are.
     """
     contact, rest = problem.contact, Within(run.surface)
-    at_rest = cache(lambda bone: depths(rest, bone.surface, bone.shape, np.eye(4)))
+    skin = cache(lambda: Surface(problem.mesh.points, boundary(problem.mesh.tets)[0]))
+    inside = cache(lambda: Within(skin()))
     pressures = np.nan_to_num(run.scalars.get("contact_pressure", np.zeros(len(run.numbers))))
     for i, number in _states(run, bones := [one for one in problem.bones if contact and contact.is_by(one.name)]):
         muscle = Within(run.surface.moved_to(run.positions[i]))
         for bone in bones:
-            half, allowed = bone.shape.half_thickness, _give(problem, bone, float(pressures[i]))
-            found = depths(muscle, bone.surface, bone.shape, bone.pose(number))
-            deepest, place = found.deepest()
-            if deepest > allowed:
-                deepest, place = found.deepest(at_rest(bone))
-                allowed += _behind(muscle.surface, place) / half if pressures[i] > 0 else 0.0
-            allowed = min(allowed, _GIVEN_WAY * half)
-            yield _at(f"{bone.name} in the muscle", np.array([deepest]), np.array([allowed]), number, place[None])
+            ask = partial(
+                _deep, bone, number, _give(problem, bone, float(pressures[i])), pressed=bool(pressures[i] > 0)
+            )
+            answer = ask(muscle, rest)
+            if not answer.met and (now := nodes(number)) is not None:
+                answer = min(
+                    answer, ask(Within(skin().moved_to(now)), inside()), key=lambda one: one.value / one.allowed
+                )
+            yield answer
+
+
+def _deep(bone: RigidBody, number: int, give: float, muscle: Within, rest: Within, *, pressed: bool) -> Answer:
+    """How deep a bone and the muscle are in each other; beyond rest, where that is more than contact gives way. Never to the middle
+    of a bone.
+    """
+    found = depths(muscle, bone.surface, bone.shape, bone.pose(number))
+    half, (deepest, place) = bone.shape.half_thickness, found.deepest()
+    if deepest > give:
+        deepest, place = found.deepest(_at_rest(rest, bone))
+        give += _behind(muscle.surface, place) / half if pressed else 0.0
+    allowed = min(give, _GIVEN_WAY * half)
+    return _at(f"{bone.name} in the muscle", np.array([deepest]), np.array([allowed]), number, place[None])
+
+
+@lru_cache(maxsize=8)
+def _at_rest(muscle: Within, bone: RigidBody) -> Depths:
+    return depths(muscle, bone.surface, bone.shape, np.eye(4))
 
 
 def _give(problem: Problem, bone: RigidBody, pressure: float) -> float:

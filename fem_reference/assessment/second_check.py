@@ -17,6 +17,7 @@ from fem_reference.foundations.records import Record
 from fem_reference.problems.body import Body
 from fem_reference.problems.muscle import Problem
 from fem_reference.runs.contents import amend
+from fem_reference.runs.cut_off import places
 from fem_reference.runs.solved import Solved
 from fem_reference.runs.store import Frame, Outcome, Run
 
@@ -42,7 +43,7 @@ def confirmed_run(problem: Callable[[], Problem], run: Run) -> Run:
     if stored.get("code") == code:
         return run
     begin, message = time.process_time(), stored.get("message", run.outcome.message)
-    answers = of_muscle(problem(), run)
+    answers = of_muscle(problem(), run, lambda number: None if run.folder is None else places(run.folder, number)[1])
     outcome = confirmed(replace(run.outcome, status="converged", message=message), answers)
     facts = [{name: _known(value) for name, value in asdict(one).items()} | {"met": one.met} for one in answers]
     seconds = time.process_time() - begin
@@ -62,7 +63,8 @@ def confirmed_frames(problem: Problem, frames: Sequence[Frame], outcome: Outcome
     numbers, positions = tuple(frame.number for frame in frames), np.array([frame.surface for frame in frames])
     run = Run("", "", outcome, numbers, problem.surface, positions, scalars=scalars)
     run = replace(run, origin={"settings": settings.model_dump(mode="json")})
-    return confirmed(outcome, of_muscle(problem, run))
+    tets = {frame.number: frame.tets for frame in frames}
+    return confirmed(outcome, of_muscle(problem, run, tets.get))
 
 
 def _code() -> str:
