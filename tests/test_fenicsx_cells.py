@@ -40,7 +40,9 @@ def test_what_stabilises_a_pressure_is_its_variance_in_each_cell() -> None:
     assert cells.projection is not None
     names, own = cells.unknowns[:, 12:], cells.function.x.array
     own[names] = 3.0
-    assert abs(cells.stabilising_energy()) < 1e-11  # rounding of terms of 9 / (4 MU) N mm per mm3, which are 5400 N mm in all
+    assert (
+        abs(cells.stabilising_energy()) < 1e-11
+    )  # rounding of terms of 9 / (4 MU) N mm per mm3, which are 5400 N mm in all
     own[np.unique(names)] = np.random.default_rng(0).normal(size=len(np.unique(names)))
     volumes = np.abs(np.linalg.det(cells.corners[:, 1:] - cells.corners[:, :1])) / 6
     aside = own[names] - own[names].mean(axis=1, keepdims=True)
