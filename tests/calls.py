@@ -216,10 +216,11 @@ def prescribed(draw: Any, name: str, on: str) -> Any:
 def solving(draw: Any) -> Callable[[], Any]:
     """Bodies that are solved."""
     body, names = draw(bodies()), draw(st.lists(st.sampled_from(list(SETTINGS)), max_size=2))
-    fitting = "P1" if isinstance(body, fr.Body) and getattr(body.mesh, "kind", "") == "tetrahedron" else "Q1"
+    fitting = ("P1", "P1/P1")
     with suppress(AttributeError, TypeError):
-        fitting = {"P1": "P1/P1", "Q1": "Q1/P0"}[fitting] if any(one.unknowns for one in body.effects) else fitting
-    settings = {"element": fitting, "time_limit": "60 s"} | {name: draw(often(SETTINGS[name])) for name in names}
+        fitting = ("Q1", "Q1/P0") if str(body.mesh.kind) == "hexahedron" else ("P1", "P1/P1")
+        fitting = fitting[::-1] if any(one.unknowns for one in body.effects) else fitting
+    settings = {"element": fitting[0], "time_limit": "60 s"} | {name: draw(often(SETTINGS[name])) for name in names}
     progress = draw(often([None]))
     return lambda: denied(body, fr.solve_body(body, progress=progress, **settings))
 

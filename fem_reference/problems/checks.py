@@ -82,11 +82,10 @@ def check_frames(frames: Any, place: str) -> None:
 
 def _is_number(value: Any) -> bool:
     """Whether a value is a number that has a place among others, and is not a truth value."""
-    return (
-        isinstance(value, int | float | np.integer | np.floating)
-        and not _is_truth(value)
-        and abs(float(value)) <= _FARTHEST
-    )
+    if not isinstance(value, int | float | np.integer | np.floating) or _is_truth(value):
+        return False
+    number: Any = value  # of whatever type, and size
+    return bool(abs(number) <= _FARTHEST)
 
 
 def _is_integer(value: Any) -> bool:
