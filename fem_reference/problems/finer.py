@@ -76,13 +76,13 @@ def _parts(kind: Kind) -> Floats:
     ten = np.concatenate([corners, [corners[list(edge)].mean(axis=0) for edge in _EDGES]])
     parts = ten[np.array(_TETRAHEDRA)]
     wrong = np.linalg.det(parts[:, 1:] - parts[:, :1]) < 0
-    return np.where(wrong[:, None, None], parts[:, [1, 0, 2, 3]], parts)
+    return np.asarray(np.where(wrong[:, None, None], parts[:, [1, 0, 2, 3]], parts))
 
 
 def _linear(kind: Kind, places: Floats) -> Floats:
     """The share (..., c) that each corner has in places (..., 3) of the reference cell."""
     if kind == "tetrahedron":
-        return np.concatenate([1 - places.sum(axis=-1, keepdims=True), places], axis=-1)
+        return np.asarray(np.concatenate([1 - places.sum(axis=-1, keepdims=True), places], axis=-1))
     corners, beside = reference_nodes(kind, 1), places[..., None, :]
     return np.asarray(np.where(corners > 0, beside, 1 - beside).prod(axis=-1))
 
