@@ -82,7 +82,7 @@ def _parts(kind: Kind) -> Floats:
 def _linear(kind: Kind, places: Floats) -> Floats:
     """The share (..., c) that each corner has in places (..., 3) of the reference cell."""
     if kind == "tetrahedron":
-        return np.concatenate([1 - places.sum(axis=-1, keepdims=True), places], axis=-1)
+        return np.asarray(np.concatenate([1 - places.sum(axis=-1, keepdims=True), places], axis=-1))
     corners, beside = reference_nodes(kind, 1), places[..., None, :]
     return np.asarray(np.where(corners > 0, beside, 1 - beside).prod(axis=-1))
 

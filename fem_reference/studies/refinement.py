@@ -3,7 +3,6 @@
 import hashlib
 import logging
 import math
-import sys
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -31,8 +30,8 @@ from fem_reference.studies.taken import without_states
 log = logging.getLogger(__name__)
 
 _EXACT = "exact attachments"
-# The modules that bars are made by, beside the metrics.
-_MAKING = (differences, error_bars, sys.modules[__name__])
+# The files that bars are made by, beside the metrics.
+_MAKING = (differences.__file__, error_bars.__file__, __file__)
 
 # A scene whose tetrahedra are refined has the coarse member of its pair in them, before the last refinement; another has a mesh of
 # its own for it, larger by so much.
@@ -237,7 +236,7 @@ def _of(reference: Run) -> dict[str, str]:
 def _measuring_hash() -> str:
     """A hash over the source files that measure the runs."""
     digest = hashlib.sha256()
-    for path in (*sorted(Path(metrics.__file__).parent.glob("*.py")), *(Path(str(one.__file__)) for one in _MAKING)):
+    for path in (*sorted(Path(metrics.__file__).parent.glob("*.py")), *map(Path, _MAKING)):
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
