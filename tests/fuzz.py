@@ -24,6 +24,7 @@ import hostile
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 
+from fem_reference.foundations.errors import MissingSoftware
 from fem_reference.solvers import fenicsx
 
 # Of one input: processor time [s], the time that passes on a machine that is shared, and memory [bytes].
@@ -166,6 +167,8 @@ def called(call: Callable[[], object]) -> str:
     except hostile.REFUSED as error:
         text = str(error)
         return "refused" if ": got " in text and ", want " in text else f"a message without place: {text}"
+    except MissingSoftware:
+        return "refused"
     except Exception as error:
         frames = traceback.extract_tb(error.__traceback__)[-3:]
         if isinstance(error, TypeError) and len(traceback.extract_tb(error.__traceback__)) <= 2 + (

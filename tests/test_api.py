@@ -223,6 +223,9 @@ def test_calls_with_what_they_do_not_want_are_refused(tmp_path) -> None:
         ),
         "case: got int 3, want a path": lambda: fr.load_case(3),
         "changes: got list": lambda: fr.load_case("hip_flexion", ["frames.last"]),
+        r'motion: got .*, want either "axis" and "centre" \(a rotation\) or "direction"': (
+            lambda: fr.load_case(tmp_path / "bar", {"bone[1].motion.axis": None})
+        ),
         "changes: got dict": lambda: fr.load_case("hip_flexion", {3: 4}),
         "reference: got NoneType None, want a Run": lambda: fr.compare(case, None),
         "candidates: got Run": lambda: fr.compare(case, run, run),

@@ -170,6 +170,8 @@ def test_regions_agree_at_what_they_share() -> None:
         (((1, 1, 1), (1.0, 0.0, 1.0), "tetrahedron"), "size: got"),
         (((1, 1, 1), (1.0, NAN, 1.0), "tetrahedron"), "size: got"),
         (((1, 1, 1), 10.0, "tetrahedron"), "size: got float 10"),
+        (((1, 1, 1), ((), 1.0, 1.0), "tetrahedron"), r"size: got tuple \(\(\), 1.0, 1.0\)"),
+        (((1, 1, 1), np.array(3.0), "tetrahedron"), r"size: got an array \(\)"),
         (((1, 1, 1), (1e-5, 1.0, 1e4), "tetrahedron"), "size: got .* times as long as another"),
         (((1, 1, 1), (1.0, 1.0, 1.0), "P2"), "kind: got str 'P2'"),
         (((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron", 3), "degree: got int 3"),

@@ -54,7 +54,7 @@ def check_box(counts: Any, size: Any, kind: Any, degree: Any) -> None:
         raise InputError("counts", said(counts), "numbers of cells along x, y, z, from 1 on")
     if int(counts[0]) * int(counts[1]) * int(counts[2]) > _MOST_CELLS:
         raise InputError("counts", said(counts), f"{_MOST_CELLS} cells at most")
-    many = isinstance(size, tuple | list | np.ndarray) and len(np.shape(size)) == 1 and len(size) == 3
+    many = isinstance(size, tuple | list | np.ndarray) and getattr(size, "ndim", 1) == 1 and len(size) == 3
     if not many or not all(_is_number(one) and one > _SHORTEST for one in size):
         raise InputError("size", said(size), f"lengths along x, y, z, from {_SHORTEST:g} to {_FARTHEST:g} mm")
     if not max(size) < _LONGEST * min(size):

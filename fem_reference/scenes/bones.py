@@ -35,8 +35,10 @@ class Motion(Record):
     @field_validator("axis", "direction")
     @classmethod
     def _check_direction(
-        cls, direction: tuple[float, float, float], info: ValidationInfo
-    ) -> tuple[float, float, float]:
+        cls, direction: tuple[float, float, float] | None, info: ValidationInfo
+    ) -> tuple[float, float, float] | None:
+        if direction is None:
+            return None
         return _checked_direction(direction, f"{'an' if info.field_name == 'axis' else 'a'} {info.field_name}")
 
     @field_validator("keyframes")
