@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import h5py  # noqa: F401 - before DOLFINx, whose HDF5 it would take for its own
 import pytest
 
 collect_ignore = ["foreign_solver.py", "run_notebook.py"]  # programs: they run where they are imported

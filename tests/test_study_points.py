@@ -40,7 +40,7 @@ def test_the_bar_of_a_statistic_is_that_of_its_worst_frame() -> None:
 
 def test_errors_are_those_of_the_worst_frame_and_none_of_the_truth_itself() -> None:
     truth = run("truth", 0, 1, 2, 3)
-    context = MeasurementContext.of(truth, LINE, (), np.ones(len(BALL.points), bool))
+    context = MeasurementContext.of(truth, LINE, ())
     found = cost.errors(run("other", 0, -1, 2, 2.5), truth, context)
     assert found["surface_deviation.rms"] == pytest.approx(2.0, rel=1e-12)
     assert cost.errors(run("truth", 0, 1, 2, 3), truth, context) == {}
