@@ -63,6 +63,12 @@ class Answer:
         """Whether it is as it should be; never of what is not a number."""
         return self.value <= self.allowed
 
+    @property
+    def share(self) -> float:
+        """The value in what is allowed; infinite where either is not a number."""
+        share = self.value / self.allowed
+        return math.inf if math.isnan(share) else share
+
     def __str__(self) -> str:
         value, allowed = (
             "not a number" if number is None else f"{number:.3g}" for number in (self.value, self.allowed)
@@ -120,7 +126,7 @@ def _worst(answers: Iterable[Answer]) -> Answers:
     """By what is asked the one of ``answers`` that comes nearest to what is allowed, or is farthest beyond."""
     found = dict[str, Answer]()
     for one in answers:
-        if one.asked not in found or not one.value / one.allowed <= found[one.asked].value / found[one.asked].allowed:
+        if one.asked not in found or one.share > found[one.asked].share:
             found[one.asked] = one
     return tuple(found.values())
 
@@ -238,9 +244,7 @@ def _depths(problem: Problem, run: Run, nodes: Nodes) -> Iterator[Answer]:
             )
             answer = ask(muscle, rest)
             if not answer.met and (now := nodes(number)) is not None:
-                answer = min(
-                    answer, ask(Within(skin().moved_to(now)), inside()), key=lambda one: one.value / one.allowed
-                )
+                answer = min(answer, ask(Within(skin().moved_to(now)), inside()), key=lambda one: one.share)
             yield answer
 
 
