@@ -62,6 +62,8 @@ def _pair(contacts: Element, kind: str, name: str, settings: dict[str, float | N
 
 def overlaps(problem: Problem) -> dict[str, float]:
     """By bone in contact how deep [mm] the facets of the contact surface are inside at rest: at corners and middles; 0 outside."""
+    if not obstacles(problem):
+        return {}
     corners = problem.mesh.points[free_facets(problem)]
     middles = corners[:, EDGES[:3]].mean(axis=2)
     points = np.concatenate([corners, middles, corners.mean(axis=1, keepdims=True)], axis=1).reshape(-1, 3)
