@@ -16,7 +16,7 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.fibres import Directions
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems.contact import Contact, Obstruction
-from fem_reference.problems.courses import Moving, course, moving_ramp, posed, some, stops
+from fem_reference.problems.resolved_paths import Moving, moving_ramp, posed, some, stops, turning
 
 Kind = Literal["tetrahedron", "hexahedron"]
 # By element: kind of cell, degree of the displacement, and of the pressure (None: no such unknown; 0: constant in each cell). Where
@@ -229,4 +229,4 @@ def _moving(entry: Prescribed, points: Floats) -> Moving:
     def at(frame: float) -> Floats:
         return points + entry.displacements(points, frame)
 
-    return Moving(f'prescribed "{entry.name}"', at, course(entry.path, points))
+    return Moving(f'prescribed "{entry.name}"', at, turning(entry.path, points))

@@ -63,11 +63,11 @@ def _end(built: Problem, choice: SolverChoice, until: int, count: int) -> tuple[
     settings = fenicsx.Settings(**{**choice.settings, **step})
     frames = list[Frame]()
     outcome = fenicsx.solve(replace(built, frames=(built.frames[0], until)), settings, frames.append)
-    told(outcome)
+    check_not_stalled(outcome)
     return outcome.status, frames[-1].tets if outcome.status == "converged" else None
 
 
-def told(outcome: Outcome) -> None:
+def check_not_stalled(outcome: Outcome) -> None:
     """StalledError where an ``outcome`` says nothing of the run."""
     if outcome.status == "stalled":
         raise StalledError(outcome.message)

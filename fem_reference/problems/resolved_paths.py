@@ -4,7 +4,7 @@ Between two stops nothing that is prescribed, and no obstruction, turns by more 
 line between two poses no longer says which way round it was; nothing goes farther, apart from what all do alike, than the body is
 long; and nothing goes there and back, but for a fifteenth of the way there and a hundredth of the body's size.
 
-Of motions and paths of this package it is known at which frames they bend and by which angle they turn between (``course``), so
+Of motions and paths of this package it is known at which frames they bend and by which angle they turn between (``turning``), so
 that this holds whatever they are. Any other function of a frame number is looked at 1024 times over all frames, 16 times between
 two of them at least, and again between where it moves far: what it does within less is not seen.
 """
@@ -20,7 +20,7 @@ import numpy as np
 from fem_reference.effects import Effect, Ramped
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
-from fem_reference.foundations.motion import Course, apply
+from fem_reference.foundations.motion import Turning, apply
 
 # [rad] by which anything turns within a load step at most, and between two frames at which it is looked at; and the share of the
 # body's size that anything travels between two of these.
@@ -35,17 +35,17 @@ _SHORTEST = 1e-9  # of all frames, within which what goes far jumps
 
 @dataclass(frozen=True)
 class Moving:
-    """Points (p, 3) [mm] by frame number (``at``) and the ``course`` that is known of them; ``place`` names them in messages.
+    """Points (p, 3) [mm] by frame number (``at``) and the ``turning`` that is known of them; ``place`` names them in messages.
     ``scale``: of an amount, as of a ramp, which is no motion.
     """
 
     place: str
     at: Callable[[float], Floats]
-    course: Course | None
+    turning: Turning | None
     scale: bool = False
 
 
-def course(path: Any, points: Floats) -> Course | None:
+def turning(path: Any, points: Floats) -> Turning | None:
     """The frames between which a ``path`` of ``points`` (p, 3) is steady, straight or about an axis, and the angle [rad] that it
     has turned by at each; None of one that says none.
     """
@@ -53,7 +53,7 @@ def course(path: Any, points: Floats) -> Course | None:
     if not type(owner).__module__.startswith("fem_reference."):
         return None
     motion = getattr(owner, "motion", owner)  # of a bone, which may have none
-    known = getattr(motion, "course", None)
+    known = getattr(motion, "turning", None)
     return ((), ()) if motion is None else known(points) if known else None
 
 
@@ -103,16 +103,16 @@ def skipped(things: Sequence[Moving], frames: Sequence[float], size: float) -> t
 def posed(place: str, pose: Callable[[float], Floats], points: Floats) -> Moving:
     """What a rigid motion does to the box around ``points`` (n, 3) [mm]."""
     box = np.where(np.indices((2, 2, 2)).reshape(3, -1).T, points.max(axis=0), points.min(axis=0))
-    return Moving(place, lambda frame: apply(pose(frame), box), course(pose, box))
+    return Moving(place, lambda frame: apply(pose(frame), box), turning(pose, box))
 
 
 def _grid(thing: Moving, frames: Sequence[float]) -> Floats:
     """The frames at which a thing is looked at first."""
     first, last = frames[0], frames[-1]
-    if thing.course is None:
+    if thing.turning is None:
         count = max(_BETWEEN, -(-_SAMPLES // (len(frames) - 1)))
         return np.concatenate([np.linspace(a, b, count + 1) for a, b in pairwise(frames)])
-    knots, angles = (np.asarray(values, float) for values in thing.course)
+    knots, angles = (np.asarray(values, float) for values in thing.turning)
     ends = np.unique(np.clip([first, *knots, last], first, last))
     turned = np.abs(np.diff(np.interp(ends, knots, angles))) if len(knots) else np.zeros(len(ends) - 1)
     if not turned.sum() < _MOST * _LOOKED:
@@ -199,8 +199,8 @@ def _turns(thing: Moving, frames: Floats, places: Floats) -> Floats:
     """By how much [rad] a thing turns from each of ``frames`` (m,) to the next, (m - 1,): as is known, or else as the direction
     from the middle of its points at ``places`` (m, p, 3) to one of them turns at most.
     """
-    if thing.course is not None:
-        knots, angles = thing.course
+    if thing.turning is not None:
+        knots, angles = thing.turning
         return np.abs(np.diff(np.interp(frames, knots, angles))) if knots else np.zeros(len(frames) - 1)
     rays = places - places.mean(axis=1, keepdims=True)
     lengths = np.linalg.norm(rays, axis=2)
