@@ -1,6 +1,7 @@
 """Where a muscle goes by the motion of its bones, guessed before it is solved, and its shape as a beam."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -56,12 +57,12 @@ def motion(guess: Guess, axis: Floats, numbers: tuple[int, ...]) -> tuple[float,
     guess, at = guess.some(100), np.linspace(numbers[0], numbers[-1], min(401, 4 * (numbers[-1] - numbers[0]) + 1))
     velocity = np.diff(np.stack([guess.at(frame) for frame in at]), axis=0) / (at[1] - at[0])
     first = np.concatenate([np.zeros_like(velocity[:1]), velocity])  # it starts from rest
-    change = _size(np.diff(first, axis=0))
+    change = rms(np.diff(first, axis=0))
     typical = float(np.median(change))
     jumps = change[change > 5 * typical + 1e-12]
     smooth = change[change <= 5 * typical + 1e-12]
     sideways = velocity - (velocity @ axis)[..., None] * axis
-    speeds = (float(_size(one).max()) for one in (velocity, sideways))
+    speeds = (float(rms(one).max()) for one in (velocity, sideways))
     return *speeds, float(jumps.max(initial=0.0)), float(smooth.max(initial=0.0)) / (at[1] - at[0])
 
 
@@ -75,9 +76,9 @@ def strain(points: Floats, moved: Floats) -> float:
     return float(min(1.0, np.linalg.norm(now - turned) / np.linalg.norm(rest)))
 
 
-def _size(vectors: Floats) -> Floats:
-    """The root mean square (f,) of ``vectors`` (f, n, 3) over n."""
-    return np.asarray(np.sqrt((vectors**2).sum(axis=2).mean(axis=1)))
+def rms(vectors: Floats) -> Any:
+    """The root mean square of ``vectors`` (n, 3), or (f,) of (f, n, 3), over n."""
+    return np.sqrt((vectors**2).sum(axis=-1).mean(axis=-1))
 
 
 def centres(rest: Setup, frame: float | None = None) -> list[Floats]:
