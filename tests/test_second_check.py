@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from fem_reference import cli, effects
 from fem_reference.assessment import comparison, second_check
-from fem_reference.assessment.run_checks import Check, of_body, of_muscle
+from fem_reference.assessment.run_checks import RunCheck, of_body, of_muscle
 from fem_reference.foundations.mesh import Surface
 from fem_reference.foundations.motion import Rotation as Turn
 from fem_reference.foundations.motion import Translation
@@ -228,12 +228,12 @@ def test_no_verdict_rests_on_a_denied_reference(tmp_path) -> None:
 
 
 def test_what_is_no_number_is_never_met() -> None:
-    assert [Check("a", value, 1.0, "mm", 0).met for value in (0.0, 1.0, 1.1, np.nan, np.inf)] == [
+    assert [RunCheck("a", value, 1.0, "mm", 0).met for value in (0.0, 1.0, 1.1, np.nan, np.inf)] == [
         True,
         True,
         *[False] * 3,
     ]
-    assert not Check("a", 0.0, np.nan, "mm", 0).met
+    assert not RunCheck("a", 0.0, np.nan, "mm", 0).met
 
 
 def test_what_is_so_at_rest_is_no_crossing(tmp_path) -> None:

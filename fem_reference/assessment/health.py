@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference.assessment.stress import History
-from fem_reference.foundations.mesh import Floats, Surface, TetMesh, enclosed_volume, tet_volumes
+from fem_reference.foundations.mesh import Floats, Surface, TetMesh, diagonal, enclosed_volume, tet_volumes
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.signed_distance import signed_distances
 from fem_reference.geometry.windings import outer_windings
@@ -43,7 +43,7 @@ class Followed:
     @property
     def size(self) -> float:
         """The diagonal of the body at rest [mm]."""
-        return float(np.linalg.norm(np.ptp(self.surface.points, axis=0)))
+        return diagonal(self.surface.points)
 
 
 _LOOKS = 33  # how often on the way from a frame to the next it is looked where vertices are

@@ -16,7 +16,7 @@ from fem_reference.effects import Effect, Load
 from fem_reference.effects.damping import Damping
 from fem_reference.effects.gravity import Gravity
 from fem_reference.effects.inertia import Inertia
-from fem_reference.foundations.mesh import Floats, Surface, boundary, vertex_areas
+from fem_reference.foundations.mesh import Floats, Surface, boundary, diagonal, place_of, vertex_areas
 from fem_reference.foundations.motion import Rotation, apply
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.intersections import overlaps, self_crossings
@@ -48,7 +48,7 @@ _BALANCE = 10.0
 
 
 @dataclass(frozen=True)
-class Check:
+class RunCheck:
     """A check by ``name``: the ``value`` at a ``frame`` and ``place``, which may be ``allowed`` at most, both in ``unit``."""
 
     name: str
@@ -77,22 +77,21 @@ class Check:
         return f"{self.name}: {value}{self.unit and f' {self.unit}'} in frame {self.frame:g}{where}, allowed {allowed}"
 
 
-Checks = tuple[Check, ...]
+RunChecks = tuple[RunCheck, ...]
 # Positions (n, 3) [mm] by frame number.
 Nodes = Callable[[int], Floats | None]
 
 
-def of_body(body: Body, solved: Solved) -> Checks:
+def of_body(body: Body, solved: Solved) -> RunChecks:
     """All states there and finite, and what is prescribed exactly met at its nodes."""
     numbers, points = tuple(state.frame for state in solved.states), [state.points for state in solved.states]
     found = (_complete(body.frames, numbers), _finite(numbers, points))
     if not all(one.met for one in found):
         return found
-    size = float(np.linalg.norm(np.ptp(body.mesh.points, axis=0)))
-    return (*found, *_worst(_prescribed(body, solved, size)))
+    return (*found, *_worst(_prescribed(body, solved)))
 
 
-def _prescribed(body: Body, solved: Solved, size: float) -> Iterator[Check]:
+def _prescribed(body: Body, solved: Solved) -> Iterator[RunCheck]:
     begun = body.start is not None  # its first state is where it is put
     for state in solved.states[1:] if begun else solved.states:
         for entry in body.prescribed:
@@ -101,11 +100,13 @@ def _prescribed(body: Body, solved: Solved, size: float) -> Iterator[Check]:
                 rest, along = body.mesh.points[nodes], list(entry.components)
                 wanted = entry.path(rest, state.frame)
                 off = np.abs((state.points[nodes] - rest - wanted)[:, along]).max(axis=1)
-                allowed = SAME * (size + float(np.abs(wanted).max()))  # by which regions may contradict where they meet
+                allowed = SAME * (
+                    body.size + float(np.abs(wanted).max())
+                )  # by which regions may contradict where they meet
                 yield _at(f"prescribed at {entry.name}", off, np.full(len(off), allowed), state.frame, rest)
 
 
-def of_muscle(problem: Problem, run: Run, nodes: Nodes = lambda _: None) -> Checks:
+def of_muscle(problem: Problem, run: Run, nodes: Nodes = lambda _: None) -> RunChecks:
     """All frames there, in order and finite; attachments where their bones are; load steps small enough; forces in balance; and no
     bone and no surface crossed. ``nodes``: where the points of the tetrahedra are, where that is known.
     """
@@ -122,44 +123,43 @@ def of_muscle(problem: Problem, run: Run, nodes: Nodes = lambda _: None) -> Chec
     return (*found, *_worst(chain(attached, _steps(problem, run), _balance(problem, run), crossed)))
 
 
-def _worst(checks: Iterable[Check]) -> Checks:
+def _worst(checks: Iterable[RunCheck]) -> RunChecks:
     """The one of the ``checks`` of each name that comes nearest to what is allowed, or is farthest beyond."""
-    found = dict[str, Check]()
+    found = dict[str, RunCheck]()
     for one in checks:
         if one.name not in found or one.share > found[one.name].share:
             found[one.name] = one
     return tuple(found.values())
 
 
-def _at(name: str, values: Floats, allowed: Floats, frame: float, places: Floats) -> Check:
+def _at(name: str, values: Floats, allowed: Floats, frame: float, places: Floats) -> RunCheck:
     """The check at the point (n, 3) where ``values`` (n,) [mm] are nearest to what is ``allowed`` (n,), or beyond it most."""
     i = int(np.argmax(values / allowed))
-    x, y, z = places[i]
-    return Check(name, float(values[i]), float(allowed[i]), "mm", frame, f"({x:.1f}, {y:.1f}, {z:.1f}) mm")
+    return RunCheck(name, float(values[i]), float(allowed[i]), "mm", frame, place_of(places[i]))
 
 
-def _complete(wanted: tuple[float, ...], numbers: tuple[float, ...]) -> Check:
+def _complete(wanted: tuple[float, ...], numbers: tuple[float, ...]) -> RunCheck:
     """The number of frames that are missing or not in their place."""
     lost = sum(one != other for one, other in zip(wanted, numbers, strict=False)) + abs(len(wanted) - len(numbers))
     first = next((one for one, other in zip(wanted, numbers, strict=False) if one != other), wanted[-1])
-    return Check("frames that are missing or out of order", float(lost), 0.0, "", first)
+    return RunCheck("frames that are missing or out of order", float(lost), 0.0, "", first)
 
 
-def _finite(numbers: tuple[float, ...], arrays: list[Floats]) -> Check:
+def _finite(numbers: tuple[float, ...], arrays: list[Floats]) -> RunCheck:
     """The number of positions that are not finite."""
     lost = [int((~np.isfinite(array)).any(axis=1).sum()) for array in arrays]
     frame = numbers[int(np.argmax(np.array(lost) > 0))] if lost else 0
-    return Check("positions that are not finite", float(sum(lost)), 0.0, "", frame)
+    return RunCheck("positions that are not finite", float(sum(lost)), 0.0, "", frame)
 
 
-def _attached(problem: Problem, run: Run, entry: AttachedVertices) -> Iterator[Check]:
+def _attached(problem: Problem, run: Run, entry: AttachedVertices) -> Iterator[RunCheck]:
     """Exact: vertices at the pose of their bone, but for strain over how far they are from the facets that are attached. Springs:
     by their mean extension, which is the force over stiffness and area.
     """
     rest, skin = problem.surface.points[entry.vertices], problem.attached_skins.get(entry.attachment)
     facets_away = distances(rest, Surface(problem.mesh.points, problem.mesh.facets[entry.attachment])).distance
     weights = vertex_areas(problem.surface.points, problem.surface.triangles)[entry.vertices]
-    size, forces = _size(problem.surface), run.scalars.get(f"force_{entry.attachment}")
+    size, forces = diagonal(problem.surface.points), run.scalars.get(f"force_{entry.attachment}")
     for i, number in enumerate(run.numbers):
         away = run.positions[i][entry.vertices] - apply(entry.bone.pose(number), rest)
         if entry.stiffness is None:
@@ -170,10 +170,10 @@ def _attached(problem: Problem, run: Run, entry: AttachedVertices) -> Iterator[C
         elif forces is not None and skin is not None:
             mean = float(np.linalg.norm(weights @ away) / weights.sum())
             yielded = float(forces[i]) / (entry.stiffness * float(skin.areas.sum()))
-            yield Check(f"springs of {entry.attachment}, mean", mean, _SPRINGS * yielded + 1e-4 * size, "mm", number)
+            yield RunCheck(f"springs of {entry.attachment}, mean", mean, _SPRINGS * yielded + 1e-4 * size, "mm", number)
 
 
-def _steps(problem: Problem, run: Run) -> Iterator[Check]:
+def _steps(problem: Problem, run: Run) -> Iterator[RunCheck]:
     """Rotation and travel of a bone in a load step, on average from a frame to the next; not of a frame that needed none."""
     counts = run.scalars.get("load_steps", np.full(len(run.numbers), np.nan))
     contact, attached = problem.contact, {entry.bone.name for entry in problem.attached}
@@ -185,8 +185,10 @@ def _steps(problem: Problem, run: Run) -> Iterator[Check]:
             if bone.motion is None or (alike and not turns):
                 continue
             travelled = _travel(bone, before, number) / float(counts[i])
-            words, allowed, unit = ("turns", _TURN, "rad") if turns else ("slides", 1.01 * _size(run.surface), "mm")
-            yield Check(f"{bone.name} {words} by load step", travelled, allowed, unit, number)
+            words, allowed, unit = (
+                ("turns", _TURN, "rad") if turns else ("slides", 1.01 * diagonal(run.surface.points), "mm")
+            )
+            yield RunCheck(f"{bone.name} {words} by load step", travelled, allowed, unit, number)
 
 
 def _travel(bone: RigidBody, before: float, after: float) -> float:
@@ -198,7 +200,7 @@ def _travel(bone: RigidBody, before: float, after: float) -> float:
     return float(np.abs(np.diff(np.interp(stops, motion.frames, amounts))).sum())
 
 
-def _balance(problem: Problem, run: Run) -> Iterator[Check]:
+def _balance(problem: Problem, run: Run) -> Iterator[RunCheck]:
     """The sums of forces and of moments of bones on the muscle, by attachments and contact: 0 where nothing acts from outside."""
     outer = any(isinstance(one, (Load, Gravity, Damping, Inertia)) or _is_foreign(one) for one in problem.effects)
     residual = _BALANCE * run.origin.get("settings", {}).get("residual", math.nan)
@@ -206,7 +208,7 @@ def _balance(problem: Problem, run: Run) -> Iterator[Check]:
     for kind, unit, arm in (("force", "N", 1.0), ("moment", "N mm", float(np.abs(run.positions).max()))):
         if not outer and f"net_{kind}" in run.scalars and math.isfinite(allowed):
             for number, value in zip(run.numbers, run.scalars[f"net_{kind}"], strict=True):
-                yield Check(f"{kind}s out of balance", float(value), allowed * arm, unit, number)
+                yield RunCheck(f"{kind}s out of balance", float(value), allowed * arm, unit, number)
 
 
 def _is_foreign(effect: Effect) -> bool:
@@ -214,13 +216,9 @@ def _is_foreign(effect: Effect) -> bool:
     return not type(effect).__module__.startswith("fem_reference.effects.")
 
 
-def _size(surface: Surface) -> float:
-    return float(np.linalg.norm(np.ptp(surface.points, axis=0)))
-
-
 def _states(run: Run, bones: Sequence[RigidBody]) -> Iterator[tuple[int, int]]:
     """Index and number of the frames at which muscle or ``bones`` are elsewhere than at rest, and at all frames before."""
-    seen, near = [(run.surface.points, *(np.eye(4) for _ in bones))], _ROUNDING * _size(run.surface)
+    seen, near = [(run.surface.points, *(np.eye(4) for _ in bones))], _ROUNDING * diagonal(run.surface.points)
     for i, number in enumerate(run.numbers):
         now = (run.positions[i], *(bone.pose(number) for bone in bones))
         if not any(all(np.abs(a - b).max() <= near for a, b in zip(now, one, strict=True)) for one in seen):
@@ -228,7 +226,7 @@ def _states(run: Run, bones: Sequence[RigidBody]) -> Iterator[tuple[int, int]]:
             yield i, number
 
 
-def _depths(problem: Problem, run: Run, nodes: Nodes) -> Iterator[Check]:
+def _depths(problem: Problem, run: Run, nodes: Nodes) -> Iterator[RunCheck]:
     """Depths of each bone in contact and the muscle in each other. Where its surface, whose triangles may be large, is deeper
     than is allowed, that of its tetrahedra is checked too: the muscle is crossed where both are.
     """
@@ -248,7 +246,7 @@ def _depths(problem: Problem, run: Run, nodes: Nodes) -> Iterator[Check]:
             yield check
 
 
-def _deep(bone: RigidBody, number: int, give: float, muscle: Within, rest: Within, *, pressed: bool) -> Check:
+def _deep(bone: RigidBody, number: int, give: float, muscle: Within, rest: Within, *, pressed: bool) -> RunCheck:
     """Depth of a bone and the muscle in each other; beyond rest, where that is more than contact gives way. Never to the middle
     of a bone.
     """
@@ -283,7 +281,7 @@ def _behind(surface: Surface, place: Floats) -> float:
     return float((np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1) ** 2).max()) / 6
 
 
-def _creases(run: Run) -> Iterator[Check]:
+def _creases(run: Run) -> Iterator[RunCheck]:
     """Reach of the muscle's surface through itself where it does not at rest."""
     triangles, allowed = run.surface.triangles, np.array([_CREASE * spacing(run.surface)])
     at_rest = cache(lambda: np.unique(triangles[self_crossings(run.surface)]))

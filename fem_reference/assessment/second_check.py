@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from fem_reference.assessment import run_checks
-from fem_reference.assessment.run_checks import Check, Checks, of_body, of_muscle
+from fem_reference.assessment.run_checks import RunCheck, RunChecks, of_body, of_muscle
 from fem_reference.foundations.records import Record
 from fem_reference.problems.body import Body
 from fem_reference.problems.muscle import Problem
@@ -27,7 +27,7 @@ log = logging.getLogger(__name__)
 RECORD = "second_check"
 
 
-def confirmed(outcome: Outcome, checks: Checks) -> Outcome:
+def confirmed(outcome: Outcome, checks: RunChecks) -> Outcome:
     """An ``outcome`` that is converged, denied where one of the ``checks`` is not met."""
     lost = [str(one) for one in checks if not one.met]
     if not lost or outcome.status != "converged":
@@ -75,7 +75,7 @@ def _code() -> str:
 def texts_of(run: Run) -> tuple[str, ...]:
     """The checks that are stored with a ``run``, in words, first those that deny it; none of one that was not checked."""
     found = run.origin.get(RECORD, {}).get("checks", [])
-    texts = [str(Check(**{key: value for key, value in one.items() if key != "met"})) for one in found]
+    texts = [str(RunCheck(**{key: value for key, value in one.items() if key != "met"})) for one in found]
     return tuple(text for met in (False, True) for text, one in zip(texts, found, strict=True) if one["met"] is met)
 
 

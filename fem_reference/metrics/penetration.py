@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats, Surface, enclosed_volume
+from fem_reference.foundations.mesh import Floats, Surface, enclosed_volume, place_of
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.exemption import Exemption
 from fem_reference.geometry.overlap import shared
@@ -103,7 +103,7 @@ def _deepest(exempt: Exemption, fine: Surface, bone: RigidBody, number: int, all
     worst = int(depths.argmax())
     vertex = np.flatnonzero(corners.vertices == worst)
     what = f"vertex {vertex[0]}" if len(vertex) else "between vertices"
-    return _Worst(float(depths[worst]), f"{what} at {_at(fine.points[worst])} in {bone.name}")
+    return _Worst(float(depths[worst]), f"{what} at {place_of(fine.points[worst])} in {bone.name}")
 
 
 def _allowed(exempt: Exemption, bones: tuple[RigidBody, ...], numbers: tuple[int, ...]) -> dict[str, Floats]:
@@ -125,11 +125,6 @@ def _alike(bone: RigidBody, name: str, bones: tuple[RigidBody, ...], numbers: tu
     """Whether a ``bone`` has this ``name`` or moves as the one that has."""
     own = next((other for other in bones if other.name == name), bone)
     return own.name == name and all(np.allclose(own.pose(frame), bone.pose(frame)) for frame in numbers)
-
-
-def _at(point: Floats) -> str:
-    x, y, z = point
-    return f"({x:.1f}, {y:.1f}, {z:.1f}) mm"
 
 
 def _value(one: _Worst) -> float:

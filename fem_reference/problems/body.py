@@ -12,7 +12,7 @@ import numpy as np
 
 from fem_reference.effects import Effect
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Floats, Ints, diagonal
 from fem_reference.geometry.fibres import Directions
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems.contact import Contact, Obstruction
@@ -208,7 +208,7 @@ class Body:
     @property
     def size(self) -> float:
         """The diagonal of the box around the body [mm]."""
-        return float(np.linalg.norm(np.ptp(self.mesh.points, axis=0)))
+        return diagonal(self.mesh.points)
 
     def points_on(self, on: str | Skin) -> Floats:
         """The corners (n, 3) [mm] of the facets of a region, or the points of a skin, at rest."""

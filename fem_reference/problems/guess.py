@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from fem_reference.foundations.mesh import Floats, enclosed_volume, vertex_areas
+from fem_reference.foundations.mesh import Floats, diagonal, enclosed_volume, vertex_areas
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.signed_distance import signed_distances
 from fem_reference.problems.muscle import RigidBody, Setup
@@ -128,7 +128,7 @@ def turn(rest: Setup, frame: float) -> float:
 def length_of(rest: Setup) -> float:
     """From the first attachment to the last, or all of the muscle where it has not two."""
     middles = centres(rest)
-    extent = float(np.linalg.norm(np.ptp(rest.surface.points, axis=0)))
+    extent = diagonal(rest.surface.points)
     return float(np.linalg.norm(middles[0] - middles[-1])) or extent if len(middles) > 1 else extent
 
 

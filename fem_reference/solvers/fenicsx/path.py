@@ -8,7 +8,7 @@ from dolfinx import la
 from mpi4py import MPI
 
 from fem_reference.foundations.limits import ENERGY_GAP
-from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.mesh import Floats, place_of
 from fem_reference.solvers.fenicsx.determinants import Determinants, Smallest
 from fem_reference.solvers.fenicsx.system import System
 
@@ -147,8 +147,7 @@ def least(values: Floats) -> Floats:
 
 def on_the_way(jump: Smallest) -> str:
     """What is wrong with a step through ``jump``."""
-    x, y, z = jump.at
     return (
         f"to a state on another path: on the straight way from the last one det F falls to {jump.value:.2g} of itself, "
-        f"in cell {jump.cell} at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
+        f"in cell {jump.cell} at {place_of(jump.at)}"
     )
