@@ -107,7 +107,7 @@ def _deepest(exempt: Exemption, fine: Surface, bone: RigidBody, number: int, all
 
 
 def _allowed(exempt: Exemption, bones: tuple[RigidBody, ...], numbers: tuple[int, ...]) -> dict[str, Floats]:
-    """By bone, the depth [mm] that is allowed at the corners (k,) of the pieces of a surface: none where contact is felt, beside
+    """The depth [mm] by bone that is allowed at the corners (k,) of the pieces of a surface: none where contact is felt, beside
     attachments that at rest, and any on attachments to this bone or to one that moves as it does at all frame ``numbers``.
     """
     near, on = exempt.corners.away <= exempt.reach, exempt.corners.away == 0
@@ -122,7 +122,7 @@ def _allowed(exempt: Exemption, bones: tuple[RigidBody, ...], numbers: tuple[int
 
 
 def _alike(bone: RigidBody, name: str, bones: tuple[RigidBody, ...], numbers: tuple[int, ...]) -> bool:
-    """Whether a ``bone`` has this ``name`` or moves as the one that has."""
+    """True where a ``bone`` has this ``name`` or moves as the one that has."""
     own = next((other for other in bones if other.name == name), bone)
     return own.name == name and all(np.allclose(own.pose(frame), bone.pose(frame)) for frame in numbers)
 

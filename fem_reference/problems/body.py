@@ -158,8 +158,8 @@ class Prescribed:
     stiffness: float | None = None
 
     def displacements(self, points: Floats, frame: float) -> Floats:
-        """What the path prescribes for ``points`` (n, 3) [mm] along the components, and 0 along the others; InputError where it
-        has no displacements for them.
+        """Displacements (n, 3) [mm] that the path prescribes for ``points`` (n, 3) [mm] along the components, and 0 along the
+        others; InputError where it has no displacements for them.
         """
         place, want = f'prescribed "{self.name}": path at frame {frame:g}', "displacements (n, 3) of points (n, 3)"
         try:

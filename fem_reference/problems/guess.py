@@ -67,7 +67,7 @@ def motion(guess: Guess, axis: Floats, numbers: tuple[int, ...]) -> tuple[float,
 
 
 def strain(points: Floats, moved: Floats) -> float:
-    """How much ``points`` (n, 3) are deformed that are ``moved`` (n, 3): what the best rigid motion (Kabsch 1976, doi
+    """The strain of ``points`` (n, 3) that are ``moved`` (n, 3): what the best rigid motion (Kabsch 1976, doi
     10.1107/S0567739476001873) leaves, root mean square, over that of the distances from the middle; 1 at most.
     """
     rest, now = points - points.mean(axis=0), moved - moved.mean(axis=0)

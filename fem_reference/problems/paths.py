@@ -116,7 +116,7 @@ class From:
         return self.pose(max(frame, self.first))
 
     def turning(self, points: Floats) -> Turning | None:
-        """That of the pose, and where it begins."""
+        """Frames and angles of the pose, from where it begins."""
         known = turning(self.pose, points)
         if known is None or not known[0]:
             return known
@@ -135,7 +135,7 @@ class Follows:
         return apply(self.pose(frame), points) - points
 
     def turning(self, points: Floats) -> Turning | None:
-        """That of the pose."""
+        """Frames and angles of the pose."""
         return turning(self.pose, points)
 
 

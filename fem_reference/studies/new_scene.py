@@ -103,7 +103,7 @@ def write(folder: Path, muscle: Surface, bones: dict[str, Surface]) -> None:
 
 
 def is_name(name: str) -> bool:
-    """Whether a scene can call something so."""
+    """True where a scene can call something so."""
     try:
         return bool(check_name(name))
     except ValueError:
@@ -111,7 +111,7 @@ def is_name(name: str) -> bool:
 
 
 def _cleaned(name: str) -> str:
-    """What a ``name`` comes to on one line, without what is not printed, and not too long."""
+    """The ``name`` on one line, without what is not printed, and not too long."""
     shown = "".join(letter if letter.isprintable() else "_" for letter in name)[:_LONGEST].strip()
     return shown.lstrip(".") or "bone"
 
@@ -135,7 +135,7 @@ def _new(folder: Path) -> Path:
 
 
 def _factor(unit: str) -> float:
-    """How many mm a unit of the command line has."""
+    """The length [mm] of a unit of the command line."""
     try:
         return length_unit(unit)
     except ValueError as error:

@@ -66,7 +66,7 @@ class Path:
         self.energy, (self.unknowns, self.forces) = energy, states[-1]
 
     def _gap(self, energy: float, states: list[tuple[Floats, Floats]]) -> float:
-        """What the energy grew by up to the last of ``states`` (unknowns and forces) without work, over the greatest so far; they
+        """The growth of the energy up to the last of ``states`` (unknowns and forces) without work, over the greatest so far; they
         are two, or three at equal distances of time.
         """
         own = self.system.owned
