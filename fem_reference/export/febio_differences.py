@@ -12,7 +12,7 @@ from fem_reference.problems.muscle import AttachedVertices, Problem
 
 # What FEBio 4.11 gave with springs over facets, for the reference's own, at 1 rad on gluteus_medius and gluteus_maximus.
 MEASURED = (
-    "springs spread in these two ways differed by 5.3 and 8.8 % of the force on the femur, and by up to 1.1 mm (rms) "
+    "the same springs at points and over facets differed by 5.3 and 8.8 % of the force on the femur, and by up to 1.1 mm (rms) "
     "in positions, on two muscles of the hip: compare forces no closer than that"
 )
 _FELT = 1e-3  # [mm]: an overlap at rest that is worth a word

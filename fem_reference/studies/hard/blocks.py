@@ -185,7 +185,7 @@ def _check_held(hard: Hard, ends: list[AttachedVertices], surface: Surface) -> N
         both = np.intersect1d(one.vertices, other.vertices)
         shared = surface.points[both]
         off = [np.ptp([apply(end.bone.pose(frame), shared) for end in (one, other)], axis=0) for frame in frames]
-        if np.max(off, initial=0.0) > _SAME * max(hard.block.size if hard.block else (1.0,)):
+        if not np.max(off, initial=0.0) <= _SAME * max(hard.block.size if hard.block else (1.0,)):
             got = f"{other.attachment}, which shares {len(both)} vertices with {one.attachment} and moves otherwise"
             raise InputError(join(hard.place, f"hold[{j}].face"), got, "a face without a common edge, or one motion")
 
