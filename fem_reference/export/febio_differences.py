@@ -7,7 +7,7 @@ from scipy.linalg import eigh
 
 from fem_reference.export.febio_contact import overlaps, search_radius
 from fem_reference.export.febio_mesh import by_springs
-from fem_reference.foundations.mesh import Floats, triangle_areas
+from fem_reference.foundations.mesh import Floats, corner_areas
 from fem_reference.problems.muscle import AttachedVertices, Problem
 
 # What FEBio 4.11 gave with springs over facets, for the reference's own, at 1 rad on gluteus_medius and gluteus_maximus.
@@ -34,7 +34,7 @@ def _springs(problem: Problem, attached: AttachedVertices) -> str:
     assert attached.stiffness is not None  # one by springs
     skin = problem.attached_skins[attached.attachment]
     corners = problem.mesh.points[problem.mesh.facets[attached.attachment]]
-    thirds = triangle_areas(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)) / 3
+    thirds = corner_areas(corners) / 3
     middles = (corners + np.roll(corners, 1, axis=1)) / 2  # of edges: a rule that is exact for squares
     points, areas = middles.reshape(-1, 3), np.repeat(thirds, 3)
     centre = skin.areas @ skin.points / skin.areas.sum()

@@ -85,10 +85,31 @@ def place_of(point: Iterable[float]) -> str:
     return f"({x:.1f}, {y:.1f}, {z:.1f}) mm"
 
 
+def edge_vectors(corners: Floats) -> Floats:
+    """Edges (m, 3, c - 1) from the first of the ``corners`` (m, c, 3) of cells to the others, as columns."""
+    return np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+
+
+def normals(corners: Floats) -> Floats:
+    """Normals (m, 3) of triangles with ``corners`` (m, 3, 3), of length twice the area."""
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
+def unit_normals(corners: Floats) -> Floats:
+    """Unit normals (m, 3) of triangles with ``corners`` (m, 3, 3); zero where they have no area."""
+    found = normals(corners)
+    lengths = np.linalg.norm(found, axis=1, keepdims=True)
+    return np.asarray(np.divide(found, lengths, out=np.zeros_like(found), where=lengths > 0))
+
+
+def corner_areas(corners: Floats) -> Floats:
+    """Areas (m,) [mm2] of triangles with ``corners`` (m, 3, 3) [mm]."""
+    return np.asarray(np.linalg.norm(normals(corners), axis=1) / 2)
+
+
 def triangle_areas(points: Floats, triangles: Ints) -> Floats:
     """Area of each of the ``triangles`` (m, 3) between ``points`` (n, 3) [mm], (m,) [mm2]."""
-    a, b, c = (points[triangles[:, corner]] for corner in range(3))
-    return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
+    return corner_areas(points[triangles])
 
 
 def vertex_areas(points: Floats, triangles: Ints) -> Floats:

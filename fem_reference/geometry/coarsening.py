@@ -6,7 +6,7 @@ import igl
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface, enclosed_volume, triangle_areas
+from fem_reference.foundations.mesh import Floats, Ints, Surface, enclosed_volume, normals, triangle_areas, unit_normals
 from fem_reference.geometry.distance import distances
 
 # Chosen on four hip muscles and a box. More rounds gain nothing.
@@ -88,9 +88,8 @@ def free_part(points: Floats, triangles: Ints, chosen: Ints, steps: Floats) -> F
 
 def _normal_tensors(points: Floats, triangles: Ints) -> Floats:
     """Sum over the triangles around each point of their angle there times ``n n^T``, n the unit normal, (n, 3, 3)."""
-    normals = _normals(points, triangles)
-    normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _TINY)
-    squares = normals[:, :, None] * normals[:, None, :]
+    across = unit_normals(points[triangles])
+    squares = across[:, :, None] * across[:, None, :]
     tensors = np.zeros((len(points), 3, 3))
     for here, left, right in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         at = points[triangles[:, here]]
@@ -111,10 +110,10 @@ def inflate(points: Floats, triangles: Ints, volume: float) -> Floats:
 
     """
     for _ in range(3):
-        normals = _around(_normals(points, triangles), triangles, len(points))
-        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _TINY)
+        across = _around(normals(points[triangles]), triangles, len(points))
+        across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), _TINY)
         missing = volume - enclosed_volume(points, triangles)
-        points = points + normals * missing / triangle_areas(points, triangles).sum()
+        points = points + across * missing / triangle_areas(points, triangles).sum()
     return points
 
 
@@ -194,12 +193,6 @@ def _flip_gain(points: Floats, hinge: _Hinges) -> Floats:
     after = _cosine(np.cross(a - c, d - c), np.cross(b - d, c - d))
     allowed = (excess > 1e-3) & (before > _NEARLY_FLAT) & (after > _NEARLY_FLAT)
     return np.where(allowed, excess, 0.0)
-
-
-def _normals(points: Floats, triangles: Ints) -> Floats:
-    """Normals (m, 3) of length twice the area."""
-    a, b, c = (points[triangles[:, corner]] for corner in range(3))
-    return np.cross(b - a, c - a)
 
 
 def _around(values: NDArray[np.float64], triangles: Ints, count: int) -> Floats:

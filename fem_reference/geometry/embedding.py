@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import igl
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, boundary, diagonal
+from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, boundary, diagonal, edge_vectors
 from fem_reference.geometry.distance import Distances, distances
 
 # A point that round-off leaves between two tets is looked for again this far away, as a share of the mesh's diagonal.
@@ -54,7 +54,7 @@ class Locator:
         skin = distances(points[lost], self.skin)
         outside[lost] = skin.distance
         tets[lost] = self.behind[self._first_of_ties(skin)]
-        return Embedding(tets, _barycentric(points, self.mesh.points[self.mesh.tets[tets]]), outside)
+        return Embedding(tets, barycentric(points, self.mesh.points[self.mesh.tets[tets]]), outside)
 
     def _first_of_ties(self, skin: Distances) -> Ints:
         """The closest boundary triangles (n,); a closest point on an edge or corner is in several, and round-off must not choose
@@ -77,8 +77,7 @@ def embed(mesh: TetMesh, points: Floats) -> Embedding:
     return Locator(mesh).embed(points)
 
 
-def _barycentric(points: Floats, corners: Floats) -> Floats:
+def barycentric(points: Floats, corners: Floats) -> Floats:
     """Barycentric coordinates (n, 4) of points (n, 3) in tets of ``corners`` (n, 4, 3)."""
-    edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
-    last = np.linalg.solve(edges, (points - corners[:, 0])[:, :, None])[:, :, 0]
+    last = np.linalg.solve(edge_vectors(corners), (points - corners[:, 0])[:, :, None])[:, :, 0]
     return np.concatenate([1 - last.sum(axis=1, keepdims=True), last], axis=1)

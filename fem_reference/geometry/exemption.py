@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh
+from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, corner_areas, unit_normals
 from fem_reference.geometry.distance import distances
-from fem_reference.geometry.pieces import Pieces, corner_areas, cut
+from fem_reference.geometry.pieces import Pieces, cut
 from fem_reference.geometry.skins import Skin, embedded, points, spacing
 
 # Facing more than 120 degrees away from what is attached is the other side of a thin body.
@@ -68,8 +68,8 @@ class Exemption:
             return np.full(len(points), np.inf), np.full(len(points), -1)
         part = Surface(self.part.reshape(-1, 3), np.arange(3 * len(self.part)).reshape(-1, 3))
         nearest = distances(points, part)
-        own = _normals(self.surface.points[self.surface.triangles])[triangles]
-        facing = np.einsum("ki,ki->k", own, _normals(self.part)[nearest.triangle])
+        own = unit_normals(self.surface.points[self.surface.triangles])[triangles]
+        facing = np.einsum("ki,ki->k", own, unit_normals(self.part)[nearest.triangle])
         return np.where(facing > _SAME_SIDE, nearest.distance, np.inf), self.by[nearest.triangle]
 
     @cached_property
@@ -148,10 +148,3 @@ def free_skin(exempt: Exemption, mesh: TetMesh, apart: float) -> Skin:
     places, areas = points(pieces.of(surface.points[surface.triangles]), np.ones(pieces.corners.shape[:2]))
     felt = exempt.away(np.repeat(pieces.parents, 3), places)[0] > exempt.reach
     return embedded(places[felt], areas[felt], mesh)
-
-
-def _normals(corners: Floats) -> Floats:
-    """Unit normals (m, 3) of triangles with ``corners`` (m, 3, 3); zero where they have no area."""
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.asarray(np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0))

@@ -4,7 +4,7 @@ import numpy as np
 from igl import predicates
 from numpy.typing import NDArray
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface
+from fem_reference.foundations.mesh import Floats, Ints, Surface, normals
 
 
 def self_intersections(surface: Surface) -> Ints:
@@ -58,10 +58,10 @@ def overlaps(one: Floats, other: Floats) -> Floats:
 
 def _reach(triangles: Floats, walls: Floats) -> Floats:
     """Reach (k,) of ``triangles`` through the planes of ``walls`` on the side where it is less; NaN without area."""
-    normals = np.cross(walls[:, 1] - walls[:, 0], walls[:, 2] - walls[:, 0])
+    across = normals(walls)
     with np.errstate(invalid="ignore", divide="ignore"):
-        normals = normals / np.linalg.norm(normals, axis=1)[:, None]
-    heights = np.einsum("kci,ki->kc", triangles - walls[:, :1], normals)
+        across = across / np.linalg.norm(across, axis=1)[:, None]
+    heights = np.einsum("kci,ki->kc", triangles - walls[:, :1], across)
     return np.asarray(np.minimum(heights.max(axis=1), -heights.min(axis=1)))
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Surface
+from fem_reference.geometry.pieces import edge_lengths, quartered
 
 # The first cubes are at most this long [mm], and one in so many of the longest extent of the surface.
 _FIRST_EDGE, _FIRST_CUBES = 10.0, 20
@@ -90,17 +91,10 @@ def _touches(surface: Surface, counts: NDArray[np.bool_], distance: Distance) ->
     for _ in range(_PARTINGS):
         if (away < 0).any():
             return True
-        longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-        corners = _quartered(corners[away.min(axis=1) < longest])
+        longest = edge_lengths(corners).max(axis=1)
+        corners = quartered(corners[away.min(axis=1) < longest])
         away = distance(corners.reshape(-1, 3)).reshape(-1, 3)
     return bool((away < 0).any())
-
-
-def _quartered(corners: Floats) -> Floats:
-    """Triangles with ``corners`` (m, 3, 3), each cut into four at the middles of its sides, (4 m, 3, 3)."""
-    middles = (corners + np.roll(corners, -1, axis=1)) / 2
-    ends = [np.stack([corners[:, k], middles[:, k], middles[:, k - 1]], axis=1) for k in range(3)]
-    return np.concatenate([*ends, middles])
 
 
 class _Sides:

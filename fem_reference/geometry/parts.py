@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface, triangle_areas
+from fem_reference.foundations.mesh import Floats, Ints, Surface, triangle_areas, unit_normals
 from fem_reference.geometry.coarsening import flip_edges, free_part, inflate, slide
 from fem_reference.geometry.distance import distances
 
@@ -172,18 +172,11 @@ def _may_collapse(parts: Parts, around: list[list[int]], goes: int, stays: int) 
     left = np.array([triangle for triangle in around[goes] if triangle not in around[stays]])
     before = triangles[left]
     after = np.where(before == goes, stays, before)
-    one, other = _normals(points, before), _normals(points, after)
+    one, other = unit_normals(points[before]), unit_normals(points[after])
     cosines = np.einsum("ij,ij->i", one, other)
     return bool(
         (cosines > _SAME_SIDE).all() and _flatness(points, after).min() >= min(_flatness(points, old).min(), 0.5)
     )
-
-
-def _normals(points: Floats, triangles: Ints) -> Floats:
-    """Unit normals (m, 3)."""
-    a, b, c = (points[triangles[:, corner]] for corner in range(3))
-    normals = np.cross(b - a, c - a)
-    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _TINY))
 
 
 def _flatness(points: Floats, triangles: Ints) -> Floats:
@@ -231,8 +224,7 @@ def _outwards(parts: Parts, label: int) -> tuple[Floats, float]:
     triangles = parts.triangles[parts.labels == label]
     ends = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     corners = parts.points[triangles]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals = np.repeat(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _TINY), 3, axis=0)
+    normals = np.repeat(unit_normals(corners), 3, axis=0)
     _, which, count = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True)
     alone = count[which.ravel()] == 1
     along = parts.points[ends[alone, 1]] - parts.points[ends[alone, 0]]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface
+from fem_reference.foundations.mesh import Floats, Ints, Surface, corner_areas
 
 # Thin is a triangle the square of whose longest edge is more than so many times its area: of half a square it is 4 times that.
 _THIN = 5.0
@@ -47,8 +47,7 @@ class Pieces:
 
     def quartered(self) -> "Pieces":
         """Each cut in four at the middles of its edges."""
-        parts = np.einsum("qcj,kji->qkci", _QUARTERS, self.corners)
-        return Pieces(np.tile(self.parents, 4), parts.reshape(-1, 3, 3))
+        return Pieces(np.tile(self.parents, 4), quartered(self.corners))
 
     def halved(self, lengths: Floats) -> "Pieces":
         """Each cut in two in the middle of the longest of its edges of ``lengths`` (k, 3), the first of which leaves corner 0."""
@@ -58,15 +57,14 @@ class Pieces:
         return Pieces(np.tile(self.parents, 2), np.concatenate(halves))
 
 
+def quartered(corners: Floats) -> Floats:
+    """Triangles with ``corners`` (k, 3, 3), each cut in four at the middles of its edges (4 k, 3, 3): part by part."""
+    return np.asarray(np.einsum("qcj,kji->qkci", _QUARTERS, corners).reshape(-1, 3, 3))
+
+
 def edge_lengths(corners: Floats) -> Floats:
-    """Those of triangles with ``corners`` (k, 3, 3): of the edge that leaves each corner (k, 3) [mm]."""
+    """Lengths of edges of triangles with ``corners`` (k, 3, 3): of the edge that leaves each corner (k, 3) [mm]."""
     return np.asarray(np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2))
-
-
-def corner_areas(corners: Floats) -> Floats:
-    """Those of triangles with ``corners`` (k, 3, 3): (k,) [mm2]."""
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return np.asarray(np.linalg.norm(normals, axis=1) / 2)
 
 
 def cut(surface: Surface, triangles: Ints, apart: float) -> Pieces:

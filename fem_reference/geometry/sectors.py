@@ -4,7 +4,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface, triangle_areas
+from fem_reference.foundations.mesh import Floats, Ints, Surface, triangle_areas, unit_normals
 from fem_reference.geometry.distance import distances
 
 # Two triangles meet in a sharp edge where their normals are more than this apart.
@@ -14,9 +14,7 @@ _SHARP = np.cos(np.radians(45))
 def sectors(surface: Surface) -> Ints:
     """The number (m, 3) of the sector that each corner of a triangle is in: around a vertex, from sharp edge to sharp edge."""
     triangles = surface.triangles
-    a, b, c = (surface.points[triangles[:, corner]] for corner in range(3))
-    normals = np.cross(b - a, c - a)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
+    normals = unit_normals(surface.points[triangles])
     sides = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)  # side 3 t + i leaves corner i of triangle t
     _, which, count = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
     which = which.ravel()

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, diagonal
+from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, corner_areas, diagonal
 from fem_reference.geometry.embedding import Locator
-from fem_reference.geometry.pieces import Pieces, corner_areas, edge_lengths
+from fem_reference.geometry.pieces import Pieces, edge_lengths
 
 _RULE = np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6
 # Points on a surface are so many to its diagonal, or more: on muscles of the hip, 3 mm apart.

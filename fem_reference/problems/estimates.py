@@ -16,7 +16,7 @@ from fem_reference.effects import (
     total_energy,
 )
 from fem_reference.foundations.indicators import Estimates, Indicator, Near
-from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Floats, Ints, edge_vectors, triangle_areas
 from fem_reference.foundations.motion import apply
 from fem_reference.problems import fibre_field
 from fem_reference.problems.guess import (
@@ -216,21 +216,15 @@ def stretched(rest: Setup, positions: Floats) -> tuple[float, float]:
     if len(rest.attached) < 2:
         return 1.0, 1.0
     triangles, axis = rest.surface.triangles, axis_of(rest)
-    edges = _edges(rest.surface.points, triangles)
+    edges = edge_vectors(rest.surface.points[triangles])
     parts = np.linalg.pinv(edges) @ axis
     along = np.linalg.norm(_combined(edges, parts), axis=1)
-    areas = np.linalg.norm(np.cross(edges[:, :, 0], edges[:, :, 1]), axis=1) / 2
+    areas = triangle_areas(rest.surface.points, triangles)
     some = along > _ALONG
-    moved = _combined(_edges(positions, triangles[some]), parts[some])
+    moved = _combined(edge_vectors(positions[triangles[some]]), parts[some])
     found = np.linalg.norm(moved, axis=1) / along[some]
     low, high = np.quantile(found, (0.01, 0.99), weights=areas[some], method="inverted_cdf")
     return float(low), float(high)
-
-
-def _edges(points: Floats, triangles: Ints) -> Floats:
-    """Two edges (t, 3, 2) of each triangle, as columns."""
-    corners = points[triangles]
-    return np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
 
 
 def _combined(edges: Floats, parts: Floats) -> Floats:

@@ -5,7 +5,8 @@ from itertools import product
 
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Floats, Ints, edge_vectors
+from fem_reference.geometry.embedding import barycentric
 from fem_reference.geometry.fibres import Directions
 from fem_reference.geometry.nested import EDGES, PARTS
 from fem_reference.geometry.skins import Skin
@@ -129,11 +130,7 @@ def _facets(mesh: Cells, names: Ints, shares: Ints) -> dict[str, Ints]:
 def _in_parts(skin: Skin, mesh: Cells) -> Skin:
     """The skin with each point in the nearest part of its cell: that of straight tetrahedra where its least share is greatest."""
     corners = mesh.points[mesh.cells[skin.cells, :4]]
-    edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
-    places = np.linalg.solve(edges, (skin.points - corners[:, 0])[:, :, None])[:, :, 0]
-    parts = _parts("tetrahedron")
-    inside = np.linalg.solve(
-        np.swapaxes(parts[:, 1:] - parts[:, :1], 1, 2)[None], (places[:, None] - parts[None, :, 0])[..., None]
-    )
+    places, parts = barycentric(skin.points, corners)[:, 1:], _parts("tetrahedron")
+    inside = np.linalg.solve(edge_vectors(parts)[None], (places[:, None] - parts[None, :, 0])[..., None])
     least = _linear("tetrahedron", inside[..., 0]).min(axis=-1)
     return replace(skin, cells=8 * skin.cells + least.argmax(axis=1))

@@ -7,7 +7,7 @@ import numpy as np
 
 from fem_reference.effects import Effect, Energy, Prestrain, State, elastic_state, total_energy
 from fem_reference.foundations.jets import Jet, JetFunctions, variables
-from fem_reference.foundations.mesh import Floats, Ints, TetMesh, tet_volumes
+from fem_reference.foundations.mesh import Floats, Ints, TetMesh, edge_vectors, tet_volumes
 
 Acting = Sequence[tuple[Effect, float]]
 
@@ -58,13 +58,13 @@ class StressSamples:
     def __init__(self, mesh: TetMesh, fibre: Floats | None) -> None:
         chosen = np.unique(np.linspace(0, len(mesh.tets) - 1, _MOST).astype(int))
         self.tets: Ints = mesh.tets[chosen]
-        self.inverse = np.linalg.inv(_edges(mesh.points, self.tets))
+        self.inverse = np.linalg.inv(edge_vectors(mesh.points[self.tets]))
         self.volumes = tet_volumes(mesh.points, self.tets)
         self.fibre = None if fibre is None else fibre[chosen]
 
     def sizes(self, positions: Floats, acting: Acting, others: Acting) -> "StressSizes":
         """The sizes for what is ``acting``, and for each of the ``others`` on top, where the points are at ``positions`` (n, 3)."""
-        F = _edges(positions, self.tets) @ self.inverse
+        F = edge_vectors(positions[self.tets]) @ self.inverse
         good = np.linalg.det(F) > _SMALLEST
         if not good.any():
             return StressSizes(np.nan, (np.nan,) * len(others), (np.nan, np.nan))
@@ -91,12 +91,6 @@ def _stretches(acting: Acting, F: Floats, fibre: Floats | None, volumes: Floats)
     state = elastic_state(acting, State([list(row) for row in np.moveaxis(F, 0, -1)], fibre=list(fibre.T)))
     low, high = np.quantile(state.fibre_stretch, (0.01, 0.99), weights=volumes, method="inverted_cdf")
     return float(low), float(high)
-
-
-def _edges(points: Floats, tets: Ints) -> Floats:
-    """Three edges (m, 3, 3) of each tetrahedron, as columns."""
-    corners = points[tets]
-    return np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
 
 
 def _mean(stress: Floats, volumes: Floats) -> float:

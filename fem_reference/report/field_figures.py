@@ -20,7 +20,7 @@ from PIL import Image
 
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.convergence import Ladder
-from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.mesh import Floats, normals
 from fem_reference.geometry.field_mesh import FieldMesh
 from fem_reference.problems.scalar import at
 from fem_reference.report.curves import LOOK, PALETTE, REFERENCE, inline
@@ -277,8 +277,8 @@ def _body(figure: Figure, example: Comparison, wanted: _Shown) -> None:
 def _front(mesh: FieldMesh, values: Floats, scale: ScalarMappable, line: float) -> PolyCollection:
     """The triangles as seen along z, the furthest first, darker the more they are turned from the light."""
     corners = mesh.points[mesh.cells]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    light = np.abs(normals @ _LIGHT) / np.linalg.norm(normals, axis=1)
+    across = normals(corners)
+    light = np.abs(across @ _LIGHT) / np.linalg.norm(across, axis=1)
     faces = np.asarray(scale.to_rgba(values[mesh.cells].mean(axis=1)))
     faces[:, :3] *= (0.55 + 0.45 * light)[:, None]
     order = np.argsort(corners[:, :, 2].mean(axis=1))

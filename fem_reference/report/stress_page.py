@@ -8,6 +8,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from fem_reference.assessment.stress import VERDICTS, History, Scene, Stress
+from fem_reference.foundations.mesh import normals
 from fem_reference.report.templates import template
 from fem_reference.report.words import number
 
@@ -73,8 +74,8 @@ def picture(scene: Scene) -> str:
     image = Image.new("RGB", (side, side), _PAPER)
     draw = ImageDraw.Draw(image)
     corners = seen[scene.triangles]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    facing = normals[:, 2] / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)
+    across = normals(corners)
+    facing = across[:, 2] / np.maximum(np.linalg.norm(across, axis=1), 1e-300)
     for i in np.argsort(-corners[:, :, 2].mean(axis=1)):
         outline = [(float(x), float(y)) for x, y in flat[scene.triangles[i]]]
         draw.polygon(outline, fill=_colour(float(facing[i])), outline=_EDGE)

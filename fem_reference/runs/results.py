@@ -15,7 +15,7 @@ import numpy as np
 from fem_reference.effects import Effect, State
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.jets import JetFunctions, variables
-from fem_reference.foundations.mesh import Floats, Ints, TetMesh
+from fem_reference.foundations.mesh import Floats, Ints, TetMesh, edge_vectors
 from fem_reference.geometry.embedding import Locator
 from fem_reference.problems.body import reference_nodes
 from fem_reference.problems.stresses import first_piola
@@ -176,8 +176,7 @@ class _Places:
 
     def __init__(self, results: Results, state: NodalState, tets: Ints, barycentric: Floats) -> None:
         self.results, self.state, self.tets, self.corners = results, state, tets, barycentric
-        corners = results.mesh.points[results.mesh.tets[tets]]
-        inverse = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))
+        inverse = np.linalg.inv(edge_vectors(results.mesh.points[results.mesh.tets[tets]]))
         gradients = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
         self.functions, self.slopes = lagrange(barycentric, gradients, state.displacement.shape[1])
         self.displacement, self.F = self._moved(state.displacement)

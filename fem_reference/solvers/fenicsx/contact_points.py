@@ -10,6 +10,7 @@ from dolfinx import fem
 from scipy.sparse import csr_array
 
 from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.geometry.embedding import barycentric
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import Cells
 from fem_reference.solvers.fenicsx.tabulated import geometry
@@ -93,9 +94,8 @@ def on_skin(space: fem.FunctionSpace, parents: Ints, skin: Skin, local: dict[int
     cells = np.array([local[int(skin.cells[i])] for i in mine], np.int64)
     msh = space.mesh
     corners = msh.geometry.x[msh.geometry.dofmap[cells]]
-    edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
     points = skin.points[mine]
-    within = np.linalg.solve(edges, (points - corners[:, 0])[:, :, None])[:, :, 0]
+    within = barycentric(points, corners)[:, 1:]
     return _points(space, parents, cells, within, points, skin.areas[mine])
 
 
