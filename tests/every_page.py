@@ -15,7 +15,7 @@ import test_versions
 from fem_reference import report
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.cost_study import Study
-from fem_reference.assessment.stress import Bound, Cell, Course, HardCase, Scene, Stress
+from fem_reference.assessment.stress import Bound, Cell, HardCase, History, Scene, Stress
 from fem_reference.report import index_page
 
 KINDS = (
@@ -88,8 +88,8 @@ def write(folder: Path, comparison: Comparison, alone: Comparison) -> dict[str, 
 def stress(comparison: Comparison) -> Stress:
     """Two hard cases by three solvers, with a picture and a curve."""
     surface, numbers = comparison.reference.surface, comparison.reference.numbers
-    course = Course("kinetic_energy", "mJ", numbers, np.array([0, 1.0, 4.0, 90.0, np.nan]))
-    shown = {"course": course, "scene": Scene(surface.points, surface.triangles, surface.points[0]), "bound": 1.0}
+    history = History("kinetic_energy", "mJ", numbers, np.array([0, 1.0, 4.0, 90.0, np.nan]))
+    shown = {"history": history, "scene": Scene(surface.points, surface.triangles, surface.points[0]), "bound": 1.0}
     verdicts = ("ok", "degraded", "failed", "refused", "inconclusive", "failed")
     places = [(case, solver) for case in ("at_rest", "squeeze") for solver in ("fenicsx", "pbd", "mass_spring")]
     cells = tuple(

@@ -18,7 +18,7 @@ from fem_reference import cli
 from fem_reference.effects import make
 from fem_reference.problems import guess, muscle, of_case
 from fem_reference.problems.estimates import STRESS_TOLERANCE, estimates
-from fem_reference.problems.stresses import Sampled, kirchhoff
+from fem_reference.problems.stresses import StressSamples, StressSizes, kirchhoff
 from fem_reference.runs.store import Frame, Outcome, Run
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
@@ -207,7 +207,7 @@ def test_stresses_of_a_stretched_bar_are_those_of_the_closed_form() -> None:
     fibre = np.tile([0.0, 0.0, 1.0], (len(mesh.tets), 1))
     acting = [(make("neo_hooke", mu=mu), 1.0), (make("incompressible", bulk=10.0), 1.0)]
     active = make("active_tension", tension=pull, ramp=[{"frame": 0, "amount": 1.0}])
-    found = Sampled(mesh, fibre).asked(mesh.points @ F.T, acting, [(active, 0.5)])
+    found = StressSamples(mesh, fibre).sizes(mesh.points @ F.T, acting, [(active, 0.5)])
     share = np.sqrt(2 / 3)  # of the deviator of a uniaxial stress
     assert found.acts == pytest.approx(mu * (stretch**2 - 1 / stretch) * share, rel=1e-9)
     assert found.added == pytest.approx([0.5 * pull * stretch**2 * share], rel=1e-9)
@@ -223,11 +223,13 @@ def test_a_prestretch_counts_by_what_it_changes_of_the_rest() -> None:
     mesh, stretch, mu = shapes.box((1, 1, 1), (1.0, 1.0, 1.0)), 1.1, 0.01
     fibre = np.tile([1.0, 0.0, 0.0], (len(mesh.tets), 1))
     effect = make("prestretch", stretch=stretch, ramp=[{"frame": 0, "amount": 1.0}])
-    found = Sampled(mesh, fibre).asked(mesh.points, [(make("neo_hooke", mu=mu), 1.0)], [(effect, 1.0)])
-    assert Sampled(mesh, fibre).asked(mesh.points, [(effect, 1.0)], []).stretch == pytest.approx((stretch, stretch))
+    found = StressSamples(mesh, fibre).sizes(mesh.points, [(make("neo_hooke", mu=mu), 1.0)], [(effect, 1.0)])
+    assert StressSamples(mesh, fibre).sizes(mesh.points, [(effect, 1.0)], []).stretch == pytest.approx(
+        (stretch, stretch)
+    )
     assert found.acts == pytest.approx(0.0, abs=1e-12)
     longer = mesh.points * [stretch, stretch**-0.5, stretch**-0.5]
-    own = Sampled(mesh, fibre).asked(longer, [(make("neo_hooke", mu=mu), 1.0)], [(effect, 1.0)])
+    own = StressSamples(mesh, fibre).sizes(longer, [(make("neo_hooke", mu=mu), 1.0)], [(effect, 1.0)])
     (uniaxial, doubly) = (mu * (one**2 - 1 / one) * np.sqrt(2 / 3) for one in (stretch, stretch**2))
     assert own.acts == pytest.approx(uniaxial)
     assert own.added == pytest.approx([doubly - uniaxial])
@@ -283,10 +285,20 @@ def test_a_run_that_was_watched_to_its_end_is_not_watched_again(tmp_path, monkey
         run = asked(bench)
     assert len(made) == 1
     assert run.origin["watched"] == bench.watch().names
-    assert bench.watch().seen == {}
+    assert bench.watch().frames == {}
     watched.begin(bench.watch(), SimpleNamespace(folder=run.folder, frames=run.numbers[:3]))  # of one that was cut off
-    assert tuple(bench.watch().seen) == run.numbers[:3]
-    assert all(one.asked.acts == pytest.approx(0, abs=1e-12) for one in bench.watch().seen.values())
+    assert tuple(bench.watch().frames) == run.numbers[:3]
+    assert all(one.stresses.acts == pytest.approx(0, abs=1e-12) for one in bench.watch().frames.values())
+
+
+def test_an_effect_whose_stress_is_no_number_is_needed(tmp_path) -> None:
+    """Energies with logarithms have none beyond their range: nothing shows that such an effect may be left out."""
+    weight = random_scenes.EFFECTS["gravity"].format(density=1e-6, weight="0, 0, -9.81")
+    watch = Bench(pennate(tmp_path / "scene", "auto", weight), tmp_path / "runs").watch()
+    rest = watch.rest.surface.points
+    for added, titles in ((0.0, []), (np.nan, ["Gravity"])):
+        watch.sampled = SimpleNamespace(sizes=lambda *_, added=added: StressSizes(1.0, (added,), (1.0, 1.0)))
+        assert [one.effect.title for one in watch.see(0, rest, rest)] == titles
 
 
 def test_what_loads_move_has_a_speed(tmp_path, monkeypatch) -> None:

@@ -7,6 +7,7 @@ import shlex
 import subprocess
 import sys
 import tomllib
+from typing import get_args
 
 import pages
 import pytest
@@ -16,6 +17,7 @@ import fem_reference as fr
 from fem_reference import effects, metrics, solvers
 from fem_reference.cli._parser import parser
 from fem_reference.foundations.records import keys, parse
+from fem_reference.runs.contents import Status
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.scenes.scalar import ScalarCase
@@ -32,6 +34,13 @@ def test_tables_list_what_there_is() -> None:
     assert sorted(set(listed("docs/command_line.md", "verb"))) == sorted(verbs.choices)
     assert sorted(listed("docs/fast_solvers.md", "solver")) == solvers.names("solve")
     assert sorted(listed("docs/measures.md", "metric")) == metrics.names()
+
+
+def test_every_status_of_a_run_is_in_the_table() -> None:
+    text = pages.page("docs/measures.md")
+    table = text[text.index("| status of a run |") :].split("\n\n")[0]
+    first = "".join(row.split("|")[1] for row in table.splitlines())
+    assert sorted(re.findall(r"`([a-z ]+)`", first)) == sorted(get_args(Status))
 
 
 def test_every_effect_of_a_muscle_is_in_the_table() -> None:

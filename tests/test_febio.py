@@ -26,7 +26,7 @@ from fem_reference import export
 from fem_reference.effects import total_energy
 from fem_reference.export import febio, febio_material
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import tet_volumes, triangle_areas
+from fem_reference.foundations.mesh import boundary, tet_volumes, triangle_areas
 from fem_reference.foundations.motion import apply
 from fem_reference.problems.muscle import Problem
 from fem_reference.scenes import casefile
@@ -136,9 +136,11 @@ def test_a_node_goes_with_one_bone(bar: Problem) -> None:
 
 
 def test_the_contact_surfaces(feb: Element) -> None:
-    """Of the sides 10 x 30 the third in the middle touches no attached node; it faces outwards, as FEBio's surfaces must."""
+    """All of the sides 10 x 30, up to the attached ends: the reference feels contact from 0.4 mm off them, less than the size of a
+    facet; they face outwards, as FEBio's surfaces must.
+    """
     points, free = nodes(feb), cells(feb, "muscle_free", "Surface")
-    assert triangle_areas(points, free[:, :3]).sum() == pytest.approx(4 * 10 * 10, rel=1e-12)
+    assert triangle_areas(points, free[:, :3]).sum() == pytest.approx(4 * 10 * 30, rel=1e-12)
     for middle, (a, b) in zip(free[:, 3:].T, ((0, 1), (1, 2), (2, 0)), strict=True):
         assert np.allclose(points[middle], (points[free[:, a]] + points[free[:, b]]) / 2, rtol=0, atol=1e-12)
     a, b, c = (points[free[:, k]] for k in range(3))
@@ -152,6 +154,16 @@ def test_the_contact_surfaces(feb: Element) -> None:
     a, b, c = (points[ball[:, k]] for k in range(3))
     assert (np.einsum("ij,ij->i", np.cross(b - a, c - a), a) > 0).all()
     assert np.array_equal(ball, cells(feb, "bone_top"))
+
+
+def test_a_contact_surface_without_facets_is_refused(bar: Problem) -> None:
+    """All sides attached: no facet is left, where FEBio would run without contact and say nothing."""
+    outer = boundary(bar.mesh.tets)[0]
+    nowhere = replace(bar, mesh=replace(bar.mesh, facets={"bottom": outer, "top": outer[:1]}))
+    with pytest.raises(
+        InputError, match=r"contact: got no facet of the tetrahedra farther than 0\.41 mm from what is att"
+    ):
+        febio.model(nowhere)
 
 
 def test_a_bone_whose_triangles_face_inwards_is_turned(bar: Problem) -> None:

@@ -23,8 +23,12 @@ STIFFNESS = 0.1  # MPa/mm
 
 @pytest.fixture(scope="module")
 def springs() -> Problem:
-    """A bar whose top of 10 x 10 mm, all of it facets of the tets, is attached on 10 x 8 mm of the muscle's own surface."""
+    """A bar whose top of 10 x 10 mm, all of it facets of the tets, is attached on 10 x 8 mm of the muscle's own surface; the bones
+    are far from its sides.
+    """
     bar = feb_file.bar()
+    far = bar.bones[0].surface.moved_to(bar.bones[0].surface.points - [100, 0, 0])
+    bar = replace(bar, bones=tuple(replace(bone, surface=far) for bone in bar.bones))
     area = Surface(np.array([[0.0, 0, 30], [10, 0, 30], [10, 8, 30], [0, 8, 30]]), np.array([[0, 1, 2], [0, 2, 3]]))
     top = replace(bar.attached[1], stiffness=STIFFNESS)
     skin = attached_skin(area, np.ones((2, 3)), bar.mesh, 3.0)

@@ -10,7 +10,7 @@ import stand_ins
 
 from fem_reference import cli
 from fem_reference.assessment import health, stress
-from fem_reference.assessment.stress import Bound, Cell, Course
+from fem_reference.assessment.stress import Bound, Cell, History
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import tet_volumes
 from fem_reference.geometry import skins
@@ -240,15 +240,15 @@ def test_what_a_case_is_not_about_is_refused_with_the_reason() -> None:
 
 
 def test_judging() -> None:
-    course = Course("volume", "%", (0, 1, 2), np.array([0.0, 3.0, 1.0]))
+    history = History("volume", "%", (0, 1, 2), np.array([0.0, 3.0, 1.0]))
     blank = Cell("case", "pbd", "ok", "", "converged")
-    assert stress.judge(blank, [(Bound(quantity="volume", at_most=2.0), course)]).verdict == "degraded"
-    assert stress.judge(blank, [(Bound(quantity="volume", at_most=2.0, frame="last"), course)]).verdict == "ok"
-    lost = replace(course, values=np.array([0.0, np.nan, 0.0]))
+    assert stress.judge(blank, [(Bound(quantity="volume", at_most=2.0), history)]).verdict == "degraded"
+    assert stress.judge(blank, [(Bound(quantity="volume", at_most=2.0, frame="last"), history)]).verdict == "ok"
+    lost = replace(history, values=np.array([0.0, np.nan, 0.0]))
     found = stress.judge(blank, [(Bound(quantity="volume", at_most=2.0), lost)])
     assert (found.verdict, found.at) == ("failed", 1)
     shown, kept = (
-        stress.judge(blank, [(Bound(quantity="volume", at_most=most), course)], "there is no pressure")
+        stress.judge(blank, [(Bound(quantity="volume", at_most=most), history)], "there is no pressure")
         for most in (2.0, 4.0)
     )
     assert (shown.verdict, kept.verdict) == ("degraded", "failed")
@@ -258,12 +258,12 @@ def test_judging() -> None:
     assert [stress.doubted(blank, "unstable", why).verdict for why in ("", "it is flat")] == ["degraded", "refused"]
     assert stress.doubted(shown, "unstable", "it is flat") is shown
     ended = replace(blank, status="inverted")
-    bounds = [(Bound(quantity="volume", at_most=2.0), course)]
+    bounds = [(Bound(quantity="volume", at_most=2.0), history)]
     assert stress.unfinished(ended, "a cell", bounds, "").verdict == "failed"
     assert stress.unfinished(ended, "a cell", bounds, "it is flat").verdict == "refused"
     assert stress.unfinished(replace(blank, status="limit point"), "", bounds, "").verdict == "refused"
     assert stress.unfinished(replace(ended, status="timed out"), "", bounds, "it is flat").verdict == "failed"
-    first = [(bounds[0][0], replace(course, numbers=(0,), values=course.values[:1]))]
+    first = [(bounds[0][0], replace(history, numbers=(0,), values=history.values[:1]))]
     assert stress.unfinished(ended, "a cell", first, "it is flat").verdict == "failed"
 
 
@@ -272,11 +272,11 @@ def test_quantities_are_zero_at_rest_and_see_what_they_are_for() -> None:
     rest = problem.surface.points
     mirrored = rest * [1, 1, -1]
     run = health.Followed((0, 1), problem.surface, np.array([rest, mirrored]), bones=problem.bones)
-    assert health.course(run, "inside_out").values.tolist() == [0.0, 100.0]
-    np.testing.assert_allclose(health.course(run, "volume").values, [0, 200])
-    np.testing.assert_allclose(health.course(run, "stretch").values, [1, 1])
-    assert health.course(run, "from_rest").values[1] > 100
-    assert health.course(run, "penetration").values.tolist() == [0.0, 0.0]
+    assert health.history(run, "inside_out").values.tolist() == [0.0, 100.0]
+    np.testing.assert_allclose(health.history(run, "volume").values, [0, 200])
+    np.testing.assert_allclose(health.history(run, "stretch").values, [1, 1])
+    assert health.history(run, "from_rest").values[1] > 100
+    assert health.history(run, "penetration").values.tolist() == [0.0, 0.0]
 
 
 def test_a_name_that_is_not_there() -> None:

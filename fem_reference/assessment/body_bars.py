@@ -16,7 +16,7 @@ LEFT = 2.0
 
 @dataclass(frozen=True, eq=False)
 class BodyBars:
-    """How far the states of a body at ``frames`` (f,) may be from those on ever finer cells of the same shape: ``points`` (f, n)
+    """Error bars of a body at ``frames`` (f,): distances from its states on ever finer cells of the same shape: ``points`` (f, n)
     [mm], ``energy`` (f,) [N mm], and by name of what is prescribed, or obstructs, the vectors ``forces`` (f,) [N] and ``moments``
     (f,) [N mm]; NaN where nobody knows. ``displacement`` (f,) is the bar of the displacement over the displacement, both rms over
     the nodes; ``sharper``: what the sharper solution had.

@@ -33,7 +33,9 @@ def typical(differences: Floats, apart: Floats, moved: Floats | None = None) -> 
 
 
 def _median_share(apart: Floats, moved: Floats) -> float:
-    """What surfaces are ``apart`` (f,) over what they have ``moved`` (f,), in the median frame where they have; 0 without any."""
+    """The distance ``apart`` (f,) of surfaces over that they have ``moved`` (f,), in the median frame where they have; 0 without
+    any.
+    """
     known = np.isfinite(apart) & (moved > _MOVED * np.nanmax(moved, initial=0.0))
     return float(np.median(apart[known] / moved[known])) if known.any() else 0.0
 
@@ -61,7 +63,7 @@ def _rms_of_known(shares: Iterable[tuple[str, float]], wanted: str) -> float:
 
 
 def carried(run: Run, moved: Floats) -> dict[str, Floats]:
-    """By statistic of the volume, how far off (f,) that of a ``run``'s surface is, which its tetrahedra carry and which lies partly
+    """Errors (f,), by statistic of the volume, of that of a ``run``'s surface, which its tetrahedra carry and which lies partly
     outside them: by what its volume and that of the tetrahedra themselves change otherwise. Of a run without tetrahedra nothing.
 
     It may cross zero: it counts as at least the share of what the surface has ``moved`` (f,) [mm] that it is on average.

@@ -9,7 +9,7 @@ _LOW = 0.1  # det F, below which a state is hardly valid
 
 
 def doubts(reference: Run) -> list[str]:
-    """What makes a reference doubtful: that it did not reach all frames, is unstable, nearly turned inside out, left the range of
+    """Reasons to doubt a reference: that it did not reach all frames, is unstable, nearly turned inside out, left the range of
     its laws, or lost energy.
     """
     said = list[str]() if reference.outcome.status == "converged" else [str(reference.outcome.status)]

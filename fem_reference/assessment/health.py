@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from fem_reference.assessment.stress import Course
-from fem_reference.foundations.mesh import Floats, Surface, TetMesh, enclosed_volume, tet_volumes
+from fem_reference.assessment.stress import History
+from fem_reference.foundations.mesh import Floats, Surface, TetMesh, diagonal, enclosed_volume, tet_volumes
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.signed_distance import signed_distances
 from fem_reference.geometry.windings import outer_windings
@@ -43,7 +43,7 @@ class Followed:
     @property
     def size(self) -> float:
         """The diagonal of the body at rest [mm]."""
-        return float(np.linalg.norm(np.ptp(self.surface.points, axis=0)))
+        return diagonal(self.surface.points)
 
 
 _LOOKS = 33  # how often on the way from a frame to the next it is looked where vertices are
@@ -208,8 +208,8 @@ def unstable(run: Followed) -> str:
     return f"an unstable equilibrium from frame {run.numbers[first]} on, with up to {most:.0f} negative modes{doubt}"
 
 
-def course(run: Followed, quantity: str) -> Course:
+def history(run: Followed, quantity: str) -> History:
     """A ``quantity`` of a run over its frames."""
     unit, measure = QUANTITIES[quantity]
     values, words, points = measure(run)
-    return Course(quantity, unit, run.numbers, values, tuple(words or ()), points)
+    return History(quantity, unit, run.numbers, values, tuple(words or ()), points)

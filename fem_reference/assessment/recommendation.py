@@ -40,7 +40,7 @@ class Expected:
         return max(self.error - self.bar, self.bar)
 
     def misses(self, limits: Mapping[str, float]) -> float:
-        """How many times as great as allowed by ``limits`` it is, the worse of its error and its time."""
+        """Ratio to what ``limits`` allow, the worse of its error and its time."""
         own = {"error": self.error, "time": self.time}
         return max(own[name] / limit for name, limit in limits.items())
 

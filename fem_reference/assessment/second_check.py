@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.assessment import questions
-from fem_reference.assessment.questions import Answer, Answers, of_body, of_muscle
+from fem_reference.assessment import run_checks
+from fem_reference.assessment.run_checks import RunCheck, RunChecks, of_body, of_muscle
 from fem_reference.foundations.records import Record
 from fem_reference.problems.body import Body
 from fem_reference.problems.muscle import Problem
@@ -27,9 +27,9 @@ log = logging.getLogger(__name__)
 RECORD = "second_check"
 
 
-def confirmed(outcome: Outcome, answers: Answers) -> Outcome:
-    """An ``outcome`` that is converged, denied where one of the ``answers`` is not met."""
-    lost = [str(one) for one in answers if not one.met]
+def confirmed(outcome: Outcome, checks: RunChecks) -> Outcome:
+    """An ``outcome`` that is converged, denied where one of the ``checks`` is not met."""
+    lost = [str(one) for one in checks if not one.met]
     if not lost or outcome.status != "converged":
         return outcome
     return replace(outcome, status="denied", message=f"denied by the second check: {lost[0]}; {outcome.message}")
@@ -43,11 +43,11 @@ def confirmed_run(problem: Callable[[], Problem], run: Run) -> Run:
     if stored.get("code") == code:
         return run
     begin, message = time.process_time(), stored.get("message", run.outcome.message)
-    answers = of_muscle(problem(), run, lambda number: None if run.folder is None else places(run.folder, number)[1])
-    outcome = confirmed(replace(run.outcome, status="converged", message=message), answers)
-    facts = [{name: _known(value) for name, value in asdict(one).items()} | {"met": one.met} for one in answers]
+    checks = of_muscle(problem(), run, lambda number: None if run.folder is None else places(run.folder, number)[1])
+    outcome = confirmed(replace(run.outcome, status="converged", message=message), checks)
+    facts = [{name: _known(value) for name, value in asdict(one).items()} | {"met": one.met} for one in checks]
     seconds = time.process_time() - begin
-    origin = run.origin | {RECORD: {"code": code, "message": message, "seconds": seconds, "answers": facts}}
+    origin = run.origin | {RECORD: {"code": code, "message": message, "seconds": seconds, "checks": facts}}
     if run.folder is not None:
         amend(run.folder, status=outcome.status, message=outcome.message, origin=origin)
     log.info("%s: second check: %s", run.name, "passed" if outcome.status == "converged" else outcome.message)
@@ -68,14 +68,14 @@ def confirmed_frames(problem: Problem, frames: Sequence[Frame], outcome: Outcome
 
 
 def _code() -> str:
-    """A hash of what is asked."""
-    return hashlib.sha256(Path(questions.__file__).read_bytes()).hexdigest()[:16]
+    """A hash of the checks."""
+    return hashlib.sha256(Path(run_checks.__file__).read_bytes()).hexdigest()[:16]
 
 
-def said(run: Run) -> tuple[str, ...]:
-    """The answers that are stored with a ``run``, first those that deny it; none of one that was not asked."""
-    found = run.origin.get(RECORD, {}).get("answers", [])
-    texts = [str(Answer(**{key: value for key, value in one.items() if key != "met"})) for one in found]
+def texts_of(run: Run) -> tuple[str, ...]:
+    """The checks that are stored with a ``run``, in words, first those that deny it; none of one that was not checked."""
+    found = run.origin.get(RECORD, {}).get("checks", [])
+    texts = [str(RunCheck(**{key: value for key, value in one.items() if key != "met"})) for one in found]
     return tuple(text for met in (False, True) for text, one in zip(texts, found, strict=True) if one["met"] is met)
 
 
@@ -84,7 +84,7 @@ def _known(value: Any) -> Any:
 
 
 def confirmed_body(body: Body, solved: Solved) -> Solved:
-    """What was ``solved`` of a ``body``, denied where the check denies that it converged."""
+    """A solution of a ``body``, denied where the check denies that it converged."""
     if solved.outcome.status != "converged":
         return solved
     return replace(solved, outcome=confirmed(solved.outcome, of_body(body, solved)))

@@ -24,7 +24,7 @@ class Bound(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class History:
     """A quantity over frames: ``values`` (f,) in ``unit`` at frame ``numbers``, ``where`` each is worst in words, the ``points``
     (f, 3) [mm] there, where it is at a place.
     """
@@ -55,7 +55,7 @@ class Scene:
 @dataclass(frozen=True, eq=False)
 class Cell:
     """A hard case by a solver: the verdict, a sentence on what happened, the status of the run (empty where there is none), the
-    decisive quantity's ``value``, ``bound`` and ``course``, which of its frames decided (``at``), and a picture of
+    decisive quantity's ``value``, ``bound`` and ``history``, which of its frames decided (``at``), and a picture of
     the worst place.
     """
 
@@ -69,7 +69,7 @@ class Cell:
     value: float | None = None
     bound: float | None = None
     seconds: float = 0.0
-    course: Course | None = None
+    history: History | None = None
     at: int = 0
     scene: Scene | None = None
 
@@ -104,7 +104,7 @@ class Stress:
 
 
 _OTHER_REASONS = ("timed out", "crashed", "denied")  # that a run may have to end than that there is no solution
-Weighed = Sequence[tuple[Bound, Course]]
+Weighed = Sequence[tuple[Bound, History]]
 
 
 def judge(cell: Cell, weighed: Weighed, contrast: str = "") -> Cell:
@@ -148,23 +148,23 @@ def doubted(cell: Cell, doubt: str, no_solution: str) -> Cell:
 
 def _decisive(cell: Cell, weighed: Weighed) -> Cell:
     """``cell`` with the first quantity that is beyond its bound, else the first of all."""
-    values = [(bound, course, course.worst(bound.frame)) for bound, course in weighed]
-    bound, course, i = next((one for one in values if not one[1].values[one[2]] <= one[0].at_most), values[0])
-    where = f" {course.where[i]}" if course.where else ""
-    unit = f" {course.unit}" if course.unit else ""
-    value = float(course.values[i])
+    values = [(bound, history, history.worst(bound.frame)) for bound, history in weighed]
+    bound, history, i = next((one for one in values if not one[1].values[one[2]] <= one[0].at_most), values[0])
+    where = f" {history.where[i]}" if history.where else ""
+    unit = f" {history.unit}" if history.unit else ""
+    value = float(history.values[i])
     sentence = (
-        f"{course.quantity.replace('_', ' ')} {value:.3g}{unit} at frame {course.numbers[i]}{where}; "
+        f"{history.quantity.replace('_', ' ')} {value:.3g}{unit} at frame {history.numbers[i]}{where}; "
         f"a healthy run has at most {bound.at_most:.3g}{unit}"
     )
     return replace(
         cell,
         sentence=sentence,
-        quantity=course.quantity,
-        unit=course.unit,
+        quantity=history.quantity,
+        unit=history.unit,
         value=value,
         bound=bound.at_most,
-        course=course,
+        history=history,
         at=i,
     )
 
@@ -179,7 +179,7 @@ def facts(stress: Stress) -> dict[str, Any]:
     cells = []
     for cell in stress.cells:
         plain = {
-            name: getattr(cell, name) for name in cell.__dataclass_fields__ if name not in ("course", "at", "scene")
+            name: getattr(cell, name) for name in cell.__dataclass_fields__ if name not in ("history", "at", "scene")
         }
         for name in ("value", "bound"):
             if plain[name] is not None and not np.isfinite(plain[name]):

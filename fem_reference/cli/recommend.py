@@ -77,7 +77,7 @@ def _limits(options: argparse.Namespace, unit: str) -> list[tuple[str, float]]:
 
 
 def _time(text: str) -> float:
-    """Of a frame [s], from that or from frames a second."""
+    """The time of a frame [s], from that or from frames a second."""
     rate = next((unit for unit in _RATES if text.rstrip().endswith(unit)), None)
     if rate is None:
         return _number(text, _PER_FRAME.sub("", text), "s", "--time")
@@ -138,11 +138,11 @@ def _text(found: Recommendation, case: str, metric: str, unit: str, limits: dict
 
 
 def _known(one: Expected, unit: str, *, measured: bool) -> str:
-    """What of an error was measured on the case itself, and what is the bar of the truth."""
+    """The parts of an error: measured on the case itself, and the bar of the truth."""
     if not measured:
         return " with margins and the bars of the truths"
     if not one.bar > 0:
-        return " (as measured: how well the truth is known, nobody said)"
+        return " (as measured: the truth has no error bar)"
     if one.point.is_truth:
         return " (the truth itself, by its error bar)"
     return f" ({number(one.error - one.bar)} {unit} measured, and {number(one.bar)} {unit}, the error bar of the truth)"

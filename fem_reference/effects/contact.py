@@ -22,7 +22,7 @@ class Contact(Interaction):
     bones: tuple[str, ...] | None = Field(default=None, min_length=1)
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """By how deep the surface may get into bones, and the pressure there."""
+        """The depth to which the surface may get into bones, and the pressure there."""
         near = {name: one for name, one in scene.near.items() if self.is_by(name)}
         gap = min((one.gap for one in near.values()), default=math.inf)
         depth = math.hypot(*(one.depth for one in near.values()))

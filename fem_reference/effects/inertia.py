@@ -30,7 +30,7 @@ class Inertia(Energy):
     spectral_radius: float = Field(default=0.9, ge=0, le=1)
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """By how far a beam lags behind: its first frequency is that of the beam that its own weight bends by as much; by the force
+        """The lag of a beam: its first frequency is that of the beam that its own weight bends by as much; by the force
         of its acceleration, and the stress of a wave that a jump of velocity sends through it.
         """
         square = scene.bend(self.density)  # of one over the frequency

@@ -61,7 +61,9 @@ def _pair(contacts: Element, kind: str, name: str, settings: dict[str, float | N
 
 
 def overlaps(problem: Problem) -> dict[str, float]:
-    """By bone in contact how deep [mm] the facets of the contact surface are inside at rest: at corners and middles; 0 outside."""
+    """Depths [mm] by bone in contact of the facets of the contact surface inside it at rest: at corners and middles; 0 outside."""
+    if not obstacles(problem):
+        return {}
     corners = problem.mesh.points[free_facets(problem)]
     middles = corners[:, EDGES[:3]].mean(axis=2)
     points = np.concatenate([corners, middles, corners.mean(axis=1, keepdims=True)], axis=1).reshape(-1, 3)
@@ -70,8 +72,8 @@ def overlaps(problem: Problem) -> dict[str, float]:
 
 
 def search_radius(problem: Problem, deep: float) -> float:
-    """How deep [mm] inside a bone FEBio looks for contact, where the muscle is ``deep`` [mm] in it at rest: less where that would
-    press at once with more than the matrix bears.
+    """Depth [mm] inside a bone to which FEBio looks for contact, where the muscle is ``deep`` [mm] in it at rest: less where that
+    would press at once with more than the matrix bears.
     """
     assert problem.contact is not None  # or there is no contact
     matrix = matrix_constants(problem.effects)

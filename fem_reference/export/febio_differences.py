@@ -1,4 +1,4 @@
-"""What of a problem is another model in FEBio, with its numbers: springs of attachments, bones that overlap the muscle at rest."""
+"""Differences of the model in FEBio, with their numbers: springs of attachments, bones that overlap the muscle at rest."""
 
 from collections.abc import Iterator
 
@@ -25,12 +25,12 @@ def notes(problem: Problem) -> list[str]:
 
 
 def _has_points(problem: Problem, attached: AttachedVertices) -> bool:
-    """Whether the reference has its springs at points of the surface, not over facets too."""
+    """True where the reference has its springs at points of the surface, not over facets too."""
     return attached.attachment in problem.attached_skins
 
 
 def _springs(problem: Problem, attached: AttachedVertices) -> str:
-    """How stiff FEBio's springs are, all together and against turning about the middle of the reference's, and where they are."""
+    """Stiffness of FEBio's springs, in all and against turning about the middle of the reference's, and their place."""
     assert attached.stiffness is not None  # one by springs
     skin = problem.attached_skins[attached.attachment]
     corners = problem.mesh.points[problem.mesh.facets[attached.attachment]]

@@ -6,7 +6,9 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
+from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, boundary, enclosed_volume
+from fem_reference.geometry.distance import distances
 from fem_reference.problems.muscle import AttachedVertices, Problem, RigidBody
 
 # Corners between which the last six nodes of a tet10 are; the first three pairs are those of a tri6 too.
@@ -65,10 +67,20 @@ def outward(surface: Surface) -> Surface:
 
 
 def free_facets(problem: Problem) -> Ints:
-    """The facets (m, 3) of the tets that may be in contact: none of what is attached, nor its neighbours."""
+    """The facets (m, 3) of the tets that are in contact: those not attached in whose middle contact is felt; InputError where there
+    are none.
+    """
     outer, _ = boundary(problem.mesh.tets)
     attached = np.concatenate([np.zeros((0, 3), np.int64), *problem.mesh.facets.values()])
-    return outer[~np.isin(outer, attached).any(axis=1)]
+    known = set(map(tuple, np.sort(attached, axis=1).tolist()))
+    loose = outer[[tuple(facet) not in known for facet in np.sort(outer, axis=1).tolist()]]
+    middles = problem.mesh.points[loose].mean(axis=1)
+    away, _ = problem.exempt.away(distances(middles, problem.surface).triangle, middles)
+    felt = loose[away > problem.exempt.reach]
+    if len(felt) == 0:
+        got = f"no facet of the tetrahedra farther than {problem.exempt.reach:.2g} mm from what is attached"
+        raise InputError("contact", got, "smaller tetrahedra (muscle.tet_size), or no effect contact")
+    return felt
 
 
 class Mesh:
@@ -94,7 +106,7 @@ class Mesh:
             self._nodes(mesh, f"{name}_nodes", points, first)
         self._elements(mesh, {name: kind for name, kind, _, _ in groups}, cells)
         self._attached(mesh)
-        if self.problem.contact is not None:
+        if obstacles(self.problem):
             self._contact_surface(mesh, cells)
         for attached in by_springs(self.problem):
             self._tied(mesh, attached, cells[springs_id(attached)])

@@ -23,7 +23,7 @@ def readme(scene: MuscleCase, *, febio: bool) -> str:
 
 
 def febio_readme(scene: MuscleCase, notes: Sequence[str]) -> str:
-    """What of a scene is the same in FEBio and what is not, with the ``notes`` on this one."""
+    """Text on what of a scene is the same in FEBio and what is not, with the ``notes`` on this one."""
     here = (
         "".join(f"- {note}\n" for note in notes)
         or "- no springs at points of the surface, no bone that overlaps the muscle at rest\n"

@@ -1,4 +1,4 @@
-"""What callers from Python give, whatever it is: said in words, or taken as a path."""
+"""Arguments of callers from Python, whatever they are: in words for messages, or as a path."""
 
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ def said(value: object) -> str:
 
 
 def path(given: Any, place: str) -> Path:
-    """What ``given`` names on a disk, there or not; InputError where that can be nothing."""
+    """The path that is ``given``, there or not; InputError where there can be none."""
     if not isinstance(given, str | Path) or not str(given):
         raise InputError(place, said(given), "a path")
     try:

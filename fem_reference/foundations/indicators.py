@@ -13,8 +13,8 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Indicator:
-    """Of an effect: the ``estimate`` [mm] of how far the surface moves by it, root mean square at the worst frame; the ``stress``
-    [MPa] that it makes, at most, there; the ``number`` that people know it by, and what that is, the ``rule``.
+    """Indicator of an effect: the ``estimate`` [mm] of how far the surface moves by it, root mean square at the worst frame; the
+    ``stress`` [MPa] that it makes, at most, there; the ``number`` that people know it by, and what that is, the ``rule``.
     """
 
     rule: str

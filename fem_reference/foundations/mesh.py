@@ -4,6 +4,7 @@ Vocabulary of shapes: points ``(n, 3)`` [mm], triangles ``(m, 3)`` and tets ``(k
 """
 
 import hashlib
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -71,6 +72,17 @@ def fingerprint(*arrays: NDArray[Any]) -> str:
         digest.update(f"{array.dtype.str}{array.shape}".encode())
         digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()
+
+
+def diagonal(points: Floats) -> float:
+    """The diagonal [mm] of the box around ``points`` (n, 3): the size of a body."""
+    return float(np.linalg.norm(np.ptp(points, axis=0)))
+
+
+def place_of(point: Iterable[float]) -> str:
+    """A point (3,) [mm] as messages show it."""
+    x, y, z = point
+    return f"({x:.1f}, {y:.1f}, {z:.1f}) mm"
 
 
 def triangle_areas(points: Floats, triangles: Ints) -> Floats:
@@ -142,8 +154,8 @@ def check_closed(surface: Surface) -> Surface:
         (edges[sides > 2], "edges of more than two triangles", "a manifold surface"),
     ):
         if len(wrong):
-            x, y, z = points[wrong[0]].mean(axis=0)
-            raise InputError(surface.place, f"{len(wrong)} {what}, the first at ({x:.1f}, {y:.1f}, {z:.1f}) mm", want)
+            first = place_of(points[wrong[0]].mean(axis=0))
+            raise InputError(surface.place, f"{len(wrong)} {what}, the first at {first}", want)
     twice = len(directed) - len(np.unique(directed, axis=0))
     if twice:
         raise InputError(
@@ -182,8 +194,8 @@ def _check_fans(surface: Surface) -> None:
     _, corner = np.unique(fan, return_index=True)
     wrong = np.flatnonzero(np.bincount(corners[corner]) > 1)
     if len(wrong):
-        x, y, z = surface.points[wrong[0]]
-        got = f"{len(wrong)} vertices where parts touch, the first vertex {wrong[0]} at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
+        first = f"vertex {wrong[0]} at {place_of(surface.points[wrong[0]])}"
+        got = f"{len(wrong)} vertices where parts touch, the first {first}"
         raise InputError(surface.place, got, "a manifold surface")
 
 
@@ -193,8 +205,8 @@ def _check_one_part(surface: Surface) -> None:
     part = _parts(one // 3, other // 3, len(surface.triangles))
     areas = np.bincount(part, weights=triangle_areas(surface.points, surface.triangles))
     if len(areas) > 1:
-        x, y, z = surface.points[surface.triangles[part == areas.argmin()]].mean(axis=(0, 1))
-        got = f"{len(areas)} separate parts, the smallest ({areas.min():.3g} mm2) around ({x:.1f}, {y:.1f}, {z:.1f}) mm"
+        middle = surface.points[surface.triangles[part == areas.argmin()]].mean(axis=(0, 1))
+        got = f"{len(areas)} separate parts, the smallest ({areas.min():.3g} mm2) around {place_of(middle)}"
         raise InputError(surface.place, got, "one connected surface")
 
 

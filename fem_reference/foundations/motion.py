@@ -7,7 +7,7 @@ import numpy as np
 from fem_reference.foundations.mesh import Floats
 
 # Frame numbers between which a motion is steady, straight or about one axis, and the angle [rad] that it has turned by at each.
-Course = tuple[tuple[float, ...], tuple[float, ...]]
+Turning = tuple[tuple[float, ...], tuple[float, ...]]
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Rotation:
         pose[:3, 3] = np.asarray(self.centre) - turn @ np.asarray(self.centre)
         return pose
 
-    def course(self, points: Floats) -> Course:  # noqa: ARG002
+    def turning(self, points: Floats) -> Turning:  # noqa: ARG002
         """The keyframes."""
         return self.frames, self.angles
 
@@ -66,7 +66,7 @@ class Translation:
         pose[:3, 3] = distance * np.asarray(self.direction, float) / np.linalg.norm(self.direction)
         return pose
 
-    def course(self, points: Floats) -> Course:  # noqa: ARG002
+    def turning(self, points: Floats) -> Turning:  # noqa: ARG002
         """The keyframes, between which nothing turns."""
         return self.frames, (0.0,) * len(self.frames)
 

@@ -130,7 +130,7 @@ def three(text: object, kind: str) -> tuple[float, float, float]:
 
 
 def length_unit(text: object) -> float:
-    """How many mm a unit of coordinates has, one of ``LENGTH_UNITS``: ``"m"`` -> 1000.0."""
+    """The length [mm] of a unit of coordinates, one of ``LENGTH_UNITS``: ``"m"`` -> 1000.0."""
     if not isinstance(text, str) or text not in LENGTH_UNITS:
         raise ValueError(f"a unit of length: {', '.join(LENGTH_UNITS)}")
     return LENGTH_UNITS[text]

@@ -1,4 +1,4 @@
-"""What processes use: the most memory of this one since it was last reset, and the processor time of those that it started."""
+"""Resources that processes use: memory since it was last reset, and processor time of those that this one started."""
 
 import os
 import resource
@@ -13,7 +13,7 @@ def forget_peak_memory() -> None:
 
 
 def processor_times(process: int) -> dict[int, float]:
-    """By number, the processor time [s] of a ``process`` and of each that descends from it and has not ended; nothing where the
+    """The processor time [s] by number of a ``process`` and of each that descends from it and has not ended; nothing where the
     system does not say.
     """
     parents, times = dict[int, int](), dict[int, float]()

@@ -8,7 +8,7 @@ from itertools import permutations
 import numpy as np
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, enclosed_volume
+from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, enclosed_volume, place_of
 from fem_reference.geometry.tetrahedra import check_size
 
 Counts = tuple[int, int, int]
@@ -72,8 +72,8 @@ def _extent(surface: Surface) -> tuple[Floats, Floats]:
     inside = np.flatnonzero(~in_a_face.any(axis=1))
     want = 'the surface of an axis-aligned box, or the muscle.mesher "quality"'
     if len(inside):
-        x, y, z = corners[inside[0]].mean(axis=0)
-        got = f"{len(inside)} triangles in no face of the box around it, the first at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
+        first = place_of(corners[inside[0]].mean(axis=0))
+        got = f"{len(inside)} triangles in no face of the box around it, the first at {first}"
         raise InputError(surface.place, got, want)
     volume, wanted = enclosed_volume(surface.points, surface.triangles), float(np.prod(high - low))
     if not abs(volume - wanted) <= wanted / 2:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import igl
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, boundary
+from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, boundary, diagonal
 from fem_reference.geometry.distance import Distances, distances
 
 # A point that round-off leaves between two tets is looked for again this far away, as a share of the mesh's diagonal.
@@ -37,7 +37,7 @@ class Locator:
     def __init__(self, mesh: TetMesh) -> None:
         self.mesh = mesh
         self.faces, self.behind = boundary(mesh.tets)
-        self.diagonal = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
+        self.diagonal = diagonal(mesh.points)
         self.skin = Surface(mesh.points, self.faces, "the skin of the tetrahedra")
         self._tree = igl.AABB()
         self._tree.init(mesh.points, mesh.tets)

@@ -1,4 +1,4 @@
-"""The part of a surface where contact is not asked: what is attached, and what is near to that on the same side."""
+"""The part of a surface that is exempt from contact: what is attached, and what is near to that on the same side."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -35,8 +35,8 @@ class Corners(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Exemption:
-    """Where contact of a ``surface`` is not asked: on its ``part`` (r, 3, 3) that is attached, as triangles, each ``by`` (r,) the
-    number of an attachment, to what the ``names`` say, and within ``reach`` [mm] of that on the same side.
+    """The part of a ``surface`` that is exempt from contact: on its ``part`` (r, 3, 3) that is attached, as triangles, each ``by``
+    (r,) the number of an attachment, to bones of these ``names``, and within ``reach`` [mm] of that on the same side.
 
     The reach is the distance of the points at which contact is felt, ``spacing``: nearer to what is attached, a point stands for
     area that is attached too. It depends on the size of the surface and not on its triangles.
@@ -50,8 +50,8 @@ class Exemption:
 
     @classmethod
     def of(cls, surface: Surface, attached: Iterable[tuple[str, Floats]] = ()) -> "Exemption":
-        """Of a surface with, by attachment, the name of what it is ``attached`` to, and the shares (m, 3) of the corners of its
-        triangles, 1 or 0; the part is where shares, linear in triangles, are a half and more.
+        """The exemption of a surface with, by attachment, the name of what it is ``attached`` to, and the shares (m, 3) of the
+        corners of its triangles, 1 or 0; the part is where shares, linear in triangles, are a half and more.
         """
         names, shares = zip(*attached, strict=True) if (attached := tuple(attached)) else ((), ())
         quarters = Pieces.whole(np.arange(len(surface.triangles))).quartered()
@@ -61,7 +61,7 @@ class Exemption:
         return cls(surface, corners[np.concatenate([np.zeros(0, np.int64), *some])], by, names, spacing(surface))
 
     def away(self, triangles: Ints, points: Floats) -> tuple[Floats, Ints]:
-        """How far (k,) [mm] ``points`` (k, 3) of the ``triangles`` (k,) are from what is attached, infinite where that faces away,
+        """Distances (k,) [mm] of ``points`` (k, 3) of the ``triangles`` (k,) from what is attached, infinite where that faces away,
         and by which attachment (k,).
         """
         if len(self.part) == 0:
@@ -89,15 +89,15 @@ class Exemption:
         names, shares = different[:, :3].astype(np.int64), different[:, 3:]
         row, column = np.nonzero(names < count)
         carried = csr_array((shares[row, column], (row, names[row, column])), shape=(len(different), count))
-        away, by = self._seen()
+        away, by = self._corners_away()
         nearest = np.lexsort((away, at.ravel()))
         nearest = nearest[np.unique(at.ravel()[nearest], return_index=True)[1]]
         single = np.flatnonzero(names[:, 1] == count)
         vertices = single[np.argsort(names[single, 0])]
         return Corners(carried, away[nearest], by[nearest], at.reshape(-1, 3), vertices)
 
-    def _seen(self) -> tuple[Floats, Ints]:
-        """As ``away`` of each corner of each piece (3 p,), 0 on what is attached."""
+    def _corners_away(self) -> tuple[Floats, Ints]:
+        """The result of ``away`` for each corner of each piece (3 p,), 0 on what is attached."""
         inward = self._places + _INWARD * (self._places.mean(axis=1, keepdims=True) - self._places)
         away, by = self.away(np.repeat(self.pieces.parents, 3), inward.reshape(-1, 3))
         return np.where(away > _INWARD / 10 * self.reach, away, 0.0), by

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface
+from fem_reference.foundations.mesh import Floats, Ints, Surface, diagonal
 from fem_reference.geometry.distance import distances
 
 # Closer to the surface than this share of its diagonal a point counts as on it.
@@ -33,7 +33,7 @@ class Extension:
         points = np.ascontiguousarray(points, np.float64)
         weights = np.zeros((len(points), len(rest.points)))
         nearest = distances(points, rest)
-        on = nearest.distance <= _ON * np.linalg.norm(np.ptp(rest.points, axis=0))
+        on = nearest.distance <= _ON * diagonal(rest.points)
         edges = _Edges(rest.triangles)
         for i in np.flatnonzero(~on):
             weights[i] = _mean_value_weights(points[i], rest.points, edges)

@@ -49,15 +49,15 @@ def _reaching(surface: Surface, low: Floats, high: Floats) -> Ints:
 
 
 def overlaps(one: Floats, other: Floats) -> Floats:
-    """How far (k,) [mm] triangles ``one`` and ``other`` (k, 3, 3) that cross reach through each other: the shorter of the ways
+    """Reach (k,) [mm] of triangles ``one`` and ``other`` (k, 3, 3) that cross through each other: the shorter of the displacements
     across either that bring the other to one side of it; 0 where either has no area.
     """
-    ways = np.stack([_reach(one, other), _reach(other, one)])
-    return np.asarray(np.nan_to_num(ways).min(axis=0))
+    reaches = np.stack([_reach(one, other), _reach(other, one)])
+    return np.asarray(np.nan_to_num(reaches).min(axis=0))
 
 
 def _reach(triangles: Floats, walls: Floats) -> Floats:
-    """How far (k,) ``triangles`` reach through the planes of ``walls`` on the side where it is less; NaN without area."""
+    """Reach (k,) of ``triangles`` through the planes of ``walls`` on the side where it is less; NaN without area."""
     normals = np.cross(walls[:, 1] - walls[:, 0], walls[:, 2] - walls[:, 0])
     with np.errstate(invalid="ignore", divide="ignore"):
         normals = normals / np.linalg.norm(normals, axis=1)[:, None]

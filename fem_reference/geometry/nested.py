@@ -23,7 +23,7 @@ EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 # diagonals between opposite edges cuts the octahedron in the middle.
 _CORNERS = [[0, 4, 5, 6], [4, 1, 7, 8], [5, 7, 2, 9], [6, 8, 9, 3]]
 _DIAGONALS = np.array([[4, 9], [5, 8], [6, 7]])
-_PARTS = np.array(
+PARTS = np.array(
     [
         [*_CORNERS, [4, 9, 5, 6], [4, 9, 7, 5], [4, 9, 8, 7], [4, 9, 6, 8]],
         [*_CORNERS, [5, 8, 4, 7], [5, 8, 6, 4], [5, 8, 9, 6], [5, 8, 7, 9]],
@@ -104,7 +104,7 @@ def _eighths(points: Floats, nodes: Ints) -> Ints:
     """
     ends = points[nodes[:, _DIAGONALS]]
     shortest = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=2).argmin(axis=1)
-    tets = np.take_along_axis(nodes, _PARTS[shortest].reshape(len(nodes), -1), axis=1).reshape(-1, 4)
+    tets = np.take_along_axis(nodes, PARTS[shortest].reshape(len(nodes), -1), axis=1).reshape(-1, 4)
     turned = tet_volumes(points, tets) < 0
     tets[turned] = tets[turned][:, [0, 2, 1, 3]]
     return tets

@@ -29,7 +29,7 @@ class Shared(NamedTuple):
 
 
 def shared(surface: Surface, counts: NDArray[np.bool_], distance: Distance, body: Floats) -> Shared:
-    """What a surface winds round inside a rigid body.
+    """The part of the inside of a surface that is in a rigid body.
 
     Space is cut into cubes, those that may contain a part of it into smaller ones, and 4000 to 8000 random points are drawn in
     these, the same every time. On average the count is exact. Its standard deviation is at most half of what one point stands

@@ -1,4 +1,4 @@
-"""How deep a closed body and a bone are in each other, wherever their surfaces cross or one is within the other."""
+"""Penetration of a closed body and a bone, wherever their surfaces cross or one is within the other."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class Body:
         return tree
 
     def depths(self, points: Floats) -> Floats:
-        """How deep (n,) [mm] ``points`` (n, 3) are in it, 0 outside."""
+        """Depths (n,) [mm] of ``points`` (n, 3) in it, 0 outside."""
         found = np.zeros(len(points))
         low, high = self.surface.points.min(axis=0), self.surface.points.max(axis=0)
         some = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
@@ -43,7 +43,7 @@ class Body:
 
 @dataclass(frozen=True, eq=False)
 class Depths:
-    """How deep [mm] in each other the vertices and the triangles of a body and then those of a bone are, 0 outside, and the
+    """Depths [mm] in each other of the vertices and the triangles of a body and then those of a bone, 0 outside, and the
     ``places`` [mm] where; of triangles only those that cross the other surface are looked at, where they are deepest.
     """
 
@@ -58,7 +58,7 @@ class Depths:
 
 
 def depths(body: Body, bone: Surface, shape: Obstacle, pose: Floats) -> Depths:
-    """How deep a ``body`` and a ``bone`` at a ``pose`` (4, 4), whose ``shape`` knows the distance to it, are in each other.
+    """Penetration of a ``body`` and a ``bone`` at a ``pose`` (4, 4), whose ``shape`` knows the distance to it.
 
     Depth in the bone is as exact as its distance field, depth in the body exact.
     """

@@ -42,7 +42,7 @@ class Pieces:
         return Pieces(np.concatenate(parents), np.concatenate(corners))
 
     def of(self, values: Floats) -> Floats:
-        """What is linear in triangles, with ``values`` (m, 3, d) at their corners, at the corners of the pieces (k, 3, d)."""
+        """A field linear in triangles, with ``values`` (m, 3, d) at their corners, at the corners of the pieces (k, 3, d)."""
         return self.corners @ values[self.parents]
 
     def quartered(self) -> "Pieces":

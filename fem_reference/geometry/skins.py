@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh
+from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, diagonal
 from fem_reference.geometry.embedding import Locator
 from fem_reference.geometry.pieces import Pieces, corner_areas, edge_lengths
 
@@ -26,7 +26,7 @@ class Skin:
 
 def spacing(surface: Surface) -> float:
     """How far apart [mm] points on a ``surface`` are at most, on average: the same whatever it is filled with."""
-    return float(np.linalg.norm(np.ptp(surface.points, axis=0))) / _ACROSS
+    return diagonal(surface.points) / _ACROSS
 
 
 def attached_skin(surface: Surface, shares: Floats, mesh: TetMesh, apart: float) -> Skin:

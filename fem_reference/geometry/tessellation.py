@@ -5,7 +5,7 @@ Their vertices lie on the body. A ball, a capsule and a box are all one: the cor
 
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface
+from fem_reference.foundations.mesh import Floats, Ints, Surface, diagonal
 from fem_reference.geometry.block import lattice_skin
 from fem_reference.geometry.rigid_bodies import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere, Vector
 
@@ -55,7 +55,7 @@ def tessellated(solid: Obstacle, beside: Floats, place: str, turn: int = TURN) -
 def _slab(half_space: HalfSpace, beside: Floats) -> tuple[Floats, Ints]:
     """A square in the plane under the middle of ``beside``, and as much of what is behind it."""
     middle = (beside.max(axis=0) + beside.min(axis=0)) / 2
-    size = float(np.linalg.norm(np.ptp(beside, axis=0)))
+    size = diagonal(beside)
     frame = _frame(np.asarray(half_space.normal, float))
     foot = middle - ((middle - half_space.point) @ frame[2]) * frame[2]
     lattice, triangles = lattice_skin((1, 1, 1))

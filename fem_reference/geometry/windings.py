@@ -3,7 +3,7 @@
 import igl
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats, Surface
+from fem_reference.foundations.mesh import Floats, Surface, diagonal
 
 # How far outside a triangle is looked, as a share of the surface's diagonal.
 _STEP = 1e-5
@@ -21,7 +21,7 @@ def outer_windings(surface: Surface) -> Floats:
     a, b, c = (points[triangles[:, corner]] for corner in range(3))
     normals = np.cross(b - a, c - a)
     sizes = np.linalg.norm(normals, axis=1)
-    step = _STEP * np.linalg.norm(np.ptp(points, axis=0))
+    step = _STEP * diagonal(points)
     if not (np.isfinite(step) and np.isfinite(sizes).all()):
         return np.full(len(triangles), np.nan)
     outside = (a + b + c) / 3 + step * normals / np.where(sizes > 0, sizes, 1)[:, None]

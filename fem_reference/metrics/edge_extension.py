@@ -5,7 +5,7 @@ Against rest this is the edge extension of the report (l / L of Figs 6.15 to 6.1
 
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.mesh import Floats, place_of
 from fem_reference.geometry.edges import Edges
 from fem_reference.metrics import Measure, MeasurementContext, percentile, rms
 from fem_reference.runs.store import Run
@@ -52,6 +52,5 @@ def worst_edges(edges: Edges, deviations: Floats, reference: Run) -> tuple[str, 
     ends = edges.ends[np.argmax(np.abs(deviations), axis=1)]
     middles = reference.positions[np.arange(len(ends))[:, None], ends].mean(axis=1)
     return tuple(
-        f"edge {one} to {other} at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
-        for (one, other), (x, y, z) in zip(np.sort(ends), middles, strict=True)
+        f"edge {one} to {other} at {place_of(at)}" for (one, other), at in zip(np.sort(ends), middles, strict=True)
     )

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats, triangle_areas
+from fem_reference.foundations.mesh import Floats, place_of, triangle_areas
 from fem_reference.geometry.windings import outer_windings
 from fem_reference.metrics import Measure, MeasurementContext
 from fem_reference.runs.store import Run
@@ -52,6 +52,6 @@ def _first(windings: Floats, run: Run) -> tuple[str, ...]:
     found = np.argmax(windings, axis=1)
     middles = run.positions[np.arange(len(found))[:, None], run.surface.triangles[found]].mean(axis=1)
     return tuple(
-        "" if line[triangle] <= 0 else f"triangle {triangle} at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
-        for line, triangle, (x, y, z) in zip(windings, found, middles, strict=True)
+        "" if line[triangle] <= 0 else f"triangle {triangle} at {place_of(at)}"
+        for line, triangle, at in zip(windings, found, middles, strict=True)
     )

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats, Surface, enclosed_volume
+from fem_reference.foundations.mesh import Floats, Surface, enclosed_volume, place_of
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.exemption import Exemption
 from fem_reference.geometry.overlap import shared
@@ -103,11 +103,11 @@ def _deepest(exempt: Exemption, fine: Surface, bone: RigidBody, number: int, all
     worst = int(depths.argmax())
     vertex = np.flatnonzero(corners.vertices == worst)
     what = f"vertex {vertex[0]}" if len(vertex) else "between vertices"
-    return _Worst(float(depths[worst]), f"{what} at {_at(fine.points[worst])} in {bone.name}")
+    return _Worst(float(depths[worst]), f"{what} at {place_of(fine.points[worst])} in {bone.name}")
 
 
 def _allowed(exempt: Exemption, bones: tuple[RigidBody, ...], numbers: tuple[int, ...]) -> dict[str, Floats]:
-    """By bone, the depth [mm] that is allowed at the corners (k,) of the pieces of a surface: none where contact is felt, beside
+    """The depth [mm] by bone that is allowed at the corners (k,) of the pieces of a surface: none where contact is felt, beside
     attachments that at rest, and any on attachments to this bone or to one that moves as it does at all frame ``numbers``.
     """
     near, on = exempt.corners.away <= exempt.reach, exempt.corners.away == 0
@@ -122,14 +122,9 @@ def _allowed(exempt: Exemption, bones: tuple[RigidBody, ...], numbers: tuple[int
 
 
 def _alike(bone: RigidBody, name: str, bones: tuple[RigidBody, ...], numbers: tuple[int, ...]) -> bool:
-    """Whether a ``bone`` has this ``name`` or moves as the one that has."""
+    """True where a ``bone`` has this ``name`` or moves as the one that has."""
     own = next((other for other in bones if other.name == name), bone)
     return own.name == name and all(np.allclose(own.pose(frame), bone.pose(frame)) for frame in numbers)
-
-
-def _at(point: Floats) -> str:
-    x, y, z = point
-    return f"({x:.1f}, {y:.1f}, {z:.1f}) mm"
 
 
 def _value(one: _Worst) -> float:

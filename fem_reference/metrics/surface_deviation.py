@@ -6,7 +6,7 @@ around each vertex at rest.
 
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.mesh import Floats, place_of
 from fem_reference.geometry.distance import distances
 from fem_reference.metrics import Measure, MeasurementContext, percentile, rms
 from fem_reference.runs.store import Run
@@ -67,6 +67,6 @@ def _worst(deviations: Floats, reference: Run) -> tuple[str, ...]:
     """By frame the vertex with the greatest deviation, and where the reference has it."""
     vertices = np.argmax(deviations, axis=1) % len(reference.surface.points)
     return tuple(
-        f"vertex {vertex} at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
-        for vertex, (x, y, z) in zip(vertices, reference.positions[np.arange(len(vertices)), vertices], strict=True)
+        f"vertex {vertex} at {place_of(at)}"
+        for vertex, at in zip(vertices, reference.positions[np.arange(len(vertices)), vertices], strict=True)
     )

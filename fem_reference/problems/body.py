@@ -12,11 +12,11 @@ import numpy as np
 
 from fem_reference.effects import Effect
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Floats, Ints, diagonal
 from fem_reference.geometry.fibres import Directions
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems.contact import Contact, Obstruction
-from fem_reference.problems.courses import Moving, course, moving_ramp, posed, some, stops
+from fem_reference.problems.resolved_paths import Moving, moving_ramp, posed, some, stops, turning
 
 Kind = Literal["tetrahedron", "hexahedron"]
 # By element: kind of cell, degree of the displacement, and of the pressure (None: no such unknown; 0: constant in each cell). Where
@@ -158,8 +158,8 @@ class Prescribed:
     stiffness: float | None = None
 
     def displacements(self, points: Floats, frame: float) -> Floats:
-        """What the path prescribes for ``points`` (n, 3) [mm] along the components, and 0 along the others; InputError where it
-        has no displacements for them.
+        """Displacements (n, 3) [mm] that the path prescribes for ``points`` (n, 3) [mm] along the components, and 0 along the
+        others; InputError where it has no displacements for them.
         """
         place, want = f'prescribed "{self.name}": path at frame {frame:g}', "displacements (n, 3) of points (n, 3)"
         try:
@@ -208,7 +208,7 @@ class Body:
     @property
     def size(self) -> float:
         """The diagonal of the box around the body [mm]."""
-        return float(np.linalg.norm(np.ptp(self.mesh.points, axis=0)))
+        return diagonal(self.mesh.points)
 
     def points_on(self, on: str | Skin) -> Floats:
         """The corners (n, 3) [mm] of the facets of a region, or the points of a skin, at rest."""
@@ -229,4 +229,4 @@ def _moving(entry: Prescribed, points: Floats) -> Moving:
     def at(frame: float) -> Floats:
         return points + entry.displacements(points, frame)
 
-    return Moving(f'prescribed "{entry.name}"', at, course(entry.path, points))
+    return Moving(f'prescribed "{entry.name}"', at, turning(entry.path, points))

@@ -1,4 +1,4 @@
-"""Whether a body is one that can be solved: every part of it is looked at before anything is, and named where it is wrong."""
+"""Checks of bodies before they are solved: every part is checked, and named where it is wrong."""
 
 from collections.abc import Sequence
 from itertools import combinations, pairwise
@@ -81,7 +81,7 @@ def check_frames(frames: Any, place: str) -> None:
 
 
 def _is_number(value: Any) -> bool:
-    """Whether a value is a number that has a place among others, and is not a truth value."""
+    """True of a finite number that is not a truth value."""
     if not isinstance(value, int | float | np.integer | np.floating) or _is_truth(value):
         return False
     number: Any = value  # of whatever type, and size
@@ -89,7 +89,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _is_integer(value: Any) -> bool:
-    """Whether a value is an integer, and not a truth value."""
+    """True of an integer that is not a truth value."""
     return isinstance(value, int | np.integer) and not _is_truth(value)
 
 

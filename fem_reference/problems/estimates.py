@@ -55,8 +55,8 @@ _FELT = 1.0  # [mm] from a bone, more than any smoothing of contact
 
 @dataclass(frozen=True)
 class Decision:
-    """Whether an effect is ``needed``: by its ``indicator`` (None: part of the material) and what is allowed of that, ``bound``
-    [mm] and ``stress_bound`` [MPa]; ``turned_out``: the frame whose solution showed it, None where it was known before;
+    """Decision whether an effect is ``needed``: by its ``indicator`` (None: part of the material) and what is allowed of that,
+    ``bound`` [mm] and ``stress_bound`` [MPa]; ``turned_out``: the frame whose solution showed it, None where it was known before;
     ``listed``: it acts whether needed or not.
     """
 
@@ -104,7 +104,7 @@ def decisions(scene: MuscleCase, rest: Setup) -> tuple[Decision, ...]:
 
 
 def decision(effect: Effect, found: Indicator | None, known: Estimates) -> Decision:
-    """Whether an ``effect`` is needed by what its indicator ``found``."""
+    """Decide whether an ``effect`` is needed by what its indicator ``found``."""
     within = found is not None and found.estimate <= known.tolerance and found.stress <= known.stress_tolerance
     return Decision(effect, not within, found, known.tolerance, known.stress_tolerance)
 
@@ -189,7 +189,7 @@ def _tension(scene: MuscleCase) -> float:
 
 
 def _taut(scene: MuscleCase) -> float:
-    """By how much fibres are stretched at rest, at the most over the frames."""
+    """The stretch of fibres at rest, at the most over the frames."""
     rest, amounts = State(F=np.eye(3).tolist(), fibre=(1.0, 0.0, 0.0)), _instants(scene)
     found = [elastic_state([(one, one.amount(number)) for one in scene.effects], rest).F[0][0] for number in amounts]
     return float(max(found))
@@ -239,7 +239,7 @@ def _combined(edges: Floats, parts: Floats) -> Floats:
 
 
 def _near(bone: RigidBody, points: Floats, moved: dict[int, Floats], doubt: float) -> Near:
-    """How near ``points`` (n, 3) that are ``moved`` come to a ``bone``; it may be wrong by ``doubt`` of the way past it."""
+    """The gap to a ``bone`` of ``points`` (n, 3) that are ``moved``, wrong by ``doubt`` of their path past it at most."""
     low, high = bone.surface.points.min(axis=0), bone.surface.points.max(axis=0)
     local = np.stack([apply(np.linalg.inv(bone.pose(frame)), at) for frame, at in moved.items()])
     off = doubt * np.linalg.norm(local - points, axis=2)

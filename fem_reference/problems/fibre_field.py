@@ -49,7 +49,7 @@ def of(scene: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh]) ->
 
 
 def lean(scene: MuscleCase, axis: Floats) -> float:
-    """By how much fibres that are given lean against the unit vector ``axis`` (3,): the root mean square of ``sin 2 a``, a their
+    """The lean of fibres that are given against the unit vector ``axis`` (3,): the root mean square of ``sin 2 a``, a their
     angle to it, which is the shear by their tension. 0 of those that are traced from one attachment to the other.
     """
     if scene.fibres.polylines is None:

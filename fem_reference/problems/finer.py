@@ -7,17 +7,11 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.fibres import Directions
+from fem_reference.geometry.nested import EDGES, PARTS
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import Body, Cells, Kind, reference_nodes
 from fem_reference.problems.shapes import facet_corners
 
-# Of a tetrahedron's corners and the middles of its edges 01, 02, 03, 12, 13 and 23, called 0 to 9: four parts at its corners, and
-# four around the line from the middle of 03 to that of 12.
-_EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
-_TETRAHEDRA = (
-    *((0, 4, 5, 6), (4, 1, 7, 8), (5, 7, 2, 9), (6, 8, 9, 3)),
-    *((6, 7, 4, 5), (6, 7, 5, 9), (6, 7, 9, 8), (6, 7, 8, 4)),
-)
 # The shares that the corners of a cell have in the nodes of its parts are multiples of one over this.
 _SHARES = 64
 
@@ -73,8 +67,8 @@ def _parts(kind: Kind) -> Floats:
     corners = reference_nodes(kind, 1)
     if kind == "hexahedron":
         return np.stack([(corners + low) / 2 for low in product((0, 1), repeat=3)])
-    ten = np.concatenate([corners, [corners[list(edge)].mean(axis=0) for edge in _EDGES]])
-    parts = ten[np.array(_TETRAHEDRA)]
+    ten = np.concatenate([corners, corners[EDGES].mean(axis=1)])
+    parts = ten[PARTS[2]]  # four at the corners, four around the line from the middle of edge 03 to that of 12
     wrong = np.linalg.det(parts[:, 1:] - parts[:, :1]) < 0
     return np.asarray(np.where(wrong[:, None, None], parts[:, [1, 0, 2, 3]], parts))
 

@@ -1,12 +1,13 @@
 """Where a muscle goes by the motion of its bones, guessed before it is solved, and its shape as a beam."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from fem_reference.foundations.mesh import Floats, enclosed_volume, vertex_areas
+from fem_reference.foundations.mesh import Floats, diagonal, enclosed_volume, vertex_areas
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.signed_distance import signed_distances
 from fem_reference.problems.muscle import RigidBody, Setup
@@ -56,17 +57,17 @@ def motion(guess: Guess, axis: Floats, numbers: tuple[int, ...]) -> tuple[float,
     guess, at = guess.some(100), np.linspace(numbers[0], numbers[-1], min(401, 4 * (numbers[-1] - numbers[0]) + 1))
     velocity = np.diff(np.stack([guess.at(frame) for frame in at]), axis=0) / (at[1] - at[0])
     first = np.concatenate([np.zeros_like(velocity[:1]), velocity])  # it starts from rest
-    change = _size(np.diff(first, axis=0))
+    change = rms(np.diff(first, axis=0))
     typical = float(np.median(change))
     jumps = change[change > 5 * typical + 1e-12]
     smooth = change[change <= 5 * typical + 1e-12]
     sideways = velocity - (velocity @ axis)[..., None] * axis
-    speeds = (float(_size(one).max()) for one in (velocity, sideways))
+    speeds = (float(rms(one).max()) for one in (velocity, sideways))
     return *speeds, float(jumps.max(initial=0.0)), float(smooth.max(initial=0.0)) / (at[1] - at[0])
 
 
 def strain(points: Floats, moved: Floats) -> float:
-    """How much ``points`` (n, 3) are deformed that are ``moved`` (n, 3): what the best rigid motion (Kabsch 1976, doi
+    """The strain of ``points`` (n, 3) that are ``moved`` (n, 3): what the best rigid motion (Kabsch 1976, doi
     10.1107/S0567739476001873) leaves, root mean square, over that of the distances from the middle; 1 at most.
     """
     rest, now = points - points.mean(axis=0), moved - moved.mean(axis=0)
@@ -75,9 +76,9 @@ def strain(points: Floats, moved: Floats) -> float:
     return float(min(1.0, np.linalg.norm(now - turned) / np.linalg.norm(rest)))
 
 
-def _size(vectors: Floats) -> Floats:
-    """The root mean square (f,) of ``vectors`` (f, n, 3) over n."""
-    return np.asarray(np.sqrt((vectors**2).sum(axis=2).mean(axis=1)))
+def rms(vectors: Floats) -> Any:
+    """The root mean square of ``vectors`` (n, 3), or (f,) of (f, n, 3), over n."""
+    return np.sqrt((vectors**2).sum(axis=-1).mean(axis=-1))
 
 
 def centres(rest: Setup, frame: float | None = None) -> list[Floats]:
@@ -127,7 +128,7 @@ def turn(rest: Setup, frame: float) -> float:
 def length_of(rest: Setup) -> float:
     """From the first attachment to the last, or all of the muscle where it has not two."""
     middles = centres(rest)
-    extent = float(np.linalg.norm(np.ptp(rest.surface.points, axis=0)))
+    extent = diagonal(rest.surface.points)
     return float(np.linalg.norm(middles[0] - middles[-1])) or extent if len(middles) > 1 else extent
 
 

@@ -129,7 +129,7 @@ class Setup:
 
     @cached_property
     def exempt(self) -> Exemption:
-        """Where the surface is exempt from contact with bones."""
+        """The part of the surface that is exempt from contact with bones."""
         attached = ((one.bone.name, attached_shares(self.surface, one.vertices)) for one in self.attached)
         return Exemption.of(self.surface, attached)
 

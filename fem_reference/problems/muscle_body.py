@@ -7,7 +7,7 @@ import numpy as np
 from fem_reference.effects import Interaction
 from fem_reference.effects.contact import Contact as ContactEffect
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats, TetMesh, boundary, tet_volumes
+from fem_reference.foundations.mesh import Floats, TetMesh, boundary, place_of, tet_volumes
 from fem_reference.problems.body import Body, Cells, Prescribed
 from fem_reference.problems.checks import check_agreement
 from fem_reference.problems.contact import Contact, Obstruction
@@ -84,8 +84,7 @@ def _check_thickness(mesh: TetMesh) -> None:
     ratios = longest**3 / (6 * tet_volumes(mesh.points, mesh.tets))
     worst = int(np.argmax(ratios))
     if not ratios[worst] < _THINNEST:
-        x, y, z = corners[worst].mean(axis=0)
-        place = f"cell {worst} at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
+        place = f"cell {worst} at {place_of(corners[worst].mean(axis=0))}"
         raise InputError(
             place, f"{ratios[worst]:.1e} times as long as thick", f"less than {_THINNEST:g}, for double precision"
         )

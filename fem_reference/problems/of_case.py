@@ -37,7 +37,7 @@ def chosen[C: Case](case: C, rest: Callable[[], Any] | None = None) -> C:
 
 
 def watch(case: Case, rest: Any, built: Callable[[], Any]) -> Watch | None:
-    """What says of frames that were solved which effects that the case left out matter; None where it left out none. ``rest`` is
+    """The watch for effects that the case left out, in frames that were solved; None where it left out none. ``rest`` is
     its setup, ``built`` gives its problem.
     """
     if not isinstance(case, MuscleCase) or all(one.needed for one in case.decisions):

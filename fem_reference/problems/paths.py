@@ -7,8 +7,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from fem_reference.foundations.mesh import Floats, Ints
-from fem_reference.foundations.motion import Course, apply
-from fem_reference.problems.courses import course
+from fem_reference.foundations.motion import Turning, apply
+from fem_reference.problems.resolved_paths import turning
 
 Matrix = tuple[tuple[float, float, float], ...]
 ONCE = ((0.0, 0.0), (1.0, 1.0))  # from rest at frame 0 to all of it at frame 1
@@ -20,6 +20,11 @@ def amount(knots: tuple[tuple[float, float], ...], frame: float) -> float:
     return float(np.interp(frame, frames, amounts))
 
 
+def _straight(knots: tuple[tuple[float, float], ...]) -> Turning:
+    """Frames of ``knots``, between which nothing turns."""
+    return tuple(frame for frame, _ in knots), (0.0,) * len(knots)
+
+
 @dataclass(frozen=True)
 class Rest:
     """Nothing moves."""
@@ -28,7 +33,7 @@ class Rest:
         """Zero, (n, 3) [mm]."""
         return np.zeros_like(points)
 
-    def course(self, points: Floats) -> Course:  # noqa: ARG002
+    def turning(self, points: Floats) -> Turning:  # noqa: ARG002
         """No frames."""
         return (), ()
 
@@ -45,9 +50,9 @@ class Affine:
         """The displacement (n, 3) [mm] of rest points (n, 3)."""
         return np.asarray(amount(self.knots, frame) * (points @ np.array(self.gradient).T + np.array(self.shift)))
 
-    def course(self, points: Floats) -> Course:  # noqa: ARG002
+    def turning(self, points: Floats) -> Turning:  # noqa: ARG002
         """The knots, between which every point goes straight on."""
-        return tuple(frame for frame, _ in self.knots), (0.0,) * len(self.knots)
+        return _straight(self.knots)
 
 
 @dataclass(frozen=True)
@@ -69,7 +74,7 @@ class Turn:
         turned = Rotation.from_rotvec(angles[:, None] * unit).apply(arms)
         return np.asarray(turned - arms)
 
-    def course(self, points: Floats) -> Course:
+    def turning(self, points: Floats) -> Turning:
         """The knots, and the angles of the point that turns most."""
         _, _, along = self._arms(points)
         most = abs(self.angle) * float(np.abs(along).max(initial=0.0))
@@ -94,9 +99,9 @@ class Radial:
         """The displacement (n, 3) [mm] of rest points (n, 3)."""
         return np.asarray(amount(self.knots, frame) * self.share * points * np.array(self.along))
 
-    def course(self, points: Floats) -> Course:  # noqa: ARG002
+    def turning(self, points: Floats) -> Turning:  # noqa: ARG002
         """The knots, between which every point goes straight on."""
-        return tuple(frame for frame, _ in self.knots), (0.0,) * len(self.knots)
+        return _straight(self.knots)
 
 
 @dataclass(frozen=True)
@@ -110,9 +115,9 @@ class From:
         """The 4 x 4 matrix at ``frame``."""
         return self.pose(max(frame, self.first))
 
-    def course(self, points: Floats) -> Course | None:
-        """That of the pose, and where it begins."""
-        known = course(self.pose, points)
+    def turning(self, points: Floats) -> Turning | None:
+        """Frames and angles of the pose, from where it begins."""
+        known = turning(self.pose, points)
         if known is None or not known[0]:
             return known
         frames = (self.first, *(frame for frame in known[0] if frame > self.first))
@@ -129,9 +134,9 @@ class Follows:
         """The displacement (n, 3) [mm] of rest points (n, 3) at a frame number."""
         return apply(self.pose(frame), points) - points
 
-    def course(self, points: Floats) -> Course | None:
-        """That of the pose."""
-        return course(self.pose, points)
+    def turning(self, points: Floats) -> Turning | None:
+        """Frames and angles of the pose."""
+        return turning(self.pose, points)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Stresses by the energies of effects, differentiated by ``jets``: they share nothing with a solver."""
+"""Stresses by the energies of effects, differentiated by ``jets``, independently of any solver."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -41,10 +41,10 @@ def kirchhoff(acting: Acting, F: Floats, fibre: Floats | None) -> Floats:
 
 
 @dataclass(frozen=True)
-class Asked:
-    """Of a state the sizes of stresses [MPa], root mean square over the volume: of what ``acts``, without its share of pressure,
-    and what each of others would add to that, ``added``; and the smallest and the greatest ``stretch`` of fibres. NaN where no
-    tetrahedron is as it should be.
+class StressSizes:
+    """Sizes of stresses [MPa] in a state, root mean square over the volume: of what ``acts``, without its share of pressure, and
+    what each of others would add to that, ``added``; and the smallest and the greatest ``stretch`` of fibres. NaN where no
+    tetrahedron has a positive volume.
     """
 
     acts: float
@@ -52,7 +52,7 @@ class Asked:
     stretch: tuple[float, float]
 
 
-class Sampled:
+class StressSamples:
     """Tetrahedra of a ``mesh``, with the unit vectors ``fibre`` (m, 3) along their fibres: stresses of states of their points."""
 
     def __init__(self, mesh: TetMesh, fibre: Floats | None) -> None:
@@ -62,23 +62,23 @@ class Sampled:
         self.volumes = tet_volumes(mesh.points, self.tets)
         self.fibre = None if fibre is None else fibre[chosen]
 
-    def asked(self, positions: Floats, acting: Acting, others: Acting) -> "Asked":
-        """What is ``acting``, and what each of the ``others`` would add to that, where the points are at ``positions`` (n, 3)."""
+    def sizes(self, positions: Floats, acting: Acting, others: Acting) -> "StressSizes":
+        """The sizes for what is ``acting``, and for each of the ``others`` on top, where the points are at ``positions`` (n, 3)."""
         F = _edges(positions, self.tets) @ self.inverse
         good = np.linalg.det(F) > _SMALLEST
         if not good.any():
-            return Asked(np.nan, (np.nan,) * len(others), (np.nan, np.nan))
+            return StressSizes(np.nan, (np.nan,) * len(others), (np.nan, np.nan))
         F, volumes, fibre = F[good], self.volumes[good], None if self.fibre is None else self.fibre[good]
         now = kirchhoff(acting, F, fibre)
         added = [_added(acting, one, now, lambda terms: kirchhoff(terms, F, fibre)) for one in others]
         shear = now - np.trace(now, axis1=1, axis2=2)[:, None, None] / 3 * np.eye(3)
-        return Asked(
+        return StressSizes(
             _mean(shear, volumes), tuple(_mean(one, volumes) for one in added), _stretches(acting, F, fibre, volumes)
         )
 
 
 def _added(acting: Acting, one: tuple[Effect, float], now: Floats, stress: Callable[[Acting], Floats]) -> Floats:
-    """What an effect adds to the stress ``now`` (n, 3, 3) of what is ``acting``: an energy its own, in what is prestretched."""
+    """The change by an effect of the stress ``now`` (n, 3, 3) of what is ``acting``: an energy its own, in what is prestretched."""
     if isinstance(one[0], Energy):
         return stress([*(other for other in acting if isinstance(other[0], Prestrain)), one])
     return stress([*acting, one]) - now if isinstance(one[0], Prestrain) else np.zeros(now.shape)

@@ -141,9 +141,9 @@ def comparison_text(result: Comparison, page: Path | None = None) -> str:
     runs += [
         f"reference: doubtful, {why}" for why in doubts(result.reference) if why != result.reference.outcome.status
     ]
-    answers = second_check.said(result.reference)
-    if answers and result.reference.outcome.status == "converged":
-        runs.append(f"second check: passed, {len(answers)} questions")
+    checks = second_check.texts_of(result.reference)
+    if checks and result.reference.outcome.status == "converged":
+        runs.append(f"second check: passed, {len(checks)} checks")
     judged = [_judged(verdict) for verdict in result.verdicts]
     asked = {verdict.expectation.of for verdict in result.verdicts}
     unjudged = result.candidates and asked == {"reference"}

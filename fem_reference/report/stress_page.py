@@ -7,7 +7,7 @@ from html import escape
 import numpy as np
 from PIL import Image, ImageDraw
 
-from fem_reference.assessment.stress import VERDICTS, Course, Scene, Stress
+from fem_reference.assessment.stress import VERDICTS, History, Scene, Stress
 from fem_reference.report.templates import template
 from fem_reference.report.words import number
 
@@ -96,9 +96,9 @@ def _colour(facing: float) -> tuple[int, int, int]:
     return red, green, blue
 
 
-def curve(course: Course, bound: float) -> str:
+def curve(history: History, bound: float) -> str:
     """A quantity over frames as SVG, with what a healthy run keeps below as a broken line; logarithmic where it spans decades."""
-    values = np.asarray(course.values, float)
+    values = np.asarray(history.values, float)
     shown = np.where(np.isfinite(values), values, np.nan)
     top = float(np.nanmax(np.append(shown, bound), initial=0.0))
     logarithmic = top > 30 * bound > 0
@@ -110,21 +110,21 @@ def curve(course: Course, bound: float) -> str:
             share = np.log(max(value, low) / low) / np.log(top / low)
         return 8 + (_HEIGHT - _BELOW - 8) * (1 - float(np.clip(share, 0, 1)))
 
-    first, last = course.numbers[0], course.numbers[-1]
+    first, last = history.numbers[0], history.numbers[-1]
 
     def along(frame: float) -> float:
         return _LEFT + (_WIDTH - _LEFT - 10) * (frame - first) / max(last - first, 1)
 
-    dots = [f"{along(n):.1f},{height(v):.1f}" for n, v in zip(course.numbers, shown, strict=True) if np.isfinite(v)]
+    dots = [f"{along(n):.1f},{height(v):.1f}" for n, v in zip(history.numbers, shown, strict=True) if np.isfinite(v)]
     lost = [
         f'<text x="{along(n):.1f}" y="20" class="lost">✗</text>'
-        for n, v in zip(course.numbers, shown, strict=True)
+        for n, v in zip(history.numbers, shown, strict=True)
         if not np.isfinite(v)
     ]
     limit, floor = height(bound), _HEIGHT - _BELOW
-    title = escape(f"{course.quantity.replace('_', ' ')}{', ' + course.unit if course.unit else ''}")
+    title = escape(f"{history.quantity.replace('_', ' ')}{', ' + history.unit if history.unit else ''}")
     return (
-        f'<svg viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" aria-label="{title} over frames" class="course">'
+        f'<svg viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" aria-label="{title} over frames" class="history">'
         f'<path d="M{_LEFT} 8V{floor}H{_WIDTH - 10}" class="axis"/>'
         f'<path d="M{_LEFT} {limit:.1f}H{_WIDTH - 10}" class="limit"/>'
         f'<polyline points="{" ".join(dots)}" class="line"/>{"".join(lost)}'

@@ -58,7 +58,7 @@ def truncate(state: dict[str, Any], number: int) -> None:
 
 
 def places(folder: Path, number: int) -> tuple[Floats, Floats | None]:
-    """Where the surface (n, 3) and the points of the tets (k, 3), if there are any, are [mm] in a stored frame of the run in
+    """Positions [mm] of the surface (n, 3) and of the points of the tets (k, 3), if there are any, in a stored frame of the run in
     ``folder``.
     """
     tets = folder / "tets" / f"frame_{number:04d}.vtu"

@@ -72,7 +72,7 @@ def write(folder: Path, frame: int, state: NodalState) -> None:
 
 
 def are_kept(folder: Path, frames: tuple[int, ...]) -> bool:
-    """Whether the run in ``folder`` keeps its states at all ``frames``."""
+    """True where the run in ``folder`` keeps its states at all ``frames``."""
     return all(path.is_file() for path in (folder / FOLDER / "rest.npz", *(_place(folder, frame) for frame in frames)))
 
 

@@ -191,7 +191,7 @@ class Case(Record):
 
     @property
     def decides(self) -> list[Any]:
-        """What verdicts follow from: the keys that determine the solution, the effects, and the solvers whose runs are judged, with
+        """Causes of verdicts: the keys that determine the solution, the effects, and the solvers whose runs are judged, with
         the settings that change their answer.
         """
         judged = {entry.of for entry in self.expect}

@@ -15,7 +15,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from fem_reference.foundations.mesh import TET_FACES, Floats, Ints, Polylines
+from fem_reference.foundations.mesh import TET_FACES, Floats, Ints, Polylines, diagonal
 from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import Length
 from fem_reference.problems.muscle import Problem, Setup
@@ -124,7 +124,7 @@ def along_fibres(points: Floats, edges: Ints, fibres: Polylines) -> Floats:
     """
     starts = np.setdiff1d(np.arange(len(fibres.points) - 1), fibres.offsets[1:] - 1)
     starts = starts[np.any(fibres.points[starts + 1] != fibres.points[starts], axis=1)]
-    within = _AS_NEAR * float(np.linalg.norm(np.ptp(points, axis=0)))
+    within = _AS_NEAR * diagonal(points)
     middles = points[edges].mean(axis=1)
     nearest = starts[nearest_segments(middles, fibres.points[starts], fibres.points[starts + 1], within)]
     edge, fibre = points[edges[:, 1]] - points[edges[:, 0]], fibres.points[nearest + 1] - fibres.points[nearest]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats, Ints, Surface, check_finite
+from fem_reference.foundations.mesh import Floats, Ints, Surface, check_finite, diagonal
 from fem_reference.foundations.records import FileName, Name, Record, parse
 from fem_reference.foundations.units import LengthUnit, length_unit
 from fem_reference.io import files, texts
@@ -146,7 +146,7 @@ def _checked_about(settings: Settings) -> About:
 
 def _check_size(place: str, positions: Floats, rest: Surface) -> None:
     """InputError where a frame is so small that it must be in another unit than the first."""
-    size = np.linalg.norm(np.ptp(positions, axis=0)) / np.linalg.norm(np.ptp(rest.points, axis=0))
+    size = diagonal(positions) / diagonal(rest.points)
     if not size >= SMALLEST:
         raise InputError(place, f"a surface of {size:.2g} times the size at rest", "one unit of length in all frames")
 
@@ -268,7 +268,7 @@ def _weld(corners: Floats, triangles: Ints, count: int) -> tuple[Floats, float, 
 def _check_at_rest(place: str, number: int, positions: Floats, rest: Surface) -> None:
     """InputError where the first frame is grossly elsewhere than ``rest``, a warning where it is not quite there."""
     away = float(np.sqrt(np.mean(np.sum((positions - rest.points) ** 2, axis=1))))
-    limit = NEAR_REST * float(np.linalg.norm(np.ptp(rest.points, axis=0)))
+    limit = NEAR_REST * diagonal(rest.points)
     got = f"a first frame ({number}) that is {away:.3g} mm (rms) from the rest surface {rest.place}"
     if not away <= limit:
         raise InputError(place, got, f"at most {limit:.3g} mm; the usual reason is another unit or another mesh")

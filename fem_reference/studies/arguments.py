@@ -43,7 +43,7 @@ def check_progress(progress: Any) -> None:
 
 
 def free_folder(given: Any, place: str) -> Path:
-    """As ``path``, of a folder that is there or can be made."""
+    """The path of a folder that is there or can be made."""
     folder = path(given, place)
     above = next(one for one in (folder, *folder.absolute().parents) if one.exists())
     if not above.is_dir():

@@ -90,7 +90,7 @@ class Bench[C: Case]:
         return self._with_all_that_matters(run, choice, place)
 
     def _ended(self, solver: str) -> tuple[str, ...]:
-        """How stored runs ended that are taken again."""
+        """Statuses of stored runs that are taken again."""
         return ("converged", "denied", *(("stopped",) if self._watches(solver) else ()))
 
     def known(self, name: str, choice: SolverChoice, place: str) -> Run | None:

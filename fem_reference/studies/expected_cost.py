@@ -13,7 +13,7 @@ _SECONDS, _UNKNOWNS, _EXPONENT, _ITERATIONS = 0.13, 5456, 1.15, 4
 
 
 def unknowns(built: Problem, settings: Any) -> int:
-    """How many unknowns the reference of a muscle has with its ``settings``."""
+    """The number of unknowns of the reference of a muscle with its ``settings``."""
     return resources.unknowns(as_body(built).mesh, settings.element)
 
 

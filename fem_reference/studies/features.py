@@ -7,6 +7,7 @@ from fem_reference.effects.fibre_passive import FibrePassive
 from fem_reference.effects.incompressible import Incompressible
 from fem_reference.effects.incompressible_penalty import IncompressiblePenalty
 from fem_reference.effects.neo_hooke import NeoHooke
+from fem_reference.foundations.mesh import diagonal
 from fem_reference.foundations.motion import apply
 from fem_reference.problems.muscle import Setup
 from fem_reference.scenes.muscle import MuscleCase
@@ -30,7 +31,7 @@ def features(scene: MuscleCase, setup: Setup) -> dict[str, float]:
     fibres = sum(effect.stress for effect in scene.effects if isinstance(effect, FibrePassive))
     pressing = 0 if contact is None else len(scene.bone if contact.bones is None else contact.bones)
     return {
-        "size": float(np.linalg.norm(np.ptp(points, axis=0))),
+        "size": diagonal(points),
         "triangles": float(len(setup.surface.triangles)),
         "motion": float(max(moved, default=0.0)),
         "contact": float(pressing),

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats, Ints, Surface, check_closed, enclosed_volume
+from fem_reference.foundations.mesh import Floats, Ints, Surface, check_closed, diagonal, enclosed_volume
 from fem_reference.foundations.records import check_name
 from fem_reference.foundations.units import LENGTH_UNITS, length_unit
 from fem_reference.geometry.distance import distances
@@ -103,7 +103,7 @@ def write(folder: Path, muscle: Surface, bones: dict[str, Surface]) -> None:
 
 
 def is_name(name: str) -> bool:
-    """Whether a scene can call something so."""
+    """True where a scene can call something so."""
     try:
         return bool(check_name(name))
     except ValueError:
@@ -111,7 +111,7 @@ def is_name(name: str) -> bool:
 
 
 def _cleaned(name: str) -> str:
-    """What a ``name`` comes to on one line, without what is not printed, and not too long."""
+    """The ``name`` on one line, without what is not printed, and not too long."""
     shown = "".join(letter if letter.isprintable() else "_" for letter in name)[:_LONGEST].strip()
     return shown.lstrip(".") or "bone"
 
@@ -135,7 +135,7 @@ def _new(folder: Path) -> Path:
 
 
 def _factor(unit: str) -> float:
-    """How many mm a unit of the command line has."""
+    """The length [mm] of a unit of the command line."""
     try:
         return length_unit(unit)
     except ValueError as error:
@@ -146,7 +146,7 @@ def _unit(muscle: Surface, bones: Sequence[Surface]) -> Unit:
     """The unit of coordinates of which each surface, by its own size, may be; InputError where that leaves none or several."""
     fitting, said = list[set[str]](), list[str]()
     for surface, kind in ((muscle, "muscle"), *((bone, "bone") for bone in bones)):
-        size, (least, most) = _length(surface), _LONG[kind]
+        size, (least, most) = diagonal(surface.points), _LONG[kind]
         units = [unit for unit in _GUESSED if least <= size * LENGTH_UNITS[unit] <= most]
         fitting.append(set(units))
         name = _cleaned(Path(surface.place).name)
@@ -156,11 +156,6 @@ def _unit(muscle: Surface, bones: Sequence[Surface]) -> Unit:
         what = "several units are" if shared else "no unit is"
         raise InputError("--unit", f"none, where {why}: {what} one of all of them", f"one of {', '.join(LENGTH_UNITS)}")
     return Unit(shared.pop(), why)
-
-
-def _length(surface: Surface) -> float:
-    """The diagonal of its box."""
-    return float(np.linalg.norm(np.ptp(surface.points, axis=0)))
 
 
 def _welded(surface: Surface, unit: float) -> Surface:
@@ -181,8 +176,8 @@ def _attachments(muscle: Surface, bones: dict[str, Surface]) -> tuple[_Attached,
     away = {name: distances(muscle.points, bone).distance for name, bone in bones.items()}
     first, second = sorted(away, key=lambda name: float(np.quantile(away[name], _ATTACHED[-1])))[:2]
     for name in (first, second):
-        if (gap := float(away[name].min())) > _APART * _length(muscle):
-            got = f'the bone "{name}" {gap:.3g} mm from it, which is {_length(muscle):.3g} mm long'
+        if (gap := float(away[name].min())) > _APART * diagonal(muscle.points):
+            got = f'the bone "{name}" {gap:.3g} mm from it, which is {diagonal(muscle.points):.3g} mm long'
             raise InputError(muscle.place, got, "surfaces in one unit (--unit) that are beside each other")
     for share in _ATTACHED:
         ends = [_nearest(name, away[name], share) for name in (first, second)]
@@ -222,7 +217,7 @@ def _text(name: str, muscle: Surface, bones: dict[str, Surface], paths: dict[str
         proves=toml_text(f"How the muscle of {source} goes with {moving}."),
         muscle=source,
         triangles=len(muscle.triangles),
-        length=f"{_length(muscle):.0f}",
+        length=f"{diagonal(muscle.points):.0f}",
         volume=f"{volume / 1000:.3g}",
         size=f"{size:.3g}",
         tets=_TETS,

@@ -18,7 +18,7 @@ log = logging.getLogger(__name__)
 
 @contextmanager
 def alone(folder: Path) -> Iterator[None]:
-    """Nobody else makes the run in ``folder`` meanwhile: whoever comes second waits, and then finds it made."""
+    """Make the run in ``folder`` alone: a second process waits, and then finds it made."""
     files.make_folder(folder.parent)
     lock = FileLock(folder.parent / f".{folder.name}.lock")
     try:

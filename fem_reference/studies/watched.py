@@ -14,7 +14,7 @@ class StoppedError(Exception):
 
 def begin(watch: Watch, writer: store.Writer) -> None:
     """Begin to watch a run, of which a process before this one may have stored frames."""
-    watch.seen.clear()
+    watch.frames.clear()
     for number in writer.frames:
         watch.see(number, *cut_off.places(writer.folder, number))
 
@@ -33,7 +33,7 @@ def end(watch: Watch) -> None:
 def again(watch: Watch, run: Run) -> tuple[Decision, ...]:
     """The effects that matter in a stored ``run``, at the first frame that shows one."""
     assert run.folder is not None
-    watch.seen.clear()
+    watch.frames.clear()
     for number in run.numbers:
         if found := watch.see(number, *cut_off.places(run.folder, number)):
             return found

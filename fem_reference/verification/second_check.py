@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from fem_reference import effects
 from fem_reference.assessment.catalogue import Entry, Finding, Lab
-from fem_reference.assessment.questions import of_muscle
+from fem_reference.assessment.run_checks import of_muscle
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import parse
 from fem_reference.problems.muscle import Problem
@@ -20,7 +20,7 @@ from fem_reference.studies.hard import blocks
 from fem_reference.studies.hard.records import Hard
 from fem_reference.verification.parts import zero
 
-Spoilt = Callable[[Problem, Run], tuple[Problem, Run]]
+Mistake = Callable[[Problem, Run], tuple[Problem, Run]]
 
 
 def _slides(direction: list[float], distance: str) -> dict[str, object]:
@@ -68,10 +68,10 @@ def _solve(lab: Lab) -> tuple[Problem, Run]:
     return problem, Run("bar", "fenicsx", found.outcome, numbers, problem.surface, positions, scalars=scalars)
 
 
-def denials(lab: Lab, spoil: Spoilt | None = None) -> Finding:
-    """How many answers are not met of the run, or of one that is spoilt."""
+def denials(lab: Lab, mistake: Mistake | None = None) -> Finding:
+    """The number of checks that are not met by the run, or by one with a mistake made on purpose."""
     problem, run = solved(lab)
-    lost = [str(one) for one in of_muscle(*(spoil(problem, run) if spoil else (problem, run))) if not one.met]
+    lost = [str(one) for one in of_muscle(*(mistake(problem, run) if mistake else (problem, run))) if not one.met]
     return Finding(float(len(lost)), note="; ".join(lost))
 
 
@@ -134,14 +134,14 @@ ENTRIES = tuple(
         truth=zero,
         within=0.5,
         relative=False,
-        because="it counts the answers that are not met",
+        because="it counts the checks that are not met",
         kind="property",
-        source="fem_reference/assessment/questions.py",
+        source="fem_reference/assessment/run_checks.py",
         measure=denials,
         negative_control=words,
-        with_negative_control=partial(denials, spoil=spoil),
+        with_negative_control=partial(denials, mistake=mistake),
     )
-    for name, words, spoil in (
+    for name, words, mistake in (
         ("order", "two frames in each other's place", swapped),
         ("frames", "its last frame missing", missing),
         ("finite", "a coordinate that is not a number", lost),

@@ -17,7 +17,7 @@ from fem_reference.runs.store import Run
 def _facts(_: Comparison) -> dict[str, Any]:
     """What its alarms are made of."""
     found = {"inversion": inversion, "least": least, "greatest": greatest, "gap": gap}
-    return found | {"energy_gap_limit": ENERGY_GAP, "second_check": second_check.said}
+    return found | {"energy_gap_limit": ENERGY_GAP, "second_check": second_check.texts_of}
 
 
 def greatest(run: Run, scalar: str) -> float:

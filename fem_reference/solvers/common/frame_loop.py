@@ -8,10 +8,10 @@ from typing import Protocol
 
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.mesh import Floats, diagonal
 from fem_reference.foundations.motion import apply
-from fem_reference.problems.courses import posed, skipped
 from fem_reference.problems.muscle import Setup
+from fem_reference.problems.resolved_paths import posed, skipped
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers.common.state_checks import Trouble, trouble
 
@@ -66,7 +66,7 @@ def _unseen(setup: Setup, per_frame: int) -> Trouble | None:
         bone for bone in setup.bones if np.isfinite([bone.pose(frame) for frame in seen]).all()
     ]  # else its loop says so
     things = [posed(f'bone "{bone.name}"', bone.pose, points) for bone in bones]
-    found = skipped(things, seen.tolist(), float(np.linalg.norm(np.ptp(points, axis=0))))
+    found = skipped(things, seen.tolist(), diagonal(points))
     if found is None:
         return None
     thing, early, late = found

@@ -91,5 +91,5 @@ def march(
 
 
 def _size(left: float, step: float, largest: float) -> float:
-    """That of a load step near to ``step``, of equal ones over what is ``left``: none is a sliver."""
+    """The size of a load step near to ``step``, of equal ones over what is ``left``: none is a sliver."""
     return left / max(1, round(left / step + 0.3), math.ceil(left / largest - 1e-9))

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface, enclosed_volume
+from fem_reference.foundations.mesh import Floats, Ints, Surface, diagonal, enclosed_volume
 from fem_reference.runs.contents import Status
 
 # A body spread this many times as wide as at rest, or as its attached part, is lost.
@@ -41,4 +41,4 @@ def trouble(points: Floats, rest: Surface, attached: Ints) -> Trouble | None:
 
 def _spread(points: Floats) -> float:
     """Diagonal of the box around points [mm], 0 without any."""
-    return float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
+    return diagonal(points) if len(points) else 0.0

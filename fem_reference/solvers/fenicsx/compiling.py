@@ -26,7 +26,7 @@ from ufl.corealg.map_dag import map_expr_dag
 from ufl.corealg.multifunction import MultiFunction
 
 PATIENCE = 300  # [s] that a process waits for the compilation of one that takes no lock
-_LOCKS = 64  # forms share them; one that is held says that something is compiled
+_LOCKS = 64  # forms share them; one that is taken shows that something is compiled
 
 
 @cache
@@ -63,7 +63,7 @@ def _lock(folder: Path, number: int) -> FileLock:
 
 
 def _alone[R](compiled: Callable[..., R]) -> Callable[..., R]:
-    """FFCx's way to compile, by one process at a time for what is the same: it takes for granted that nothing of a form is there
+    """FFCx's compilation, by one process at a time for what is the same: it takes for granted that nothing of a form is there
     when it has compiled it, and ends with an error where an interrupted process, or one that was taken for dead, left some.
     """
 
@@ -145,11 +145,11 @@ def prepare() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # ours to end is the parent's business
     signal.signal(signal.SIGTERM, _stop)
     folder = Path(jit.get_options()["cache_dir"])
-    with ExitStack() as held:
+    with ExitStack() as locks:
         try:
             for path in folder.glob(".fem_reference_*.lock"):
-                held.enter_context(FileLock(path).acquire(timeout=0))
-        except Timeout:  # what looks half-done may be on its way
+                locks.enter_context(FileLock(path).acquire(timeout=0))
+        except Timeout:  # what looks half-done may be in the making
             return
         _remove_broken(folder)
 

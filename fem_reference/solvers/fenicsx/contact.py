@@ -12,7 +12,7 @@ import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
-from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Floats, Ints, place_of
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.rigid_bodies import Sampled
 from fem_reference.problems.contact import Contact, Obstruction, nearest_on_path
@@ -172,8 +172,8 @@ class ContactForces:
         found = [one for rank in comm.allgather(mine) for one in rank]
         if not found:
             return "nowhere"
-        depth, name, (x, y, z) = max(found)
-        return f'{max(depth, 0.0):.2f} mm in "{name}" at ({x:.1f}, {y:.1f}, {z:.1f}) mm'
+        depth, name, at = max(found)
+        return f'{max(depth, 0.0):.2f} mm in "{name}" at {place_of(at)}'
 
     def settle(self) -> None:
         """Take the present state as the one that the next step starts from."""
@@ -225,6 +225,5 @@ class ContactForces:
         if not excess.max(initial=0.0) > self.law.smoothing:
             return None
         worst = int(np.argmax(excess))
-        x, y, z = self.points.rest[met[turned[worst]]]
-        where = f"the point that rests at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
+        where = f"the point that rests at {place_of(self.points.rest[met[turned[worst]]])}"
         return float(excess[worst]), f'{where} went through "{self.obstructions[i].name}"'

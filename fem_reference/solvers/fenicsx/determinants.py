@@ -7,7 +7,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fem_reference.foundations.mesh import Floats, Ints
+from fem_reference.foundations.mesh import Floats, Ints, place_of
 from fem_reference.problems.body import Kind, reference_nodes
 from fem_reference.solvers.fenicsx import compiling
 from fem_reference.solvers.fenicsx.tabulated import Displacement, geometry
@@ -23,8 +23,7 @@ class Smallest:
     at: tuple[float, float, float]
 
     def __str__(self) -> str:
-        x, y, z = self.at
-        return f"{self.value:.3f} at a {self.where} of cell {self.cell} at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
+        return f"{self.value:.3f} at a {self.where} of cell {self.cell} at {place_of(self.at)}"
 
 
 class Determinants:

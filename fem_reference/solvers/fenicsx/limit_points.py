@@ -6,7 +6,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.mesh import Floats, place_of
 from fem_reference.solvers.fenicsx.body import AssembledBody
 from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolveError
 
@@ -26,10 +26,9 @@ class LimitPoint:
     at: tuple[float, float, float]
 
     def __str__(self) -> str:
-        x, y, z = self.at
         return (
             f"the equilibrium comes to a limit point at frame {self.frame:.4g}, where the stiffness of its softest mode, "
-            f"largest at ({x:.1f}, {y:.1f}, {z:.1f}) mm, is 0: no state is near beyond it, and what follows is a snap"
+            f"largest at {place_of(self.at)}, is 0: no state is near beyond it, and what follows is a snap"
         )
 
 

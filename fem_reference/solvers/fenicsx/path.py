@@ -8,7 +8,7 @@ from dolfinx import la
 from mpi4py import MPI
 
 from fem_reference.foundations.limits import ENERGY_GAP
-from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.mesh import Floats, place_of
 from fem_reference.solvers.fenicsx.determinants import Determinants, Smallest
 from fem_reference.solvers.fenicsx.system import System
 
@@ -66,7 +66,7 @@ class Path:
         self.energy, (self.unknowns, self.forces) = energy, states[-1]
 
     def _gap(self, energy: float, states: list[tuple[Floats, Floats]]) -> float:
-        """What the energy grew by up to the last of ``states`` (unknowns and forces) without work, over the greatest so far; they
+        """The growth of the energy up to the last of ``states`` (unknowns and forces) without work, over the greatest so far; they
         are two, or three at equal distances of time.
         """
         own = self.system.owned
@@ -147,8 +147,7 @@ def least(values: Floats) -> Floats:
 
 def on_the_way(jump: Smallest) -> str:
     """What is wrong with a step through ``jump``."""
-    x, y, z = jump.at
     return (
         f"to a state on another path: on the straight way from the last one det F falls to {jump.value:.2g} of itself, "
-        f"in cell {jump.cell} at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
+        f"in cell {jump.cell} at {place_of(jump.at)}"
     )

@@ -14,7 +14,7 @@ from dolfinx import mesh
 from mpi4py import MPI
 
 from fem_reference.foundations.limits import Limit
-from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.mesh import Floats, place_of
 from fem_reference.problems.body import Body
 from fem_reference.solvers.fenicsx import compiling
 from fem_reference.solvers.fenicsx.determinants import Determinants
@@ -38,8 +38,7 @@ class Extreme:
     at: tuple[float, float, float]
 
     def __str__(self) -> str:
-        x, y, z = self.at
-        return f"{self.value:.3g} in cell {self.cell} at ({x:.1f}, {y:.1f}, {z:.1f}) mm"
+        return f"{self.value:.3g} in cell {self.cell} at {place_of(self.at)}"
 
 
 @dataclass(frozen=True)

@@ -171,15 +171,15 @@ def _solved(posed: Posed, choice: SolverChoice) -> Cell:
     if posed.truth is not None and posed.truth[1][: len(followed.numbers)] == followed.numbers:
         followed = replace(followed, truth=posed.truth[0][: len(followed.numbers)])
     known = [bound for bound in hard.bound if bound.quantity != "from_reference" or followed.truth is not None]
-    courses = [(bound, health.course(followed, bound.quantity)) for bound in known]
+    histories = [(bound, health.history(followed, bound.quantity)) for bound in known]
     begins = followed.least_determinant
     if hard.start is not None and begins is not None and not begins[0] > 0:
         said = f"it begins with det F down to {begins[0]:.2g}, where it needs more than 0: {outcome.status}"
         found = replace(blank, verdict="refused", sentence=said)
     elif outcome.status != "converged":
-        found = stress.unfinished(blank, outcome.message, courses, hard.no_solution)
+        found = stress.unfinished(blank, outcome.message, histories, hard.no_solution)
     else:
-        found = stress.judge(blank, courses, hard.contrast)
+        found = stress.judge(blank, histories, hard.contrast)
     wanted = hard.steps or (steps.farthest(followed) if posed.in_steps and hard.start is None else None)
     if choice.solver == REFERENCE and isinstance(built, Problem) and wanted is not None:
         ends = steps.compare(built, choice, wanted)
@@ -212,7 +212,7 @@ def _muscle(built: Problem, choice: SolverChoice) -> tuple[Outcome, Followed]:
     solvers.require(choice.solver, settings, choice.solver)
     frames = list[Frame]()
     outcome = offer.solve(built, settings, frames.append)
-    steps.told(outcome)
+    steps.check_not_stalled(outcome)
     if not frames:
         frames.append(Frame(built.frames[0], np.array(built.surface.points)))
     if solvers.takes_effects(choice.solver):
@@ -277,7 +277,7 @@ def _field(posed: Posed, built: FieldProblem, choice: SolverChoice) -> tuple[Out
     changes = posed.hard.settings.get(choice.solver, {})
     settings = solvers.settings(SolverChoice(solver=choice.solver, **changes), choice.solver, "solve_field")
     solution = offer.solve_field(built, settings)
-    steps.told(solution.outcome)
+    steps.check_not_stalled(solution.outcome)
     nothing = np.zeros((1, 0, 3))
     return solution.outcome, Followed((0,), NO_SURFACE, nothing, values=solution.values[None], range=posed.range)
 
@@ -288,10 +288,10 @@ def _scene(found: Cell, followed: Followed) -> Scene | None:
     """
     ended = found.status != "converged"
     i = len(followed.positions) - 1 if ended else found.at
-    points, course = followed.positions[i], found.course
+    points, history = followed.positions[i], found.history
     if not len(points) or not np.isfinite(points).all():
         return None
-    place = None if course is None or course.points is None else course.points[i]
+    place = None if history is None or history.points is None else history.points[i]
     if ended and (named := _PLACE.search(found.sentence)):
         off = followed.surface.points - [float(number) for number in named.groups()]
         place = points[np.argmin(np.linalg.norm(off, axis=1))]

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fem_reference.assessment.health import Followed
-from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.mesh import Floats, diagonal
 from fem_reference.problems.muscle import Problem
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes.case import SolverChoice
@@ -45,7 +45,7 @@ def compare(built: Problem, choice: SolverChoice, steps: Steps) -> SameEnd:
             ends[count] = end
     if not ends:
         return SameEnd(True, f"no number of load steps reaches frame {steps.until} ({', '.join(words)})")
-    standard, size = ends[max(ends)], float(np.linalg.norm(np.ptp(built.surface.points, axis=0)))
+    standard, size = ends[max(ends)], diagonal(built.surface.points)
     off = {count: 100 * float(np.linalg.norm(end - standard, axis=1).max()) / size for count, end in ends.items()}
     words = [
         f"{count}: {share:.2g} % from that of {max(ends)}" for count, share in off.items() if count != max(ends)
@@ -63,11 +63,11 @@ def _end(built: Problem, choice: SolverChoice, until: int, count: int) -> tuple[
     settings = fenicsx.Settings(**{**choice.settings, **step})
     frames = list[Frame]()
     outcome = fenicsx.solve(replace(built, frames=(built.frames[0], until)), settings, frames.append)
-    told(outcome)
+    check_not_stalled(outcome)
     return outcome.status, frames[-1].tets if outcome.status == "converged" else None
 
 
-def told(outcome: Outcome) -> None:
+def check_not_stalled(outcome: Outcome) -> None:
     """StalledError where an ``outcome`` says nothing of the run."""
     if outcome.status == "stalled":
         raise StalledError(outcome.message)

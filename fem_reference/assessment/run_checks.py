@@ -1,6 +1,6 @@
-"""What is asked of the states that a solver calls converged: by positions and forces that it recorded, and nothing of its loop.
+"""Checks of the states that a solver calls converged: by positions and forces that it recorded, and nothing of its loop.
 
-Every frame is asked; each answer stands beside what is allowed, at the frame and place where it comes nearest to that, or goes
+Every frame is asked; each check stands beside what is allowed, at the frame and place where it comes nearest to that, or goes
 farthest beyond.
 """
 
@@ -16,7 +16,7 @@ from fem_reference.effects import Effect, Load
 from fem_reference.effects.damping import Damping
 from fem_reference.effects.gravity import Gravity
 from fem_reference.effects.inertia import Inertia
-from fem_reference.foundations.mesh import Floats, Surface, boundary, vertex_areas
+from fem_reference.foundations.mesh import Floats, Surface, boundary, diagonal, place_of, vertex_areas
 from fem_reference.foundations.motion import Rotation, apply
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.intersections import overlaps, self_crossings
@@ -32,11 +32,11 @@ from fem_reference.runs.store import Run
 
 # What is in place to this share of the size of a body is in place: rounding of what is stored is a thousandth of it.
 _ROUNDING = 1e-9
-# Attached vertices go astray from their bone by strain times how far they are from the facets that hold them: stretch up to 4.
+# Attached vertices go astray from their bone by strain times how far they are from the facets that are attached: stretch up to 4.
 _STRAIN = 3.0
 # By how much more than the recorded force says springs may have yielded on average: they pull at other points of the surface.
 _SPRINGS = 1.5
-# What bones turn by within a load step at most, on average between two frames: beyond it nothing says which way round it was.
+# What bones turn by within a load step at most, on average between two frames: beyond it nothing says in which direction it turned.
 _TURN = 1.01 * math.pi / 2
 # Between points of contact, half a spacing apart, a right-angled edge gets in by a quarter of it; of self-contact there is none,
 # and what a surface may reach through itself is what its creases do.
@@ -48,10 +48,10 @@ _BALANCE = 10.0
 
 
 @dataclass(frozen=True)
-class Answer:
-    """What was ``asked``: the ``value`` at a ``frame`` and ``place``, which may be ``allowed`` at most, both in ``unit``."""
+class RunCheck:
+    """A check by ``name``: the ``value`` at a ``frame`` and ``place``, which may be ``allowed`` at most, both in ``unit``."""
 
-    asked: str
+    name: str
     value: float
     allowed: float
     unit: str
@@ -60,33 +60,38 @@ class Answer:
 
     @property
     def met(self) -> bool:
-        """Whether it is as it should be; never of what is not a number."""
+        """True where it is as it should be; never of what is not a number."""
         return self.value <= self.allowed
+
+    @property
+    def share(self) -> float:
+        """The value in what is allowed; infinite where either is not a number."""
+        share = self.value / self.allowed
+        return math.inf if math.isnan(share) else share
 
     def __str__(self) -> str:
         value, allowed = (
             "not a number" if number is None else f"{number:.3g}" for number in (self.value, self.allowed)
         )
         where = f" at {self.place}" if self.place else ""
-        return f"{self.asked}: {value}{self.unit and f' {self.unit}'} in frame {self.frame:g}{where}, allowed {allowed}"
+        return f"{self.name}: {value}{self.unit and f' {self.unit}'} in frame {self.frame:g}{where}, allowed {allowed}"
 
 
-Answers = tuple[Answer, ...]
+RunChecks = tuple[RunCheck, ...]
 # Positions (n, 3) [mm] by frame number.
 Nodes = Callable[[int], Floats | None]
 
 
-def of_body(body: Body, solved: Solved) -> Answers:
+def of_body(body: Body, solved: Solved) -> RunChecks:
     """All states there and finite, and what is prescribed exactly met at its nodes."""
     numbers, points = tuple(state.frame for state in solved.states), [state.points for state in solved.states]
     found = (_complete(body.frames, numbers), _finite(numbers, points))
     if not all(one.met for one in found):
         return found
-    size = float(np.linalg.norm(np.ptp(body.mesh.points, axis=0)))
-    return (*found, *_worst(_prescribed(body, solved, size)))
+    return (*found, *_worst(_prescribed(body, solved)))
 
 
-def _prescribed(body: Body, solved: Solved, size: float) -> Iterator[Answer]:
+def _prescribed(body: Body, solved: Solved) -> Iterator[RunCheck]:
     begun = body.start is not None  # its first state is where it is put
     for state in solved.states[1:] if begun else solved.states:
         for entry in body.prescribed:
@@ -95,11 +100,13 @@ def _prescribed(body: Body, solved: Solved, size: float) -> Iterator[Answer]:
                 rest, along = body.mesh.points[nodes], list(entry.components)
                 wanted = entry.path(rest, state.frame)
                 off = np.abs((state.points[nodes] - rest - wanted)[:, along]).max(axis=1)
-                allowed = SAME * (size + float(np.abs(wanted).max()))  # by which regions may contradict where they meet
+                allowed = SAME * (
+                    body.size + float(np.abs(wanted).max())
+                )  # by which regions may contradict where they meet
                 yield _at(f"prescribed at {entry.name}", off, np.full(len(off), allowed), state.frame, rest)
 
 
-def of_muscle(problem: Problem, run: Run, nodes: Nodes = lambda _: None) -> Answers:
+def of_muscle(problem: Problem, run: Run, nodes: Nodes = lambda _: None) -> RunChecks:
     """All frames there, in order and finite; attachments where their bones are; load steps small enough; forces in balance; and no
     bone and no surface crossed. ``nodes``: where the points of the tetrahedra are, where that is known.
     """
@@ -116,59 +123,58 @@ def of_muscle(problem: Problem, run: Run, nodes: Nodes = lambda _: None) -> Answ
     return (*found, *_worst(chain(attached, _steps(problem, run), _balance(problem, run), crossed)))
 
 
-def _worst(answers: Iterable[Answer]) -> Answers:
-    """By what is asked the one of ``answers`` that comes nearest to what is allowed, or is farthest beyond."""
-    found = dict[str, Answer]()
-    for one in answers:
-        if one.asked not in found or not one.value / one.allowed <= found[one.asked].value / found[one.asked].allowed:
-            found[one.asked] = one
+def _worst(checks: Iterable[RunCheck]) -> RunChecks:
+    """The one of the ``checks`` of each name that comes nearest to what is allowed, or is farthest beyond."""
+    found = dict[str, RunCheck]()
+    for one in checks:
+        if one.name not in found or one.share > found[one.name].share:
+            found[one.name] = one
     return tuple(found.values())
 
 
-def _at(asked: str, values: Floats, allowed: Floats, frame: float, places: Floats) -> Answer:
-    """The answer at the point (n, 3) where ``values`` (n,) [mm] are nearest to what is ``allowed`` (n,), or beyond it most."""
+def _at(name: str, values: Floats, allowed: Floats, frame: float, places: Floats) -> RunCheck:
+    """The check at the point (n, 3) where ``values`` (n,) [mm] are nearest to what is ``allowed`` (n,), or beyond it most."""
     i = int(np.argmax(values / allowed))
-    x, y, z = places[i]
-    return Answer(asked, float(values[i]), float(allowed[i]), "mm", frame, f"({x:.1f}, {y:.1f}, {z:.1f}) mm")
+    return RunCheck(name, float(values[i]), float(allowed[i]), "mm", frame, place_of(places[i]))
 
 
-def _complete(wanted: tuple[float, ...], numbers: tuple[float, ...]) -> Answer:
-    """How many frames are missing or not in their place."""
+def _complete(wanted: tuple[float, ...], numbers: tuple[float, ...]) -> RunCheck:
+    """The number of frames that are missing or not in their place."""
     lost = sum(one != other for one, other in zip(wanted, numbers, strict=False)) + abs(len(wanted) - len(numbers))
     first = next((one for one, other in zip(wanted, numbers, strict=False) if one != other), wanted[-1])
-    return Answer("frames that are missing or out of order", float(lost), 0.0, "", first)
+    return RunCheck("frames that are missing or out of order", float(lost), 0.0, "", first)
 
 
-def _finite(numbers: tuple[float, ...], arrays: list[Floats]) -> Answer:
-    """How many positions are not finite."""
+def _finite(numbers: tuple[float, ...], arrays: list[Floats]) -> RunCheck:
+    """The number of positions that are not finite."""
     lost = [int((~np.isfinite(array)).any(axis=1).sum()) for array in arrays]
     frame = numbers[int(np.argmax(np.array(lost) > 0))] if lost else 0
-    return Answer("positions that are not finite", float(sum(lost)), 0.0, "", frame)
+    return RunCheck("positions that are not finite", float(sum(lost)), 0.0, "", frame)
 
 
-def _attached(problem: Problem, run: Run, entry: AttachedVertices) -> Iterator[Answer]:
+def _attached(problem: Problem, run: Run, entry: AttachedVertices) -> Iterator[RunCheck]:
     """Exact: vertices at the pose of their bone, but for strain over how far they are from the facets that are attached. Springs:
     by their mean extension, which is the force over stiffness and area.
     """
     rest, skin = problem.surface.points[entry.vertices], problem.attached_skins.get(entry.attachment)
-    hold = distances(rest, Surface(problem.mesh.points, problem.mesh.facets[entry.attachment])).distance
+    facets_away = distances(rest, Surface(problem.mesh.points, problem.mesh.facets[entry.attachment])).distance
     weights = vertex_areas(problem.surface.points, problem.surface.triangles)[entry.vertices]
-    size, forces = _size(problem.surface), run.scalars.get(f"force_{entry.attachment}")
+    size, forces = diagonal(problem.surface.points), run.scalars.get(f"force_{entry.attachment}")
     for i, number in enumerate(run.numbers):
         away = run.positions[i][entry.vertices] - apply(entry.bone.pose(number), rest)
         if entry.stiffness is None:
-            off, allowed = np.linalg.norm(away, axis=1), _ROUNDING * size + _STRAIN * hold
+            off, allowed = np.linalg.norm(away, axis=1), _ROUNDING * size + _STRAIN * facets_away
             yield _at(
                 f"{entry.attachment} off {entry.bone.name}", off, allowed, number, run.positions[i][entry.vertices]
             )
         elif forces is not None and skin is not None:
             mean = float(np.linalg.norm(weights @ away) / weights.sum())
-            said = float(forces[i]) / (entry.stiffness * float(skin.areas.sum()))
-            yield Answer(f"springs of {entry.attachment}, mean", mean, _SPRINGS * said + 1e-4 * size, "mm", number)
+            yielded = float(forces[i]) / (entry.stiffness * float(skin.areas.sum()))
+            yield RunCheck(f"springs of {entry.attachment}, mean", mean, _SPRINGS * yielded + 1e-4 * size, "mm", number)
 
 
-def _steps(problem: Problem, run: Run) -> Iterator[Answer]:
-    """How far a bone turns or slides in a load step, on average from a frame to the next; not of a frame that needed none."""
+def _steps(problem: Problem, run: Run) -> Iterator[RunCheck]:
+    """Rotation and travel of a bone in a load step, on average from a frame to the next; not of a frame that needed none."""
     counts = run.scalars.get("load_steps", np.full(len(run.numbers), np.nan))
     contact, attached = problem.contact, {entry.bone.name for entry in problem.attached}
     bones = [bone for bone in problem.bones if bone.name in attached or (contact and contact.is_by(bone.name))]
@@ -178,13 +184,15 @@ def _steps(problem: Problem, run: Run) -> Iterator[Answer]:
             turns = isinstance(bone.motion, Rotation)
             if bone.motion is None or (alike and not turns):
                 continue
-            way = _way(bone, before, number) / float(counts[i])
-            words, allowed, unit = ("turns", _TURN, "rad") if turns else ("slides", 1.01 * _size(run.surface), "mm")
-            yield Answer(f"{bone.name} {words} by load step", way, allowed, unit, number)
+            travelled = _travel(bone, before, number) / float(counts[i])
+            words, allowed, unit = (
+                ("turns", _TURN, "rad") if turns else ("slides", 1.01 * diagonal(run.surface.points), "mm")
+            )
+            yield RunCheck(f"{bone.name} {words} by load step", travelled, allowed, unit, number)
 
 
-def _way(bone: RigidBody, before: float, after: float) -> float:
-    """How far a bone goes between two frames, there and back counted twice: [rad], or of one that slides [mm]."""
+def _travel(bone: RigidBody, before: float, after: float) -> float:
+    """Travel of a bone between two frames, there and back counted twice: [rad], or of one that slides [mm]."""
     motion = bone.motion
     assert motion is not None  # of those that move
     amounts = motion.angles if isinstance(motion, Rotation) else motion.distances
@@ -192,7 +200,7 @@ def _way(bone: RigidBody, before: float, after: float) -> float:
     return float(np.abs(np.diff(np.interp(stops, motion.frames, amounts))).sum())
 
 
-def _balance(problem: Problem, run: Run) -> Iterator[Answer]:
+def _balance(problem: Problem, run: Run) -> Iterator[RunCheck]:
     """The sums of forces and of moments of bones on the muscle, by attachments and contact: 0 where nothing acts from outside."""
     outer = any(isinstance(one, (Load, Gravity, Damping, Inertia)) or _is_foreign(one) for one in problem.effects)
     residual = _BALANCE * run.origin.get("settings", {}).get("residual", math.nan)
@@ -200,21 +208,17 @@ def _balance(problem: Problem, run: Run) -> Iterator[Answer]:
     for kind, unit, arm in (("force", "N", 1.0), ("moment", "N mm", float(np.abs(run.positions).max()))):
         if not outer and f"net_{kind}" in run.scalars and math.isfinite(allowed):
             for number, value in zip(run.numbers, run.scalars[f"net_{kind}"], strict=True):
-                yield Answer(f"{kind}s out of balance", float(value), allowed * arm, unit, number)
+                yield RunCheck(f"{kind}s out of balance", float(value), allowed * arm, unit, number)
 
 
 def _is_foreign(effect: Effect) -> bool:
-    """Whether it is somebody's own, of which it is not known what it acts from."""
+    """True of an effect of the caller's own, of which it is not known what it acts from."""
     return not type(effect).__module__.startswith("fem_reference.effects.")
-
-
-def _size(surface: Surface) -> float:
-    return float(np.linalg.norm(np.ptp(surface.points, axis=0)))
 
 
 def _states(run: Run, bones: Sequence[RigidBody]) -> Iterator[tuple[int, int]]:
     """Index and number of the frames at which muscle or ``bones`` are elsewhere than at rest, and at all frames before."""
-    seen, near = [(run.surface.points, *(np.eye(4) for _ in bones))], _ROUNDING * _size(run.surface)
+    seen, near = [(run.surface.points, *(np.eye(4) for _ in bones))], _ROUNDING * diagonal(run.surface.points)
     for i, number in enumerate(run.numbers):
         now = (run.positions[i], *(bone.pose(number) for bone in bones))
         if not any(all(np.abs(a - b).max() <= near for a, b in zip(now, one, strict=True)) for one in seen):
@@ -222,9 +226,9 @@ def _states(run: Run, bones: Sequence[RigidBody]) -> Iterator[tuple[int, int]]:
             yield i, number
 
 
-def _depths(problem: Problem, run: Run, nodes: Nodes) -> Iterator[Answer]:
-    """How deep each bone in contact and the muscle are in each other. Where its surface, whose triangles may be large, is deeper
-    than is allowed, that of its tetrahedra is asked too: the muscle is crossed where both are.
+def _depths(problem: Problem, run: Run, nodes: Nodes) -> Iterator[RunCheck]:
+    """Depths of each bone in contact and the muscle in each other. Where its surface, whose triangles may be large, is deeper
+    than is allowed, that of its tetrahedra is checked too: the muscle is crossed where both are.
     """
     contact, rest = problem.contact, Within(run.surface)
     skin = cache(lambda: Surface(problem.mesh.points, boundary(problem.mesh.tets)[0]))
@@ -233,19 +237,17 @@ def _depths(problem: Problem, run: Run, nodes: Nodes) -> Iterator[Answer]:
     for i, number in _states(run, bones := [one for one in problem.bones if contact and contact.is_by(one.name)]):
         muscle = Within(run.surface.moved_to(run.positions[i]))
         for bone in bones:
-            ask = partial(
+            check_of = partial(
                 _deep, bone, number, _give(problem, bone, float(pressures[i])), pressed=bool(pressures[i] > 0)
             )
-            answer = ask(muscle, rest)
-            if not answer.met and (now := nodes(number)) is not None:
-                answer = min(
-                    answer, ask(Within(skin().moved_to(now)), inside()), key=lambda one: one.value / one.allowed
-                )
-            yield answer
+            check = check_of(muscle, rest)
+            if not check.met and (now := nodes(number)) is not None:
+                check = min(check, check_of(Within(skin().moved_to(now)), inside()), key=lambda one: one.share)
+            yield check
 
 
-def _deep(bone: RigidBody, number: int, give: float, muscle: Within, rest: Within, *, pressed: bool) -> Answer:
-    """How deep a bone and the muscle are in each other; beyond rest, where that is more than contact gives way. Never to the middle
+def _deep(bone: RigidBody, number: int, give: float, muscle: Within, rest: Within, *, pressed: bool) -> RunCheck:
+    """Depth of a bone and the muscle in each other; beyond rest, where that is more than contact gives way. Never to the middle
     of a bone.
     """
     found = depths(muscle, bone.surface, bone.shape, bone.pose(number))
@@ -263,24 +265,24 @@ def _at_rest(muscle: Within, bone: RigidBody) -> Depths:
 
 
 def _give(problem: Problem, bone: RigidBody, pressure: float) -> float:
-    """How deep [mm] a bone may get: by the give of contact under the ``pressure`` [MPa] that was recorded, the error of the
-    distance to it, and what is between points of contact.
+    """The depth [mm] allowed to a bone: the give of contact under the ``pressure`` [MPa] that was recorded, the error of the bone's
+    distance, and what is between points of contact.
     """
-    assert problem.contact is not None  # asked where there is contact
+    assert problem.contact is not None  # called where there is contact
     known = bone.shape.error if isinstance(bone.shape, Grid) else 0.0
     return pressure / problem.contact.stiffness + known + _BETWEEN * spacing(problem.surface)
 
 
 def _behind(surface: Surface, place: Floats) -> float:
-    """How far the middle of the flat triangle at a ``place`` is behind a sphere through its corners, times its radius [mm2]: what
-    is between vertices is curved where a bone presses.
+    """The distance of the middle of the flat triangle at a ``place`` from a sphere through its corners, times its radius [mm2]:
+    between vertices a muscle is curved where a bone presses.
     """
     corners = surface.points[surface.triangles[distances(place[None], surface).triangle[0]]]
     return float((np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1) ** 2).max()) / 6
 
 
-def _creases(run: Run) -> Iterator[Answer]:
-    """How far the muscle's surface reaches through itself where it does not at rest."""
+def _creases(run: Run) -> Iterator[RunCheck]:
+    """Reach of the muscle's surface through itself where it does not at rest."""
     triangles, allowed = run.surface.triangles, np.array([_CREASE * spacing(run.surface)])
     at_rest = cache(lambda: np.unique(triangles[self_crossings(run.surface)]))
     for i, number in _states(run, ()):

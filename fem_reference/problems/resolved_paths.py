@@ -1,11 +1,11 @@
-"""Where load steps end between frames, so that none leaves out what happens within it, whatever the frames.
+"""Stops of load steps between frames, so that none leaves out what happens within it, whatever the frames.
 
 Between two stops nothing that is prescribed, and no obstruction, turns by more than a right angle, from half a turn on the straight
-line between two poses no longer says which way round it was; nothing goes farther, apart from what all do alike, than the body is
-long; and nothing goes there and back, but for a fifteenth of the way there and a hundredth of the body's size.
+line between two poses no longer shows the direction; nothing goes farther, apart from what all do alike, than the body is
+long; and nothing goes there and back, but for a fifteenth of that distance and a hundredth of the body's size.
 
-Of motions and paths of this package it is known at which frames they bend and by which angle they turn between (``course``), so
-that this holds whatever they are. Any other function of a frame number is looked at 1024 times over all frames, 16 times between
+Of motions and paths of this package it is known at which frames they bend and by which angle they turn between (``turning``), so
+that this holds whatever they are. Any other function of a frame number is sampled 1024 times over all frames, 16 times between
 two of them at least, and again between where it moves far: what it does within less is not seen.
 """
 
@@ -20,11 +20,11 @@ import numpy as np
 from fem_reference.effects import Effect, Ramped
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
-from fem_reference.foundations.motion import Course, apply
+from fem_reference.foundations.motion import Turning, apply
 
 # [rad] by which anything turns within a load step at most, and between two frames at which it is looked at; and the share of the
 # body's size that anything travels between two of these.
-TURN, _LOOKED, _STRIDE = np.pi / 2, np.pi / 16, 0.5
+TURN, _SAMPLED, _STRIDE = np.pi / 2, np.pi / 16, 0.5
 # A quarter of a circle is 1.11 times as long as its chord; what is longer, and by this share of the body's size, comes back.
 _BENT, _BACK = 1.12, 0.01
 _SAMPLES, _BETWEEN = 1024, 16  # of what is not known, over all frames and between two
@@ -35,17 +35,17 @@ _SHORTEST = 1e-9  # of all frames, within which what goes far jumps
 
 @dataclass(frozen=True)
 class Moving:
-    """Points (p, 3) [mm] by frame number (``at``) and the ``course`` that is known of them; ``place`` names them in messages.
+    """Points (p, 3) [mm] by frame number (``at``) and the ``turning`` that is known of them; ``place`` names them in messages.
     ``scale``: of an amount, as of a ramp, which is no motion.
     """
 
     place: str
     at: Callable[[float], Floats]
-    course: Course | None
+    turning: Turning | None
     scale: bool = False
 
 
-def course(path: Any, points: Floats) -> Course | None:
+def turning(path: Any, points: Floats) -> Turning | None:
     """The frames between which a ``path`` of ``points`` (p, 3) is steady, straight or about an axis, and the angle [rad] that it
     has turned by at each; None of one that says none.
     """
@@ -53,12 +53,12 @@ def course(path: Any, points: Floats) -> Course | None:
     if not type(owner).__module__.startswith("fem_reference."):
         return None
     motion = getattr(owner, "motion", owner)  # of a bone, which may have none
-    known = getattr(motion, "course", None)
+    known = getattr(motion, "turning", None)
     return ((), ()) if motion is None else known(points) if known else None
 
 
 def moving_ramp(effect: Effect, size: float) -> Moving | None:
-    """How much of an ``effect`` acts, as a point that all of it takes as far as a ``size`` [mm]; None where that is all always."""
+    """The amount of an ``effect`` as a point that moves by ``size`` [mm] from none to all of it; None where all acts always."""
     if type(effect).amount is Effect.amount:
         return None
     knots = effect.ramp if isinstance(effect, Ramped) and type(effect).amount is Ramped.amount else None
@@ -69,7 +69,7 @@ def moving_ramp(effect: Effect, size: float) -> Moving | None:
 
 
 def some(points: Floats) -> Floats:
-    """As many of ``points`` (n, 3) as are looked at, evenly among them."""
+    """A sample of ``points`` (n, 3), evenly among them."""
     chosen = np.unique(np.linspace(0, len(points) - 1, min(len(points), _POINTS)).astype(int))
     return np.asarray(points[chosen])
 
@@ -81,9 +81,9 @@ def stops(things: Sequence[Moving], frames: Sequence[float], size: float) -> tup
     if len(frames) < 2 or not things:
         return ()
     things = [replace(thing, at=cache(thing.at)) for thing in things]
-    looked = _Looked(things, np.unique(np.concatenate([_grid(thing, frames) for thing in things])), size)
+    looked = _Samples(things, np.unique(np.concatenate([_grid(thing, frames) for thing in things])), size)
     while len(wide := looked.wide()):
-        looked = _Looked(things, np.unique(np.concatenate([looked.frames, wide])), size)
+        looked = _Samples(things, np.unique(np.concatenate([looked.frames, wide])), size)
     found, at = list[float](), 0
     while (at := looked.farthest(at)) < len(looked.frames) - 1:
         found.append(float(looked.frames[at]))
@@ -92,7 +92,7 @@ def stops(things: Sequence[Moving], frames: Sequence[float], size: float) -> tup
 
 def skipped(things: Sequence[Moving], frames: Sequence[float], size: float) -> tuple[Moving, float, float] | None:
     """Which thing does more from one of ``frames`` to the next than a step may, and these two; None where none does."""
-    looked = _Looked(things, np.unique(np.concatenate([frames, *(_grid(thing, frames) for thing in things)])), size)
+    looked = _Samples(things, np.unique(np.concatenate([frames, *(_grid(thing, frames) for thing in things)])), size)
     for early, late in pairwise(np.searchsorted(looked.frames, frames).tolist()):
         for i, thing in enumerate(things):
             if looked.reach(i, early) < late:
@@ -101,31 +101,31 @@ def skipped(things: Sequence[Moving], frames: Sequence[float], size: float) -> t
 
 
 def posed(place: str, pose: Callable[[float], Floats], points: Floats) -> Moving:
-    """What a rigid motion does to the box around ``points`` (n, 3) [mm]."""
+    """The motion of the box around ``points`` (n, 3) [mm] by a rigid motion."""
     box = np.where(np.indices((2, 2, 2)).reshape(3, -1).T, points.max(axis=0), points.min(axis=0))
-    return Moving(place, lambda frame: apply(pose(frame), box), course(pose, box))
+    return Moving(place, lambda frame: apply(pose(frame), box), turning(pose, box))
 
 
 def _grid(thing: Moving, frames: Sequence[float]) -> Floats:
     """The frames at which a thing is looked at first."""
     first, last = frames[0], frames[-1]
-    if thing.course is None:
+    if thing.turning is None:
         count = max(_BETWEEN, -(-_SAMPLES // (len(frames) - 1)))
         return np.concatenate([np.linspace(a, b, count + 1) for a, b in pairwise(frames)])
-    knots, angles = (np.asarray(values, float) for values in thing.course)
+    knots, angles = (np.asarray(values, float) for values in thing.turning)
     ends = np.unique(np.clip([first, *knots, last], first, last))
     turned = np.abs(np.diff(np.interp(ends, knots, angles))) if len(knots) else np.zeros(len(ends) - 1)
-    if not turned.sum() < _MOST * _LOOKED:
+    if not turned.sum() < _MOST * _SAMPLED:
         raise InputError(
-            f"{thing.place}: path", f"{turned.sum():.4g} rad of turning", f"at most {_MOST * _LOOKED:.0f} rad"
+            f"{thing.place}: path", f"{turned.sum():.4g} rad of turning", f"at most {_MOST * _SAMPLED:.0f} rad"
         )
-    counts = np.maximum(np.ceil(turned / _LOOKED - 1e-9), 1).astype(int)
+    counts = np.maximum(np.ceil(turned / _SAMPLED - 1e-9), 1).astype(int)
     return np.concatenate([np.linspace(a, b, count + 1) for (a, b), count in zip(pairwise(ends), counts, strict=True)])
 
 
-class _Looked:
-    """Things at ``frames`` (m,): where they are (m, p, 3), how far they have turned (m,) [rad], how long their ways are (m, p)
-    [mm], and those (m, p) that not all go alike.
+class _Samples:
+    """Things at ``frames`` (m,): where they are (m, p, 3), how far they have turned (m,) [rad], how long their paths are (m, p)
+    [mm], and without what all do alike.
     """
 
     def __init__(self, things: Sequence[Moving], frames: Floats, size: float) -> None:
@@ -140,17 +140,17 @@ class _Looked:
                 for thing, place in zip(things, self.places, strict=True)
             ]
             self.angles = [_turns(thing, frames, place) for thing, place in zip(things, self.places, strict=True)]
-            self.ways, self.travels, self.turns = (
+            self.lengths, self.travels, self.turns = (
                 [np.concatenate([np.zeros_like(one[:1]), np.cumsum(one, axis=0)]) for one in steps]
                 for steps in (self.strides, self.apart, self.angles)
             )
 
     def wide(self) -> Floats:
-        """The middles of the intervals in which anything goes too far to say how; InputError where it jumps."""
+        """The middles of intervals in which anything goes too far to be resolved; InputError where it jumps."""
         spans, found = np.diff(self.frames), np.zeros(len(self.frames) - 1, bool)
         short = ~(spans > _SHORTEST * (self.frames[-1] - self.frames[0]))
         for apart, angles in zip(self.apart, self.angles, strict=True):
-            far = ~(apart.max(axis=1) <= _STRIDE * self.size) | ~(angles <= 2 * _LOOKED)
+            far = ~(apart.max(axis=1) <= _STRIDE * self.size) | ~(angles <= 2 * _SAMPLED)
             if (far & short).any():
                 raise self._jump(int(np.argmax(far & short)))
             found |= far
@@ -159,7 +159,7 @@ class _Looked:
         return (self.frames[:-1] + spans / 2)[found]
 
     def _jump(self, i: int) -> InputError:
-        """What goes farthest in the interval of a number."""
+        """The error that names what goes farthest in the interval of a number."""
         far = [float(strides[i].max()) for strides in self.strides]
         which = int(np.argmax(far))
         got = f"{far[which]:.4g} mm up to frame {self.frames[i + 1]:g}, or a turn by {self.angles[which][i]:.3g} rad"
@@ -170,18 +170,18 @@ class _Looked:
         return max(at + 1, min(self.reach(i, at) for i in range(len(self.things))))
 
     def reach(self, i: int, at: int) -> int:
-        """As ``farthest``, for a thing."""
+        """The same as ``farthest``, for one thing."""
         turns, places = self.turns[i], self.places[i] - self.places[i][at]
-        travels, ways = ((lengths[i] - lengths[i][at]) for lengths in (self.travels, self.ways))
+        travels, lengths = ((each[i] - each[i][at]) for each in (self.travels, self.lengths))
         last = int(np.searchsorted(turns, turns[at] + TURN + 1e-6, "right")) - 1
         last = min(last, int(np.searchsorted(travels.max(axis=1), self.size * (1 + 1e-9), "right")) - 1)
         on = slice(at + 1, last + 1)
-        back = (ways[on] > _BENT * np.linalg.norm(places[on], axis=2) + _BACK * self.size).any(axis=1)
+        back = (lengths[on] > _BENT * np.linalg.norm(places[on], axis=2) + _BACK * self.size).any(axis=1)
         return at + int(np.argmax(back)) if back.any() else last
 
 
 def _places(thing: Moving, frames: Floats) -> Floats:
-    """Where the points of a thing are at ``frames``, (m, p, 3) [mm]; InputError where that is not finite."""
+    """The points of a thing at ``frames``, (m, p, 3) [mm]; InputError where that is not finite."""
     found = np.array([thing.at(float(frame)) for frame in frames], float)
     lost = np.flatnonzero(~np.isfinite(found).all(axis=(1, 2)))
     if len(lost):
@@ -191,16 +191,16 @@ def _places(thing: Moving, frames: Floats) -> Floats:
 
 
 def _steps(places: Floats) -> Floats:
-    """How far (m - 1, p) points (m, p, 3) go from each frame to the next."""
+    """The distances (m - 1, p) that points (m, p, 3) go from each frame to the next."""
     return np.asarray(np.linalg.norm(np.diff(places, axis=0), axis=2))
 
 
 def _turns(thing: Moving, frames: Floats, places: Floats) -> Floats:
-    """By how much [rad] a thing turns from each of ``frames`` (m,) to the next, (m - 1,): as is known, or else as the direction
-    from the middle of its points at ``places`` (m, p, 3) to one of them turns at most.
+    """The angles [rad] that a thing turns by from each of ``frames`` (m,) to the next, (m - 1,): as is known, or else as the
+    direction from the middle of its points at ``places`` (m, p, 3) to one of them turns at most.
     """
-    if thing.course is not None:
-        knots, angles = thing.course
+    if thing.turning is not None:
+        knots, angles = thing.turning
         return np.abs(np.diff(np.interp(frames, knots, angles))) if knots else np.zeros(len(frames) - 1)
     rays = places - places.mean(axis=1, keepdims=True)
     lengths = np.linalg.norm(rays, axis=2)
