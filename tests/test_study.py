@@ -107,7 +107,7 @@ def test_a_change_is_known_no_better_than_its_metric_on_average() -> None:
     """What differs little by chance has no short bar; other metrics have nothing to do with it."""
     deviations = [np.array([0.0, 1.0, 2.0]), np.array([0.0, 4.0, 4.0]), np.array([0.0, 5.0, np.nan])]
     changes = [0.8 * deviations[0], np.zeros(3), -0.1 * deviations[2]]
-    names = [("a", "rms"), ("a", "max"), ("b", "rms")]
+    names = [("a", "rms"), ("a", "mean"), ("b", "rms")]
     one, other, alone = typical_changes(changes, deviations, names)
     assert one == pytest.approx(0.8 * deviations[0])
     assert other == pytest.approx(0.8 / np.sqrt(2) * deviations[1])
@@ -115,6 +115,15 @@ def test_a_change_is_known_no_better_than_its_metric_on_average() -> None:
     assert np.isnan(alone[2])
     (nothing,) = typical_changes([np.zeros(2)], [np.zeros(2)], [("a", "rms")])
     assert nothing.tolist() == [0, 0]
+
+
+def test_a_value_of_one_place_is_known_no_better_than_places_are_on_average() -> None:
+    names = [("a", "rms_percent"), ("a", "max_percent"), ("a", "p95_percent"), ("b", "max")]
+    deviations = [np.array([0.0, 1.0, 2.0]), *[np.array([0.0, 3.0, 0.5])] * 3]
+    still = [np.zeros(3)] * 4
+    # On its own (b) there is no average to go by.
+    rms, greatest, quantile, alone = typical_changes(still, deviations, names)
+    assert [one.tolist() for one in (rms, greatest, quantile, alone)] == [[0, 0, 0], [0, 1, 2], [0, 1, 2], [0, 0, 0]]
 
 
 def test_a_quantile_is_that_of_one_place_whose_difference_no_other_cancels() -> None:

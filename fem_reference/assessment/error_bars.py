@@ -33,8 +33,8 @@ VARIATION = 2.0
 # displacement goes with the root of the distance, order 1 comes, and 2 only where a mesh that resolves them is graded towards them;
 # from elsewhere 2 or more: in general it is between, as three sizes in a row show too (docs/accuracy.md).
 ORDER, ORDER_OF_WORST = 1.5, 1.0
-# Metrics that say as little of what is left as the worst place does: the volume is nearly kept, and fibres are few lines that end at
-# rims, so that one of them may be most of their mean square.
+# Metrics that say as little of what is left as the worst place does: the volume is nearly kept, and fibres are few lines that end
+# at rims, so that one of them may be most of their mean square.
 _OF_WORST = ("volume", "fibre_length")
 TETRAHEDRA, CARRIED = "tetrahedra", "surface in tetrahedra"
 # The measures of a run against another or (None) its rest.
