@@ -72,6 +72,7 @@ class Work:
 def solved(monkeypatch) -> None:
     """The reference is made by ``swell``."""
     stand_ins.solve_by(monkeypatch, fenicsx, swell)
+    stand_ins.unchecked(monkeypatch)
 
 
 @pytest.fixture(scope="module")
@@ -79,6 +80,7 @@ def made(tmp_path_factory) -> Path:
     """The folder of a case with a baseline, its reference solved and its error bars known."""
     with pytest.MonkeyPatch.context() as patch:
         stand_ins.solve_by(patch, fenicsx, swell)
+        stand_ins.unchecked(patch)
         root = tmp_path_factory.mktemp("made")
         small.write(root / "bar")
         (root / "mine").mkdir()
@@ -208,6 +210,7 @@ def test_the_example_of_the_readme_passes_and_fails(work, monkeypatch) -> None:
 def test_from_another_folder_it_says_that_nothing_is_stored_there(made: Path, tmp_path, monkeypatch, caplog) -> None:
     caplog.set_level(logging.INFO, logger="fem_reference")
     stand_ins.solve_by(monkeypatch, fenicsx, swell)
+    stand_ins.unchecked(monkeypatch)
     words = [
         "check",
         str(made / "bar"),

@@ -84,6 +84,7 @@ def test_it_is_asked_for_by_the_command_line(tmp_path, monkeypatch) -> None:
         return Outcome("converged", "done", {"seconds": 1.0})
 
     stand_ins.solve_by(monkeypatch, fenicsx, swell)
+    stand_ins.unchecked(monkeypatch)
     case, out = small.write(tmp_path / "bar"), tmp_path / "out"
     assert cli.main(["page", "error-bars", "--case", str(case), "--out", str(out), "--quiet"]) == cli.DONE
     numbers = json.loads((out / "error-bars-bar.json").read_text())

@@ -247,6 +247,7 @@ def sag(problem, settings, sink) -> Outcome:
 def test_the_verb_measures_what_each_effect_changes_once(tmp_path, monkeypatch) -> None:
     limits.clear()
     stand_ins.solve_by(monkeypatch, fenicsx, sag)
+    stand_ins.unchecked(monkeypatch)
     case = small.write(tmp_path / "bar")
     scene_in(case, GRAVITY.format(g=-9.81) + FIBRES)
     status, facts = call(case)
@@ -271,6 +272,7 @@ def test_the_verb_measures_what_each_effect_changes_once(tmp_path, monkeypatch) 
 @pytest.mark.slow
 def test_nothing_is_left_out_of_a_reference_that_fails(tmp_path, monkeypatch, capsys) -> None:
     stand_ins.solve_by(monkeypatch, fenicsx, sag)
+    stand_ins.unchecked(monkeypatch)
     case = small.write(tmp_path / "bar")
     scene_in(case, GRAVITY.format(g=-9.81))
     status, facts = call(case)

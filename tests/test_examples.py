@@ -19,7 +19,7 @@ LINES = 60
 # The last number that each prints; how near it must be; why it is what it is.
 ENDS = {
     "body_from_scratch": pytest.approx(1, rel=5e-3),  # torsion in small strain
-    "error_bar": pytest.approx(0.072, rel=0.5),  # an estimate from two meshes
+    "error_bar": pytest.approx(0.11, rel=0.5),  # an estimate from two meshes
     "own_material": pytest.approx(1, rel=5e-4),  # closed form, but for a bulk modulus of 10^4 shear moduli
     "own_scene": pytest.approx(1.75, rel=0.05),  # pinned: by a mesh that gmsh makes
     "own_solver": pytest.approx(4.24, rel=0.02),  # pinned

@@ -50,6 +50,7 @@ def swell(problem, _settings, sink) -> Outcome:
 def case(tmp_path, monkeypatch) -> Path:
     """The small scene, solved by ``swell``, without its page."""
     stand_ins.solve_by(monkeypatch, fenicsx, swell)
+    stand_ins.unchecked(monkeypatch)
     monkeypatch.setattr(report, "write", lambda _, folder, __: folder)
     return small.write(tmp_path / "bar")
 
@@ -155,6 +156,7 @@ def test_a_run_that_failed_has_none(case, monkeypatch) -> None:
         return Outcome("diverged", "no")
 
     stand_ins.solve_by(monkeypatch, fenicsx, fail)
+    stand_ins.unchecked(monkeypatch)
     status, facts = call(case, "run", "--error-bar")
     assert (status, facts["error_bars"]) == (cli.SOLVER_FAILED, [])
 
@@ -170,6 +172,7 @@ def test_a_coarser_run_that_fails_leaves_frames_without_a_bar(case, monkeypatch)
         return Outcome("diverged", "no")
 
     stand_ins.solve_by(monkeypatch, fenicsx, fail)
+    stand_ins.unchecked(monkeypatch)
     _, facts = call(case, "run", "--error-bar")
     values = rows(facts, "change", "surface_deviation", "max")
     assert values.tolist()[1:] == [None] * 4

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import shapes
 
+from fem_reference import metrics
 from fem_reference.assessment import error_bars
 from fem_reference.assessment.differences import carried, typical, typical_changes
 from fem_reference.assessment.error_bars import Pair
@@ -60,13 +61,13 @@ def bars(**given: float) -> error_bars.ErrorBars:
 @pytest.mark.parametrize("of", ["change", "deviation"])
 def test_bars_cover_an_error_of_their_order_with_the_safety_of_the_index(of) -> None:
     found = bars()
-    for metric, statistic in (("surface_deviation", "rms"), ("fibre_length", "mean")):
+    for metric, statistic, left in (("surface_deviation", "rms", LEFT), ("fibre_length", "mean", 1)):
         # Every vertex is 10 mm out, so that sizes h and 2 h differ by 0.1 mm: of an error a h^1.5 that is 1.83 a h^1.5.
         bar = found.find(of, metric, statistic)
-        assert (bar.values, bar.unit) == (pytest.approx(1.25 * 0.1 / LEFT * TIMES, abs=1e-9), "mm")
-        assert bar.parts == {"tetrahedra": pytest.approx(2.5 * 0.1 / LEFT)}
+        assert (bar.values, bar.unit) == (pytest.approx(1.25 * 0.1 / left * TIMES, abs=1e-9), "mm")
+        assert bar.parts == {"tetrahedra": pytest.approx(2.5 * 0.1 / left)}
         assert (bar.model, bar.worst) == (None, 2)
-    # At the worst place alone it is of first order.
+    # At the worst place alone it is of first order, as of fibres, which are few and end at rims.
     worst = found.find(of, "surface_deviation", "max")
     assert worst.values == pytest.approx(1.25 * 0.1 * TIMES, abs=1e-9)
     # A sphere has no other shape when it grows.
@@ -78,7 +79,8 @@ def test_bars_cover_an_error_of_their_order_with_the_safety_of_the_index(of) -> 
     ("metric", "statistic", "order"),
     [
         ("surface_deviation", "rms", 1.5),
-        ("fibre_length", "rms_percent", 1.5),
+        ("surface_deviation", "p95", 1.5),
+        ("fibre_length", "rms_percent", 1),
         ("fibre_length", "max", 1),
         ("surface_deviation", "hausdorff", 1),
         ("volume", "deviation", 1),
@@ -105,13 +107,44 @@ def test_a_change_is_known_no_better_than_its_metric_on_average() -> None:
     """What differs little by chance has no short bar; other metrics have nothing to do with it."""
     deviations = [np.array([0.0, 1.0, 2.0]), np.array([0.0, 4.0, 4.0]), np.array([0.0, 5.0, np.nan])]
     changes = [0.8 * deviations[0], np.zeros(3), -0.1 * deviations[2]]
-    one, other, alone = typical_changes(changes, deviations, ["a", "a", "b"])
+    names = [("a", "rms"), ("a", "mean"), ("b", "rms")]
+    one, other, alone = typical_changes(changes, deviations, names)
     assert one == pytest.approx(0.8 * deviations[0])
     assert other == pytest.approx(0.8 / np.sqrt(2) * deviations[1])
     assert alone[:2] == pytest.approx([0, 0.5])
     assert np.isnan(alone[2])
-    (nothing,) = typical_changes([np.zeros(2)], [np.zeros(2)], ["a"])
+    (nothing,) = typical_changes([np.zeros(2)], [np.zeros(2)], [("a", "rms")])
     assert nothing.tolist() == [0, 0]
+
+
+def test_a_value_of_one_place_is_known_no_better_than_places_are_on_average() -> None:
+    names = [("a", "rms_percent"), ("a", "max_percent"), ("a", "p95_percent"), ("b", "max")]
+    deviations = [np.array([0.0, 1.0, 2.0]), *[np.array([0.0, 3.0, 0.5])] * 3]
+    still = [np.zeros(3)] * 4
+    # On its own (b) there is no average to go by.
+    rms, greatest, quantile, alone = typical_changes(still, deviations, names)
+    assert [one.tolist() for one in (rms, greatest, quantile, alone)] == [[0, 0, 0], [0, 1, 2], [0, 1, 2], [0, 0, 0]]
+
+
+def test_a_quantile_is_that_of_one_place_whose_difference_no_other_cancels() -> None:
+    """Differences that are independent from place to place cancel in means, and in the 95 % quantile of a change do not."""
+    covered = []
+    for seed in range(20):
+        noise = 0.1 * np.random.default_rng(seed).normal(size=(2, *REST.points.shape))
+        # Of order 3/2, in other directions: what is left of the error of the finer run is 1 / LEFT of what the two differ by.
+        runs = [moving_away(each) for each in (0 * noise[0], noise[0], noise[1] / LEFT)]
+        context = MeasurementContext.of(runs[0], FIBRE, ())
+        found = error_bars.error_bars(replace(pair(0.1), fine=runs[0], coarse=runs[1]), context)
+        truths = [metrics.change(one, context, ["surface_deviation"]) for one in (runs[0], runs[2])]
+        errors = [abs(a.values - b.values)[1:] for a, b in zip(*truths, strict=True) if a.statistic == "p95"]
+        covered += (errors[0] <= found.find("change", "surface_deviation", "p95").values[1:]).tolist()
+    assert np.mean(covered) >= 0.95
+
+
+def moving_away(noise: np.ndarray) -> Run:
+    """A sphere whose places move the farther the higher they are, each by ``noise`` (n, 3) otherwise."""
+    moved = 0.1 * (REST.points + 10.0) * [0, 0, 1] + noise
+    return replace(run(0.0), positions=np.stack([REST.points + time * moved for time in TIMES]))
 
 
 def test_the_volume_is_known_no_better_than_tetrahedra_carry_its_surface() -> None:
@@ -139,7 +172,7 @@ def test_the_fibres_of_other_meshes_are_not_mistaken_for_those_of_the_reference(
     found = error_bars.error_bars(
         replace(given, fine=still[0], coarse=still[1]), MeasurementContext.of(still[0], FIBRE, ())
     )
-    assert found.find("deviation", "fibre_length", "mean").values[1] == pytest.approx(0.125 / LEFT, abs=1e-9)
+    assert found.find("deviation", "fibre_length", "mean").values[1] == pytest.approx(0.125, abs=1e-9)
 
 
 def test_a_variation_adds_twice_what_halving_its_cause_changes() -> None:

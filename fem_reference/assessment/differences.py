@@ -8,6 +8,8 @@ import numpy as np
 from fem_reference.foundations.mesh import Floats, enclosed_volume
 from fem_reference.runs.store import Run
 
+# What names of statistics begin with that are the value of one place, and the average over places beside each.
+_OF_ONE_PLACE = {"p95": "rms", "max": "rms", "hausdorff": "distance_rms"}
 _MOVED = 0.01  # of what a surface moves at most: where it has moved by less, shares of that say nothing
 
 
@@ -40,20 +42,26 @@ def _median_share(apart: Floats, moved: Floats) -> float:
     return float(np.median(apart[known] / moved[known])) if known.any() else 0.0
 
 
-def typical_changes(changes: list[Floats], deviations: list[Floats], metrics: list[str]) -> list[Floats]:
-    """The sizes (f,) of signed differences of ``changes`` (f,) from rest between two runs, by statistic: at least the share of the
-    ``deviations`` (f,) of these runs from each other that they are on average, over the frames and the statistics of their metric.
+def typical_changes(changes: list[Floats], deviations: list[Floats], names: list[tuple[str, str]]) -> list[Floats]:
+    """The sizes (f,) of signed differences of ``changes`` (f,) from rest between two runs, by metric and statistic (``names``): at
+    least the share of the ``deviations`` (f,) of these runs from each other that they are on average, over the frames and the
+    statistics of their metric.
 
     By the triangle inequality a change of the same places differs by no more than their deviation, and by less as most of that is
     not along the displacement or cancels. How much less, one statistic alone does not show: its difference may be small by chance,
-    that of the worst place above all.
+    that of the worst place above all. A quantile or a greatest value is that of one place, wherever it is: nothing cancels there,
+    and no quantile of the deviation bounds it, so that it is known no better than any one place is, in the root mean square.
     """
+    metrics = [metric for metric, _ in names]
     shares = [ratio(found, deviation) for found, deviation in zip(changes, deviations, strict=True)]
     means = {name: _rms_of_known(zip(metrics, shares, strict=True), name) for name in set(metrics)}
-    return [
-        np.maximum(np.abs(found), means[metric] * deviation)
-        for metric, found, deviation in zip(metrics, changes, deviations, strict=True)
-    ]
+    by_name, sizes = dict(zip(names, deviations, strict=True)), []
+    for (metric, statistic), found, deviation in zip(names, changes, deviations, strict=True):
+        size = np.maximum(np.abs(found), means[metric] * deviation)
+        kind = statistic.partition("_")[0]
+        average = statistic.replace(kind, _OF_ONE_PLACE.get(kind, kind))
+        sizes.append(np.maximum(size, by_name.get((metric, average), size)) if kind in _OF_ONE_PLACE else size)
+    return sizes
 
 
 def _rms_of_known(shares: Iterable[tuple[str, float]], wanted: str) -> float:

@@ -29,10 +29,13 @@ FORMAT = 2
 SAFETY = 1.25
 # What is left of an error of first order, when halving its cause changes the result by 1.
 VARIATION = 2.0
-# Of which order in the size of tetrahedra an error is: in general, and of the worst place or fibre alone. From rims of attachments,
-# where displacement goes with the root of the distance, order 1 comes, and 2 only where a mesh that resolves them is graded towards
-# them; from elsewhere 2 or more: in general it is between, as three sizes in a row show too (docs/accuracy.md).
+# Of which order in the size of tetrahedra an error is: in general, and of the worst place alone. From rims of attachments, where
+# displacement goes with the root of the distance, order 1 comes, and 2 only where a mesh that resolves them is graded towards them;
+# from elsewhere 2 or more: in general it is between, as three sizes in a row show too (docs/accuracy.md).
 ORDER, ORDER_OF_WORST = 1.5, 1.0
+# Metrics that say as little of what is left as the worst place does: the volume is nearly kept, and fibres are few lines that end
+# at rims, so that one of them may be most of their mean square.
+_OF_WORST = ("volume", "fibre_length")
 TETRAHEDRA, CARRIED = "tetrahedra", "surface in tetrahedra"
 # The measures of a run against another or (None) its rest.
 _Measured = Callable[[Run, Run | None], tuple[Measure, ...]]
@@ -104,10 +107,8 @@ class Pair:
     safety: float = SAFETY
 
     def share(self, metric: str, statistic: str) -> float:
-        """The error of the fine run over what the two differ by, with the safety of a grid convergence index. The volume, which is
-        nearly kept, says as little of what is left as the worst place does.
-        """
-        order = ORDER_OF_WORST if metric == "volume" or is_local(statistic) else ORDER
+        """The error of the fine run over what the two differ by, with the safety of a grid convergence index."""
+        order = ORDER_OF_WORST if metric in _OF_WORST or is_local(statistic) else ORDER
         return float(self.safety / ((self.sizes[1] / self.sizes[0]) ** order - 1))
 
 
@@ -156,8 +157,8 @@ def _sizes(differences: _Differences, statistics: tuple[Measure, ...], moved: Fl
     """The sizes of the signed ``differences`` of these ``statistics`` between two runs, whose surfaces have ``moved`` (f,) [mm]."""
     apart = _rms_of_surface(statistics, differences["deviation"])
     deviations = [typical(found, apart, moved) for found in differences["deviation"]]
-    metrics = [one.metric for one in statistics]
-    return {"change": typical_changes(differences["change"], deviations, metrics), "deviation": deviations}
+    kinds = [(one.metric, one.statistic) for one in statistics]
+    return {"change": typical_changes(differences["change"], deviations, kinds), "deviation": deviations}
 
 
 def _rms_of_surface(statistics: tuple[Measure, ...], values: list[Floats]) -> Floats:

@@ -70,6 +70,7 @@ def drawing(claims: Sequence[Claim], metric: str, name: str) -> Curve:
         axes.set(xlim=ends, ylim=ends)
         axes.set_xlabel(f"difference from the finer solution, {UNITS[metric]}")
         axes.set_ylabel(f"error bar, {UNITS[metric]}")
-        axes.legend(fontsize="small")
+        if claims:
+            axes.legend(fontsize="small")
 
     return drawn(f"{name}-{metric}", title, (4.6, 4.0), draw)
