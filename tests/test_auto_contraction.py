@@ -23,7 +23,7 @@ from fem_reference.runs.store import Frame, Outcome, Run
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx
-from fem_reference.studies import taken, watched
+from fem_reference.studies import run_folders, watched
 from fem_reference.studies.execution import Bench
 
 ACTIVE = """
@@ -59,7 +59,7 @@ def pennate(folder: Path, choice: str, effects: str = ACTIVE) -> MuscleCase:
 
 def asked(bench: Bench[MuscleCase]) -> Run:
     """The reference's run, of which a stand-in for the solver has no states to keep."""
-    return bench.obtain("reference", taken.without_states(bench.scene.reference), "reference")
+    return bench.obtain("reference", run_folders.without_states(bench.scene.reference), "reference")
 
 
 def spindle(folder: Path, choice: str, effects: str = ACTIVE) -> MuscleCase:

@@ -63,7 +63,7 @@ def balls() -> dict[str, Obstacle]:
     return {"exact": form, "grid": build(tessellated(form, np.zeros((1, 3)), "ball"), 0.5, 4.0)}
 
 
-def course(ball: Obstacle, every: bool) -> list[tuple[list[float], str | None, int]]:
+def passage(ball: Obstacle, every: bool) -> list[tuple[list[float], str | None, int]]:
     """A ball comes down on a sheet that trembles, lies on it, leaves through it by a leap and comes back: of each state what is out
     of balance, whether a point went through, and how many points were looked at. With ``every``, all of them are.
     """
@@ -98,7 +98,7 @@ def rng() -> np.random.Generator:
 @pytest.mark.parametrize("kind", ["exact", "grid"])
 def test_what_comes_and_goes_is_felt_as_if_every_point_were_asked(kind) -> None:
     ball = balls()[kind]
-    quick, whole = course(ball, False), course(ball, True)
+    quick, whole = passage(ball, False), passage(ball, True)
     assert np.allclose([one[0] for one in quick], [one[0] for one in whole], rtol=1e-12, atol=1e-14)
     felt = np.array([np.any(one[0]) for one in quick])
     assert 5 < felt.sum() < len(quick) - 20

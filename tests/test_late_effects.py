@@ -27,7 +27,7 @@ def down_and_up(frame: float) -> np.ndarray:
     return pose
 
 
-def course() -> tuple[list[np.ndarray], list[bool]]:
+def solved_states() -> tuple[list[np.ndarray], list[bool]]:
     """A plate comes down on a cube of 1 mm and leaves it: by frame the unknowns, and whether contact was in the equations."""
     plate = Obstruction("plate", Box((0.5, 0.5, 1.25), (4.0, 4.0, 0.2), 0.0), down_and_up)
     law = Contact("z1", 1.0, 0.01)
@@ -43,9 +43,9 @@ def course() -> tuple[list[np.ndarray], list[bool]]:
 
 
 def test_until_something_is_pressed_contact_is_not_in_the_equations(monkeypatch: pytest.MonkeyPatch) -> None:
-    late, there = course()
+    late, there = solved_states()
     monkeypatch.setattr(ContactForces, "presses", lambda *_: True)
-    always, everywhere = course()
+    always, everywhere = solved_states()
     assert there == [False, True, True, True, True, False]  # from 0.15 mm on; at frame 5 it still begins pressed
     assert all(everywhere)
     for one, other in zip(late, always, strict=True):

@@ -200,10 +200,7 @@ def test_what_is_recommended_is_shown_with_the_bar_and_without(bar, tmp_path: Pa
         in text
     )
     _, text = said(bar, saved(tmp_path / "without", own_study(bar[1])), capsys, "--error", "7 mm")
-    assert (
-        "surface deviation, rms at most 5 mm (as measured: the truth has no error bar), 3 ms a frame"
-        in text
-    )
+    assert "surface deviation, rms at most 5 mm (as measured: the truth has no error bar), 3 ms a frame" in text
 
 
 @pytest.mark.parametrize("own_bar", [0.0, 0.5, 2.0])

@@ -28,7 +28,7 @@ from fem_reference.runs.store import Frame, Outcome, Run
 from fem_reference.scenes.case import MACHINE_ONLY, Case, SolverChoice
 from fem_reference.solvers import recorded
 from fem_reference.solvers.common.protocol import MuscleSolver
-from fem_reference.studies import expected_cost, taken, watched
+from fem_reference.studies import expected_cost, run_folders, watched
 
 log = logging.getLogger(__name__)
 
@@ -84,7 +84,7 @@ class Bench[C: Case]:
         takes = expected_cost.seconds(choice.solver, built, settings)
         long = "" if takes is None else f", about {takes:.2g} s of processor time"
         log.info("%s: no stored run of it in %s; solving%s", name, folder.parent.resolve(), long)
-        with taken.alone(folder), taken.bars_kept(folder):
+        with run_folders.locked(folder), run_folders.bars_kept(folder):
             run = _stored(folder, name, ended, settings) or self._solve(name, choice.solver, settings, folder)
             run = self._checked(run)
         return self._with_all_that_matters(run, choice, place)
@@ -126,7 +126,7 @@ class Bench[C: Case]:
         self.watch.cache_clear()  # type: ignore[attr-defined]
         assert run.folder is not None  # from the store
         folder = self.folder(choice, place)
-        with taken.alone(folder):
+        with run_folders.locked(folder):
             cut_off.pass_on(run.folder, folder)
         return self.obtain(run.name, choice, place)
 

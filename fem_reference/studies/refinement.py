@@ -25,7 +25,7 @@ from fem_reference.scenes.bones import Bone
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx
 from fem_reference.studies.execution import Bench
-from fem_reference.studies.taken import without_states
+from fem_reference.studies.run_folders import without_states
 
 log = logging.getLogger(__name__)
 

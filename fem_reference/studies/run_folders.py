@@ -17,7 +17,7 @@ log = logging.getLogger(__name__)
 
 
 @contextmanager
-def alone(folder: Path) -> Iterator[None]:
+def locked(folder: Path) -> Iterator[None]:
     """Make the run in ``folder`` alone: a second process waits, and then finds it made."""
     files.make_folder(folder.parent)
     lock = FileLock(folder.parent / f".{folder.name}.lock")
