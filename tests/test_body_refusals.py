@@ -114,7 +114,7 @@ def test_cells_are_between_points(changes, message) -> None:
     [
         ({"mesh": None}, "mesh: got NoneType None, want Cells"),
         ({"effects": None}, "effects: got NoneType None"),
-        ({"effects": ("neo_hooke",)}, r"effects\[0\]: got str 'neo_hooke', want a Effect"),
+        ({"effects": ("neo_hooke",)}, r"effects\[0\]: got str 'neo_hooke', want Effect records"),
         ({"prescribed": FIXED}, "prescribed: got Prescribed"),
         ({"interval": -1.0}, "interval: got float -1.0, want a time above 0 s, or None"),
         ({"interval": NAN}, "interval: got float nan"),
@@ -180,3 +180,22 @@ def test_regions_agree_at_what_they_share() -> None:
 def test_boxes_have_cells_and_edges(given, message) -> None:
     with pytest.raises(fr.InputError, match=message):
         fr.box(*given)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"path": lambda points, _: 1j * points}, "path at frame 0: got TypeError: complex numbers"),
+        ({"path": lambda points, _: 0 * points + 1, "stiffness": 1.0}, "path at frame 0: got displacements up to 1 mm"),
+        ({"path": lambda points, _: 0 * points + 1}, "path at frame 0: got displacements up to 1 mm"),
+    ],
+)
+def test_a_path_is_real_and_begins_at_rest(changes, message) -> None:
+    with pytest.raises(fr.InputError, match=message):
+        fr.solve_body(replace(BODY, prescribed=(replace(TOP, **changes),)), element="P1")
+
+
+def test_obstructions_and_a_start_are_what_they_should_be() -> None:
+    refused(replace(BODY, obstructions=(3,)), r"obstructions\[0\]: got int 3, want Obstruction records")
+    refused(replace(BODY, start=lambda points: points * NAN), "start: got places .*, not all finite")
+    refused(replace(BODY, start=lambda _: np.zeros(3)), r"start: got places \(3,\)")

@@ -85,6 +85,38 @@ def test_a_bar_that_is_attached_all_round_is_refused_before_it_is_meshed(tmp_pat
         muscle.build(case, muscle.setup(case))
 
 
+def plate(folder, thick: float, smoothing: str = "0.3 mm"):
+    """The bar and a plate beside it, which goes face on to its other side within the one interval between two frames."""
+    case = scene(folder, COARSE)
+    size = f"20, {thick}, 20 mm"
+    ball = {"centre": "5, -3, 20 mm", "size": size, "rounding": "0.05 mm"}
+    bones = [*case.bone[:2], case.bone[2].model_copy(update={"sphere": None, "box": type(case.bone[0].box)(**ball)})]
+    motion = case.bone[2].motion.model_copy(update={"direction": (0.0, 1.0, 0.0)})
+    bones[2] = bones[2].model_copy(update={"motion": motion})
+    effects = [*case.effects[:2], case.effects[2].model_copy(update={"smoothing": float(smoothing.split()[0])})]
+    frames = case.frames.model_copy(update={"every": LAST})
+    return case.model_copy(update={"bone": tuple(bones), "effect": tuple(effects), "frames": frames})
+
+
+def test_a_bone_that_would_pass_between_contact_points_is_refused(tmp_path) -> None:
+    # Points of the bar are 0.53 mm apart, an eightieth of its diagonal: 1.5 times that is 0.8 mm.
+    case = plate(tmp_path, 0.4)
+    with pytest.raises(InputError, match=r"bone\[2\]: got a bone 0.4 mm thick, want 0.8 mm or more"):
+        muscle.build(case, muscle.setup(case))
+
+
+@pytest.mark.slow
+def test_a_plate_thinner_than_twice_the_smoothing_does_not_pass_in_one_step(tmp_path) -> None:
+    if not any(importlib.util.find_spec(name) for name in ("dolfinx_solver", "dolfinx")):
+        pytest.skip("FEniCSx is not installed")
+    case, frames = plate(tmp_path, 0.9, "0.6 mm"), []
+    settings = fenicsx.Settings(ranks=1, first_step=float(LAST), smallest_step=LAST / 4)
+    outcome = fenicsx.solve(muscle.build(case, muscle.setup(case)), settings, frames.append)
+    # It cannot be solved in steps of that size: what matters is that no step takes it through.
+    assert outcome.status != "converged"
+    assert "went through" in outcome.message
+
+
 @pytest.fixture(scope="module")
 def pressed(tmp_path_factory):
     """By the surface, its setup and its frames."""

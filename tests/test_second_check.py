@@ -424,3 +424,14 @@ def test_a_denied_run_is_no_truth_anywhere(tmp_path, monkeypatch, capsys) -> Non
     run = bench.obtain("reference", case.reference, "reference")
     result = comparison.compare(case, bench.setup(), run, ())
     assert result.word == "fail"
+
+
+def test_a_path_that_writes_into_its_points_is_asked_like_any_other() -> None:
+    mesh = bodies.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
+
+    def still(points, _frame):
+        return np.multiply(points, 0, out=points)
+
+    body = Body(mesh, (effects.make("neo_hooke", mu=0.01),), (Prescribed("low", "z0", (0, 1, 2), still),), (0.0,))
+    solved = Solved((Reached(0.0, mesh.points, {}, {}),), Outcome("converged", ""))
+    assert all(one.met for one in of_body(body, solved))

@@ -98,7 +98,7 @@ def _prescribed(body: Body, solved: Solved) -> Iterator[RunCheck]:
             if entry.stiffness is None and isinstance(entry.on, str):
                 nodes = np.unique(body.mesh.facets[entry.on])
                 rest, along = body.mesh.points[nodes], list(entry.components)
-                wanted = entry.path(rest, state.frame)
+                wanted = entry.displacements(rest, state.frame)
                 off = np.abs((state.points[nodes] - rest - wanted)[:, along]).max(axis=1)
                 allowed = SAME * (
                     body.size + float(np.abs(wanted).max())

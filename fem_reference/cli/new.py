@@ -31,6 +31,8 @@ def run(options: argparse.Namespace) -> int:
     """Write the scene, and say how to go on."""
     if options.muscle is None and options.bone:
         raise InputError("--bone", "a bone without --muscle", "the muscle too")
+    if options.muscle is None and options.unit is not None:
+        raise InputError("--unit", f'"{options.unit}" without --muscle', "files whose unit it is")
     if options.muscle is not None and options.case is not None:
         raise InputError("--from", f'"{options.case}" beside --muscle', "one of the two")
     folder, unit, said = options.name, {}, ""

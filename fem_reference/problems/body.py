@@ -163,7 +163,10 @@ class Prescribed:
         """
         place, want = f'prescribed "{self.name}": path at frame {frame:g}', "displacements (n, 3) of points (n, 3)"
         try:
-            found = np.asarray(self.path(np.array(points), frame), float)
+            found = np.asarray(self.path(np.array(points), frame))
+            if np.iscomplexobj(found):
+                raise TypeError("complex numbers")
+            found = np.asarray(found, float)
         except Exception as error:  # whatever a function of the caller's own does wrong
             raise InputError(place, f"{type(error).__name__}: {error}", want) from error
         if found.shape != points.shape:

@@ -12,7 +12,7 @@ from fem_reference.foundations.given import said
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import Body, Cells, Prescribed, boundary_facets, check_element, reference_nodes
-from fem_reference.problems.contact import Contact
+from fem_reference.problems.contact import Contact, Obstruction
 
 SAME = 1e-6  # of the body's size, by which two regions may prescribe what is meant to be the same
 _UNIT = 1e-6  # by which a unit vector may be longer or shorter
@@ -102,7 +102,7 @@ def _check_many(place: str, given: Any, kind: type, want: str) -> None:
         raise InputError(place, said(given), f"{want}, in a tuple")
     for i, one in enumerate(given):
         if not isinstance(one, kind):
-            raise InputError(f"{place}[{i}]", said(one), f"a {kind.__name__}")
+            raise InputError(f"{place}[{i}]", said(one), f"{kind.__name__} records")
 
 
 def _check_rest(body: Body) -> None:
@@ -113,6 +113,11 @@ def _check_rest(body: Body) -> None:
         part = getattr(body, name)
         if part is not None and not callable(part):
             raise InputError(name, said(part), "a function, or None")
+    _check_many("obstructions", body.obstructions, Obstruction, "bones that may press")
+    if body.start is not None:
+        begun = np.asarray(body.start(np.array(body.mesh.points)))
+        if begun.shape != body.mesh.points.shape or not np.isfinite(begun).all():
+            raise InputError("start", f"places {begun.shape}, not all finite", "finite places (n, 3) of points (n, 3)")
     if body.contact is not None and not isinstance(body.contact, Contact):
         raise InputError("contact", said(body.contact), "a Contact, or None")
 
@@ -235,6 +240,17 @@ def check_agreement(body: Body) -> None:
                 x, y, z = places[np.argmax(off)]
                 got = f"displacements {off.max():.4g} mm apart at ({x:.4g}, {y:.4g}, {z:.4g}) mm at frame {frame:g}"
                 raise InputError(f'prescribed "{one.name}" and "{other.name}"', got, "the same at what they share")
+
+
+def check_start(body: Body) -> None:
+    """InputError where something is prescribed elsewhere than at rest at the first frame, at which a body is at rest."""
+    for entry in body.prescribed if body.start is None else ():
+        off = np.abs(entry.displacements(body.points_on(entry.on), body.frames[0])).max(initial=0.0)
+        if not off <= SAME * body.size:
+            place = f'prescribed "{entry.name}": path at frame {body.frames[0]:g}'
+            raise InputError(
+                place, f"displacements up to {off:.4g} mm", "none at the first frame: the body begins at rest"
+            )
 
 
 def _looked_at(body: Body) -> Floats:

@@ -15,6 +15,8 @@ from fem_reference.geometry.skins import Skin
 
 # Of what is not attached of a surface no more than this share may be exempt from contact; half of that is worth a word.
 _LOST = 0.5
+# Of the spacing of contact points half the thickness of a bone: between four of them, 0.71 of it apart from each, it would pass.
+_THINNEST = 0.75
 
 log = logging.getLogger(__name__)
 
@@ -98,6 +100,15 @@ def check_outside(bones: Mapping[str, Surface], muscle: Surface) -> None:
     for place, bone in bones.items():
         if signed_distances(bone.points, muscle).max() < 0:
             raise InputError(place, "a bone wholly inside the muscle", "one that is not")
+
+
+def check_thickness(bones: Mapping[str, Obstacle], apart: float) -> None:
+    """InputError where a bone, by its place in a scene, is too thin for contact points that are ``apart`` [mm]."""
+    for place, bone in bones.items():
+        if not bone.half_thickness >= _THINNEST * apart:
+            got = f"a bone {2 * bone.half_thickness:.2g} mm thick"
+            want = f"{2 * _THINNEST * apart:.2g} mm or more, as it would pass between points of contact that are {apart:.2g} mm apart"
+            raise InputError(place, got, want)
 
 
 def check_exempt(exempt: Exemption, place: str) -> None:

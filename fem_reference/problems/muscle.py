@@ -46,7 +46,7 @@ from fem_reference.geometry.tetrahedra import tetrahedralise
 from fem_reference.io import files
 from fem_reference.problems import fibre_field
 from fem_reference.problems.attachments import facets_under, pick
-from fem_reference.problems.contact import check_exempt, check_outside
+from fem_reference.problems.contact import check_exempt, check_outside, check_thickness
 from fem_reference.scenes.bones import Bone
 from fem_reference.scenes.muscle import MuscleCase
 
@@ -183,10 +183,11 @@ def build(scene: MuscleCase, rest: Setup) -> Problem:
     contact = among(scene.effects)
     distances_known = {} if contact is None else _distance_facts(rest)
     if contact is not None:
-        outside = {join(scene.place, f"bone[{i}]"): bone for i, bone in enumerate(rest.bones)}
-        check_outside(
-            {place: bone.surface for place, bone in outside.items() if contact.is_by(bone.name)}, rest.surface
-        )
+        pressing = {
+            join(scene.place, f"bone[{i}]"): bone for i, bone in enumerate(rest.bones) if contact.is_by(bone.name)
+        }
+        check_outside({place: bone.surface for place, bone in pressing.items()}, rest.surface)
+        check_thickness({place: bone.shape for place, bone in pressing.items()}, spacing(rest.surface))
         check_exempt(rest.exempt, join(scene.place, "attachment"))
     mesh = _filled(scene, rest, scene.muscle.tet_size)
     exact = tuple(attached.attachment for attached in rest.attached if attached.stiffness is None)

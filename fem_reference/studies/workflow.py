@@ -17,6 +17,7 @@ from fem_reference.foundations.progress import Progress, reported
 from fem_reference.foundations.records import parse
 from fem_reference.problems import of_case
 from fem_reference.problems.body import Body
+from fem_reference.problems.checks import check, check_start
 from fem_reference.runs.solved import Solved
 from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
@@ -279,5 +280,7 @@ def solve_body(body: Body, *, progress: Progress | None = None, **settings: Any)
     arguments.check_progress(progress)
     with reported(progress):
         chosen = parse(fenicsx.BodySettings, settings, "settings")
+        check(body, chosen.element)
+        check_start(body)
         solved = second_check.confirmed_body(body, fenicsx.solve_body(body, chosen))
         return replace(solved, body=body, settings=chosen)

@@ -21,6 +21,8 @@ from fem_reference.solvers.fenicsx.contact_points import ContactPoints
 
 # A point deeper in an obstruction than this share of its half thickness is as good as through.
 _GIVEN_WAY = 0.75
+# What slides round a rim may be so deep in it on its straight path, of half the thickness, and what smoothing rounds; no deeper.
+_RIM = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,9 +222,10 @@ class ContactForces:
             for one, sign in ((before, -1), (now, 1))
         ]
         turned = np.flatnonzero(np.einsum("ni,ni->n", *outward) < 0)
-        on_path = nearest_on_path(self.obstructions[i], starts[turned], displacements[turned], self.law.smoothing)
+        felt = min(self.law.smoothing, _RIM * self.obstructions[i].shape.half_thickness)
+        on_path = nearest_on_path(self.obstructions[i], starts[turned], displacements[turned], felt)
         excess = np.minimum(np.minimum(before.distance, now.distance)[turned], 0) - on_path
-        if not excess.max(initial=0.0) > self.law.smoothing:
+        if not excess.max(initial=0.0) > felt:
             return None
         worst = int(np.argmax(excess))
         where = f"the point that rests at {place_of(self.points.rest[met[turned[worst]]])}"
