@@ -107,7 +107,7 @@ def check_thickness(bones: Mapping[str, Obstacle], apart: float) -> None:
     for place, bone in bones.items():
         if not bone.half_thickness >= _THINNEST * apart:
             got = f"a bone {2 * bone.half_thickness:.2g} mm thick"
-            want = f"{2 * _THINNEST * apart:.2g} mm or more, as it would pass between points of contact that are {apart:.2g} mm apart"
+            want = f"{2 * _THINNEST * apart:.2g} mm or more, as points of contact are {apart:.2g} mm apart"
             raise InputError(place, got, want)
 
 
