@@ -6,6 +6,7 @@ import math
 import re
 import tomllib
 from collections.abc import Callable
+from contextlib import chdir
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
@@ -297,10 +298,8 @@ def _make_index(folder: Path) -> None:
 
 def _make_series(data_format: str) -> Callable[[Path], None]:
     def make(folder: Path) -> None:
-        import os
-
-        os.chdir(folder)  # where meshio puts its .h5
-        with meshio.xdmf.TimeSeriesWriter(folder / "run.xdmf", data_format=data_format) as series:
+        # Meshio puts its .h5 where the process is.
+        with chdir(folder), meshio.xdmf.TimeSeriesWriter(folder / "run.xdmf", data_format=data_format) as series:
             series.write_points_cells(BALL.points, [("triangle", BALL.triangles)])
             for number in NUMBERS:
                 series.write_data(number, point_data={"displacement": moved(number) - BALL.points})
