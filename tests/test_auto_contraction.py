@@ -270,7 +270,7 @@ def test_fibres_that_are_stretched_inside_only_are_added(stored, tmp_path, monke
     scene = pennate(tmp_path / "scene", "auto", random_scenes.EFFECTS["fibre_passive"].format(**STILL))
     bench = Bench(scene, tmp_path / "runs")
     assert len(bench.scene.effects) == 2
-    with caplog.at_level("INFO"):
+    with caplog.at_level("INFO", logger="fem_reference"):
         run = asked(bench)
     assert [len(titles) for titles in made] == [2, 3]
     assert "FibrePassive: needed as it turned out at frame" in caplog.text

@@ -113,7 +113,7 @@ def test_what_a_stored_run_shows_in_one_frame_in_the_middle_is_seen(
         patch.setattr(estimates, "_near", lambda *_: Near(1e9, 0.0, 0.0))
         bench = Bench(scene, tmp_path / "runs")
     assert bench.folder(scene.reference, "reference") == stored.folder
-    with caplog.at_level("INFO"):
+    with caplog.at_level("INFO", logger="fem_reference"):
         bench.obtain("reference", scene.reference, "reference")
     assert solved == [["NeoHooke", "Incompressible"], ["NeoHooke", "Incompressible", "Contact"]]
     assert "Contact: needed as it turned out at frame 10" in caplog.text

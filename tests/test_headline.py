@@ -38,6 +38,7 @@ def shift(setup, _settings, sink) -> Outcome:
 @pytest.fixture
 def words(tmp_path: Path, monkeypatch) -> list[str]:
     stand_ins.solve_by(monkeypatch, fenicsx, still)
+    stand_ins.unchecked(monkeypatch)
     stand_ins.solve_by(monkeypatch, pbd, shift)
     return ["compare", str(small.write(tmp_path / "bar")), "--quiet", "--out", str(tmp_path / "out")]
 
@@ -70,6 +71,7 @@ def test_energy_that_came_from_nowhere_is_judged_where_it_stands(
         return Outcome("converged", "done", {"seconds": 1.0})
 
     stand_ins.solve_by(monkeypatch, fenicsx, leaking)
+    stand_ins.unchecked(monkeypatch)
     target = tmp_path / "facts.json"
     assert cli.main([*words, "--json", str(target)]) == cli.DONE
     doubts, printed = json.loads(target.read_text())["doubts"], capsys.readouterr().out

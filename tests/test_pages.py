@@ -151,6 +151,7 @@ def test_the_small_picture_is_the_first_that_can_be_read(tmp_path: Path) -> None
 @pytest.mark.usefixtures("without_pictures")
 def test_runs_that_differ_leave_pages_beside_each_other(tmp_path: Path, monkeypatch, capsys) -> None:
     stand_ins.solve_by(monkeypatch, fenicsx, test_headline.still)
+    stand_ins.unchecked(monkeypatch)
     stand_ins.solve_by(monkeypatch, pbd, test_headline.shift)
     case, out = small.write(tmp_path / "bar"), tmp_path / "out"
     common = [str(case), "--out", str(out), "--quiet"]

@@ -53,6 +53,7 @@ def shift(problem, _, sink) -> Outcome:
 def case(tmp_path, monkeypatch):
     """The small scene, its reference shifted, and a table of two kinds."""
     stand_ins.solve_by(monkeypatch, fenicsx, shift)
+    stand_ins.unchecked(monkeypatch)
     monkeypatch.setattr(table_5_1, "solver_kinds", lambda: ROWS)
     monkeypatch.setattr(candidates, "solver_kinds", lambda: ROWS)
     return small.write(tmp_path / "bar")

@@ -115,6 +115,7 @@ def shift(by: float):
 @pytest.mark.usefixtures("without_pictures")
 def test_the_verb_compares_with_a_baseline_and_with_a_stored_run(tmp_path: Path, monkeypatch, capsys) -> None:
     stand_ins.solve_by(monkeypatch, fenicsx, test_headline.still)
+    stand_ins.unchecked(monkeypatch)
     stand_ins.solve_by(monkeypatch, pbd, shift(0.1))
     case, out, past = small.write(tmp_path / "bar"), tmp_path / "out", tmp_path / "past.json"
     common = [str(case), "--out", str(out), "--quiet"]

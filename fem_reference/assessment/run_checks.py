@@ -12,10 +12,7 @@ from itertools import chain, pairwise
 
 import numpy as np
 
-from fem_reference.effects import Effect, Load
-from fem_reference.effects.damping import Damping
-from fem_reference.effects.gravity import Gravity
-from fem_reference.effects.inertia import Inertia
+from fem_reference.effects import Effect
 from fem_reference.foundations.mesh import Floats, Surface, boundary, diagonal, place_of, vertex_areas
 from fem_reference.foundations.motion import Rotation, apply
 from fem_reference.geometry.distance import distances
@@ -202,7 +199,7 @@ def _travel(bone: RigidBody, before: float, after: float) -> float:
 
 def _balance(problem: Problem, run: Run) -> Iterator[RunCheck]:
     """The sums of forces and of moments of bones on the muscle, by attachments and contact: 0 where nothing acts from outside."""
-    outer = any(isinstance(one, (Load, Gravity, Damping, Inertia)) or _is_foreign(one) for one in problem.effects)
+    outer = any(one.outer or _is_foreign(one) for one in problem.effects)
     residual = _BALANCE * run.origin.get("settings", {}).get("residual", math.nan)
     allowed = residual * math.sqrt(run.outcome.cost.get("unknowns", math.nan))
     for kind, unit, arm in (("force", "N", 1.0), ("moment", "N mm", float(np.abs(run.positions).max()))):

@@ -113,11 +113,13 @@ class Effect(Record):
     """A frozen record of parameters of what acts in a body.
 
     ``unknowns``: names of the fields that it brings; ``needs``: what it asks of the rest state, ``"fibre"``, of the frames,
-    ``"interval"``: the time from a frame number to the next, or of a step, ``"momentum"``: velocities and where these lead.
+    ``"interval"``: the time from a frame number to the next, or of a step, ``"momentum"``: velocities and where these lead;
+    ``outer``: whether it acts from outside the body, so that its forces are not in balance by themselves.
     """
 
     unknowns: ClassVar[tuple[str, ...]] = ()
     needs: ClassVar[tuple[str, ...]] = ()
+    outer: ClassVar[bool] = False
 
     def amount(self, frame: float) -> float:  # noqa: ARG002
         """How much of it acts at a frame: all of it, unless it has a ramp."""
@@ -173,6 +175,7 @@ class Energy(Effect):
 class Load(Effect):
     """A load on a part of the surface; ``on`` names it."""
 
+    outer: ClassVar[bool] = True
     on: str
 
     @property

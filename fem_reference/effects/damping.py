@@ -16,6 +16,7 @@ class Damping(Energy):
     ``coefficient``: [MPa s/mm^2].
     """
 
+    outer: ClassVar[bool] = True
     needs: ClassVar[tuple[str, ...]] = ("interval",)
     stored: ClassVar[bool] = False
 

@@ -1,7 +1,7 @@
 """Weight, or any other steady acceleration."""
 
 import math
-from typing import Any
+from typing import Any, ClassVar
 
 from fem_reference.effects import Energy, Ramped, State
 from fem_reference.foundations.indicators import Estimates, Indicator
@@ -14,6 +14,7 @@ class Gravity(Ramped, Energy):
     ``density``: rho at rest [tonne/mm^3]; ``acceleration``: g (3,) [mm/s^2].
     """
 
+    outer: ClassVar[bool] = True
     density: Density
     acceleration: AccelerationVector
 

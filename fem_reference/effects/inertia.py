@@ -23,6 +23,7 @@ class Inertia(Energy):
     ``density``: at rest [tonne/mm^3]; ``spectral_radius``: from 0 to 1.
     """
 
+    outer: ClassVar[bool] = True
     needs: ClassVar[tuple[str, ...]] = ("interval", "momentum")
     stored: ClassVar[bool] = False
 
