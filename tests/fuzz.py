@@ -30,6 +30,8 @@ from fem_reference.solvers import fenicsx
 # Of one input: processor time [s], the time that passes on a machine that is shared, and memory [bytes].
 SECONDS, PATIENCE, MEMORY = 10, 120, 2 * 2**30
 KINDS = [*hostile.KINDS, *calls.KINDS]
+# Inputs are drawn, and neither timed, kept nor made smaller, by Hypothesis.
+UNTIMED = settings(deadline=None, database=None, phases=[Phase.generate], suppress_health_check=list(HealthCheck))
 
 
 @dataclass
@@ -100,13 +102,7 @@ def fuzz(name: str, inputs: int, number: int, kept: Path) -> Tried:
         strategies = {target: hostile.damage((whole / target).read_bytes()) for target in targets}
 
         @seed(number)
-        @settings(
-            max_examples=inputs,
-            deadline=None,
-            database=None,
-            phases=[Phase.generate],
-            suppress_health_check=list(HealthCheck),
-        )
+        @settings(UNTIMED, max_examples=inputs)
         @given(st.sampled_from(targets).flatmap(lambda target: st.tuples(st.just(target), strategies[target])))
         def attempt(damaged: tuple[Path, bytes]) -> None:
             target, data = damaged
@@ -132,13 +128,7 @@ def fuzz_calls(name: str, inputs: int, number: int) -> Tried:
         world = calls.World(Path(place))
 
         @seed(number)
-        @settings(
-            max_examples=inputs,
-            deadline=None,
-            database=None,
-            phases=[Phase.generate],
-            suppress_health_check=list(HealthCheck),
-        )
+        @settings(UNTIMED, max_examples=inputs)
         @given(calls.KINDS[name](world))
         def attempt(call: Callable[[], object]) -> None:
             began = time.perf_counter()

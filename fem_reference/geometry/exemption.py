@@ -104,7 +104,7 @@ class Exemption:
 
     @property
     def vertices(self) -> NDArray[np.bool_]:
-        """Which vertices (n,) are exempt, as seen from any triangle around them."""
+        """Mask (n,) of the vertices that are exempt, as seen from any triangle around them."""
         return np.asarray(self.corners.away[self.corners.vertices] <= self.reach)
 
     @cached_property

@@ -78,7 +78,7 @@ def shared(surface: Surface, counts: NDArray[np.bool_], distance: Distance, body
 
 
 def _within(surface: Surface, body: Floats) -> NDArray[np.bool_]:
-    """Which of the points (k, 3) of a body are inside; none where their middle is not in the surface's box."""
+    """Mask of the points (k, 3) of a body that are inside; none where their middle is not in the surface's box."""
     middle, low, high = body.sum(axis=0) / max(1, len(body)), surface.points.min(axis=0), surface.points.max(axis=0)
     boxed = len(body) > 0 and bool(((middle > low) & (middle < high)).all())
     return _inside(surface, body) if boxed else np.zeros(len(body), bool)

@@ -135,7 +135,7 @@ class Setup:
 
     @cached_property
     def free(self) -> NDArray[np.bool_]:
-        """Which vertices (n,) of the surface may be in contact with bones."""
+        """Mask (n,) of the vertices of the surface that may be in contact with bones."""
         return ~self.exempt.vertices
 
 

@@ -91,7 +91,7 @@ def stops(things: Sequence[Moving], frames: Sequence[float], size: float) -> tup
 
 
 def skipped(things: Sequence[Moving], frames: Sequence[float], size: float) -> tuple[Moving, float, float] | None:
-    """Which thing does more from one of ``frames`` to the next than a step may, and these two; None where none does."""
+    """The thing that does more from one of ``frames`` to the next than a step may, and these two; None where none does."""
     looked = _Samples(things, np.unique(np.concatenate([frames, *(_grid(thing, frames) for thing in things)])), size)
     for early, late in pairwise(np.searchsorted(looked.frames, frames).tolist()):
         for i, thing in enumerate(things):

@@ -57,7 +57,7 @@ def follow(model: Model, setup: Setup, sink: Sink, per_frame: int = 1) -> Outcom
 
 
 def _unseen(setup: Setup, per_frame: int) -> Trouble | None:
-    """Which bone turns too far from where it is seen to where it is seen next, or there and back; None where none does."""
+    """Trouble with a bone that turns too far from where it is seen to where it is seen next, or there and back; None without."""
     if all(bone.motion is None for bone in setup.bones):
         return None
     points, count = setup.surface.points, (setup.frames[-1] - setup.frames[0]) * per_frame
