@@ -13,7 +13,7 @@ import pytest
 collect_ignore = ["foreign_solver.py", "run_notebook.py"]  # programs: they run where they are imported
 # Of these files each test takes long, and only those of one parameter, a case or an entry, have something in common; the tests of
 # any other file share its fixtures.
-SINGLE = ("test_cases.py", "test_verification_entries.py")
+SINGLE = ("test_every_case.py", "test_every_entry.py")
 
 
 def pytest_configure() -> None:

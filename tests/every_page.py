@@ -4,19 +4,17 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import test_claims
-import test_effects_verb
-import test_field_page
-import test_study_page
-import test_table_5_1
-import test_verify_page
-import test_versions
 
 from fem_reference import report
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.cost_study import Study
 from fem_reference.assessment.stress import Bound, Cell, HardCase, History, Scene, Stress
 from fem_reference.report import index_page
+from tests.assessment import test_versions
+from tests.report import test_field_page, test_study_page, test_verify_page
+from tests.studies import test_omissions as test_effects_verb
+from tests.studies import test_table_5_1
+from tests.studies import test_true_errors as test_claims
 
 KINDS = (
     "comparison",

@@ -1,10 +1,10 @@
 """Effects: one file each, named as in scene files. A problem sums its effects and adds nothing else.
 
-Contract (tests/test_effects.py): an effect is a frozen record of its parameters, and one expression written once, with operators
-and the few functions of ``Functions`` only, so that a solver can take it symbolically and a test can evaluate it in numpy. What
-acts in a body is an ``Effect`` of one of three kinds: an ``Energy`` per rest volume, a ``Load`` on a part of its surface (a
-traction, where no energy exists), or a ``Prestrain``, which changes the deformation that the energies see. A ``FieldEffect``
-acts on a scalar field psi and has a weak form.
+Contract (tests/contracts/test_every_effect.py): an effect is a frozen record of its parameters, and one expression written once,
+with operators and the few functions of ``Functions`` only, so that a solver can take it symbolically and a test can evaluate it
+in numpy. What acts in a body is an ``Effect`` of one of three kinds: an ``Energy`` per rest volume, a ``Load`` on a part of its
+surface (a traction, where no energy exists), or a ``Prestrain``, which changes the deformation that the energies see. A
+``FieldEffect`` acts on a scalar field psi and has a weak form.
 
 A solver may hand symbols in place of an effect's parameters (so that a compiled form serves every value of them): an expression
 never branches on a parameter and computes with it by operators and ``state.functions`` only.

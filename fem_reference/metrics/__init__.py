@@ -1,8 +1,8 @@
 """Metrics: one file each, named as in scene files and JSON. A metric does not know the solver of a run.
 
-Contract (tests/test_metrics.py): zero against itself, a known change gives a known value, NaN stays NaN, units stated. Each
-declares the unit of every statistic (``UNITS``), what of a run it is ``OF`` (its surface, its lines, its field) and what it is
-measured ``AGAINST``: the reference (or the rest state), the exact solution, or nothing but the run itself.
+Contract (tests/contracts/test_every_metric.py): zero against itself, a known change gives a known value, NaN stays NaN, units
+stated. Each declares the unit of every statistic (``UNITS``), what of a run it is ``OF`` (its surface, its lines, its field) and
+what it is measured ``AGAINST``: the reference (or the rest state), the exact solution, or nothing but the run itself.
 """
 
 import importlib

@@ -1,7 +1,7 @@
 """Solvers: one file or folder each, named as in scene files.
 
 A file lists what it offers in ``SOLVES``: a ``MuscleSolver``, a ``FieldSolver``, a ``BodySolver``, or more than one of them
-(``common.protocol``; the contract is tests/test_solvers.py).
+(``common.protocol``; the contract is tests/contracts/test_every_solver.py).
 """
 
 import importlib

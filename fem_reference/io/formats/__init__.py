@@ -1,7 +1,7 @@
 """Formats of surface meshes: one file each, found by their folder.
 
-A file has one ``FORMAT``. Contract (tests/test_formats.py): a surface comes back bit by bit, and a file that was cut off is
-refused.
+A file has one ``FORMAT``. Contract (tests/contracts/test_every_format.py): a surface comes back bit by bit, and a file that was
+cut off is refused.
 """
 
 import importlib

@@ -1,7 +1,7 @@
 """Sections of the page of a comparison: one file each, found by their folder, with its template beside it.
 
-A file has one ``SECTION``, and the template of its name ends in a ``<section>`` of HTML. Contract (tests/test_report.py): it is
-shown where its numbers exist and absent where they do not, and repeats no id.
+A file has one ``SECTION``, and the template of its name ends in a ``<section>`` of HTML. Contract (tests/report/test_page.py): it
+is shown where its numbers exist and absent where they do not, and repeats no id.
 """
 
 import importlib

@@ -1,8 +1,8 @@
 """Who solves the problem of ``peer_problem``: one file each, found by this folder; ``fenicsx`` is the reference of this project.
 
-Contract (tests/test_peers.py): ``PACKAGES`` are the distributions that it needs, ``TUNED`` says in words how it was made fast,
-``OMITTED`` by element why it does not solve in that; ``opened()`` is a context that has all imported and started that is not the
-work itself, and gives ``Solve``.
+Contract (tests/studies/benchmark/test_peers.py): ``PACKAGES`` are the distributions that it needs, ``TUNED`` says in words how it
+was made fast, ``OMITTED`` by element why it does not solve in that; ``opened()`` is a context that has all imported and started
+that is not the work itself, and gives ``Solve``.
 """
 
 import importlib

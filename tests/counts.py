@@ -1,0 +1,214 @@
+"""Counts of the house: its size, arrows against the order of packages, loose types, twins of names, tests that are not there.
+
+``python tests/counts.py`` prints each count beside what is allowed and exits with 1 where one is above; with ``--where`` it lists
+each place.
+"""
+
+import ast
+import collections
+import itertools
+import re
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGE = ROOT / "fem_reference"
+# A package imports only what stands before it (or in itself).
+ORDER = [
+    "foundations",
+    "io",
+    "effects",
+    "geometry",
+    "scenes",
+    "problems",
+    "runs",
+    "solvers",
+    "metrics",
+    "assessment",
+    "export",
+    "report",
+    "studies",
+    "verification",
+    "cli",
+]
+KINDS = {"MuscleCase", "ScalarCase", "Problem", "Setup", "FieldProblem", "Body", "Solved"}
+HEADLESS = {
+    "What",
+    "How",
+    "Whether",
+    "Where",
+    "When",
+    "Who",
+    "Why",
+    "Which",
+    "By",
+    "Of",
+    "As",
+    "That",
+    "From",
+    "With",
+    "To",
+}
+# Modules that have no file of tests of their own, and where they are tested.
+TESTED_ELSEWHERE: dict[str, str] = {}
+
+
+class Module(NamedTuple):
+    """A file of the package: its ``name`` below it, its ``lines`` and its ``tree``."""
+
+    name: str
+    lines: int
+    tree: ast.Module
+
+
+def modules() -> list[Module]:
+    """Every file of the package, parsed."""
+    texts = {path: path.read_text(encoding="utf-8") for path in sorted(PACKAGE.rglob("*.py"))}
+    return [
+        Module(str(path.relative_to(PACKAGE)), len(text.splitlines()), ast.parse(text)) for path, text in texts.items()
+    ]
+
+
+def imported(tree: ast.AST) -> set[str]:
+    """Every module that is imported, anywhere in ``tree``."""
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module == "fem_reference":
+            found |= {f"fem_reference.{alias.name}" for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found.add(node.module or "")
+    return found
+
+
+def arrows_up(house: list[Module]) -> Iterator[str]:
+    """Imports against the order of packages; from the package itself, too, which stands above them all."""
+    for module in house:
+        room = module.name.split("/")[0]
+        if room not in ORDER:
+            continue
+        later = {f"fem_reference.{name}" for name in [*ORDER[ORDER.index(room) + 1 :], "__version__"]}
+        for name in imported(module.tree):
+            if ".".join(name.split(".")[:2]) in later or name == "fem_reference":
+                yield f"{module.name} imports {name}"
+
+
+def loose_types(house: list[Module]) -> Iterator[str]:
+    """Public functions of ``problems``, ``runs`` and ``studies/execution`` whose signature has ``Any``, and public calls."""
+    for module in house:
+        if not (module.name.startswith(("problems/", "runs/", "studies/")) or module.name == "__init__.py"):
+            continue
+        for node in ast.walk(module.tree):
+            if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
+                hints = [arg.annotation for arg in (*node.args.args, *node.args.kwonlyargs)] + [node.returns]
+                if any(re.search(r"\bAny\b", ast.unparse(hint)) for hint in hints if hint is not None):
+                    yield f"{module.name}:{node.lineno} {node.name}"
+
+
+def questions_of_kind(house: list[Module]) -> Iterator[str]:
+    """``isinstance`` on the kind of problem outside ``scenes`` and ``problems``, and functions that choose by the type of it."""
+    for module in house:
+        if module.name.startswith(("scenes/", "problems/")):
+            continue
+        for node in ast.walk(module.tree):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "isinstance":
+                asked = {name.id for name in ast.walk(node.args[1]) if isinstance(name, ast.Name)}
+                if asked & KINDS:
+                    yield f"{module.name}:{node.lineno} {ast.unparse(node)}"
+            elif isinstance(node, ast.FunctionDef):
+                for mark in node.decorator_list:
+                    if "singledispatch" in ast.unparse(mark):
+                        yield f"{module.name}:{node.lineno} singledispatch {node.name}"
+
+
+def long_files(house: list[Module]) -> Iterator[str]:
+    """Files of more than 300 lines."""
+    return (f"{module.name} {module.lines}" for module in house if module.lines > 300)
+
+
+def long_functions(house: list[Module]) -> Iterator[str]:
+    """Functions of more than 40 lines."""
+    for module in house:
+        for node in ast.walk(module.tree):
+            if isinstance(node, ast.FunctionDef) and (length := (node.end_lineno or 0) - node.lineno + 1) > 40:
+                yield f"{module.name}:{node.lineno} {node.name} {length}"
+
+
+def twins_of_classes(house: list[Module]) -> Iterator[str]:
+    """Public names that stand for more than one class."""
+    places = collections.defaultdict(list)
+    for module in house:
+        for node in module.tree.body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                places[node.name].append(module.name)
+    return (f"{name}: {', '.join(found)}" for name, found in places.items() if len(found) > 1)
+
+
+def headless_docstrings(house: list[Module]) -> Iterator[str]:
+    """Docstrings that begin with neither a verb nor a noun."""
+    for module in house:
+        for node in ast.walk(module.tree):
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+                text = ast.get_docstring(node) or ""
+                if re.split(r"\W", text, maxsplit=1)[0] in HEADLESS:
+                    yield f"{module.name}:{getattr(node, 'lineno', 1)} {text.splitlines()[0][:80]}"
+
+
+def untested_modules(house: list[Module]) -> Iterator[str]:
+    """Modules without a file of tests of their own: that of ``a/b.py`` is ``tests/a/test_b.py``, of a package ``test_init.py``.
+
+    What lies in a folder where each file is an entry of one kind is asked by the contract of that kind.
+    """
+    by_contract = ("effects/", "metrics/", "io/formats/", "report/sections/", "verification/", "cli/")
+    for module in house:
+        if module.lines < 12 or module.name.startswith(by_contract):
+            continue
+        folder, _, file = module.name.rpartition("/")
+        if not (ROOT / "tests" / folder / f"test_{file.replace('__init__', 'init')}").is_file():
+            yield f"{module.name}: {TESTED_ELSEWHERE.get(module.name, 'no reason')}"
+
+
+class Count(NamedTuple):
+    """A count with how many are allowed."""
+
+    title: str
+    places: Callable[[list[Module]], Iterator[str]]
+    most: int
+
+
+COUNTS = (
+    Count("arrows up", arrows_up, 0),
+    Count("Any in public signatures", loose_types, 0),
+    Count("questions of the kind of problem", questions_of_kind, 0),
+    Count("files above 300 lines", long_files, 0),
+    Count("functions above 40 lines", long_functions, 0),
+    Count("names of two classes", twins_of_classes, 0),
+    Count("headless docstrings", headless_docstrings, 0),
+    Count("modules without a file of tests", untested_modules, 20),
+)
+LINES = 36000
+
+
+def main(words: list[str]) -> int:
+    """Print the counts; the exit status."""
+    house = modules()
+    total = sum(module.lines for module in house)
+    sys.stdout.write(f"{total:6} of at most {LINES}: lines of the library\n")
+    over = total > LINES
+    for count in COUNTS:
+        places = list(count.places(house))
+        over |= len(places) > count.most
+        sys.stdout.write(f"{len(places):6} of at most {count.most}: {count.title}\n")
+        if "--where" in words:
+            sys.stdout.writelines(f"         {place}\n" for place in places)
+    if "--where" in words:
+        sizes = itertools.groupby(house, lambda module: module.name.split("/")[0])
+        sys.stdout.writelines(f"{sum(one.lines for one in group):6} {room}\n" for room, group in sizes)
+    return 1 if over else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,125 @@
+"""The design as tests: fourteen packages in one order of imports, one door per heavy package, sizes of files and functions."""
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = ROOT / "fem_reference"
+
+# A package imports only what stands before it (or in itself).
+ORDER = [
+    "foundations",
+    "io",
+    "effects",
+    "geometry",
+    "scenes",
+    "problems",
+    "runs",
+    "solvers",
+    "metrics",
+    "assessment",
+    "export",
+    "report",
+    "studies",
+    "verification",
+    "cli",
+]
+# These see runs and never who made them.
+BLIND_TO_SOLVERS = ["metrics", "assessment", "report"]
+DOORS = {
+    "dolfinx": ["solvers/fenicsx/"],
+    "dolfinx_solver": ["solvers/fenicsx/"],
+    "ufl": ["solvers/fenicsx/"],
+    "basix": ["solvers/fenicsx/"],
+    "petsc4py": ["solvers/fenicsx/"],
+    "mpi4py": ["solvers/fenicsx/"],
+    "gmsh": ["geometry/tetrahedra.py"],
+    "pytetwild": ["geometry/tetrahedra.py"],
+    "igl": ["geometry/"],
+    "skfem": ["geometry/fibres.py", "solvers/scikit_fem/"],
+    "numba": [
+        f"solvers/{name}_kernels.py" for name in ("compiled", "pbd", "program", "collision", "xpbd", "arap", "spring")
+    ],
+    "pyvista": ["io/", "report/pictures.py"],
+    "vtk": [],
+    "vtkmodules": [],
+    "meshio": ["io/"],
+    "matplotlib": ["report/"],
+    "jinja2": ["report/"],
+    "pint": ["foundations/units.py"],
+    "felupe": ["studies/benchmark/peers/felupe.py"],
+    "sfepy": ["studies/benchmark/peers/sfepy.py"],
+    "pypardiso": ["studies/benchmark/peers/felupe.py"],
+}
+TRUTHS_MAY = {"numpy", "scipy", "math", "dataclasses", "collections", "typing", "validation"}
+LINES, FUNCTION, ARGUMENTS = 310, 60, 6
+
+
+def sources() -> Iterator[tuple[str, ast.Module, str]]:
+    """Every module of the package: where it is in it, parsed, and its text."""
+    for path in sorted(PACKAGE.rglob("*.py")):
+        text = path.read_text(encoding="utf-8")
+        yield str(path.relative_to(PACKAGE)), ast.parse(text), text
+
+
+def imports(tree: ast.AST) -> set[str]:
+    """Every module that is imported, anywhere."""
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module == "fem_reference":
+            found |= {f"fem_reference.{alias.name}" for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found.add(node.module or "")
+    return found
+
+
+def own(tree: ast.AST) -> set[str]:
+    """Which of our packages are imported."""
+    return {name.split(".")[1] for name in imports(tree) if name.startswith("fem_reference.")} - {"__version__"}
+
+
+def test_packages_import_in_one_order_and_heavy_ones_have_one_door() -> None:
+    found = {path.name for path in PACKAGE.iterdir() if path.name != "__pycache__"}
+    assert found == {*ORDER, "__init__.py", "__main__.py", "py.typed"}
+    wrong = []
+    for name, tree, _ in sources():
+        place = name.split("/")[0]
+        later = ORDER[ORDER.index(place) + 1 :] if place in ORDER else []
+        wrong += [f"{name} imports {other}, which stands after it" for other in own(tree) & set(later)]
+        if place in BLIND_TO_SOLVERS:
+            wrong += [f"{name} knows solvers" for other in own(tree) & {"solvers"}]
+        for module in imports(tree):
+            doors = DOORS.get(module.split(".")[0])
+            if doors is not None and not any(name.startswith(door) for door in doors):
+                wrong.append(f"{name} imports {module}, whose door is {doors}")
+    for path in (ROOT / "validation").rglob("*.py"):
+        strange = {module.split(".")[0] for module in imports(ast.parse(path.read_text(encoding="utf-8")))} - TRUTHS_MAY
+        wrong += [f"{path.name}, a truth, imports {module}" for module in strange]
+    assert not wrong
+
+
+def test_files_and_functions_stay_small_and_only_the_command_line_prints() -> None:
+    wrong = []
+    for name, tree, text in sources():
+        if len(text.splitlines()) > LINES:
+            wrong.append(f"{name} has {len(text.splitlines())} lines")
+        for node in ast.walk(tree):
+            if isinstance(node, ast.FunctionDef):
+                parameters = {arg.arg for arg in (*node.args.args, *node.args.kwonlyargs)} - {"self", "cls"}
+                if len(parameters) > ARGUMENTS or (node.end_lineno or 0) - node.lineno >= FUNCTION:
+                    wrong.append(f"{name}: {node.name} is too long, or has too many arguments")
+            called = node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
+            if called in ("print", "exit", "quit") and not name.startswith("cli/"):
+                wrong.append(f"{name} calls {called}")
+    assert not wrong
+
+
+def test_importing_the_package_loads_nothing_heavy() -> None:
+    code = "import sys, fem_reference.cli; print(*({'dolfinx', 'gmsh', 'pyvista', 'vtk', 'meshio', 'numba'} & set(sys.modules)))"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert loaded == []

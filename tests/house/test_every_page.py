@@ -1,0 +1,127 @@
+"""Every kind of page in a browser: in light and dark colours, on a phone, printed, without a message and without a request."""
+
+import base64
+import re
+from pathlib import Path
+from typing import Any
+
+import every_page
+import pytest
+from browser import PROGRAM, Browser
+
+from tests.report import test_page as test_report
+
+pytestmark = pytest.mark.slow
+comparison = test_report.comparison
+PHONE, DESK, SHEET = 390, 1280, 1032  # widths in pixels, the last of A4 on its side within margins
+
+CHECKS = (Path(__file__).parents[1] / "page_checks.js").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    if PROGRAM is None:
+        pytest.skip("chromium is not installed: apt-get install chromium")
+    with Browser(tmp_path_factory.mktemp("profile")) as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory) -> dict[str, Path]:
+    """The path of a page of each kind."""
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("pages")
+        found = test_report.small_comparison(folder, patch)
+        return every_page.write(folder / "reports", found, test_report.alone(found))
+
+
+def show(browser: Browser, path: Path, width: int, **media: Any) -> None:
+    browser.screen(width, **media)
+    browser.open(path)
+    browser.wait("document.readyState === 'complete'")
+    browser.ask(CHECKS)
+    browser.ask("checks.open()")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("kind", every_page.KINDS)
+def test_it_is_legible_and_silent_at_a_desk_and_on_a_phone(browser, written, kind, scheme) -> None:
+    for width in (DESK, PHONE):
+        show(browser, written[kind], width, scheme=scheme)
+        assert browser.ask("document.documentElement.scrollWidth") <= width, browser.ask("checks.wide()")
+        assert browser.ask("checks.pale()") == []
+        assert browser.complaints() == []
+        assert [address for address in browser.requests() if not address.startswith(("data:", "blob:"))] == [
+            written[kind].resolve().as_uri()
+        ]
+    ground = [int(one) for one in re.findall(r"\d+", browser.ask("getComputedStyle(document.body).backgroundColor"))]
+    assert (min(ground) > 200) == (scheme == "light")
+
+
+@pytest.mark.parametrize("kind", every_page.KINDS)
+def test_printed_it_is_light_whole_and_without_controls(browser, written, kind) -> None:
+    show(browser, written[kind], SHEET, scheme="dark", media="print")
+    assert browser.ask("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+    assert browser.ask("document.documentElement.scrollWidth") <= SHEET, browser.ask("checks.wide()")
+    assert browser.ask("checks.cut()") == []
+    assert browser.ask("checks.controls()") == 0
+    printed = base64.b64decode(browser.call("Page.printToPDF", printBackground=False, preferCSSPageSize=True)["data"])
+    assert printed.startswith(b"%PDF-")
+    assert browser.complaints() == []
+
+
+def rows(browser: Browser, table: str) -> list[str]:
+    return browser.ask(
+        f"[...document.querySelector('{table}').tBodies[0].rows].map(row => row.cells[0].innerText.trim())"
+    )
+
+
+def test_a_table_sorts_by_the_keyboard_as_by_a_click(browser, written) -> None:
+    show(browser, written["comparison"], DESK)
+    assert rows(browser, ".first") == ["quick\npbd", "torn\nrecorded"]
+    head = "document.querySelector('.first thead tr:last-child th:nth-child(6)')"
+    assert browser.ask(f"{head}.getAttribute('aria-sort')") is None
+    browser.ask(f"{head}.querySelector('button').focus()")
+    browser.press("Enter")
+    assert browser.ask(f"{head}.getAttribute('aria-sort')") == "ascending"
+    assert rows(browser, ".first") == ["quick\npbd", "torn\nrecorded"]  # what is not a number comes last, whichever way
+    browser.press("Enter")
+    assert browser.ask(f"{head}.getAttribute('aria-sort')") == "descending"
+    assert rows(browser, ".first") == ["quick\npbd", "torn\nrecorded"]
+    browser.ask("document.querySelector('.first thead tr:last-child button').click()")
+    browser.ask("document.querySelector('.first thead tr:last-child button').click()")
+    assert rows(browser, ".first") == ["torn\nrecorded", "quick\npbd"]
+    assert browser.ask("document.querySelectorAll('.first [aria-sort]').length") == 1
+
+
+def test_rows_that_belong_together_stay_together(browser, written) -> None:
+    show(browser, written["verify"], DESK)
+    error = "[...document.querySelectorAll('table thead button')].find(it => it.innerText.startsWith('Error')).click()"
+    for _ in range(2):
+        browser.ask(error)
+    names = "[...document.querySelectorAll('tr.first')].map(row => row.id)"
+    assert browser.ask(names) == ["a_name_that_is_long_enough_to_wrap", "rod", "bar"]
+    assert browser.ask(
+        "[...document.querySelectorAll('tr.first')].every(row => row.nextElementSibling.className === 'more')"
+    )
+
+
+@pytest.mark.parametrize(
+    ("cells", "sorted_cells"),
+    [
+        ("2 s|300 ms|\N{EN DASH}|1 min", "300 ms|2 s|1 min|\N{EN DASH}"),
+        (
+            "\N{MINUS SIGN}3|1.2 \N{MULTIPLICATION SIGN} 10⁻⁵|12\N{NARROW NO-BREAK SPACE}034|not a number|0.5 mm",
+            "\N{MINUS SIGN}3|1.2 \N{MULTIPLICATION SIGN} 10⁻⁵|0.5 mm|12\N{NARROW NO-BREAK SPACE}034|not a number",
+        ),
+        ("b||a", "a|b|"),
+    ],
+)
+def test_numbers_sort_as_numbers_with_their_units(browser, written, tmp_path, cells, sorted_cells) -> None:
+    text = written["verify"].read_text(encoding="utf-8")
+    body = "".join(f"<tr><td>{one}</td></tr>" for one in cells.split("|"))
+    table = f"<table id='t'><thead><tr><th>x</th></tr></thead><tbody>{body}</tbody></table>"
+    (tmp_path / "t.html").write_text(text.replace("<header>", f"{table}<header>", 1), encoding="utf-8")
+    show(browser, tmp_path / "t.html", DESK)
+    browser.ask("document.querySelector('#t button').click()")
+    assert rows(browser, "#t") == sorted_cells.split("|")
