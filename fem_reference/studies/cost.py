@@ -1,4 +1,4 @@
-"""What accuracy costs on a case: its reference and candidates over ladders of settings, each run measured against the truth."""
+"""Accuracy against time on a case: its reference and candidates over ladders of settings, each run measured against the truth."""
 
 import logging
 import math
@@ -12,11 +12,11 @@ import numpy as np
 
 from fem_reference import __version__, metrics, solvers
 from fem_reference.assessment.claims import Claim
-from fem_reference.assessment.cost_study import CaseStudy, Study
+from fem_reference.assessment.cost_study import CaseStudy, Study, load_all
 from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.assessment.fronts import COSTS, Point
 from fem_reference.foundations.errors import InputError
-from fem_reference.metrics import MeasurementContext, measure
+from fem_reference.metrics import MeasurementContext, context_of, measure
 from fem_reference.runs.complete import complete
 from fem_reference.runs.cost import seconds_per_frame
 from fem_reference.runs.key import versions
@@ -38,6 +38,7 @@ METRICS = ("volume", "fibre_length", "surface_deviation", "penetration")
 _POWERS = (-1, 1)
 _MOST_TRIANGLES = 20_000  # above it a run takes minutes, most of a study's time
 SURFACES = "surfaces"
+FILE = "study.json"
 # Error bars of so many of the reference's coarser members are set beside their errors: the finest of those that are cheap.
 _CLAIMING = 4
 
@@ -57,6 +58,16 @@ def study(scenes: Iterable[MuscleCase], store: Path, workers: Workers, only: Col
     return Study(tuple(cases), missing, {"fem_reference": __version__, "machine": machine, **versions()})
 
 
+def stored(folder: Path) -> list[CaseStudy]:
+    """The studies below ``folder``, of a case that of its own name before those with another; InputError where there is none."""
+    known = [(study, path.parent.name) for path in sorted(folder.glob(f"*/{FILE}")) for study in load_all(path)]
+    found = {study.case: study for study, name in sorted(known, key=lambda one: one[0].case == one[1])}
+    if not found:
+        want = "a folder with studies: fem-reference study CASE makes one"
+        raise InputError("--out", f'"{folder}", where no study is', want)
+    return list(found.values())
+
+
 def alone(found: Study, case: CaseStudy) -> Study:
     """The part of a study that is about one of its cases."""
     return replace(found, cases=(case,), missing={})
@@ -69,7 +80,7 @@ def _of(scene: MuscleCase, store: Path, workers: Workers, only: Collection[str])
     if truth.outcome.status != "converged" or truth.fibres is None:
         raise InputError(scene.place, f"a reference that {truth.outcome.status}", "one that reaches all frames")
     bars = refinement.stored(truth) or refinement.obtain(bench, truth, model=False)
-    context = MeasurementContext.of(truth, truth.fibres, bench.setup().bones, bench.setup().exempt)
+    context = context_of(bench.setup(), truth)
     trials = list[Trial]()
     if not only or scene.reference.solver in only:
         trials += reference_trials(scene)
