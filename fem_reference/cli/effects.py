@@ -5,10 +5,11 @@ from functools import partial
 
 from fem_reference import report
 from fem_reference.assessment.omissions import facts
-from fem_reference.cli._pages import Asked, case_part, changes, written
+from fem_reference.cli._pages import case_part, changes, written
 from fem_reference.cli._parser import share
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, out, write_output
 from fem_reference.report import effects_page
+from fem_reference.report.asked import Asked
 from fem_reference.scenes import casefile
 from fem_reference.studies import omissions
 from fem_reference.studies.campaign import Workers

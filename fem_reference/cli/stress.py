@@ -5,11 +5,12 @@ from functools import partial
 
 from fem_reference import report
 from fem_reference.assessment.stress import facts
-from fem_reference.cli._pages import Asked, Part, written
+from fem_reference.cli._pages import written
 from fem_reference.cli._parser import share
 from fem_reference.cli._printing import DONE, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import stress_page
+from fem_reference.report.asked import Asked, Part
 from fem_reference.studies.hard import choosing, records, running
 
 PAGE = "stress"

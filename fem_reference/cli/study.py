@@ -7,10 +7,11 @@ from functools import partial
 
 from fem_reference import report, solvers
 from fem_reference.assessment.cost_study import Study, facts
-from fem_reference.cli._pages import Asked, Part, case_part, changes, written
+from fem_reference.cli._pages import case_part, changes, written
 from fem_reference.cli._parser import CASE, share
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, out, write_output
 from fem_reference.report import study_page
+from fem_reference.report.asked import Asked, Part
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import cost, growth

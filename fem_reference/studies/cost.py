@@ -2,15 +2,13 @@
 
 import logging
 import math
-import os
-import platform
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from fem_reference import __version__, metrics, solvers
+from fem_reference import metrics, solvers
 from fem_reference.assessment.claims import Claim
 from fem_reference.assessment.cost_study import CaseStudy, Study, load_all
 from fem_reference.assessment.error_bars import ErrorBars
@@ -19,7 +17,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.metrics import MeasurementContext, context_of, measure
 from fem_reference.runs.complete import complete
 from fem_reference.runs.cost import seconds_per_frame
-from fem_reference.runs.key import versions
+from fem_reference.runs.key import made_with
 from fem_reference.runs.store import Run
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import refinement
@@ -54,8 +52,7 @@ def study(scenes: Iterable[MuscleCase], store: Path, workers: Workers, only: Col
         except InputError as error:
             log.info("%s is left out: %s", scene.name, error)
             missing[scene.name] = str(error)
-    machine = f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores, {workers}"
-    return Study(tuple(cases), missing, {"fem_reference": __version__, "machine": machine, **versions()})
+    return Study(tuple(cases), missing, made_with(str(workers)))
 
 
 def stored(folder: Path) -> list[CaseStudy]:

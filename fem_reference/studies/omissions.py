@@ -2,8 +2,6 @@
 
 import logging
 import math
-import os
-import platform
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -12,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference import __version__, metrics, solvers
+from fem_reference import metrics, solvers
 from fem_reference.assessment.omissions import MEASURES, Ablation, CaseOmissions, Omission
 from fem_reference.effects import Effect, Energy, Load, Ramped
 from fem_reference.foundations.errors import InputError, MissingSoftware
-from fem_reference.metrics import MeasurementContext, measure
+from fem_reference.metrics import MeasurementContext, context_of, measure
 from fem_reference.problems import of_case
 from fem_reference.problems.body import ELEMENTS
 from fem_reference.runs.complete import complete
-from fem_reference.runs.key import versions
+from fem_reference.runs.key import made_with
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import MACHINE_ONLY, SolverChoice
 from fem_reference.scenes.muscle import MuscleCase
@@ -63,11 +61,10 @@ def study(scene: MuscleCase, store: Path, workers: Workers) -> CaseOmissions:
         made = iter(carry_out([trial for _, trial in _listed(trials)], store, workers))
         without = {name: [(part, next(made)) for part, _ in entries] for name, entries in trials.items()}
         bench = shared_bench(scene, store)
-        context = None if not _is_there(reference) else _context(bench, _run(reference))
+        truth = reference.run if _is_there(reference) else None
+        context = None if truth is None or truth.fibres is None else context_of(bench.setup(), truth)
         bars, unknown = _bars(bench, reference)
     ablations = tuple(_ablation(one, without.get(one.trial.name, []), context) for one in wholes)
-    together = "one after the other" if workers == Workers() else f"{workers.count} at once"
-    machine = f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores, runs {together}"
     return CaseOmissions(
         scene.name,
         scene.title,
@@ -75,7 +72,7 @@ def study(scene: MuscleCase, store: Path, workers: Workers) -> CaseOmissions:
         {name: unit for name, unit in metrics.units().items() if name in MEASURES},
         bars,
         unknown,
-        {"fem_reference": __version__, "machine": machine, **versions()},
+        made_with(str(workers)),
     )
 
 
@@ -192,12 +189,6 @@ def _limit(one: Made) -> dict[str, str]:
 
 def _listed(trials: Mapping[str, list[tuple[Part, Trial]]]) -> list[tuple[Part, Trial]]:
     return [entry for entries in trials.values() for entry in entries]
-
-
-def _context(bench: Bench[MuscleCase], truth: Run) -> MeasurementContext | None:
-    if truth.fibres is None:
-        return None
-    return MeasurementContext.of(truth, truth.fibres, bench.setup().bones, bench.setup().exempt)
 
 
 def _bars(bench: Bench[MuscleCase], reference: Made) -> tuple[dict[str, float], str]:

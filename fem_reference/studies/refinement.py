@@ -18,7 +18,7 @@ from fem_reference.effects.contact import Contact, among
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record
 from fem_reference.geometry.sectors import attached_area, attached_shares
-from fem_reference.metrics import MeasurementContext
+from fem_reference.metrics import context_of
 from fem_reference.runs.complete import complete
 from fem_reference.runs.store import Run
 from fem_reference.scenes.bones import Bone
@@ -99,9 +99,7 @@ def obtain(bench: Bench[MuscleCase], reference: Run, *, model: bool = True) -> E
     with fenicsx.shared():
         pair = _pair(bench, reference, model)
     log.info("error bar: measuring the runs against each other")
-    bars = error_bars.error_bars(
-        pair, MeasurementContext.of(reference, reference.fibres, bench.setup().bones, bench.setup().exempt)
-    )
+    bars = error_bars.error_bars(pair, context_of(bench.setup(), reference))
     if reference.folder is not None:
         error_bars.save(bars, reference.folder, _of(reference))
     return bars
