@@ -49,7 +49,7 @@ def stake(scenes: Iterable[MuscleCase], store: Path) -> Claims:
 def _of(scene: MuscleCase, store: Path) -> list[Claim]:
     bench = Bench(scene, store)
     reference = bench.obtain("reference", scene.reference, "reference")
-    bars = refinement.stored(reference) or refinement.obtain(bench, reference)
+    bars = refinement.bars(bench, reference)
     if bars is None:
         return []
     finer = Bench(refinement.finer(bench, reference, FINER), store)
