@@ -154,9 +154,9 @@ def _pair(bench: Bench[MuscleCase], reference: Run, model: bool) -> Pair:
 
 
 def safety(bench: Bench[MuscleCase]) -> float:
-    """The factor of safety: that of a grid convergence index, and more where the tetrahedra, before they are refined, are larger than
-    the radius of the smallest attachment, by that ratio: nested tetrahedra share its polygon, and their difference does not show
-    what is wrong with that.
+    """The factor of safety: that of a grid convergence index, and more where the tetrahedra, before they are refined, are larger
+    than the radius of the smallest attachment, by that ratio: nested tetrahedra share its polygon, and their difference does not
+    show what is wrong with that.
     """
     rest, radii = bench.setup(), [math.inf]
     for entry in rest.attached:
