@@ -11,20 +11,10 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.markup import table
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import join
-from fem_reference.metrics import Context, Measure, at_rest, context_of, find, measure, names
+from fem_reference.metrics import Context, Measure, at_rest, context_of, described, find, measure, names
 from fem_reference.metrics.fibre_length import extension_error
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case, Expectation
-
-# What a notebook shows of a candidate; the page has it all.
-_SHOWN = (
-    ("volume", "deviation"),
-    ("fibre_length", "rms_percent"),
-    ("surface_deviation", "rms"),
-    ("surface_deviation", "max"),
-    ("difference", "max"),
-    ("l2_error", "norm"),
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +60,7 @@ class Comparison:
             (name, f"{one.metric}.{one.statistic}", f"{one.values[one.worst]:.4g} {one.unit}", self._known(one), number)
             for name, measures in self.deviations.items()
             for one in measures
-            if (one.metric, one.statistic) in _SHOWN
+            if (one.metric, one.statistic) in described("main")
             for number in [self.reference.numbers[one.worst]]
         ]
         return table(f"{self.scene.name}: {self.word}", ("candidate", "measure", "greatest", "known to", "frame"), rows)

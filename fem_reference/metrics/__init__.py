@@ -1,16 +1,16 @@
 """Metrics: one file each, named as in scene files and JSON. A metric does not know the solver of a run.
 
 Contract (tests/contracts/test_every_metric.py): zero against itself, a known change gives a known value, NaN stays NaN, units
-stated. Each declares the unit of every statistic (``UNITS``), what of a run it is ``OF`` (its surface, its lines, its field) and
+stated. Each describes its ``STATISTICS``, and states what of a run it is ``OF`` (its surface, its lines, its field) and
 what it is measured ``AGAINST``: the reference (or the rest state), the exact solution, or nothing but the run itself.
 """
 
 import importlib
 import pkgutil
-from collections.abc import Collection, Iterable
-from dataclasses import dataclass, replace
-from functools import singledispatch
-from typing import Any, Protocol, cast
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache, singledispatch
+from typing import Any, Literal, Protocol, cast
 
 import numpy as np
 
@@ -22,6 +22,40 @@ from fem_reference.problems.muscle import RigidBody, Setup
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Part, Standard
+
+# Places that a statistic is shown at: ``main``, notebooks and omissions; ``table``, the first table of a comparison; ``headline``, its
+# sentence; ``curve``, drawings of changes from rest; ``solvers``, the tables of solvers, and ``scenes``, that of them over all scenes;
+# ``rank``, rankings of solvers; ``claim``, error bars beside true errors.
+Shown = Literal["main", "table", "headline", "curve", "solvers", "scenes", "rank", "claim"]
+
+
+@dataclass(frozen=True)
+class Statistic:
+    """A statistic as its metric describes it.
+
+    ``title`` and ``part``: the words above a group of columns and above its own; ``headline``: a sentence with ``{}`` in place of
+    its value; ``curve``: the title of the drawing of its changes from rest; ``share_of``: what a per cent is of; ``shown``: by
+    place, its position there, the least first; ``local``: True where its error is of the order that it is of at the worst place.
+    """
+
+    unit: str
+    title: str = ""
+    part: str = ""
+    headline: str = ""
+    curve: str = ""
+    share_of: str = ""
+    shown: Mapping[Shown, int] = field(default_factory=dict)
+    local: bool = False
+
+    @property
+    def label(self) -> str:
+        """Title and part in one."""
+        return f"{self.title}, {self.part}" if self.part else self.title
+
+    @property
+    def full_unit(self) -> str:
+        """The unit, of a per cent with what it is of."""
+        return f"{self.unit} of {self.share_of}" if self.share_of else self.unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,9 +141,9 @@ def _(setup: FieldProblem, reference: Run) -> FieldContext:  # noqa: ARG001
 
 
 class Metric(Protocol):
-    """What the module of a metric has."""
+    """The contents of the module of a metric."""
 
-    UNITS: dict[str, str]
+    STATISTICS: dict[str, Statistic]
     OF: Part
     AGAINST: Standard
 
@@ -128,14 +162,29 @@ def names(against: Collection[Standard] | None = None) -> list[str]:
     return [name for name in found if against is None or metric(name).AGAINST in against]
 
 
+@cache
+def described(where: Shown | None = None) -> dict[tuple[str, str], Statistic]:
+    """Every statistic by metric and name: all, or those that are shown somewhere, in the order that they have there."""
+    found = {(name, one): each for name in names() for one, each in metric(name).STATISTICS.items()}
+    if where is None:
+        return found
+    chosen = {key: each for key, each in found.items() if where in each.shown}
+    return dict(sorted(chosen.items(), key=lambda entry: entry[1].shown[where]))
+
+
+def in_tables() -> tuple[str, ...]:
+    """The metrics of the first table of a comparison."""
+    return tuple(dict.fromkeys(name for name, _ in described("table")))
+
+
 def units(of: Collection[Part] | None = None, against: Collection[Standard] | None = None) -> dict[str, str]:
     """The unit of every ``metric.statistic`` there is: all, or those ``of`` such parts and ``against`` such standards."""
     chosen = {name: metric(name) for name in names(against)}
     return {
-        f"{name}.{statistic}": unit
+        f"{name}.{statistic}": described.unit
         for name, found in chosen.items()
         if of is None or found.OF in of
-        for statistic, unit in found.UNITS.items()
+        for statistic, described in found.STATISTICS.items()
     }
 
 
@@ -151,6 +200,16 @@ def measure(run: Run, reference: Run, context: Context, wanted: Iterable[str] | 
     chosen = map(metric, names() if wanted is None else wanted)
     return tuple(
         statistic for found in chosen if found.OF in run.carries for statistic in found.measure(run, reference, context)
+    )
+
+
+def measures(name: str, values: Mapping[str, Floats], where: Collection[str] = ()) -> tuple[Measure, ...]:
+    """The measures of the metric ``name`` from the ``values`` (f,) of its statistics, all worst at the same places (f,) in words,
+    nowhere in particular without any.
+    """
+    stated = metric(name).STATISTICS
+    return tuple(
+        Measure(name, one, stated[one].unit, each, tuple(where) or ("",) * len(each)) for one, each in values.items()
     )
 
 

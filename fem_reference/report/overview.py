@@ -18,7 +18,7 @@ from fem_reference.effects import Effect
 from fem_reference.foundations.mesh import Surface, enclosed_volume
 from fem_reference.foundations.motion import RigidMotion, Translation
 from fem_reference.geometry.sectors import attached_area, attached_shares
-from fem_reference.metrics import Measure, find
+from fem_reference.metrics import Measure, described, find
 from fem_reference.problems.muscle import AttachedVertices, RigidBody, Setup
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.report.words import exact
@@ -27,15 +27,7 @@ from fem_reference.scenes.case import Case, Expectation
 from fem_reference.scenes.muscle import MuscleCase
 
 # The statistics that are printed of a comparison; the page, JSON and CSV have them all.
-PRINTED = (
-    ("volume", "deviation"),
-    ("fibre_length", "max"),
-    ("surface_deviation", "rms"),
-    ("surface_deviation", "p95"),
-    ("surface_deviation", "max"),
-    ("surface_deviation", "hausdorff"),
-    ("penetration", "deepest"),
-)
+PRINTED = tuple(key for key in described("table") if not key[1].endswith("_percent"))
 
 
 def case_facts(case: Case, setup: Any) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.doubts import doubts
 from fem_reference.assessment.error_bars import Of
 from fem_reference.assessment.judge import overall
-from fem_reference.metrics import Measure, find
+from fem_reference.metrics import Measure, described, find
 from fem_reference.report import reached
 from fem_reference.report.at_frames import columns, label
 from fem_reference.report.curves import colour_of, label_of
@@ -23,15 +23,6 @@ from fem_reference.report.viewer import view
 from fem_reference.report.words import listed, number, ratio
 from fem_reference.runs.cost import seconds_per_frame
 from fem_reference.runs.store import Run
-
-# What the headline says of a candidate, and how; of a field the last two.
-_HEADLINE = (
-    ("surface_deviation", "rms", "surface off by up to {} rms"),
-    ("fibre_length", "rms_percent", "lengths of fibres by {} rms"),
-    ("volume", "deviation", "volume by {}"),
-    ("difference", "max", "off by up to {}"),
-    ("l2_error", "norm", "L2 error {}"),
-)
 
 
 def render(comparison: Comparison) -> str:
@@ -145,7 +136,7 @@ def headlines(comparison: Comparison) -> list[tuple[str, str, str]]:
 def _greatest(comparison: Comparison, run: Run) -> str:
     """The greatest deviations of a candidate, with the error bars of the reference."""
     said = []
-    for metric, statistic, words in _HEADLINE:
+    for (metric, statistic), described_as in described("headline").items():
         one = find(comparison.deviations.get(run.name, ()), metric, statistic)
         if one is None:
             continue
@@ -156,7 +147,7 @@ def _greatest(comparison: Comparison, run: Run) -> str:
             continue
         bar = _bar_at(comparison, "deviation", metric, statistic, frame)
         value = f"{number(value)}{f' ± {number(bar)}' if bar is not None else ''} {one.unit}".strip()
-        said.append(words.format(value) + lost)
+        said.append(described_as.headline.format(value) + lost)
     return "; ".join(said) or "nothing of it can be measured"
 
 

@@ -12,22 +12,13 @@ from fem_reference.assessment.convergence import Ladder
 from fem_reference.assessment.doubts import doubts
 from fem_reference.assessment.error_bars import ErrorBar
 from fem_reference.assessment.judge import Verdict, overall
-from fem_reference.metrics import Measure
+from fem_reference.metrics import Measure, described
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case
 
 COLUMNS = ("candidate", "metric", "statistic", "frame", "value", "unit")
 # The columns of the first table: metric, statistic, the words above a group and above the column, unit.
-DEVIATIONS = (
-    ("volume", "deviation", "Volume", "", "%"),
-    ("fibre_length", "max", "Fibre length", "worst fibre", "mm"),
-    ("fibre_length", "max_percent", "Fibre length", "worst fibre", "%"),
-    ("surface_deviation", "rms", "Surface", "rms", "mm"),
-    ("surface_deviation", "p95", "Surface", "95 % below", "mm"),
-    ("surface_deviation", "max", "Surface", "worst vertex", "mm"),
-    ("surface_deviation", "hausdorff", "Surface", "Hausdorff", "mm"),
-    ("penetration", "deepest", "In bones", "deepest", "mm"),
-)
+DEVIATIONS = tuple((*key, one.title, one.part, one.unit) for key, one in described("table").items())
 
 
 def summary(comparison: Comparison) -> dict[str, Any]:
