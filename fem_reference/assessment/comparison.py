@@ -9,7 +9,6 @@ from fem_reference.assessment.judge import Verdict, Word, overall, resolved, ver
 from fem_reference.assessment.ranking import Ranking, rankings
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.markup import table
-from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import join
 from fem_reference.metrics import Context, Measure, at_rest, context_of, described, find, measure, names
 from fem_reference.metrics.fibre_length import extension_error
@@ -57,17 +56,14 @@ class Comparison:
     def _repr_html_(self) -> str:
         """What notebooks show: the greatest deviation of each candidate, with its frame and its error bar."""
         rows = [
-            (name, f"{one.metric}.{one.statistic}", f"{one.values[one.worst]:.4g} {one.unit}", self._known(one), number)
+            (name, f"{one.metric}.{one.statistic}", f"{it.value:.4g} {it.unit}", known, it.frame)
             for name, measures in self.deviations.items()
             for one in measures
             if (one.metric, one.statistic) in described("main")
-            for number in [self.reference.numbers[one.worst]]
+            for it in [one.worst]
+            for known in ["" if it.error_bar is None else f"± {it.error_bar:.2g} {it.unit}"]
         ]
         return table(f"{self.scene.name}: {self.word}", ("candidate", "measure", "greatest", "known to", "frame"), rows)
-
-    def _known(self, one: Measure) -> str:
-        bar = self.error_bars and self.error_bars.find("deviation", one.metric, one.statistic)
-        return f"± {bar.values[one.worst]:.2g} {one.unit}" if bar else ""
 
     @property
     def rankings(self) -> tuple[Ranking, ...]:
@@ -101,17 +97,15 @@ def compare(
     """
     context, runs = context_of(setup, reference), (reference, *candidates)
     candidate, alone = names(scene.standards("candidates")), names(scene.standards("reference"))
-    deviations = {run.name: measure(run, reference, context, candidate) for run in candidates}
+    deviations = {
+        run.name: _with_bars(measure(run, reference, context, candidate), "deviation", error_bars) for run in candidates
+    }
     changes = {run.name: measure(run, at_rest(run), context, alone) for run in runs}
+    changes["reference"] = _with_bars(changes["reference"], "change", error_bars)
     measured = {"reference": changes["reference"]} | deviations
     _check_expected(scene, measured)
     verdicts = tuple(
-        verdict(
-            expectation.model_copy(update={"of": name}),
-            measured[name],
-            reference.numbers,
-            _bars(error_bars, expectation),
-        )
+        verdict(expectation.model_copy(update={"of": name}), measured[name], reference.numbers)
         for expectation in map(resolved, scene.expect)
         for name in (deviations if expectation.of == "candidates" else [expectation.of])
         if _is_measured(expectation, measured.get(name, ()))
@@ -148,8 +142,9 @@ def _is_measured(expectation: Expectation, measures: tuple[Measure, ...]) -> boo
     return find(measures, expectation.metric, str(expectation.statistic)) is not None
 
 
-def _bars(error_bars: ErrorBars | None, expectation: Expectation) -> Floats | None:
-    """The error bars (f,) of what is expected; None without any of it."""
-    of: Of = "change" if expectation.of == "reference" else "deviation"
-    found = None if error_bars is None else error_bars.find(of, expectation.metric, str(expectation.statistic))
-    return None if found is None else found.values
+def _with_bars(measures: tuple[Measure, ...], of: Of, error_bars: ErrorBars | None) -> tuple[Measure, ...]:
+    """The ``measures``, each with its error bars, as far as there are some."""
+    if error_bars is None:
+        return measures
+    known = [(one, error_bars.find(of, one.metric, one.statistic)) for one in measures]
+    return tuple(one if bar is None else replace(one, error_bars=bar.values) for one, bar in known)

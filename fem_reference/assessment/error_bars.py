@@ -27,6 +27,9 @@ FILE = "error_bar.json"
 FORMAT = 2
 # Of a grid convergence index (Roache 1998, Verification and Validation in Computational Science, ch. 5).
 SAFETY = 1.25
+# Longer by this for one fibre alone, of the few that there are: nothing averages there, and a pair of sizes says less than three do
+# (Roache takes 3 for a pair). Chosen so that bars cover the differences from finer solutions (docs/accuracy.md).
+LONE_FIBRE = 1.2
 # What is left of an error of first order, when halving its cause changes the result by 1.
 VARIATION = 2.0
 # Of which order in the size of tetrahedra an error is: in general, and of the worst place alone. From rims of attachments, where
@@ -59,7 +62,7 @@ class ErrorBar:
     model: Floats | None = None
 
     @property
-    def worst(self) -> int:
+    def widest(self) -> int:
         """Index of the frame with the greatest bar; one that is not known counts as greatest of all."""
         return int(np.argmax(np.where(np.isnan(self.values), np.inf, self.values)))
 
@@ -105,8 +108,10 @@ class Pair:
 
     def share(self, metric: str, statistic: str) -> float:
         """The error of the fine run over what the two differ by, with the safety of a grid convergence index."""
-        order = ORDER_OF_WORST if described()[metric, statistic].local else ORDER
-        return float(self.safety / ((self.sizes[1] / self.sizes[0]) ** order - 1))
+        stated = described()[metric, statistic]
+        order = ORDER_OF_WORST if stated.local else ORDER
+        safety = self.safety * (LONE_FIBRE if stated.lone else 1.0)
+        return float(safety / ((self.sizes[1] / self.sizes[0]) ** order - 1))
 
 
 def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import join
 from fem_reference.foundations.units import quantity
 from fem_reference.metrics import Measure, units
@@ -101,14 +100,11 @@ def resolved(expectation: Expectation) -> Expectation:
     return expectation.model_copy(update={"statistic": names[0]})
 
 
-def verdict(
-    expectation: Expectation, measures: Iterable[Measure], numbers: tuple[int, ...], bars: Floats | None = None
-) -> Verdict:
-    """The verdict on a checked ``expectation`` from the measures of the run that it is of, over frame ``numbers``; ``bars`` (f,)
-    are the reference's error bars of what it expects, None without any.
-    """
+def verdict(expectation: Expectation, measures: Iterable[Measure], numbers: tuple[int, ...]) -> Verdict:
+    """The verdict on a checked ``expectation`` from the measures of the run that it is of, over frame ``numbers``."""
     name = (expectation.metric, expectation.statistic)
     found = next(measure for measure in measures if (measure.metric, measure.statistic) == name)
+    bars = found.error_bars
     truth, within = (in_unit(text, found.unit) for text in (expectation.truth, expectation.within))
     frames = range(len(numbers)) if expectation.frame == "any" else [numbers.index(expectation.frame)]
     values = [float(found.values[frame]) for frame in frames]

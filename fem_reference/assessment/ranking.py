@@ -86,7 +86,7 @@ def rankings(measured: dict[str, tuple[Measure, ...]], bars: Iterable[Measure]) 
         if bar is None:
             continue
         places = ranked(
-            Deviation(name, abs(float(one.values[one.worst])), float(bar.values[one.worst]))
+            Deviation(name, abs(one.worst.value), float(bar.values[one.worst.index]))
             for name, one in measures.items()
             if one is not None
         )

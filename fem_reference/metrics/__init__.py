@@ -23,8 +23,8 @@ from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Part, Standard
 
-# Places that a statistic is shown at: ``main``, notebooks and omissions; ``table``, the first table of a comparison; ``headline``, its
-# sentence; ``curve``, drawings of changes from rest; ``solvers``, the tables of solvers, and ``scenes``, that of them over all scenes;
+# Places that a statistic is shown at: ``main``, notebooks and omissions; ``table``, the first table of a comparison; ``headline``,
+# its sentence; ``curve``, drawings of changes from rest; ``solvers``, the tables of solvers, and ``scenes``, that over all scenes;
 # ``rank``, rankings of solvers; ``claim``, error bars beside true errors.
 Shown = Literal["main", "table", "headline", "curve", "solvers", "scenes", "rank", "claim"]
 
@@ -35,7 +35,8 @@ class Statistic:
 
     ``title`` and ``part``: the words above a group of columns and above its own; ``headline``: a sentence with ``{}`` in place of
     its value; ``curve``: the title of the drawing of its changes from rest; ``share_of``: what a per cent is of; ``shown``: by
-    place, its position there, the least first; ``local``: True where its error is of the order that it is of at the worst place.
+    place, its position there, the least first; ``local``: True where its error is of the order that it is of at the worst place,
+    ``lone`` where it is the value of one fibre alone.
     """
 
     unit: str
@@ -46,6 +47,7 @@ class Statistic:
     share_of: str = ""
     shown: Mapping[Shown, int] = field(default_factory=dict)
     local: bool = False
+    lone: bool = False
 
     @property
     def label(self) -> str:
@@ -60,19 +62,53 @@ class Statistic:
 
 @dataclass(frozen=True, eq=False)
 class Measure:
-    """One statistic of one metric: ``values`` per frame (f,) in ``unit``; ``where`` (f,) says in words where each is worst."""
+    """One statistic of one metric: ``values`` (f,) in ``unit`` at frame ``numbers`` (f,), from 0 on where these are not given;
+    ``where`` (f,), in words, each is worst; ``error_bars`` (f,) of the reference that it is measured against, None without any.
+    """
 
     metric: str
     statistic: str
     unit: str
     values: Floats
     where: tuple[str, ...] = ()
+    numbers: tuple[int, ...] = ()
+    error_bars: Floats | None = None
 
     @property
-    def worst(self) -> int:
-        """Index of the frame with the greatest magnitude; a frame that is not a number counts as worst of all."""
-        magnitudes = np.abs(self.values)
-        return int(np.argmax(np.where(np.isnan(magnitudes), np.inf, magnitudes)))
+    def worst(self) -> "Worst":
+        """The frame with the greatest magnitude; a frame that is not a number counts as worst of all."""
+        return self._at(np.where(np.isnan(self.values), np.inf, np.abs(self.values)))
+
+    @property
+    def worst_number(self) -> "Worst | None":
+        """The worst of the frames whose value is a finite number, None without any."""
+        known = np.isfinite(self.values)
+        return self._at(np.where(known, np.abs(self.values), -1.0)) if known.any() else None
+
+    def _at(self, magnitudes: Floats) -> "Worst":
+        i = int(np.argmax(magnitudes))
+        return Worst(
+            value=float(self.values[i]),
+            frame=self.numbers[i] if self.numbers else i,
+            error_bar=None if self.error_bars is None else float(self.error_bars[i]),
+            unit=self.unit,
+            where=self.where[i] if self.where else "",
+            index=i,
+        )
+
+
+@dataclass(frozen=True)
+class Worst:
+    """A measure at its worst frame: its ``value`` and the ``error_bar`` of the reference there, None without any, in ``unit``, at
+    the number of the ``frame``, the one with this ``index``; ``where`` in words.
+    """
+
+    value: float
+    frame: int
+    error_bar: float | None
+    unit: str
+    where: str
+    index: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,7 +235,10 @@ def measure(run: Run, reference: Run, context: Context, wanted: Iterable[str] | 
     """
     chosen = map(metric, names() if wanted is None else wanted)
     return tuple(
-        statistic for found in chosen if found.OF in run.carries for statistic in found.measure(run, reference, context)
+        replace(statistic, numbers=run.numbers)
+        for found in chosen
+        if found.OF in run.carries
+        for statistic in found.measure(run, reference, context)
     )
 
 

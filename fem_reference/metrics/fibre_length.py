@@ -19,7 +19,7 @@ STATISTICS = {
         "mm", curve="Change of fibre length from rest, mean over the fibres", shown={"curve": 20}, local=True
     ),
     "rms": Statistic("mm", _TITLE, "rms", shown={"solvers": 20}, local=True),
-    "max": Statistic("mm", _TITLE, "worst fibre", shown={"table": 20}, local=True),
+    "max": Statistic("mm", _TITLE, "worst fibre", shown={"table": 20}, local=True, lone=True),
     "mean_percent": Statistic("%", _TITLE, "mean", shown={"claim": 40}, local=True),
     "rms_percent": Statistic(
         "%",
@@ -29,7 +29,7 @@ STATISTICS = {
         shown={"main": 20, "headline": 20, "solvers": 30, "scenes": 20, "rank": 20, "claim": 50},
         local=True,
     ),
-    "max_percent": Statistic("%", _TITLE, "worst fibre", shown={"table": 30, "claim": 60}, local=True),
+    "max_percent": Statistic("%", _TITLE, "worst fibre", shown={"table": 30, "claim": 60}, local=True, lone=True),
 }
 OF, AGAINST = "lines", "reference"
 # Fibre points of a run this close [mm] to the measurement context's are the same points, after a file of single precision.
@@ -71,7 +71,8 @@ def extension_error(reference: Run, context: MeasurementContext) -> Measure:
         errors = _extended(reference, context) - _direct(reference, context)
     else:
         errors = np.full((len(reference.positions), len(context.fibres)), np.nan)
-    return Measure("fibre_length", "extension_error", "mm", np.abs(errors).max(axis=1), _worst(errors))
+    worst = np.abs(errors).max(axis=1)
+    return Measure("fibre_length", "extension_error", "mm", worst, _worst(errors), reference.numbers)
 
 
 def _carries(run: Run, context: MeasurementContext) -> bool:

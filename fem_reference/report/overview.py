@@ -178,8 +178,7 @@ def _worst(result: Comparison) -> list[str]:
     lines = []
     for name, measures in result.deviations.items():
         text = [
-            f"{' '.join(key).replace('_', ' ')} {measure.values[measure.worst]:.4g} {measure.unit}"
-            f" (frame {result.reference.numbers[measure.worst]})"
+            f"{' '.join(key).replace('_', ' ')} {measure.worst.value:.4g} {measure.unit} (frame {measure.worst.frame})"
             for key in PRINTED
             if (measure := find(measures, *key)) is not None
         ]
@@ -195,7 +194,7 @@ def _known(result: Comparison) -> list[str]:
     for measure in result.changes[result.reference.name]:
         bar = result.error_bars.find("change", measure.metric, measure.statistic)
         if bar is not None:
-            value = f"{measure.values[measure.worst]:.4g} {measure.unit}"
+            value = f"{measure.worst.value:.4g} {measure.unit}"
             lines.append(f"  {measure.metric} {measure.statistic}: {value}, {_bar(result, bar)}")
     lines.append("error bars of deviations from it (the error bar, where that is widest):")
     deviations = [bar for bar in result.error_bars.bars if bar.of == "deviation"]
@@ -204,8 +203,8 @@ def _known(result: Comparison) -> list[str]:
 
 def _bar(result: Comparison, bar: ErrorBar) -> str:
     assert result.error_bars is not None  # the bar is of them
-    at = f"frame {result.error_bars.numbers[bar.worst]}"
-    return f"\N{PLUS-MINUS SIGN} {bar.values[bar.worst]:.2g} {bar.unit} at {at}"
+    at = f"frame {result.error_bars.numbers[bar.widest]}"
+    return f"\N{PLUS-MINUS SIGN} {bar.values[bar.widest]:.2g} {bar.unit} at {at}"
 
 
 def run_text(run: Run, measures: Iterable[Measure], verdicts: Iterable[Verdict]) -> str:

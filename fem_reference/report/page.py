@@ -1,16 +1,12 @@
 """The page of a comparison. It contains everything itself, and reads without a network."""
 
-import math
 from functools import partial
 from typing import Any
 
-import numpy as np
-
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.doubts import doubts
-from fem_reference.assessment.error_bars import Of
 from fem_reference.assessment.judge import overall
-from fem_reference.metrics import Measure, described, find
+from fem_reference.metrics import described, find
 from fem_reference.report import reached
 from fem_reference.report.at_frames import columns, label
 from fem_reference.report.curves import colour_of, label_of
@@ -73,13 +69,9 @@ def _shared(comparison: Comparison) -> dict[str, Any]:
         "runs": runs(comparison),
         "columns": DEVIATIONS,
         "bars": known(comparison),
-        "bar_at": partial(_bar_at, comparison),
-        "error": None
-        if comparison.extension_error is None
-        else worst(comparison.reference, comparison.extension_error),
+        "error": comparison.extension_error and comparison.extension_error.worst,
         "viewer": view(comparison),
         "colours": ramp(),
-        "worst": worst,
         "find": find,
         "ratio": ratio,
         "label_of": label_of,
@@ -88,28 +80,6 @@ def _shared(comparison: Comparison) -> dict[str, Any]:
         "changes": changes(comparison.scene),
         "seconds_per_frame": seconds_per_frame,
     }
-
-
-def worst(run: Run, measure: Measure) -> dict[str, Any]:
-    """A measure at its worst frame: ``value``, ``frame`` number and ``where`` in words.
-
-    Where that value is not a number, ``finite`` is the worst (value, frame) of the frames where it is one, else None.
-    """
-    i = measure.worst
-    known = np.flatnonzero(np.isfinite(measure.values))
-    finite = None
-    if len(known) and not np.isfinite(measure.values[i]):
-        k = known[np.argmax(np.abs(measure.values[known]))]
-        finite = (float(measure.values[k]), run.numbers[k])
-    where = measure.where[i] if measure.where else ""
-    return {"value": float(measure.values[i]), "frame": run.numbers[i], "where": where, "finite": finite}
-
-
-def _bar_at(comparison: Comparison, of: Of, metric: str, statistic: str, frame: int) -> float | None:
-    """The error bar of a statistic at a frame number, None without any."""
-    bars = comparison.error_bars
-    found = None if bars is None else bars.find(of, metric, statistic)
-    return None if bars is None or found is None else float(found.values[bars.numbers.index(frame)])
 
 
 def headlines(comparison: Comparison) -> list[tuple[str, str, str]]:
@@ -140,13 +110,12 @@ def _greatest(comparison: Comparison, run: Run) -> str:
         one = find(comparison.deviations.get(run.name, ()), metric, statistic)
         if one is None:
             continue
-        at = worst(run, one)
-        lost = "" if at["finite"] is None else f", and not a number in frame {at['frame']}"
-        value, frame = at["finite"] or (at["value"], at["frame"])
-        if not math.isfinite(value):
+        at = one.worst_number
+        if at is None:
             continue
-        bar = _bar_at(comparison, "deviation", metric, statistic, frame)
-        value = f"{number(value)}{f' ± {number(bar)}' if bar is not None else ''} {one.unit}".strip()
+        lost = "" if at.index == one.worst.index else f", and not a number in frame {one.worst.frame}"
+        bar = "" if at.error_bar is None else f" ± {number(at.error_bar)}"
+        value = f"{number(at.value)}{bar} {one.unit}".strip()
         said.append(described_as.headline.format(value) + lost)
     return "; ".join(said) or "nothing of it can be measured"
 

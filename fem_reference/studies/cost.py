@@ -105,7 +105,7 @@ def known(bars: ErrorBars | None) -> dict[str, float]:
     """The error bar of each statistic of a deviation, the greatest over the frames."""
     if bars is None:
         return {}
-    worst = {f"{bar.metric}.{bar.statistic}": float(bar.values[bar.worst]) for bar in bars.of_deviations}
+    worst = {f"{bar.metric}.{bar.statistic}": bar.worst.value for bar in bars.of_deviations}
     return {name: value for name, value in worst.items() if math.isfinite(value)}
 
 

@@ -110,8 +110,8 @@ def test_a_tolerance_below_zero_is_refused() -> None:
 
 def test_a_verdict_takes_the_error_bar_of_each_frame() -> None:
     def with_bars(values, bars, **changes):
-        measure = Measure("volume", "deviation", "%", np.array(values))
-        return verdict(expectation(**changes), [measure], NUMBERS, np.array(bars))
+        measure = Measure("volume", "deviation", "%", np.array(values), error_bars=np.array(bars))
+        return verdict(expectation(**changes), [measure], NUMBERS)
 
     # 0.5 % are allowed.
     found = with_bars([0.1, -0.4, 0.2], [0.0, 0.1, 0.29])
