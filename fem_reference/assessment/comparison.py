@@ -1,11 +1,12 @@
 """A reference and its candidates, measured and judged: what reports are written from."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from fem_reference.assessment.convergence import Ladder
+from fem_reference.assessment.doubts import doubts
 from fem_reference.assessment.error_bars import ErrorBars, Of
-from fem_reference.assessment.judge import Verdict, Word, overall, resolved, verdict
+from fem_reference.assessment.judge import Verdict, Word, doubted, overall, resolved, verdict
 from fem_reference.assessment.ranking import Ranking, rankings
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.markup import table
@@ -71,11 +72,23 @@ class Comparison:
         return rankings(self.deviations, self.error_bars.of_deviations) if self.error_bars else ()
 
     @property
+    def doubts(self) -> list[str]:
+        """Reasons to doubt the reference, in words."""
+        return doubts(self.reference)
+
+    @property
     def word(self) -> Word:
         """The verdict of the case: none that rests on a reference which was denied."""
-        return (
-            "fail" if self.reference.outcome.status == "denied" else overall(verdict.word for verdict in self.verdicts)
-        )
+        if self.reference.outcome.status == "denied":
+            return "fail"
+        return doubted(overall(one.word for one in self.verdicts), self.doubts)
+
+    def word_of(self, name: str) -> Word:
+        """The verdict on a run by its name; the reference fails where it did not converge, whatever of it was met."""
+        found = overall(one.word for one in self.verdicts if one.expectation.of == name)
+        if name != "reference":
+            return found
+        return doubted(found, self.doubts) if self.reference.outcome.status == "converged" else "fail"
 
 
 def compare(
@@ -118,15 +131,24 @@ def compare(
     return Comparison(scene, setup, reference, candidates, context, deviations, changes, error, verdicts, error_bars)
 
 
-def alone(scene: Case, setup: Any, run: Run) -> tuple[tuple[Measure, ...], tuple[Verdict, ...]]:
-    """What can be measured and judged of a ``run`` without a reference: of a muscle nothing, whose measures all take their
-    context from one.
+class Alone(NamedTuple):
+    """A run that nothing was compared with: its ``measures``, the ``verdicts`` on them and their ``word``."""
+
+    measures: tuple[Measure, ...]
+    verdicts: tuple[Verdict, ...]
+    word: Word
+
+
+def alone(scene: Case, setup: Any, run: Run) -> Alone:
+    """The measures and verdicts of a ``run`` without a reference: of a muscle none, whose measures all take their context from
+    one.
     """
     if "reference" in scene.standards("reference"):
-        return (), ()
+        return Alone((), (), "not judged")
     measures = measure(run, run, context_of(setup, run), names(scene.standards("reference")))
     expected = [one for one in map(resolved, scene.expect) if one.of == run.name and _is_measured(one, measures)]
-    return measures, tuple(verdict(one, measures, run.numbers) for one in expected)
+    verdicts = tuple(verdict(one, measures, run.numbers) for one in expected)
+    return Alone(measures, verdicts, doubted(overall(one.word for one in verdicts), doubts(run)))
 
 
 def _check_expected(scene: Case, measured: dict[str, tuple[Measure, ...]]) -> None:

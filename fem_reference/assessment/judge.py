@@ -1,7 +1,7 @@
-"""measure + truth + tolerance -> pass, fail or inconclusive."""
+"""The judge: measure, truth and tolerance give pass, fail or inconclusive; doubts about the reference make a pass doubtful."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -11,7 +11,9 @@ from fem_reference.foundations.units import quantity
 from fem_reference.metrics import Measure, units
 from fem_reference.scenes.case import Case, Expectation
 
-Word = Literal["pass", "fail", "inconclusive", "not judged"]
+Word = Literal["pass", "doubtful pass", "fail", "inconclusive", "not judged"]
+# What is expected is met: commands end with 0, as they do where nothing is judged or known well enough.
+MET: tuple[Word, ...] = ("pass", "doubtful pass")
 _KINDS = {
     "mm": ("a length", 1.0),
     "%": ("a fraction", 100.0),
@@ -60,10 +62,15 @@ def judge(value: float, truth: float, within: float, error_bar: float = 0.0) -> 
 
 
 def overall(words: Iterable[Word]) -> Word:
-    """Fail if one fails, else inconclusive if one is, else pass; not judged where there is none."""
+    """Fail if one fails, else inconclusive if one is, else a doubtful pass if one is, else pass; not judged where there is none."""
     found = set(words)
-    order: tuple[Word, ...] = ("fail", "inconclusive", "pass")
+    order: tuple[Word, ...] = ("fail", "inconclusive", "doubtful pass", "pass")
     return next((word for word in order if word in found), "not judged")
+
+
+def doubted(word: Word, doubts: Collection[str]) -> Word:
+    """A verdict that rests on a reference, of which there may be ``doubts``: a pass is a doubtful one then."""
+    return "doubtful pass" if word == "pass" and doubts else word
 
 
 def check(scene: Case) -> None:

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from fem_reference.assessment import second_check
-from fem_reference.assessment.comparison import Comparison
-from fem_reference.assessment.doubts import doubts
+from fem_reference.assessment.comparison import Alone, Comparison
 from fem_reference.assessment.error_bars import ErrorBar
 from fem_reference.assessment.judge import Verdict
 from fem_reference.assessment.solver_table import Table
@@ -130,9 +129,7 @@ def comparison_text(result: Comparison, page: Path | None = None) -> str:
     runs = [
         f"{run.name}: {run.outcome.status}, {run.outcome.message}" for run in (result.reference, *result.candidates)
     ]
-    runs += [
-        f"reference: doubtful, {why}" for why in doubts(result.reference) if why != result.reference.outcome.status
-    ]
+    runs += [f"reference: doubtful, {why}" for why in result.doubts if why != result.reference.outcome.status]
     checks = second_check.texts_of(result.reference)
     if checks and result.reference.outcome.status == "converged":
         runs.append(f"second check: passed, {len(checks)} checks")
@@ -207,10 +204,10 @@ def _bar(result: Comparison, bar: ErrorBar) -> str:
     return f"\N{PLUS-MINUS SIGN} {bar.values[bar.widest]:.2g} {bar.unit} at {at}"
 
 
-def run_text(run: Run, measures: Iterable[Measure], verdicts: Iterable[Verdict]) -> str:
+def run_text(run: Run, found: Alone) -> str:
     """What came of a run that nothing was compared with, line by line."""
-    printed = [f"{run.name}: {run.outcome.status}, {run.outcome.message}", *_measured(run.name, measures)]
-    return "\n".join([*printed, *map(_judged, verdicts), f"stored in {run.folder}"])
+    printed = [f"{run.name}: {run.outcome.status}, {run.outcome.message}", *_measured(run.name, found.measures)]
+    return "\n".join([*printed, *map(_judged, found.verdicts), f"stored in {run.folder}"])
 
 
 def ranking_text(table: Table) -> str:

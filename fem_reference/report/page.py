@@ -4,8 +4,6 @@ from functools import partial
 from typing import Any
 
 from fem_reference.assessment.comparison import Comparison
-from fem_reference.assessment.doubts import doubts
-from fem_reference.assessment.judge import overall
 from fem_reference.metrics import described, find
 from fem_reference.report import reached
 from fem_reference.report.at_frames import columns, label
@@ -88,18 +86,11 @@ def headlines(comparison: Comparison) -> list[tuple[str, str, str]]:
     """
     found = list[tuple[str, str, str]]()
     for run in comparison.candidates:
-        words = [one.word for one in comparison.verdicts if one.expectation.of == run.name]
         ended = "" if run.outcome.status == "converged" else f"{run.outcome.status}; "
-        found.append((run.name, overall(words) if words else "not judged", ended + _greatest(comparison, run)))
+        found.append((run.name, comparison.word_of(run.name), ended + _greatest(comparison, run)))
     words = [one.word for one in comparison.verdicts if one.expectation.of == "reference"]
     checks = f"{words.count('pass')} of {len(words)} of its own checks met" if words else "nothing is expected of it"
-    word: str = overall(words) if words else "not judged"
-    if comparison.reference.outcome.status != "converged":  # whatever of it was met
-        word = "fail"
-    doubtful = doubts(comparison.reference)
-    if word == "pass" and doubtful:
-        word = "doubtful pass"
-    found.append(("reference", word, "; ".join([checks, *doubtful])))
+    found.append(("reference", comparison.word_of("reference"), "; ".join([checks, *comparison.doubts])))
     return found
 
 

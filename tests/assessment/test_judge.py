@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fem_reference.assessment.judge import check, judge, overall, resolved, verdict
+from fem_reference.assessment.judge import MET, check, doubted, judge, overall, resolved, verdict
 from fem_reference.foundations.errors import InputError
 from fem_reference.metrics import Measure
 from fem_reference.scenes.case import Expectation
@@ -43,6 +43,19 @@ def test_pass_only_within_the_tolerance() -> None:
     assert judge(1.0, 1.0, 0.0) == "pass"
     assert judge(1.11, 1.0, 0.1) == "fail"
     assert judge(0.89, 1.0, 0.1) == "fail"
+
+
+@pytest.mark.parametrize("word", ["pass", "doubtful pass", "fail", "inconclusive", "not judged"])
+def test_doubts_change_a_pass_alone(word) -> None:
+    assert doubted(word, []) == word
+    assert doubted(word, ["unstable"]) == ("doubtful pass" if word == "pass" else word)
+    assert (doubted(word, ["unstable"]) in MET) == (word in MET)
+
+
+def test_the_worst_of_several_verdicts_counts() -> None:
+    assert overall(["pass", "doubtful pass"]) == "doubtful pass"
+    assert overall(["doubtful pass", "inconclusive"]) == "inconclusive"
+    assert overall([]) == "not judged"
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
