@@ -30,8 +30,7 @@ _PLACES = {
     if isinstance(node, ast.ImportFrom)
     for alias in node.names
 }
-__version__ = "0.1.0"
-__all__ = sorted(_PLACES)
+__all__ = sorted({*_PLACES} - {"__version__"})
 
 
 def __getattr__(name: str) -> Any:
@@ -42,4 +41,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return [*__all__, "__version__"]
+    return sorted(_PLACES)

@@ -3,6 +3,7 @@ from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.effects import make as make_effect
 from fem_reference.foundations.errors import InputError, MissingSoftware
+from fem_reference.foundations.version import __version__ as __version__
 from fem_reference.problems.body import Body, Cells, Prescribed
 from fem_reference.problems.shapes import box
 from fem_reference.runs.store import Run
@@ -21,7 +22,6 @@ from fem_reference.studies.workflow import (
     write_report,
 )
 
-__version__: str
 __all__ = [
     "Body",
     "Case",

@@ -9,8 +9,8 @@ import importlib
 from pathlib import Path
 from typing import Any, Protocol, cast
 
-from fem_reference import __version__
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.version import __version__
 
 RANKS = "MPI processes of the reference (default: 1, or 2 for large bodies where cores are free)"
 _FOLDER = Path(__file__).parent

@@ -10,12 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from fem_reference import __version__, metrics, solvers
+from fem_reference import metrics, solvers
 from fem_reference.assessment.claims import Claim
 from fem_reference.assessment.cost_study import CaseStudy, Study
 from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.assessment.fronts import COSTS, Point
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.version import __version__
 from fem_reference.metrics import MeasurementContext, measure
 from fem_reference.runs.complete import complete
 from fem_reference.runs.cost import seconds_per_frame

@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference import __version__, solvers
+from fem_reference import solvers
 from fem_reference.assessment import second_check
 from fem_reference.foundations.records import Record, join
 from fem_reference.foundations.usage import forget_peak_memory, peak_memory
+from fem_reference.foundations.version import __version__
 from fem_reference.problems import of_case
 from fem_reference.problems.muscle import Problem, Setup
 from fem_reference.problems.scalar import FieldProblem

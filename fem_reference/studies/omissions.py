@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference import __version__, metrics, solvers
+from fem_reference import metrics, solvers
 from fem_reference.assessment.omissions import MEASURES, Ablation, CaseOmissions, Omission
 from fem_reference.effects import Effect, Energy, Load, Ramped
 from fem_reference.foundations.errors import InputError, MissingSoftware
+from fem_reference.foundations.version import __version__
 from fem_reference.metrics import MeasurementContext, measure
 from fem_reference.problems import of_case
 from fem_reference.problems.body import ELEMENTS

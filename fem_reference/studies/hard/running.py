@@ -13,12 +13,13 @@ from functools import cached_property
 
 import numpy as np
 
-from fem_reference import __version__, solvers
+from fem_reference import solvers
 from fem_reference.assessment import health, second_check, stress
 from fem_reference.assessment.health import Followed
 from fem_reference.assessment.stress import Cell, HardCase, Scene, Stress
 from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.version import __version__
 from fem_reference.geometry.embedding import Locator
 from fem_reference.problems import of_case
 from fem_reference.problems.muscle import Problem
