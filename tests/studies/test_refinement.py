@@ -19,7 +19,7 @@ from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx, recorded
-from fem_reference.solvers.common.load_steps import Attempt, Steps, march
+from fem_reference.solvers.common.load_steps import Attempt, StepSizes, march
 from fem_reference.solvers.fenicsx import Settings
 from fem_reference.studies import refinement
 from fem_reference.studies.execution import Bench
@@ -210,9 +210,9 @@ def test_load_steps_are_at_most_half_as_long(case, every, largest) -> None:
     taken = [0.0]
     list(
         march(
-            lambda at: taken.append(at) or Attempt(None, 2),
+            lambda at: taken.append(at) or Attempt("converged", 2),
             frames.numbers,
-            Steps(changed["first_step"], 0.1, changed["largest_step"]),
+            StepSizes(changed["first_step"], 0.1, changed["largest_step"]),
         )
     )
     assert max(np.diff(taken)) <= min(every, largest or every) / 2
@@ -225,7 +225,7 @@ def test_load_steps_are_varied_where_time_matters(case) -> None:
     path.write_text(path.read_text().replace("every = 5", 'every = 5\ninterval = "20 ms"'))
     timed = scene_of(case, VISCOSITY)
     assert list(refinement.variations(timed, Settings())) == ["load steps"]
-    assert refinement.variations(timed, recorded.Settings(folder="frames", unit="mm")) == {}
+    assert refinement.variations(timed, recorded.RecordedSettings(folder="frames", unit="mm")) == {}
 
 
 def test_where_no_bone_pressed_contact_has_no_error(case) -> None:
