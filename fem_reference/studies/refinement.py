@@ -154,8 +154,8 @@ def _pair(bench: Bench[MuscleCase], reference: Run, model: bool) -> Pair:
 
 
 def safety(bench: Bench[MuscleCase]) -> float:
-    """Factor of safety: that of a grid convergence index, times the size of the unrefined tetrahedra over the radius of the smallest
-    attachment, where that is above 1. Nested tetrahedra share its polygon, and their difference does not show its error.
+    """Factor of safety: that of a grid convergence index, times the size of the unrefined tetrahedra over the radius of the
+    smallest attachment, where that is above 1. Nested tetrahedra share its polygon, and their difference does not show its error.
     """
     rest, radii = bench.setup(), [math.inf]
     for entry in rest.attached:
