@@ -27,11 +27,14 @@ FILE = "error_bar.json"
 FORMAT = 2
 # Of a grid convergence index (Roache 1998, Verification and Validation in Computational Science, ch. 5).
 SAFETY = 1.25
+# Longer by this for one fibre alone, of the few that there are: nothing averages there, and a pair of sizes says less than three do
+# (Roache takes 3 for a pair). Chosen so that bars cover the differences from finer solutions (docs/error_bars.md).
+LONE_FIBRE = 1.2
 # What is left of an error of first order, when halving its cause changes the result by 1.
 VARIATION = 2.0
 # Of which order in the size of tetrahedra an error is: in general, and of the worst place alone. From rims of attachments, where
 # displacement goes with the root of the distance, order 1 comes, and 2 only where a mesh that resolves them is graded towards them;
-# from elsewhere 2 or more: in general it is between, as three sizes in a row show too (docs/accuracy.md).
+# from elsewhere 2 or more: in general it is between, as three sizes in a row show too (docs/error_bars.md).
 ORDER, ORDER_OF_WORST = 1.5, 1.0
 # Metrics that say as little of what is left as the worst place does: the volume is nearly kept, and fibres are few lines that end
 # at rims, so that one of them may be most of their mean square.
@@ -109,7 +112,8 @@ class Pair:
     def share(self, metric: str, statistic: str) -> float:
         """The error of the fine run over what the two differ by, with the safety of a grid convergence index."""
         order = ORDER_OF_WORST if metric in _OF_WORST or is_local(statistic) else ORDER
-        return float(self.safety / ((self.sizes[1] / self.sizes[0]) ** order - 1))
+        safety = self.safety * (LONE_FIBRE if metric == "fibre_length" and is_local(statistic) else 1.0)
+        return float(safety / ((self.sizes[1] / self.sizes[0]) ** order - 1))
 
 
 def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
