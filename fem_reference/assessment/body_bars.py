@@ -7,7 +7,7 @@ import numpy as np
 
 from fem_reference.assessment.error_bars import SAFETY
 from fem_reference.foundations.mesh import Floats, Ints
-from fem_reference.runs.solved import Reached
+from fem_reference.runs.store import Frame
 
 # The error over what half the size of cells changes of it, where it is of first order: the least order there is away from rims of
 # what is prescribed, where displacement goes with the root of the distance, whatever the element (docs/error_bars.md).
@@ -31,7 +31,7 @@ class BodyBars:
     sharper: str
 
 
-def body_bars(states: tuple[Reached, ...], finer: tuple[Reached, ...], shared: Ints, sharper: str) -> BodyBars:
+def body_bars(states: tuple[Frame, ...], finer: tuple[Frame, ...], shared: Ints, sharper: str) -> BodyBars:
     """The bars of the ``states`` of a body.
 
     Parameters
@@ -65,7 +65,7 @@ def body_bars(states: tuple[Reached, ...], finer: tuple[Reached, ...], shared: I
     return BodyBars(frames, points, vectors("forces"), vectors("moments"), energy, share, sharper)
 
 
-def _beside(state: Reached, other: Reached | None, shared: Ints) -> Reached:
+def _beside(state: Frame, other: Frame | None, shared: Ints) -> Frame:
     """The ``other`` state at the points of ``state``, NaN where it has none or was not reached."""
     if other is None:
         blank: dict[str, Any] = {

@@ -18,7 +18,7 @@ from pydantic import Field
 from fem_reference.foundations.mesh import TET_FACES, Floats, Ints, Polylines, diagonal
 from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import Length
-from fem_reference.problems.muscle import Problem, Setup
+from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Outcome, Sink
 from fem_reference.solvers import collision_kernels
 from fem_reference.solvers.collision_kernels import Obstacle, move_out
@@ -159,8 +159,8 @@ def _constraints(setup: Setup, settings: Settings) -> Constraints:
     found = Constraints.at_rest(surface.points, surface.triangles, setup.attached_vertices)
     if settings.anisotropy is None:
         return found
-    assert isinstance(setup, Problem)  # what a scene is solved from; it has fibres
-    return replace(found, share=1 - settings.anisotropy * along_fibres(surface.points, found.edges, setup.fibres))
+    assert setup.rest.fibres is not None  # what a scene is solved from has them
+    return replace(found, share=1 - settings.anisotropy * along_fibres(surface.points, found.edges, setup.rest.fibres))
 
 
 def obstacles_of(setup: Setup, gap: float) -> list[Obstacle]:

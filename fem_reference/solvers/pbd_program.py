@@ -44,7 +44,7 @@ from pydantic import Field
 from fem_reference.foundations.mesh import TET_FACES, Floats, Ints, Surface
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record
-from fem_reference.problems.muscle import Problem, RigidBody, Setup
+from fem_reference.problems.setup import RigidBody, Setup
 from fem_reference.runs.store import Outcome, Sink
 from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow
 from fem_reference.solvers.common.protocol import MuscleSolver, Trade
@@ -167,8 +167,8 @@ def constraints_of(setup: Setup, settings: Settings) -> Constraints:
     edges, (hinges, angles) = half_edges_of(triangles), hinges_of(points, triangles)
     share = np.ones(len(edges))
     if settings.anisotropy is not None:
-        assert isinstance(setup, Problem)  # what a scene is solved from; it has fibres
-        share = (1 - along_fibres(points, edges, setup.fibres)) ** settings.anisotropy
+        assert setup.rest.fibres is not None  # what a scene is solved from has them
+        share = (1 - along_fibres(points, edges, setup.rest.fibres)) ** settings.anisotropy
     return Constraints(
         inverse_masses=np.ones(len(points)),
         edges=edges,

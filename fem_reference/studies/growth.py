@@ -27,7 +27,8 @@ from fem_reference.foundations.records import Record
 from fem_reference.foundations.usage import forget_peak_memory, peak_memory
 from fem_reference.geometry import tessellation
 from fem_reference.geometry.rigid_bodies import Sphere
-from fem_reference.problems.muscle import AttachedVertices, Problem, RigidBody, Setup
+from fem_reference.problems.muscle import Problem
+from fem_reference.problems.setup import AttachedVertices, RigidBody, Setup
 from fem_reference.runs.store import Frame
 from fem_reference.scenes.case import Candidate
 from fem_reference.solvers import fenicsx
@@ -106,7 +107,7 @@ def of_candidate(candidate: Candidate, progress: Progress, most: int | None = No
     )
     points = []
     for setup in made[:most]:
-        size = len(setup.mesh.tets if isinstance(setup, Problem) else setup.surface.triangles)
+        size = len(setup.rest.mesh.tets if setup.rest.mesh else setup.surface.triangles)
         points.append(Point(size, _costs(candidate.solver, settings, setup)))
         progress(f"growth: {candidate.name}, {size} {counted}: {points[-1].costs['iteration']:.2g} s")
     return fitted(candidate.name, points, counted)

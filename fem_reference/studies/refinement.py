@@ -22,6 +22,7 @@ from fem_reference.metrics import MeasurementContext
 from fem_reference.runs.complete import complete
 from fem_reference.runs.store import Run
 from fem_reference.scenes.bones import Bone
+from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx
 from fem_reference.studies.execution import Bench
@@ -89,7 +90,7 @@ def _closer(scene: MuscleCase) -> tuple[Bone, ...]:
     )
 
 
-def obtain(bench: Bench[MuscleCase], reference: Run, *, model: bool = True) -> ErrorBars | None:
+def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> ErrorBars | None:
     """The error bars of the ``reference`` of a bench: from runs in the store where they are, else solved now; stored beside it.
     With ``model``, also what exact attachments would change. None for a run that did not converge, and for one without an interior.
     """
@@ -97,17 +98,16 @@ def obtain(bench: Bench[MuscleCase], reference: Run, *, model: bool = True) -> E
         log.info("error bar: none, of a reference that did not converge or has no interior")
         return None
     with fenicsx.shared():
-        pair = _pair(bench, reference, model)
+        pair = _pair(bench.of_muscle(), reference, model)
     log.info("error bar: measuring the runs against each other")
-    bars = error_bars.error_bars(
-        pair, MeasurementContext.of(reference, reference.fibres, bench.setup().bones, bench.setup().exempt)
-    )
+    setup = bench.setup()
+    bars = error_bars.error_bars(pair, MeasurementContext.of(reference, reference.fibres, setup.bones, setup.exempt))
     if reference.folder is not None:
         error_bars.save(bars, reference.folder, _of(reference))
     return bars
 
 
-def offered(bench: Bench[MuscleCase], reference: Run) -> ErrorBars | None:
+def offered(bench: Bench[Case], reference: Run) -> ErrorBars | None:
     """The error bars where nobody asked for them: those that are stored, or new ones where they cost less than a fifth of the
     reference; else None, as of what did not converge or has no interior.
     """
@@ -116,8 +116,9 @@ def offered(bench: Bench[MuscleCase], reference: Run) -> ErrorBars | None:
         return found
     if reference.outcome.status != "converged" or reference.fibres is None:
         return None
-    _, (fine, coarse) = _coarser(bench.scene)
-    count = 1 + len(_needed(bench, reference))
+    own = bench.of_muscle()
+    _, (fine, coarse) = _coarser(own.scene)
+    count = 1 + len(_needed(own, reference))
     if count * (fine / coarse) ** 3 > CHEAP:
         return None
     log.info("error bar: made without being asked for, as it takes less than a fifth of the time")

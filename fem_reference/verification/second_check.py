@@ -14,7 +14,6 @@ from fem_reference.assessment.run_checks import of_muscle
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import parse
 from fem_reference.problems.muscle import Problem
-from fem_reference.problems.muscle_body import as_body
 from fem_reference.runs.store import Run
 from fem_reference.studies.hard import blocks
 from fem_reference.studies.hard.records import Hard
@@ -59,7 +58,7 @@ def solved(lab: Lab) -> tuple[Problem, Run]:
 
 def _solve(lab: Lab) -> tuple[Problem, Run]:
     problem = bar()
-    found = lab.solve(as_body(problem), "P2/P1", first_step=5.0)
+    found = lab.solve(problem.body, "P2/P1", first_step=5.0)
     _, nodes = cKDTree(problem.mesh.points).query(problem.surface.points)
     positions = np.array([state.points[nodes] for state in found.states])
     numbers = tuple(int(state.frame) for state in found.states)

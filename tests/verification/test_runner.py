@@ -17,8 +17,7 @@ import pytest
 from fem_reference import cli, report
 from fem_reference.assessment.catalogue import Entry, Finding, Kind, order
 from fem_reference.foundations.errors import InputError, MissingSoftware
-from fem_reference.runs.solved import Solved
-from fem_reference.runs.store import Outcome
+from fem_reference.runs.store import Outcome, collected
 from fem_reference.verification import runner, truths
 
 
@@ -367,7 +366,7 @@ def test_a_body_of_the_catalogue_has_a_time_limit() -> None:
 
     class Noted:
         def solve(self, _, settings):
-            return Solved((), Outcome("timed out", f"{settings.time_limit:g}"))
+            return collected((), Outcome("timed out", f"{settings.time_limit:g}"))
 
     lab = FemLab(Noted())
     assert lab.solve(None, "P2/P1").outcome.message == "1800"

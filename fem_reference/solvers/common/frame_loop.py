@@ -10,8 +10,8 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats, diagonal
 from fem_reference.foundations.motion import apply
-from fem_reference.problems.muscle import Setup
 from fem_reference.problems.resolved_paths import posed, skipped
+from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers.common.state_checks import Trouble, trouble
 

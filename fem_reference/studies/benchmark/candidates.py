@@ -104,7 +104,7 @@ def _task(bench: Bench[MuscleCase], candidate: Candidate, place: str) -> Callabl
 
 
 def _solve(bench: Bench[MuscleCase], solver: str, settings: Record, iterations: int) -> str:
-    built = bench.made_for(solver, settings)
+    built: Any = bench.given(solvers.find(solver, solver), settings)
     first = built.frames[0]
 
     def drop(frame: Frame) -> None:

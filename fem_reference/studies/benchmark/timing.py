@@ -100,7 +100,7 @@ def muscle(request: dict[str, Any]) -> tuple[str, Solve]:
             reached[:] = [frame]
 
         outcome = solver.solve(replace(built, frames=frames[:1] if rest else frames), settings, keep)
-        return outcome, reached[0].tets if reached and reached[0].tets is not None else built.mesh.points
+        return outcome, reached[0].points if reached else built.mesh.points
 
     return fingerprint(built.mesh.points, built.mesh.tets, np.array(frames)), solve
 

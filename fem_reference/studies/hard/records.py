@@ -15,12 +15,11 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import FileName, Record, join, keys, parse
 from fem_reference.foundations.units import AreaStiffness, Point, PositiveLength
 from fem_reference.io import texts
+from fem_reference.problems.problem import Task
 from fem_reference.scenes import casefile
 from fem_reference.scenes.bones import Bone, Motion
 from fem_reference.scenes.case import HOME, Case, SolverChoice
 from fem_reference.scenes.muscle import Frames
-from fem_reference.scenes.scalar import ScalarCase
-from fem_reference.solvers.common.protocol import Task
 from fem_reference.studies.hard.choosing import SECOND, choices
 
 FOLDER = HOME / "cases" / "hard"
@@ -218,7 +217,7 @@ def _hard(table: dict[str, Any], name: str, where: str) -> Hard:
         want = 'nothing beside "no_solution", which no run should reach the end of'
         raise InputError(join(where, "contrast"), f'"{hard.contrast}"', want)
     scene = hard.shipped.read() if hard.shipped else None
-    scalar = isinstance(scene, ScalarCase)
+    scalar = scene is not None and "field" in scene.carries
     for i, bound in enumerate(hard.bound):
         if (bound.quantity == "overshoot") != scalar:
             want = "overshoot for a scalar field, and only there"

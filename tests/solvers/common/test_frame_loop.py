@@ -2,7 +2,7 @@
 
 import pytest
 
-from fem_reference.problems.muscle import Setup
+from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import NO_SURFACE, Frame, Outcome
 from fem_reference.solvers.common.frame_loop import each, follow, refused
 from fem_reference.solvers.common.state_checks import Trouble

@@ -14,7 +14,6 @@ from fem_reference.assessment.stress import Bound, Cell, History
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import tet_volumes
 from fem_reference.geometry import skins
-from fem_reference.problems.muscle_body import as_body
 from fem_reference.runs.store import Outcome
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.solvers import fenicsx
@@ -104,7 +103,7 @@ def test_a_bone_that_contact_does_not_hold_is_no_success() -> None:
 )
 def test_what_no_mesh_and_no_direction_resolves_is_refused(name, got, want) -> None:
     with pytest.raises(InputError, match=f"got {got}, want less.*{want}"):
-        as_body(blocks.problem(CASES[name]))
+        _ = blocks.problem(CASES[name]).body
 
 
 def test_the_farthest_frame_is_where_load_steps_are_compared() -> None:
