@@ -6,10 +6,11 @@ from functools import partial
 
 from fem_reference import report
 from fem_reference.assessment.catalogue import Result
-from fem_reference.cli._pages import Asked, Part, written
-from fem_reference.cli._parser import add_name
+from fem_reference.cli._pages import written
+from fem_reference.cli._parser import share
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, write_output
 from fem_reference.foundations.version import __version__
+from fem_reference.report.asked import Asked, Part
 from fem_reference.report.verify_page import Verification, facts
 from fem_reference.runs.key import versions
 from fem_reference.verification import runner
@@ -26,7 +27,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("names", metavar="NAME", nargs="*", help=known)
     control = "measure this entry with its one thing wrong, named or not: it must fail; may be repeated"
     parser.add_argument("--negative-control", action="append", default=[], metavar="NAME", help=control)
-    add_name(parser)
+    share(parser, "--name")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -186,7 +186,7 @@ def _between(mesh: FieldMesh, values: Floats) -> Floats:
     edges = mesh.edges
     middles = np.full(len(edges), np.nan)
     if mesh.cells.shape[1] == 3:
-        on_rim = mesh.edgedomain.numbers(mesh.facets)
+        on_rim = mesh.edge_numbers(mesh.facets)
         middles[on_rim] = values[edges[on_rim]].mean(axis=1)
     return middles
 
@@ -249,7 +249,7 @@ def _nodes_of(facets: Ints, mesh: FieldMesh, order: int) -> Ints:
     vertices = np.unique(facets)
     if order == 1 or facets.shape[1] == 1:
         return vertices
-    return np.concatenate([vertices, len(mesh.points) + mesh.edgedomain.numbers(facets)])
+    return np.concatenate([vertices, len(mesh.points) + mesh.edge_numbers(facets)])
 
 
 def _flux(entry: Boundary, mesh: FieldMesh) -> Flux:

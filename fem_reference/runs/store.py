@@ -44,7 +44,8 @@ class Frame:
     fibres and, (0, 3) without cells, of the nodes of the mesh. ``forces`` (3,) [N] by name of what is prescribed: those of the
     constraint along the prescribed components, and their ``moments`` (3,) [N mm] about the origin (at nodes of several regions that
     prescribe the same component, the force counts in each); and what obstacles exert. ``state``: the unknowns of the cells, where
-    they were asked for. ``field``: of a scalar problem. ``note``: what progress says of the frame.
+    they were asked for. ``field``: of a scalar problem. ``residuals``: the norms [N, mm3] before and after each of Newton's
+    iterations in the last load step to it. ``note``: what progress says of the frame.
 
     ``scalars`` of a body: min_det_F_quadrature, min_det_F_vertices, volume_ratio, energy [N mm] of what acts inside,
     newton_iterations, cut_backs. Of the reference besides, where all energy is stored, energy_gap since the frame before
@@ -65,6 +66,7 @@ class Frame:
     forces: dict[str, Floats] = field(default_factory=dict)
     moments: dict[str, Floats] = field(default_factory=dict)
     field: NodalField | None = None
+    residuals: tuple[float, ...] = ()
 
     @property
     def frame(self) -> float:
@@ -101,7 +103,7 @@ class Run:
     alone moves no surface: ``has_surface`` is False, and every entry of ``positions`` NaN. A scalar run has a ``mesh`` in their
     place, and ``fields`` by name (f, ...) at its nodes, as :class:`NodalField` has them. ``states``: the frames in full, of a run
     that is not stored, all that there is of one of a body. ``body`` and ``settings``: what was solved how, where error bars of a
-    body may be asked for.
+    body may be asked for. ``residuals`` by frame.
     """
 
     name: str
@@ -121,6 +123,7 @@ class Run:
     states: tuple[Frame, ...] = ()
     body: Body | None = None
     settings: Record | None = None
+    residuals: tuple[tuple[float, ...], ...] = ()
 
     @property
     def last(self) -> Frame:
@@ -155,11 +158,8 @@ class Run:
 
     def _repr_html_(self) -> str:
         """What notebooks show."""
-        cost = {
-            name: value
-            for name, value in self.outcome.cost.items()
-            if name in ("seconds", "newton_iterations", "unknowns")
-        }
+        known = ("seconds", "newton_iterations", "unknowns")
+        cost = {name: value for name, value in self.outcome.cost.items() if name in known}
         facts = {
             "solver": self.solver,
             "status": f"{self.outcome.status}: {self.outcome.message}",
@@ -212,7 +212,8 @@ def load(folder: Path) -> Run:
     stored = parse(Contents, state, f"{place}: run")
     whose: dict[str, Any] = {"name": stored.name, "solver": stored.solver, "numbers": stored.numbers, "folder": folder}
     whose |= {"outcome": Outcome(stored.status, stored.message, stored.cost), "origin": state["origin"]}
-    whose |= {"scalars": {name: np.asarray(values, float) for name, values in stored.scalars.items()}}
+    scalars = {name: np.asarray(values, float) for name, values in stored.scalars.items()}
+    whose |= {"scalars": scalars, "residuals": stored.residuals}
     if fields.FOLDER in stored.parts:
         mesh, arrays = fields.read(folder, stored.numbers)
         return Run(**whose, has_surface=False, mesh=mesh, fields=arrays)

@@ -42,7 +42,7 @@ class Writer:
         """
         self.folder, self.rest = folder, rest
         self.state: dict[str, Any] = {"format": FORMAT, **identity, "status": "running", "message": "", "numbers": []}
-        self.state |= {"scalars": {}, "cost": {}, "parts": []}
+        self.state |= {"scalars": {}, "residuals": [], "cost": {}, "parts": []}
         self.begin, self.reported = time.perf_counter(), 0.0
         if (stored := cut_off.stored(folder, identity)) is not None:
             self.state = stored | {"name": identity["name"], "origin": identity["origin"]}
@@ -79,6 +79,7 @@ class Writer:
             parts[fields.FOLDER] = lambda path: fields.write(path, solved)
             self.state["origin"]["form"] = solved.form
         self.state["numbers"].append(frame.number)
+        self.state["residuals"].append(frame.residuals)
         self.state["parts"] = sorted([*parts, *stored])
         for part, write in parts.items():
             suffix = ".vtu" if part in ("tets", fields.FOLDER) else ".vtp"
@@ -125,8 +126,7 @@ class Writer:
         done, wanted = len(self.state["numbers"]), len(self.state["frames"])
         passed = time.perf_counter() - self.begin
         left = f", about {passed / (done - 1) * (wanted - done):.0f} s left" if 1 < done < wanted else ""
-        note = f", {frame.note}" if frame.note else ""
         if 1 < done < wanted and passed - self.reported < QUIET:
             return
-        self.reported, name = passed, self.state["name"]
+        self.reported, name, note = passed, self.state["name"], f", {frame.note}" if frame.note else ""
         log.info("%s: frame %d (%d of %d)%s, %.0f s%s", name, frame.number, done, wanted, note, passed, left)

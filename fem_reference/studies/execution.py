@@ -201,7 +201,7 @@ class Bench[C: Case]:
     def read(self, name: str, choice: SolverChoice, place: str) -> Run:
         """The run that somebody recorded, checked against the setup of the scene; it is read each time and not stored."""
         wanted, frames = self.settings(choice, place), list[Frame]()
-        assert isinstance(wanted, recorded.Settings)
+        assert isinstance(wanted, recorded.RecordedSettings)
         outcome = solvers.find(choice.solver, place, self.scene.task).solve(self._setup(), wanted, frames.append)
         origin = self.origin(choice.solver, wanted) | recorded.origin(wanted)
         run = collected(frames, outcome, self._setup().rest)

@@ -92,6 +92,7 @@ def _state(event: dict[str, Any]) -> Frame:
             state=stored_state(arrays),
             forces=forces,
             moments=moments,
+            residuals=tuple(event["residuals"]),
         )
     path.unlink()
     return state

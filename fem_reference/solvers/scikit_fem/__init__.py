@@ -5,12 +5,12 @@
 
 from fem_reference.solvers.common.protocol import BodySolver, FieldSolver
 from fem_reference.solvers.scikit_fem import body, field
-from fem_reference.solvers.scikit_fem.body import BodySettings, solve_body
-from fem_reference.solvers.scikit_fem.field import FieldSettings, assemble, solve_field, space
+from fem_reference.solvers.scikit_fem.body import ScikitBodySettings, solve_body
+from fem_reference.solvers.scikit_fem.field import ScikitFieldSettings, assemble, solve_field, space
 
-__all__ = ["SOLVES", "BodySettings", "FieldSettings", "assemble", "solve_body", "solve_field", "space"]
+__all__ = ["SOLVES", "ScikitBodySettings", "ScikitFieldSettings", "assemble", "solve_body", "solve_field", "space"]
 
 SOLVES = (
-    FieldSolver(settings=FieldSettings, solve=field.solve, example={}),
-    BodySolver(settings=BodySettings, solve=body.solve, example={}),
+    FieldSolver(settings=ScikitFieldSettings, solve=field.solve, example={}),
+    BodySolver(settings=ScikitBodySettings, solve=body.solve, example={}),
 )

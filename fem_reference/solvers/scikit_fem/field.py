@@ -32,7 +32,7 @@ _ELEMENTS = {
 }
 
 
-class FieldSettings(Record):
+class ScikitFieldSettings(Record):
     """``form``: as the ``scene`` has it, or plain ``galerkin`` whatever the scene says, to show what stabilisation is for."""
 
     form: Literal["scene", "galerkin"] = "scene"
@@ -96,7 +96,7 @@ def assemble(problem: FieldProblem) -> tuple[Any, Floats]:
     return A, b + _fluxes(problem)
 
 
-def solve(problem: FieldProblem, settings: FieldSettings, sink: Sink) -> Outcome:
+def solve(problem: FieldProblem, settings: ScikitFieldSettings, sink: Sink) -> Outcome:
     """Assemble and solve."""
     if settings.form == "galerkin":
         problem = replace(problem, tau=None)
@@ -105,7 +105,7 @@ def solve(problem: FieldProblem, settings: FieldSettings, sink: Sink) -> Outcome
     return outcome
 
 
-def solve_field(problem: FieldProblem, settings: FieldSettings) -> Run:
+def solve_field(problem: FieldProblem, settings: ScikitFieldSettings) -> Run:
     """The run of a scalar field, in memory."""
     return solved(solve, problem, settings)
 
