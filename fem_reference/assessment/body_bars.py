@@ -46,8 +46,8 @@ def body_bars(states: tuple[Frame, ...], finer: tuple[Frame, ...], shared: Ints,
         What it had otherwise, in words.
 
     """
-    there = {state.frame: state for state in finer}
-    pairs = [(state, _beside(state, there.get(state.frame), shared)) for state in states]
+    there = {state.number: state for state in finer}
+    pairs = [(state, _beside(state, there.get(state.number), shared)) for state in states]
     left = SAFETY * LEFT
 
     def vectors(kind: str) -> dict[str, Floats]:
@@ -61,7 +61,7 @@ def body_bars(states: tuple[Frame, ...], finer: tuple[Frame, ...], shared: Ints,
     moved = np.array([np.linalg.norm(one.points - states[0].points) for one in states])
     wrong = np.sqrt(np.sum(np.where(shared < 0, 0.0, points) ** 2, axis=1))
     share = np.divide(wrong, moved, out=np.where(wrong > 0, np.inf, wrong), where=moved > 0)
-    frames = tuple(state.frame for state in states)
+    frames = tuple(state.number for state in states)
     return BodyBars(frames, points, vectors("forces"), vectors("moments"), energy, share, sharper)
 
 

@@ -81,7 +81,7 @@ Nodes = Callable[[int], Floats | None]
 
 def of_body(body: Body, solved: Run) -> RunChecks:
     """All states there and finite, and what is prescribed exactly met at its nodes."""
-    numbers, points = tuple(state.frame for state in solved.states), [state.points for state in solved.states]
+    numbers, points = tuple(state.number for state in solved.states), [state.points for state in solved.states]
     found = (_complete(body.frames, numbers), _finite(numbers, points))
     if not all(one.met for one in found):
         return found
@@ -95,12 +95,12 @@ def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
             if entry.stiffness is None and isinstance(entry.on, str):
                 nodes = np.unique(body.mesh.facets[entry.on])
                 rest, along = body.mesh.points[nodes], list(entry.components)
-                wanted = entry.displacements(rest, state.frame)
+                wanted = entry.displacements(rest, state.number)
                 off = np.abs((state.points[nodes] - rest - wanted)[:, along]).max(axis=1)
                 allowed = SAME * (
                     body.size + float(np.abs(wanted).max())
                 )  # by which regions may contradict where they meet
-                yield _at(f"prescribed at {entry.name}", off, np.full(len(off), allowed), state.frame, rest)
+                yield _at(f"prescribed at {entry.name}", off, np.full(len(off), allowed), state.number, rest)
 
 
 def of_muscle(problem: Problem, run: Run, nodes: Nodes = lambda _: None) -> RunChecks:

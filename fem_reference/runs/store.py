@@ -68,11 +68,6 @@ class Frame:
     field: NodalField | None = None
     residuals: tuple[float, ...] = ()
 
-    @property
-    def frame(self) -> float:
-        """The number of the frame."""
-        return self.number
-
     @classmethod
     def of_field(cls, problem: FieldProblem, values: Floats, form: str, components: Floats | None = None) -> "Frame":
         """The one frame of a scalar field: its ``values`` (N,), solved in a weak ``form``, and its ``components``, if it has
