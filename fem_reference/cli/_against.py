@@ -1,6 +1,7 @@
 """A candidate against what it was -> the page of what changed: what ``compare --against`` does."""
 
 import argparse
+from functools import partial
 from pathlib import Path
 
 from fem_reference import report
@@ -66,4 +67,4 @@ def _written(found: Versions, bench: Bench[MuscleCase], options: argparse.Namesp
     who = candidates(bench.scene, [entry]) or (Part(("--candidate", entry.name), entry.name),)
     asked = Asked("compare", bench.scene.name, (case_part(bench.scene), *changes(options), *who, part), PAGE)
     setup = bench.setup()
-    return written(options, asked, lambda *where: report.write_versions(found, setup, *where))[1]
+    return written(options, asked, partial(report.write, against_page.page(found, setup)))[1]

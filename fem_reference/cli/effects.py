@@ -30,6 +30,6 @@ def run(options: argparse.Namespace) -> int:
     scene = scene.model_copy(update={"choice": "listed"})  # what it would leave out is measured too
     found = omissions.study(scene, out(options) / "runs", Workers(options.workers))
     asked = Asked("effects", scene.name, (case_part(scene), *changes(options)), PAGE)
-    _, lines = written(options, asked, partial(report.write_effects, found))
+    _, lines = written(options, asked, partial(report.write, effects_page.page(found)))
     write_output(facts(found), "\n".join([effects_page.text(found), *lines]), options)
     return DONE if found.ablations[0].whole.status == "converged" else SOLVER_FAILED

@@ -41,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
     parts += [Part(("--solver", name), name) for name in options.solver]
     parts += [Part(("--steps",), "steps")] if options.steps else []
     parts += [Part(("--jitters", str(options.jitters)), "jitters")] if options.jitters else []
-    _, lines = written(options, Asked("stress", PAGE, tuple(parts)), partial(report.write_stress, found))
+    _, lines = written(options, Asked("stress", PAGE, tuple(parts)), partial(report.write, stress_page.page(found)))
     write_output(facts(found), "\n".join([stress_page.text(found), *lines]), options)
     return DONE
 

@@ -11,6 +11,7 @@ import stand_ins
 
 from fem_reference import cli, report
 from fem_reference.assessment import versions
+from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import ErrorBar, ErrorBars
 from fem_reference.assessment.measured import CurrentMeasures
 from fem_reference.assessment.versions import Change, Versions
@@ -18,11 +19,15 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.report import against_page
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import fenicsx, pbd
-from tests.report import test_headline
-from tests.report import test_page as test_report
+from tests.report import comparisons, test_headline
 
 NAN = float("nan")
-comparison = test_report.comparison
+
+
+@pytest.fixture
+def comparison(tmp_path, monkeypatch) -> Comparison:
+    """The small comparison of the tests of pages."""
+    return comparisons.small_comparison(tmp_path, monkeypatch)
 
 
 def change(was, now, bars=(NAN, NAN), unit="mm") -> Change:
@@ -66,7 +71,7 @@ def of(comparison, shift: float, bars: ErrorBars | None = None) -> CurrentMeasur
     """The candidate ``quick`` of the small comparison, ``shift`` times as far away."""
     truth = comparison.reference.positions
     run = replace(comparison.candidates[0], positions=truth + shift * (comparison.candidates[0].positions - truth))
-    measures = test_report.measured(run, truth)
+    measures = comparisons.measured(run, truth)
     return CurrentMeasures(comparison.scene, run, comparison.reference, measures, bars)
 
 
@@ -90,8 +95,8 @@ def test_two_runs_are_compared_statistic_by_statistic_and_vertex_by_vertex(compa
 
 def test_the_page_has_its_table_curves_and_place(comparison, tmp_path) -> None:
     bars = (ErrorBar("deviation", "surface_deviation", "rms", "mm", np.full(5, 5.0), {}),)
-    found = pair(comparison, ErrorBars(test_report.NUMBERS, (1.0, 2.0), 2.0, bars))
-    path = report.write_versions(found, comparison.setup, tmp_path, "against", "fem-reference compare")
+    found = pair(comparison, ErrorBars(comparisons.NUMBERS, (1.0, 2.0), 2.0, bars))
+    path = report.write(against_page.page(found, comparison.setup), tmp_path, "against", "fem-reference compare")
     text = path.read_text(encoding="utf-8")
     assert '<span class="badge within">within the error bar</span>' in text
     assert "2 mm from where it was, in frame 40: vertex 0, at rest at (30, 0, 0) mm" in text

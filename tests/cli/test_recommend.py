@@ -227,7 +227,7 @@ def test_at_most_means_the_same_on_the_page_of_the_study(own_bar: float) -> None
 def test_the_page_says_that_the_bar_is_in_its_table() -> None:
     case = own_study(features(50), bar=2.0)
     case = replace(case, units=case.units | dict.fromkeys(study_page.SHOWN, "mm"))
-    text = study_page.render(Study((case,)))
+    text = study_page.page(Study((case,))).html()
     table = text[text.index("The same surface deviation, rms: time of a frame") :]
     plain = html.unescape(re.sub(r"<[^>]+>", "", table)).replace("\N{NARROW NO-BREAK SPACE}", " ")
     assert "with the error bar of the truth, 2 mm, at most" in plain

@@ -180,11 +180,11 @@ def test_the_page_says_what_each_changes_and_what_it_saves() -> None:
 
 
 def test_a_prediction_stands_beside_what_was_measured_where_there_is_one(tmp_path) -> None:
-    page = report.write_effects(found(), tmp_path, "effects")
+    page = report.write(effects_page.page(found()), tmp_path, "effects")
     assert "surface deviation, rms: 2.50" in page.read_text(encoding="utf-8")
     whole = found().ablations[0]
     bare = replace(whole, omissions=tuple(replace(one, predicted={}) for one in whole.omissions))
-    assert "predicted" not in effects_page.render(replace(found(), ablations=(bare,)))
+    assert "predicted" not in effects_page.page(replace(found(), ablations=(bare,))).html()
     table = json.loads((tmp_path / "effects.json").read_text(encoding="utf-8"))
     assert [row["verdict"] for row in table["ablations"][0]["omissions"]] == ["matters", "does not matter"]
 
@@ -192,12 +192,12 @@ def test_a_prediction_stands_beside_what_was_measured_where_there_is_one(tmp_pat
 def test_a_failure_is_a_row_with_its_cause_and_a_change_of_nothing_is_drawn(tmp_path) -> None:
     failed = Omission(("contact", "gravity"), "diverged", "frame 3: <b>lost</b>", instead={"element": "P2"})
     whole = found(failed)
-    text = report.write_effects(whole, tmp_path, "effects").read_text(encoding="utf-8")
+    text = report.write(effects_page.page(whole), tmp_path, "effects").read_text(encoding="utf-8")
     assert "frame 3: &lt;b&gt;lost" in text
     assert "<b>" not in text
     assert "element = P2" in text
     assert not re.search(r'(?:src|href)="https?:', text)
-    assert "contact (0 mm)" in effects_page.render(changed(whole, 0.0))
+    assert "contact (0 mm)" in effects_page.page(changed(whole, 0.0)).html()
     assert effects_page.drawing(replace(whole, ablations=())) is None
 
 
@@ -212,7 +212,7 @@ def test_without_error_bars_nothing_is_said_to_matter() -> None:
     blind = replace(found(), bars={}, unknown="the tetrahedra are the same")
     assert "Whether it matters is not known." in effects_page.text(blind)
     assert "the tetrahedra are the same" in effects_page.text(blind)
-    assert "the tetrahedra are the same" in effects_page.render(blind)
+    assert "the tetrahedra are the same" in effects_page.page(blind).html()
 
 
 # The verb

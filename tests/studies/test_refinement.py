@@ -29,7 +29,7 @@ pytestmark = pytest.mark.slow
 CONTACT = '\n[[effect]]\nname = "contact"\nstiffness = "100 kPa/mm"\nsmoothing = "0.2 mm"\n'
 VISCOSITY = '\n[[effect]]\nname = "viscosity"\neta = "1 kPa s"\n'
 CONTACT_GIVES = 1e-5
-WRITE = report.write
+WRITE, PAGE = report.write, report.of_comparison
 
 
 def growth(tets: float) -> float:
@@ -51,7 +51,8 @@ def case(tmp_path, monkeypatch) -> Path:
     """The small scene, solved by ``swell``, without its page."""
     stand_ins.solve_by(monkeypatch, fenicsx, swell)
     stand_ins.unchecked(monkeypatch)
-    monkeypatch.setattr(report, "write", lambda _, folder, __: folder)
+    monkeypatch.setattr(report, "of_comparison", lambda _: None)
+    monkeypatch.setattr(report, "write", lambda _, folder, *__: folder)
     return small.write(tmp_path / "bar")
 
 
@@ -77,6 +78,7 @@ def scene_of(case: Path, more: str = "") -> MuscleCase:
 
 
 def test_the_bar_covers_an_error_that_is_known(case, capsys, monkeypatch) -> None:
+    monkeypatch.setattr(report, "of_comparison", PAGE)
     monkeypatch.setattr(report, "write", WRITE)
     monkeypatch.setattr(gallery, "_command", lambda _job, _folder: ["/nowhere/python"])
     path = case / "case.toml"

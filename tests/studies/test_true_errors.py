@@ -8,11 +8,11 @@ import small
 import stand_ins
 
 import fem_reference as fr
-from fem_reference import cli
+from fem_reference import cli, report
 from fem_reference.assessment.claims import CLAIMED, Claim, Claims, Cover, claimed
 from fem_reference.assessment.error_bars import ErrorBar, ErrorBars
 from fem_reference.metrics import Measure
-from fem_reference.report import claims_page, write_claims
+from fem_reference.report import claims_page
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
 from fem_reference.solvers import fenicsx
@@ -62,7 +62,7 @@ def whole(*cases: str) -> Claims:
 
 
 def test_the_page_and_its_numbers(tmp_path) -> None:
-    path = write_claims(whole("one", "other"), tmp_path / "new", "error-bars")
+    path = report.write(claims_page.page(whole("one", "other")), tmp_path / "new", "error-bars")
     text, numbers = path.read_text(), json.loads((path.parent / "error-bars.json").read_text())
     assert (numbers["claims"], numbers["covered"], numbers["missing"]) == (56, 1.0, {"lost": "why it was"})
     assert numbers["median_ratio"] == pytest.approx(2.25)  # 3 and 1.5, each half of them

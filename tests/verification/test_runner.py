@@ -327,7 +327,7 @@ def test_a_page_that_cannot_be_written_leaves_what_was_measured_reported(verify,
         raise OSError("no space left")
 
     target = verify.folder / "facts.json"
-    monkeypatch.setattr(report, "write_verification", full)
+    monkeypatch.setattr(report, "write", full)
     status, printed, _ = verify("bars", "--json", str(target))
     assert status == cli.BAD_INPUT
     assert "no space left" in printed.err
