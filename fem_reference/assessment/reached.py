@@ -43,6 +43,12 @@ def cut(comparison: Comparison) -> Comparison:
 
 def _measures(kept: Ints, measures: tuple[Measure, ...]) -> tuple[Measure, ...]:
     return tuple(
-        replace(one, values=one.values[kept], where=tuple(one.where[i] for i in kept) if one.where else ())
+        replace(
+            one,
+            values=one.values[kept],
+            where=tuple(one.where[i] for i in kept) if one.where else (),
+            numbers=tuple(one.numbers[i] for i in kept) if one.numbers else (),
+            error_bars=None if one.error_bars is None else one.error_bars[kept],
+        )
         for one in measures
     )

@@ -4,7 +4,7 @@ import argparse
 
 from fem_reference.assessment import solver_table
 from fem_reference.assessment.comparison import alone
-from fem_reference.assessment.judge import check, overall
+from fem_reference.assessment.judge import check
 from fem_reference.cli._choosing import refuse_error_bar, scene_of
 from fem_reference.cli._judging import judge, unturned
 from fem_reference.cli._parser import add_case, add_error_bar, add_name, add_negative_control, add_ranks
@@ -45,9 +45,9 @@ def run(options: argparse.Namespace) -> int:
     check(scene)
     bench = Bench(scene, out(options) / "runs", options.ranks)
     solved = bench.obtain(*solver_table.choice(scene, options.solver), f"--solver {options.solver}")
-    measures, verdicts = alone(scene, bench.setup(), solved)
-    said = [run_text(solved, measures, verdicts), *unturned(options, overall(one.word for one in verdicts))]
-    write_output(of_run(scene, solved, measures, verdicts), "\n".join(said), options)
+    result = alone(scene, bench.setup(), solved)
+    said = [run_text(solved, result), *unturned(options, result.word)]
+    write_output(of_run(scene, solved, result), "\n".join(said), options)
     if solved.outcome.status != "converged":
         return SOLVER_FAILED
-    return VERDICT_FAIL if any(verdict.word == "fail" for verdict in verdicts) else DONE
+    return VERDICT_FAIL if result.word == "fail" else DONE

@@ -6,22 +6,13 @@ from matplotlib.axes import Axes
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import Of
 from fem_reference.foundations.mesh import Floats
-from fem_reference.metrics import Measure, find
+from fem_reference.metrics import Measure, described, find
 from fem_reference.report.drawings import BAND, NOT_A_NUMBER, REFERENCE, Drawing, colour_of, over_frames, plain_numbers
 from fem_reference.report.tables import inversion
 from fem_reference.report.words import words
 
 _KNOWN = "error bar"
 _FAR = 50.0  # of two candidates' greatest distances, beyond which they share a logarithmic axis
-# A drawing of all runs: its name, the metric and statistic, and its title.
-_VOLUME = ("volume", "volume", "deviation", "Change of volume from rest")
-_FIBRES = ("fibres", "fibre_length", "mean", "Change of fibre length from rest, mean over the fibres")
-_OTHERS = (
-    ("edges", "edge_extension", "mean", "Extension of the surface's edges from rest, mean by area"),
-    ("angles", "dihedral_angle", "mean_magnitude", "Bending at the edges from rest, mean magnitude by area"),
-    ("depth", "penetration", "deepest", "Depth of the muscle inside a bone, beside attachments beyond that at rest"),
-    ("inside", "penetration", "volume", "Volume inside bones, without attached parts"),
-)
 _STATISTICS = (
     ("max", "worst vertex", "-"),
     ("hausdorff", "Hausdorff", "--"),
@@ -32,10 +23,9 @@ _STATISTICS = (
 
 def curves(comparison: Comparison) -> list[Drawing]:
     """Every drawing for which the comparison has numbers."""
-    found = [_of_runs(comparison, *one) for one in (_VOLUME, _FIBRES)]
-    found += [_surface(comparison, i) for i in range(len(comparison.candidates))]
-    found += [_inversion(comparison), *(_of_runs(comparison, *one) for one in _OTHERS)]
-    return [drawing for drawing in found if drawing is not None]
+    found = [_surface(comparison, i) for i in range(len(comparison.candidates))]
+    found += [_of_runs(comparison, *key, one.curve) for key, one in described("curve").items()]
+    return [drawing for drawing in [*found, _inversion(comparison)] if drawing is not None]
 
 
 def label_of(inverted: Measure) -> str:
@@ -43,7 +33,7 @@ def label_of(inverted: Measure) -> str:
     return words(inverted.statistic.removeprefix("min_det_F").lstrip("_"))
 
 
-def _of_runs(comparison: Comparison, name: str, metric: str, statistic: str, title: str) -> Drawing | None:
+def _of_runs(comparison: Comparison, metric: str, statistic: str, title: str) -> Drawing | None:
     """A measure of every run from rest, with the error bar of the reference; None where no run has it."""
     measures = {run.name: find(comparison.changes[run.name], metric, statistic) for run in comparison.runs}
     found = {run: measure for run, measure in measures.items() if measure is not None}
@@ -56,7 +46,7 @@ def _of_runs(comparison: Comparison, name: str, metric: str, statistic: str, tit
                     _band(axes, comparison, "change", found[run.name], found[run.name].values)
                 _line(axes, run.numbers, found[run.name], run.name, color=colour, linewidth=2.4 if i == 0 else 1.5)
 
-    return over_frames(name, title, next(iter(found.values())).unit, draw) if found else None
+    return over_frames(f"{metric}-{statistic}", title, next(iter(found.values())).unit, draw) if found else None
 
 
 def surface_limits(comparison: Comparison) -> tuple[float, float, bool]:

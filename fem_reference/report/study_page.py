@@ -24,6 +24,7 @@ from fem_reference.assessment.fronts import (
     solvers,
 )
 from fem_reference.assessment.transfer import transfers
+from fem_reference.metrics import described
 from fem_reference.report.claims_page import UNITS as CLAIMED_UNITS
 from fem_reference.report.claims_page import drawing as claims_drawing
 from fem_reference.report.drawings import BAND, PALETTE, Drawing, drawn, logarithmic
@@ -33,7 +34,7 @@ from fem_reference.report.words import duration, listed, number, words
 REFERENCE = "fenicsx"
 TIME = "seconds_per_frame"
 # What the fronts, the sentences and the tables are about, and what tables are matched by.
-SHOWN = ("surface_deviation.rms", "fibre_length.rms_percent", "volume.deviation")
+SHOWN = tuple(map(".".join, described("rank")))
 MAIN = SHOWN[0]
 LARGE = 1e7  # the size that growth is extrapolated to
 MATCHED = (TIME, "peak_memory_mb", "unknowns")

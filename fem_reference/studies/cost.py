@@ -16,7 +16,7 @@ from fem_reference.assessment.cost_study import CaseStudy, Study
 from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.assessment.fronts import COSTS, Point
 from fem_reference.foundations.errors import InputError
-from fem_reference.metrics import MeasurementContext, measure
+from fem_reference.metrics import MeasurementContext, in_tables, measure
 from fem_reference.runs.complete import complete
 from fem_reference.runs.cost import seconds_per_frame
 from fem_reference.runs.key import versions
@@ -33,7 +33,7 @@ from fem_reference.studies.true_errors import claims_of
 log = logging.getLogger(__name__)
 
 # What is measured on every point.
-METRICS = ("volume", "fibre_length", "surface_deviation", "penetration")
+METRICS = in_tables()
 # Solvers of surfaces are also tried on 4 to these powers as many triangles, whose files are kept beside the runs.
 _POWERS = (-1, 1)
 _MOST_TRIANGLES = 20_000  # above it a run takes minutes, most of a study's time
@@ -105,7 +105,7 @@ def known(bars: ErrorBars | None) -> dict[str, float]:
     """The error bar of each statistic of a deviation, the greatest over the frames."""
     if bars is None:
         return {}
-    worst = {f"{bar.metric}.{bar.statistic}": float(bar.values[bar.worst]) for bar in bars.of_deviations}
+    worst = {f"{bar.metric}.{bar.statistic}": bar.worst.value for bar in bars.of_deviations}
     return {name: value for name, value in worst.items() if math.isfinite(value)}
 
 

@@ -115,15 +115,6 @@ def test_effects_are_reported_with_their_units(comparison):
     assert "<tr><th>NeoHooke</th><td>mu = 0.01 MPa</td></tr>" in html(comparison)
 
 
-def test_worst_of_a_measure_with_a_frame_that_is_not_a_number(comparison):
-    torn = comparison.candidates[1]
-    it = comparison_page.worst(
-        torn, Measure("volume", "deviation", "%", np.array([0, -3.0, 2, NAN, 1]), tuple("abcde"))
-    )
-    assert np.isnan(it["value"])
-    assert (it["frame"], it["where"], it["finite"]) == (30, "d", (-3.0, 10))
-
-
 def test_of_a_reference_that_failed_the_frames_that_it_reached_are_shown(comparison):
     positions = np.array(comparison.reference.positions)
     positions[3:] = NAN
