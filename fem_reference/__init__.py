@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from fem_reference.assessment.error_bars import ErrorBars
     from fem_reference.effects import make as make_effect
     from fem_reference.foundations.errors import InputError, MissingSoftware
+    from fem_reference.foundations.version import __version__ as __version__
     from fem_reference.problems.body import Body, Cells, Prescribed
     from fem_reference.problems.shapes import box
     from fem_reference.runs.store import Run
@@ -44,7 +45,6 @@ if sys.version_info[:2] < (3, 12):  # noqa: UP036 - who imports a checkout has n
     wanted = "fem_reference needs Python 3.12 or newer: python3.12 -m venv .venv, and install it there"
     raise ImportError(f"this is Python {sys.version.split()[0]} ({sys.executable}); {wanted}")
 
-__version__ = "0.1.0"
 __all__ = [
     "Body",
     "Case",
@@ -82,6 +82,7 @@ _PLACES = {
     "MissingSoftware": ("fem_reference.foundations.errors", "MissingSoftware"),
     "Prescribed": ("fem_reference.problems.body", "Prescribed"),
     "Run": ("fem_reference.runs.store", "Run"),
+    "__version__": ("fem_reference.foundations.version", "__version__"),
     "box": ("fem_reference.problems.shapes", "box"),
     "cases": ("fem_reference.scenes.casefile", "cases"),
     "make_case": ("fem_reference.scenes.made", "make_case"),
@@ -90,7 +91,7 @@ _PLACES = {
 
 
 def __getattr__(name: str) -> Any:
-    if name not in __all__:
+    if name not in __dir__():
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module, own = _PLACES.get(name, (_WORKFLOW, name))
     return getattr(import_module(module), own)

@@ -1,18 +1,17 @@
 """A candidate against what it was -> the page of what changed: what ``compare --against`` does."""
 
 import argparse
-from functools import partial
 from pathlib import Path
 
-from fem_reference import report
 from fem_reference.assessment import baseline, versions
 from fem_reference.assessment.measured import CurrentMeasures
 from fem_reference.assessment.versions import Versions
 from fem_reference.cli._choosing import check_names, checked_bench
-from fem_reference.cli._pages import Asked, Part, candidates, case_part, changes, written
+from fem_reference.cli._pages import candidates, case_part, changes, written
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import against_page
+from fem_reference.report.asked import Asked, Part
 from fem_reference.runs.complete import complete
 from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
@@ -67,4 +66,4 @@ def _written(found: Versions, bench: Bench[MuscleCase], options: argparse.Namesp
     who = candidates(bench.scene, [entry]) or (Part(("--candidate", entry.name), entry.name),)
     asked = Asked("compare", bench.scene.name, (case_part(bench.scene), *changes(options), *who, part), PAGE)
     setup = bench.setup()
-    return written(options, asked, partial(report.write, against_page.page(found, setup)))[1]
+    return written(options, asked, against_page.page(found, setup))[1]

@@ -1,12 +1,12 @@
 """Reference and candidates of a case -> page, JSON and exit status: what ``demo``, ``run`` and ``compare`` share."""
 
 import argparse
-from functools import partial
 
 from fem_reference import report
 from fem_reference.cli._choosing import check_names, checked_bench, refuse_error_bar
-from fem_reference.cli._pages import Asked, Part, candidates, case_part, changes, written
+from fem_reference.cli._pages import candidates, case_part, changes, written
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, write_output
+from fem_reference.report.asked import Asked, Part
 from fem_reference.report.overview import comparison_text
 from fem_reference.scenes.case import Candidate, Case
 from fem_reference.solvers import fenicsx
@@ -31,7 +31,7 @@ def _judge(scene: Case, options: argparse.Namespace, chosen: list[tuple[Candidat
     bars = refinement.obtain(bench, reference) if options.error_bar else refinement.offered(bench, reference)
     result = judging.compare(bench, reference, [(read | solved)[entry.name] for entry, _ in chosen], bars)
     asked = _asked(scene, options, [entry for entry, _ in chosen])
-    _, lines = written(options, asked, partial(report.write, report.of_comparison(result)))
+    _, lines = written(options, asked, report.of_comparison(result))
     write_output(
         report.summary(result), "\n".join([comparison_text(result), *unturned(options, result.word), *lines]), options
     )

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from fem_reference import export
 from fem_reference.cli._choosing import check_names, checked_bench, choose, scene_of
-from fem_reference.cli._parser import UNIT, add_case, add_ranks
+from fem_reference.cli._parser import share
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, lines, out, write_output
 from fem_reference.export import paraview
 from fem_reference.export.folders import check
@@ -24,7 +24,7 @@ PARAVIEW = "paraview"
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb: where to, and in which formats."""
-    add_case(parser)
+    share(parser, "case", "--set")
     parser.add_argument(
         "--to", type=Path, required=True, metavar="DIR", help="a folder that is not there yet, or empty"
     )
@@ -32,10 +32,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--format", choices=(*export.FORMATS, PARAVIEW), default="open", help=forms)
     either = f"for {PARAVIEW}: a candidate of the case, a folder of frames or a solver; may be repeated"
     parser.add_argument("--candidate", action="append", default=[], metavar="NAME|DIR", help=either)
-    parser.add_argument("--unit", help=UNIT)
+    share(parser, "--unit")
     again = f"for {PARAVIEW}: solve the reference again where it was solved before without its states"
     parser.add_argument("--solve", action="store_true", help=again)
-    add_ranks(parser)
+    share(parser, "--ranks")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -1,7 +1,6 @@
 """The verb ``page``: a page over several cases."""
 
 import argparse
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,11 +8,12 @@ from fem_reference import report
 from fem_reference.assessment.claims import Cover
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.cli._choosing import check_names, checked_bench, own_candidates
-from fem_reference.cli._pages import Asked, Part, case_part, written
-from fem_reference.cli._parser import UNIT, add_name
+from fem_reference.cli._pages import case_part, written
+from fem_reference.cli._parser import share
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import claims_page, field_page, ranking_page
+from fem_reference.report.asked import Asked, Part
 from fem_reference.report.overview import comparison_text
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Candidate
@@ -41,8 +41,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--case", action="append", default=[], metavar="CASE", help=some)
     foreign = f"for {TABLE}: frames that your solver made of a case; may be repeated"
     parser.add_argument("--candidate", action="append", default=[], metavar="CASE=DIR", help=foreign)
-    parser.add_argument("--unit", help=UNIT)
-    add_name(parser)
+    share(parser, "--unit", "--name")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -64,8 +63,9 @@ def _examples(options: argparse.Namespace) -> int:
     benches = [checked_bench(case, options, own_candidates(case)) for case in cases]
     with fenicsx.shared():
         results = tuple(_compared(bench) for bench in benches)
-        write = partial(report.write, field_page.page(title, results))
-        path, lines = written(options, Asked("page", options.name, (Part((options.name,)),)), write)
+        path, lines = written(
+            options, Asked("page", options.name, (Part((options.name,)),)), field_page.page(title, results)
+        )
     facts = {"page": str(path), "cases": [report.summary(result) for result in results]}
     texts = [f"{result.scene.title}:\n{comparison_text(result)}" for result in results]
     write_output(facts, "\n\n".join([*texts, "\n".join(lines)]), options)
@@ -89,9 +89,7 @@ def _table(options: argparse.Namespace) -> int:
     for name in scenes if options.case else foreign:
         Bench(scenes[name], out(options)).setup()  # only what nobody asked for by name may be missing
     table = table_5_1.stand(scenes.values(), out(options) / "runs", foreign)
-    _, lines = written(
-        options, _asked(TABLE, scenes, foreign, options), partial(report.write, ranking_page.page(table))
-    )
+    _, lines = written(options, _asked(TABLE, scenes, foreign, options), ranking_page.page(table))
     write_output(ranking_page.facts(table), "\n".join([ranking_page.text(table), *lines]), options)
     return DONE if all(one.reference.status == "converged" for one in table.scenarios) else SOLVER_FAILED
 
@@ -103,7 +101,7 @@ def _claims(options: argparse.Namespace) -> int:
     _, lines = written(
         options,
         _asked(CLAIMS, {scene.name: scene for scene in scenes}, {}, options),
-        partial(report.write, claims_page.page(found)),
+        claims_page.page(found),
     )
     whole = Cover.of(found.claims)
     covered = f"{100 * whole.share:.1f} % cover the difference from a finer solution, median ratio {whole.median:.2f}"

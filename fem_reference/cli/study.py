@@ -3,14 +3,14 @@
 import argparse
 import logging
 from dataclasses import replace
-from functools import partial
 
-from fem_reference import report, solvers
+from fem_reference import solvers
 from fem_reference.assessment.cost_study import Study, facts
-from fem_reference.cli._pages import Asked, Part, case_part, changes, written
-from fem_reference.cli._parser import Distinct, add_name, add_workers
+from fem_reference.cli._pages import case_part, changes, written
+from fem_reference.cli._parser import CASE, share
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, out, write_output
 from fem_reference.report import study_page
+from fem_reference.report.asked import Asked, Part
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import cost, growth
@@ -24,23 +24,19 @@ HELP = "what accuracy costs in time: reference and candidates over ladders of se
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """The options that this verb has."""
-    parser.add_argument(
-        "cases", metavar="CASE", nargs="+", help="a shipped case (see list), a case folder or a case.toml"
-    )
+    parser.add_argument("cases", metavar="CASE", nargs="+", help=CASE)
     change = "change a key of every case, such as muscle.tet_size='8 mm'; may be repeated"
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help=change)
-    add_workers(parser)
+    share(parser, "--workers")
     cluster = (
         "address of a Dask scheduler (such as dask-jobqueue starts) whose workers make the runs; they see --out too"
     )
     parser.add_argument("--scheduler", metavar="ADDRESS", help=cluster)
     only = "only this solver; may be repeated (default: the reference and every candidate)"
-    parser.add_argument(
-        "--solver", action=Distinct, default=[], choices=solvers.names("solve"), metavar="NAME", help=only
-    )
+    parser.add_argument("--solver", default=[], choices=solvers.names("solve"), metavar="NAME", help=only)
     grown = "measure too how costs grow with the size of the problem, on bodies of our own making (about 5 minutes)"
     parser.add_argument("--growth", action="store_true", help=grown)
-    add_name(parser)
+    share(parser, "--name")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -65,10 +61,8 @@ def _written(found: Study, scenes: list[MuscleCase], options: argparse.Namespace
     for case in found.cases:
         asked = Asked("study", case.case, (parts[case.case], *more), PAGE)
         own = argparse.Namespace(**vars(options) | ({"page_name": None} if several else {}))
-        lines = written(own, asked, partial(report.write, study_page.page(cost.alone(found, case))))[1]
+        lines = written(own, asked, study_page.page(cost.alone(found, case)))[1]
     if several:
         named = [Part(part.words, name) for name, part in parts.items()]
-        lines = written(options, Asked("study", PAGE, (*named, *more)), partial(report.write, study_page.page(found)))[
-            1
-        ]
+        lines = written(options, Asked("study", PAGE, (*named, *more)), study_page.page(found))[1]
     return lines

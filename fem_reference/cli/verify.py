@@ -2,14 +2,14 @@
 
 import argparse
 import time
-from functools import partial
 
-from fem_reference import __version__, report
 from fem_reference.assessment.catalogue import Result, Verification
-from fem_reference.cli._pages import Asked, Part, written
-from fem_reference.cli._parser import add_name
+from fem_reference.cli._pages import written
+from fem_reference.cli._parser import share
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, write_output
+from fem_reference.foundations.version import __version__
 from fem_reference.report import verify_page
+from fem_reference.report.asked import Asked, Part
 from fem_reference.runs.key import versions
 from fem_reference.verification import runner
 
@@ -25,7 +25,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("names", metavar="NAME", nargs="*", help=known)
     control = "measure this entry with its one thing wrong, named or not: it must fail; may be repeated"
     parser.add_argument("--negative-control", action="append", default=[], metavar="NAME", help=control)
-    add_name(parser)
+    share(parser, "--name")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -36,9 +36,7 @@ def run(options: argparse.Namespace) -> int:
     parts = [Part((name,), name) for name in options.names]
     parts += [Part(("--negative-control", name), f"negative_control={name}") for name in options.negative_control]
     print(
-        *written(options, Asked("verify", "verify", tuple(parts)), partial(report.write, verify_page.page(measured)))[
-            1
-        ],
+        *written(options, Asked("verify", "verify", tuple(parts)), verify_page.page(measured))[1],
         sep="\n",
     )
     return {"failed": SOLVER_FAILED, "fail": VERDICT_FAIL}.get(measured.word, DONE)

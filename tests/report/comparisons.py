@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fem_reference.assessment.comparison import Comparison
-from fem_reference.assessment.error_bars import ErrorBar, ErrorBars
+from fem_reference.assessment.error_bars import ErrorBar, ErrorBars, Of
 from fem_reference.assessment.judge import Verdict
 from fem_reference.foundations.mesh import Polylines, Surface
 from fem_reference.metrics import Measure, MeasurementContext
@@ -90,7 +90,7 @@ def measured(run: Run, other: np.ndarray) -> tuple[Measure, ...]:
     """Measures in the manner of the metrics, made by hand so that these tests stand alone."""
     distances = np.linalg.norm(run.positions - other, axis=2)
     where = tuple(f"vertex {i}" for i in np.argmax(np.nan_to_num(distances), axis=1))
-    return (
+    found = (
         Measure("volume", "deviation", "%", distances.mean(axis=1) / 7),
         Measure("volume", "deviation_volume", "mm3", distances.mean(axis=1) * 700),
         Measure("fibre_length", "mean", "mm", -distances.mean(axis=1)),
@@ -100,6 +100,7 @@ def measured(run: Run, other: np.ndarray) -> tuple[Measure, ...]:
         Measure("surface_deviation", "max", "mm", distances.max(axis=1), where),
         Measure("surface_deviation", "hausdorff", "mm", distances.max(axis=1) / 2, where),
     )
+    return tuple(replace(one, numbers=run.numbers) for one in found)
 
 
 def a_run(name: str, solver: str, positions: np.ndarray, status: str = "converged", **more) -> Run:
@@ -134,7 +135,7 @@ def small_comparison(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Compari
         ),
         deviations={run.name: measured(run, moved) for run in (quick, torn)},
         changes={run.name: measured(run, rest.points) for run in (reference, quick, torn)},
-        extension_error=Measure("fibre_length", "extension_error", "mm", np.arange(5) / 8, ("fibre 1",) * 5),
+        extension_error=Measure("fibre_length", "extension_error", "mm", np.arange(5) / 8, ("fibre 1",) * 5, NUMBERS),
         verdicts=(Verdict("pass", scene.expect[0], 0.25, 0.0, 0.5, "%", 20),),
     )
 
@@ -156,4 +157,12 @@ def with_bars(comparison: Comparison) -> Comparison:
         for one in comparison.deviations["quick"]
         for known in [np.append(np.abs(one.values[:-1]) / 10, NAN)]
     ]
-    return replace(comparison, error_bars=ErrorBars(NUMBERS, (2.0, 4.0), 1.5, tuple(bars)))
+    known = ErrorBars(NUMBERS, (2.0, 4.0), 1.5, tuple(bars))
+    reference = comparison.changes | {"reference": _known(comparison.changes["reference"], known, "change")}
+    deviations = {name: _known(found, known, "deviation") for name, found in comparison.deviations.items()}
+    return replace(comparison, changes=reference, deviations=deviations, error_bars=known)
+
+
+def _known(measures: tuple[Measure, ...], bars: ErrorBars, of: Of) -> tuple[Measure, ...]:
+    found = [(one, bars.find(of, one.metric, one.statistic)) for one in measures]
+    return tuple(replace(one, error_bars=None if bar is None else bar.values) for one, bar in found)

@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 from fem_reference import report
-from fem_reference.metrics import Measure
-from fem_reference.report import comparison_page
 from fem_reference.runs.store import Outcome
 from fem_reference.scenes import casefile
 from tests.report.comparisons import NAN, NUMBERS, alone, ball, html, measured, with_bars

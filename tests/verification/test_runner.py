@@ -14,9 +14,10 @@ from typing import get_args
 
 import pytest
 
-from fem_reference import cli, report
+from fem_reference import cli
 from fem_reference.assessment.catalogue import Entry, Finding, Kind, order
 from fem_reference.foundations.errors import InputError, MissingSoftware
+from fem_reference.report import pages
 from fem_reference.runs.solved import Solved
 from fem_reference.runs.store import Outcome
 from fem_reference.verification import runner, truths
@@ -327,7 +328,7 @@ def test_a_page_that_cannot_be_written_leaves_what_was_measured_reported(verify,
         raise OSError("no space left")
 
     target = verify.folder / "facts.json"
-    monkeypatch.setattr(report, "write", full)
+    monkeypatch.setattr(pages, "write", full)
     status, printed, _ = verify("bars", "--json", str(target))
     assert status == cli.BAD_INPUT
     assert "no space left" in printed.err

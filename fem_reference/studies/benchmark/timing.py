@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-import fem_reference
 from fem_reference import solvers
 from fem_reference.effects import make
+from fem_reference.foundations import subprocesses
 from fem_reference.foundations.mesh import Floats, fingerprint
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, ByCell, Cells, Prescribed
@@ -118,7 +118,7 @@ def main(order: Path) -> None:
     RuntimeError where the package is not that below ``root``.
     """
     wanted = json.loads(order.read_text(encoding="utf-8"))
-    package = Path(fem_reference.__file__).resolve().parent
+    package = Path(subprocesses.__file__).resolve().parents[1]
     if package.parent != Path(wanted["root"]).resolve():
         raise RuntimeError(f"fem_reference is that of {package.parent}, not of {wanted['root']}")
     request = wanted["request"]
