@@ -1,6 +1,5 @@
 """A page of every kind, small: written from the same stand-ins as the tests of each kind."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -58,8 +57,7 @@ def write(folder: Path, comparison: Comparison, alone: Comparison) -> dict[str, 
         made_entries.made(name, 2.0 + i / 50, order=2.0, ladder=made_entries.LADDER)
         for i, name in enumerate(("bar", "rod", "a_name_that_is_long_enough_to_wrap"))
     ]
-    lost = replace(examples[0], changes=examples[0].changes | {"listing": ()})
-    comparisons = {"press": comparison, "press-reference": alone, "rod-page": lost}
+    comparisons = {"press": comparison, "press-reference": alone, "rod-page": examples[0]}
     verified, known = made_entries.verification(*entries), test_claims.whole("one", "other")
     pages = {
         "octave-examples": ("page", field_page.page("Octave examples", examples)),
