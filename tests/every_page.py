@@ -48,7 +48,6 @@ def write(folder: Path, comparison: Comparison, alone: Comparison) -> dict[str, 
     folder.mkdir(exist_ok=True)
     examples = (scalar_examples.rod(folder / "rod"), scalar_examples.plate(folder / "plate", lambda base: 3 * base))
     left_out = test_study_page.points("arap", 0.5, 9.0)
-    growth = test_study_page.growth("pbd", "iteration", (10, 100, 1000), (1e-4, 1e-2, 1.0))
     cases = tuple(test_study_page.study(case, *left_out) for case in ("hip", "knee", "jaw"))
     results = [
         test_table_5_1.solver_result(case, *values) for case, values in (("case0", (1.0, 4.0)), ("case1", (2.0, 3.0)))
@@ -62,7 +61,7 @@ def write(folder: Path, comparison: Comparison, alone: Comparison) -> dict[str, 
     pages = {
         "octave-examples": ("page", field_page.page("Octave examples", examples)),
         "verify": ("verify", verify_page.page(verified)),
-        "study": ("study", study_page.page(Study(cases, {"lost": "why"}, {"machine": "this one"}, (growth,)))),
+        "study": ("study", study_page.page(Study(cases, {"lost": "why"}, {"machine": "this one"}))),
         "table-5-1": ("page", ranking_page.page(test_table_5_1.table(*results))),
         "error-bars": ("page", claims_page.page(known)),
         "effects": ("effects", effects_page.page(test_effects_verb.found())),

@@ -11,6 +11,8 @@ from fem_reference.report.pages import Page
 from fem_reference.report.tables import finite
 from fem_reference.report.words import duration
 
+_HEADS = ("entry", "value", "truth", "unit", "error", "within", "order", "seconds", "verdict")
+
 
 def page(verification: Verification) -> Page:
     """The page of the results of entries."""
@@ -27,6 +29,25 @@ def page(verification: Verification) -> Page:
     said = (("", verification.word, passed),)
     title = "Verification: problems whose answers are known"
     return Page("verification", title, said, "verify_page.html", contents, facts(verification))
+
+
+def text(verification: Verification) -> str:
+    """One line for each result, in columns below their heads, and the verdict."""
+    rows = [_HEADS, *map(_cells, verification.results)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    sides = ["<" if head in ("entry", "unit", "verdict") else ">" for head in _HEADS]
+    layout = list(zip(sides, widths, strict=True))
+    lines = [
+        "  ".join(f"{cell:{side}{width}}" for cell, (side, width) in zip(row, layout, strict=True)) for row in rows
+    ]
+    return "\n".join([*(line.rstrip() for line in lines), verification.summary])
+
+
+def _cells(one: Result) -> tuple[str, ...]:
+    numbers = (f"{one.finding.value:.6g}", f"{one.truth:.6g}", one.entry.unit, f"{one.error:.2g}", f"{one.within:.2g}")
+    order = "" if one.finding.order is None else f"{one.finding.order:.2f}"
+    note = " (negative control)" if one.with_negative_control else ""
+    return (one.entry.name, *numbers, order, f"{one.seconds:.1f}", one.word + note)
 
 
 def facts(verification: Verification) -> dict[str, Any]:

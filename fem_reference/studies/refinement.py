@@ -154,9 +154,8 @@ def _pair(bench: Bench[MuscleCase], reference: Run, model: bool) -> Pair:
 
 
 def safety(bench: Bench[MuscleCase]) -> float:
-    """The factor of safety: that of a grid convergence index, and more where the tetrahedra, before they are refined, are larger than
-    the radius of the smallest attachment, by that ratio: nested tetrahedra share its polygon, and their difference does not show
-    what is wrong with that.
+    """Factor of safety: that of a grid convergence index, times the size of the unrefined tetrahedra over the radius of the
+    smallest attachment, where that is above 1. Nested tetrahedra share its polygon, and their difference does not show its error.
     """
     rest, radii = bench.setup(), [math.inf]
     for entry in rest.attached:

@@ -19,11 +19,9 @@ def text(found: Recommendation, limit: float = float("inf")) -> list[str]:
 
 def test_a_setting_that_was_measured_on_the_case_has_its_error_in_parts() -> None:
     found = Recommendation(ONE, None, 7, Margins(), ("hip",), measured=True)
-    assert text(found) == [
-        "pbd: sweeps = 8",
-        "surface deviation, rms at most 2 mm (1.50 mm measured, and 0.500 mm, the error bar of the truth), "
-        "250 ms a frame, measured on it",
-    ]
+    parts = "(1.50 mm measured, and 0.500 mm, the error bar of the truth)"
+    error = f"surface deviation, rms at most 2 mm {parts}, 250 ms a frame, measured on it"
+    assert text(found) == ["pbd: sweeps = 8", error]
     facts = json.loads(json.dumps(recommendation_texts.facts(found, NAME), allow_nan=False))
     assert (facts["recommended"], facts["error"], facts["bar"], facts["nearest"]) == (POINT.choice, 2.0, 0.5, None)
 
