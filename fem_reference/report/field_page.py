@@ -46,7 +46,7 @@ class Difference(Record):
 
 
 def page(title: str, examples: tuple[Comparison, ...]) -> Page:
-    """The page of scalar examples with the table of where the report's text and listings part."""
+    """The page of scalar examples with the table of differences between the report's text and listings."""
     words = [one.word for one in examples]
     said = (("", overall(words), f"{words.count('pass')} of {len(words)} pass"),)
     return Page("examples", title, said, "field_page.html", _contents(examples) | {"differences": read_differences()})
@@ -78,7 +78,7 @@ def _contents(examples: tuple[Comparison, ...]) -> dict[str, Any]:
 
 
 def read_differences() -> tuple[Difference, ...]:
-    """The places where the report's text and its listings part, in the order of section 4.6."""
+    """The differences between the report's text and its listings, in the order of section 4.6."""
     path = Path(__file__).with_name("octave_differences.toml")
     table = tomllib.loads(path.read_text(encoding="utf-8"))
     return tuple(parse(Difference, row, f"{path}: difference[{i}]") for i, row in enumerate(table["difference"]))
@@ -96,7 +96,7 @@ def apart(example: Comparison) -> str:
     distance = float(np.abs(other.vertex_values[-1] - reference.vertex_values[-1]).max())
     size = float(np.abs(reference.vertex_values[-1]).max())
     if distance <= AGREE * size:
-        return f"{name} and the equation agree; at the furthest vertex they part by {number(distance)}."
+        return f"{name} and the equation agree; at the furthest vertex they differ by {number(distance)}."
     (low, high), (least, greatest) = bounds(other), bounds(reference)
     compared = (
         f"{number(distance / size)} times as far as the equation's solution gets from zero"
@@ -105,7 +105,7 @@ def apart(example: Comparison) -> str:
     )
     return (
         f"{name} gives {number(low)} to {number(high)}, the equation {number(least)} to {number(greatest)}; "
-        f"at the furthest vertex they part by {number(distance)}, {compared}."
+        f"at the furthest vertex they differ by {number(distance)}, {compared}."
     )
 
 

@@ -73,7 +73,7 @@ def test_nothing_but_a_diverged_reference_has_a_page(tmp_path):
     read(text)
     assert "there is a reference alone" in text
     assert "No run has values that are numbers" in text
-    assert "What was expected" not in text
+    assert "Expectations" not in text
     assert "not a number" not in text[text.index("<h3>Runs") : text.index("<h3>Convergence")]
     bad = replace(alone, ladders=(replace(LADDERS[1], errors=(NAN, 0.0, NAN)),))
     assert field_figures.convergence(bad).missing
@@ -81,11 +81,11 @@ def test_nothing_but_a_diverged_reference_has_a_page(tmp_path):
 
 def test_the_first_sentence_says_how_far_listing_and_equation_part(tmp_path):
     same, other = rod(tmp_path / "rod"), plate(tmp_path / "plate", lambda base: 3 * base)
-    assert field_page.apart(same) == "the listing and the equation agree; at the furthest vertex they part by 0."
-    # The reference falls to -2 and the listing to 3 times that: they part by 4, twice as far as 2.
+    assert field_page.apart(same) == "the listing and the equation agree; at the furthest vertex they differ by 0."
+    # The reference falls to -2 and the listing to 3 times that: they differ by 4, twice as far as 2.
     minus = "\N{MINUS SIGN}"
     assert field_page.apart(other) == (
-        f"the listing gives {minus}6 to 0, the equation {minus}2 to 0; at the furthest vertex they part by 4, "
+        f"the listing gives {minus}6 to 0, the equation {minus}2 to 0; at the furthest vertex they differ by 4, "
         "2 times as far as the equation's solution gets from zero."
     )
 

@@ -176,7 +176,7 @@ def test_numbers_of_the_page_are_valid_json_with_every_point(tmp_path) -> None:
 def test_settings_are_tried_on_cases_that_they_were_not_chosen_on(tmp_path) -> None:
     whole = Study(tuple(study(case) for case in ("hip", "knee", "jaw")), {}, {"machine": "here"})
     text = report.write(study_page.page(whole), tmp_path, "study").read_text(encoding="utf-8")
-    assert "Are settings that are good on some cases good on another?" in text
+    assert "Do good settings carry over to other cases?" in text
     plain = re.sub(r"<[^>]+>|&#8239;", "", text)
     assert "with the best of the same settings: 0% in the median, 0% at most" in plain
     assert math.isclose(max(one.loss for one in study_page.transfers(whole.cases, "surface_deviation.rms")), 0.0)

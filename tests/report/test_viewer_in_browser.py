@@ -135,7 +135,7 @@ def test_the_worst_vertex_is_reported_and_has_the_colour_at_the_end_of_the_bar(o
 def test_what_the_reference_does_not_know_is_grey_and_said(browser, comparison, tmp_path):
     show(browser, with_bars(comparison, 2.5), tmp_path, "#frame=20")
     known = "document.getElementById('viewer-known').textContent"
-    assert browser.ask(known) == "Grey: below the reference's error bar of 2.5 mm nothing is known."
+    assert browser.ask(known) == "Grey: below the reference's error bar of 2.5 mm."
     assert browser.ask("document.getElementById('viewer-joint').textContent") == "plate 28.6°"
     below = browser.picture("#viewer-stage")  # quick is 2 mm off in this frame
     browser.ask("location.hash = '#frame=30'")
