@@ -17,7 +17,8 @@ from fem_reference.foundations.mesh import Floats, Ints, Polylines
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record, join
 from fem_reference.geometry.wrapping import Cylinder, Obstacle, Paths, Sphere, straight
-from fem_reference.problems.muscle import Problem, RigidBody
+from fem_reference.problems.muscle import Problem
+from fem_reference.problems.setup import RigidBody
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.scenes import bones
 from fem_reference.solvers.common.frame_loop import each

@@ -9,7 +9,7 @@ from fem_reference.effects.incompressible_penalty import IncompressiblePenalty
 from fem_reference.effects.neo_hooke import NeoHooke
 from fem_reference.foundations.mesh import diagonal
 from fem_reference.foundations.motion import apply
-from fem_reference.problems.muscle import Setup
+from fem_reference.problems.setup import Setup
 from fem_reference.scenes.muscle import MuscleCase
 
 

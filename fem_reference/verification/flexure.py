@@ -9,7 +9,7 @@ from fem_reference.assessment.catalogue import Entry, Lab, Ladder
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
-from fem_reference.runs.solved import Reached
+from fem_reference.runs.store import Frame
 from fem_reference.verification.parts import neo_hooke, sliding
 from fem_reference.verification.truths import find
 
@@ -35,7 +35,7 @@ class Bend:
         return moves
 
 
-def bent(lab: Lab, n: int, element: str, mu: float, faces: tuple[str, ...]) -> tuple[Floats, Reached]:
+def bent(lab: Lab, n: int, element: str, mu: float, faces: tuple[str, ...]) -> tuple[Floats, Frame]:
     """The half y >= 0 of the block in 2n by 2n by 1 cells: its nodes at rest (n, 3) [mm], and bent; its lateral ``faces`` stay in
     their planes, ``mu`` [MPa].
     """
