@@ -1,24 +1,26 @@
-"""Who solves the problem of ``peer_problem``: one file each, found by this folder; ``fenicsx`` is the reference of this project.
+"""Peers of the reference, one file each: who else solves the muscle of ``problem``; ``fenicsx`` is the reference of this project.
 
-Contract (tests/studies/benchmark/test_peers.py): ``PACKAGES`` are the distributions that it needs, ``TUNED`` says in words how it
-was made fast, ``OMITTED`` by element why it does not solve in that; ``opened()`` is a context that has all imported and started
-that is not the work itself, and gives ``Solve``.
+A peer states ``PACKAGES``, the distributions that it needs, ``TUNED``, how it was made fast, and ``OMITTED``, by element why it has
+no solution in that. Its ``opened()`` is a context in which all is imported and started that is not the work itself; it gives
+``Solve``.
 """
 
 import importlib
 import importlib.metadata
-import pkgutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from benchmarks.peers.problem import Muscle
 from fem_reference.foundations.mesh import Floats
-from fem_reference.studies.benchmark.peer_problem import Muscle
+
+OURS = "fenicsx"
+NAMES = (OURS, "felupe", "sfepy")
 
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """How a peer came through: ``converged`` or a ``message``, Newton ``iterations`` of all load steps, ``unknowns`` of its linear
+    """The end of a solution: ``converged`` or a ``message``, Newton ``iterations`` of all load steps, ``unknowns`` of its linear
     systems, and the final positions (n, 3) [mm] of the corners of the mesh's cells.
     """
 
@@ -30,12 +32,6 @@ class Solved:
 
 
 Solve = Callable[[Muscle], Solved]
-OURS = "fenicsx"
-
-
-def names() -> list[str]:
-    """All peers, the reference of this project first."""
-    return sorted((module.name for module in pkgutil.iter_modules(__path__)), key=lambda name: (name != OURS, name))
 
 
 def find(name: str) -> Any:
@@ -44,7 +40,7 @@ def find(name: str) -> Any:
 
 
 def missing(name: str) -> str | None:
-    """What has to be installed for a peer; None where it is there."""
+    """The packages that have to be installed for a peer, in a sentence; None where they are."""
     lacking = [package for package, version in versions(name).items() if version is None]
     return f"{', '.join(lacking)} not installed" if lacking else None
 

@@ -1,18 +1,20 @@
 """The problem that the reference and its peers solve: a fusiform muscle with fibres, nearly incompressible, bent and stretched."""
 
+import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from benchmarks import bodies
 from fem_reference.effects import make
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import Body, Cells, Prescribed
 from fem_reference.problems.paths import Rest
-from fem_reference.studies.benchmark import timing
 
 # Its upper end turns by ANGLE [rad] and its middle line becomes longer by STRETCH, in so many FRAMES: each is one load step.
 ANGLE, STRETCH, FRAMES = np.pi / 3, 0.1, 12
-# What ends Newton's iteration everywhere: the Euclidean norm of the nodal forces [N] that are out of balance.
+# What ends Newton's iteration everywhere: the Euclidean norm of the residual [N] of nodal forces.
 RESIDUAL = 1e-8
 # Degree of the polynomials that are integrated exactly on a cell: 8 points in a hexahedron, 4 in a tetrahedron.
 QUADRATURE = {"Q1/P0": 3, "P2/P0": 2, "P2/P1": 2}
@@ -30,8 +32,8 @@ class Bend:
         if share == 0:
             return np.zeros_like(points)
         x, y, z = points.T
-        radius = (1 + STRETCH * share) * timing.LENGTH / (ANGLE * share)
-        angle = ANGLE * share * z / timing.LENGTH
+        radius = (1 + STRETCH * share) * bodies.LENGTH / (ANGLE * share)
+        angle = ANGLE * share * z / bodies.LENGTH
         arms = radius - x
         return np.stack([radius - arms * np.cos(angle), y, arms * np.sin(angle)], axis=1) - points
 
@@ -63,12 +65,12 @@ class Muscle:
     def fixed(self, points: Floats) -> tuple[Ints, Ints]:
         """Which of ``points`` (n, 3), nodes at rest, are on the lower and on the upper end."""
         z = points[:, 2]
-        return np.flatnonzero(np.isclose(z, 0, atol=1e-9)), np.flatnonzero(np.isclose(z, timing.LENGTH, atol=1e-9))
+        return np.flatnonzero(np.isclose(z, 0, atol=1e-9)), np.flatnonzero(np.isclose(z, bodies.LENGTH, atol=1e-9))
 
 
 def muscle(element: str, rings: int, slices: int, frames: int = FRAMES) -> Muscle:
-    """The fusiform body of ``timing`` with other motion, its first ``frames`` load steps."""
-    body = timing.fusiform(element, rings, slices)
+    """The fusiform body of ``bodies`` with other motion, its first ``frames`` load steps."""
+    body = bodies.fusiform(element, rings, slices)
     ends = (
         Prescribed("bottom", "bottom", (0, 1, 2), Rest()),
         Prescribed("top", "top", (0, 1, 2), Bend()),
@@ -85,6 +87,12 @@ def tension(law: dict[str, float], stretch: Floats) -> tuple[Floats, Floats]:
     return c3 * (growing - 1) + c5 * beyond, slope
 
 
-def acting() -> str:
-    """What acts, for people."""
-    return ", ".join(make(name, **parameters).title for name, parameters in timing.EFFECTS.items())
+def facts() -> dict[str, Any]:
+    """The problem in numbers, and its effects in words."""
+    return {
+        "effects": ", ".join(make(name, **parameters).title for name, parameters in bodies.EFFECTS.items()),
+        "turned_degrees": round(math.degrees(ANGLE), 6),
+        "stretched_percent": 100 * STRETCH,
+        "load_steps": FRAMES,
+        "residual_N": RESIDUAL,
+    }

@@ -1,4 +1,4 @@
-"""How cost grows with the size of a problem: a power of it, by phase, with its uncertainty."""
+"""A power of the size fitted to costs, with its uncertainty."""
 
 import math
 from collections.abc import Sequence
@@ -7,31 +7,23 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import stdtrit
 
-from fem_reference.foundations.mesh import Floats
-
-# How sure an extrapolation is.
+# The probability with which an interval holds another measurement.
 CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
-class Growth:
-    """``cost`` of a ``solver`` over ``sizes`` (k,), unknowns, triangles or tets as ``counted`` says: ``values`` (k,), about
-    ``size^exponent``. ``uncertainty``: the standard error of the exponent.
-    """
+class PowerLaw:
+    """Costs over sizes, ``points`` (k, 2), about ``size^exponent``. ``uncertainty``: the standard error of the exponent."""
 
-    solver: str
-    cost: str
-    sizes: tuple[float, ...]
-    values: tuple[float, ...]
+    points: tuple[tuple[float, float], ...]
     exponent: float
     uncertainty: float
-    counted: str = "unknowns"
 
     def at(self, size: float) -> tuple[float, float, float]:
         """The cost expected at a ``size``, and its least and greatest value: the interval in which another measurement there would
         be found with ``CONFIDENCE``, if the power is the same that far.
         """
-        x, y = np.log(np.array(self.sizes)), np.log(np.array(self.values))
+        x, y = np.log(np.array(self.points)).T
         away = math.log(size) - float(x.mean())
         middle = float(y.mean()) + self.exponent * away
         rest = y - y.mean() - self.exponent * (x - x.mean())
@@ -40,36 +32,22 @@ class Growth:
         reach = float(stdtrit(len(x) - 2, (1 + CONFIDENCE) / 2)) * spread
         return _exp(middle), _exp(middle - reach), _exp(middle + reach)
 
-    @property
-    def decades(self) -> float:
-        """Over how many powers of ten of the size it was measured."""
-        return math.log10(max(self.sizes) / min(self.sizes))
 
-
-def growth(
-    solver: str, cost: str, sizes: Sequence[float], values: Sequence[float], counted: str = "unknowns"
-) -> Growth | None:
+def fit(sizes: Sequence[float], costs: Sequence[float]) -> PowerLaw | None:
     """A line through costs over sizes in logarithms, by least squares; None for fewer than three sizes whose costs are above zero.
 
-    >>> found = growth("pbd", "seconds", (10, 100, 1000), (1, 10, 100))
+    >>> found = fit((10, 100, 1000), (1, 10, 100))
     >>> round(found.exponent, 6), round(found.uncertainty, 6)
     (1.0, 0.0)
     """
-    known = [(size, value) for size, value in zip(sizes, values, strict=True) if value > 0 and math.isfinite(value)]
+    known = [(float(size), cost) for size, cost in zip(sizes, costs, strict=True) if 0 < cost < math.inf]
     if len({size for size, _ in known}) < 3:
         return None
     x, y = np.log(np.array(known)).T
-    exponent, error = _slope(x, y)
-    kept_sizes, kept_values = (tuple(map(float, column)) for column in zip(*known, strict=True))
-    return Growth(solver, cost, kept_sizes, kept_values, exponent, error, counted)
-
-
-def _slope(x: Floats, y: Floats) -> tuple[float, float]:
-    """Slope and its standard error of a line through points by least squares."""
     centred = x - x.mean()
     slope = float(centred @ y / (centred @ centred))
     rest = y - y.mean() - slope * centred
-    return slope, float(np.sqrt(rest @ rest / (len(x) - 2) / (centred @ centred)))
+    return PowerLaw(tuple(known), slope, math.sqrt(rest @ rest / (len(x) - 2) / (centred @ centred)))
 
 
 def _exp(x: float) -> float:

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
+from benchmarks.peers import Solve, Solved
+from benchmarks.peers.problem import QUADRATURE, RESIDUAL, Muscle
 from fem_reference.solvers import fenicsx
-from fem_reference.studies.benchmark.peer_problem import QUADRATURE, RESIDUAL, Muscle
-from fem_reference.studies.benchmark.peers import Solve, Solved
 
 PACKAGES = ("dolfinx-solver-real",)
 TUNED = (

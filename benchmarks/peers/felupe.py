@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.peers import Solve, Solved
+from benchmarks.peers.problem import RESIDUAL, Muscle, tension
 from fem_reference.foundations.mesh import Floats
-from fem_reference.studies.benchmark.peer_problem import RESIDUAL, Muscle, tension
-from fem_reference.studies.benchmark.peers import Solve, Solved
 
 PACKAGES = ("felupe", "pypardiso")
 TUNED = (

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks import bodies
+from benchmarks.peers import Solve, Solved
+from benchmarks.peers.problem import QUADRATURE, RESIDUAL, Bend, Muscle, tension
 from fem_reference.foundations.mesh import Floats
-from fem_reference.studies.benchmark import timing
-from fem_reference.studies.benchmark.peer_problem import QUADRATURE, RESIDUAL, Bend, Muscle, tension
-from fem_reference.studies.benchmark.peers import Solve, Solved
 
 PACKAGES = ("sfepy", "pypardiso")
 TUNED = (
@@ -109,7 +109,7 @@ def _problem(muscle: Muscle) -> tuple[Any, Any]:
     domain = FEDomain("domain", made)
     omega = domain.create_region("Omega", "all")
     bottom = domain.create_region("Bottom", "vertices in (z < 0.001)", "facet")
-    top = domain.create_region("Top", f"vertices in (z > {timing.LENGTH - 0.001:.3f})", "facet")
+    top = domain.create_region("Top", f"vertices in (z > {bodies.LENGTH - 0.001:.3f})", "facet")
     of_u = Field.from_args("of_u", np.float64, "vector", omega, approx_order=order)
     of_p = Field.from_args("of_p", np.float64, "scalar", omega, approx_order=int(muscle.element[-1]))
     u, v = FieldVariable("u", "unknown", of_u), FieldVariable("v", "test", of_u, primary_var_name="u")
