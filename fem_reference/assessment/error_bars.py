@@ -28,13 +28,13 @@ FORMAT = 2
 # Of a grid convergence index (Roache 1998, Verification and Validation in Computational Science, ch. 5).
 SAFETY = 1.25
 # Longer by this for one fibre alone, of the few that there are: nothing averages there, and a pair of sizes says less than three do
-# (Roache takes 3 for a pair). Chosen so that bars cover the differences from finer solutions (docs/accuracy.md).
+# (Roache takes 3 for a pair). Chosen so that bars cover the differences from finer solutions (docs/error_bars.md).
 LONE_FIBRE = 1.2
 # What is left of an error of first order, when halving its cause changes the result by 1.
 VARIATION = 2.0
 # Of which order in the size of tetrahedra an error is: in general, and of the worst place alone. From rims of attachments, where
 # displacement goes with the root of the distance, order 1 comes, and 2 only where a mesh that resolves them is graded towards them;
-# from elsewhere 2 or more: in general it is between, as three sizes in a row show too (docs/accuracy.md).
+# from elsewhere 2 or more: in general it is between, as three sizes in a row show too (docs/error_bars.md).
 ORDER, ORDER_OF_WORST = 1.5, 1.0
 TETRAHEDRA, CARRIED = "tetrahedra", "surface in tetrahedra"
 # The measures of a run against another or (None) its rest.

@@ -44,7 +44,7 @@ def test_every_status_of_a_run_is_in_the_table() -> None:
 
 
 def test_every_effect_of_a_muscle_is_in_the_table() -> None:
-    text = pages.page("docs/laws.md")
+    text = pages.page("docs/effects.md")
     table = text[text.index("| effect |") :].split("\n\n")[0]
     first = "".join(row.split("|")[1] for row in table.splitlines())
     assert sorted(re.findall(r"`(\w+)`", first)) == effects.names()
