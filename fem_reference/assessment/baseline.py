@@ -10,11 +10,12 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from fem_reference import __version__, metrics
+from fem_reference import metrics
 from fem_reference.assessment.measured import CurrentMeasures, sample
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import Record, parse
+from fem_reference.foundations.version import __version__
 from fem_reference.io import files, texts
 from fem_reference.metrics import Measure
 from fem_reference.scenes.muscle import MuscleCase

@@ -7,7 +7,6 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from fem_reference import __version__
 from fem_reference.assessment import judge
 from fem_reference.assessment.baseline import PLACES, POSITION_ROUNDING, Baseline, Positions, Stored
 from fem_reference.assessment.doubts import doubts
@@ -15,6 +14,7 @@ from fem_reference.assessment.judge import Word
 from fem_reference.assessment.measured import CurrentMeasures
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.version import __version__
 
 Question = Literal["unchanged", "within"]
 MOVED = "positions.moved"

@@ -7,7 +7,7 @@ from fem_reference.assessment.comparison import alone
 from fem_reference.assessment.judge import check
 from fem_reference.cli._choosing import refuse_error_bar, scene_of
 from fem_reference.cli._judging import judge, unturned
-from fem_reference.cli._parser import add_case, add_error_bar, add_name, add_negative_control, add_ranks
+from fem_reference.cli._parser import share
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.problems import of_case
@@ -20,12 +20,9 @@ HELP = "solve a case and judge what it expects of the reference"
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
-    add_case(parser)
+    share(parser, "case", "--set")
     parser.add_argument("--solver", metavar="NAME", help="another solver than the case's own reference")
-    add_error_bar(parser)
-    add_ranks(parser)
-    add_negative_control(parser)
-    add_name(parser)
+    share(parser, "--error-bar", "--ranks", "--negative-control", "--name")
     explain = "say of each effect whether the case needs it and why, and solve nothing"
     parser.add_argument("--explain", action="store_true", help=explain)
 

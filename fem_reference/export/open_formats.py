@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference import __version__
 from fem_reference.effects import Effect
 from fem_reference.foundations.mesh import Floats, Polylines
+from fem_reference.foundations.version import __version__
 from fem_reference.geometry.embedding import embed
 from fem_reference.io import files
 from fem_reference.problems.muscle import Problem

@@ -20,7 +20,7 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.embedding import embed
 from fem_reference.io import files
-from fem_reference.io.blocks import Block, Tree
+from fem_reference.io.formats.vtk import Block, Tree
 from fem_reference.metrics import MeasurementContext
 from fem_reference.problems.contact import Contact
 from fem_reference.runs import results, states

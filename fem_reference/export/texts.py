@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from string import Template
 
-from fem_reference import __version__
+from fem_reference.foundations.version import __version__
 from fem_reference.scenes.muscle import MuscleCase
 
 _FEBIO_FILES = """\

@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference import __version__, solvers
+from fem_reference import solvers
 from fem_reference.assessment import second_check
 from fem_reference.foundations.records import Record, join
 from fem_reference.foundations.usage import forget_peak_memory, peak_memory
+from fem_reference.foundations.version import __version__
 from fem_reference.problems import of_case
 from fem_reference.problems.muscle import Problem, Setup
 from fem_reference.problems.scalar import FieldProblem
@@ -155,7 +156,7 @@ class Bench[C: Case]:
     def read(self, name: str, choice: SolverChoice, place: str) -> Run:
         """The run that somebody recorded, checked against the setup of the scene; it is read each time and not stored."""
         settings, frames, rest = self.settings(choice, place), list[Frame](), self.setup()
-        assert isinstance(settings, recorded.Settings)
+        assert isinstance(settings, recorded.RecordedSettings)
         outcome = recorded.solve(rest, settings, frames.append)
         positions = np.stack([frame.surface for frame in frames if frame.surface is not None])
         numbers = tuple(frame.number for frame in frames)

@@ -15,7 +15,7 @@ import reference_pages
 
 import fem_reference as fr
 from fem_reference import effects, metrics, solvers
-from fem_reference.cli._parser import parser
+from fem_reference.cli import parser
 from fem_reference.foundations.records import keys, parse
 from fem_reference.runs.contents import Status
 from fem_reference.scenes import casefile
