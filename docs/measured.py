@@ -140,14 +140,44 @@ def _reference() -> str:
     return table("hip_flexion", ("unknowns", "load steps", "Newton iterations", "processor time, s"), [row])
 
 
+def _omissions(found: dict[str, Any]) -> Any:
+    statistics = ("surface_deviation.rms", "fibre_length.rms_percent", "volume.deviation")
+    rows = []
+    for solver in found["ablations"]:
+        costs = solver["whole"]["costs"]
+        clock = "seconds_processor_solve" if solver["name"] == "reference" else "seconds_processor"
+        for one in solver["omissions"]:
+            share = one["costs"][clock] / costs[clock] if one["status"] == "converged" else None
+            changes = [one["changes"].get(name) for name in statistics]
+            rows.append({"of": solver["name"], "left_out": one["left_out"], "status": one["status"]})
+            rows[-1] |= {"changes": changes, "time": share, "verdict": one.get("verdict", "")}
+    return rows
+
+
+def _omission_rows() -> str:
+    rows = []
+    for one in kept("effects")["measured"]:
+        of = "" if one["of"] == "reference" else f"`{one['of']}`: "
+        name = of + ", ".join(f"`{effect}`" for effect in one["left_out"])
+        changes = [
+            "" if value is None else f"{number(value, 2)} {unit}"
+            for value, unit in zip(one["changes"], ("mm", "%", "%"), strict=True)
+        ]
+        time = "" if one["time"] is None else f"{100 * one['time']:.0f} %"
+        rows.append((name, *changes, time, one["verdict"] or one["status"]))
+    return table("effects", ("left out", "surface, rms", "fibre length, rms", "volume", "time", ""), rows)
+
+
 MEASUREMENTS = {
     "verify": Measurement("verify", _verify),
     "hip_flexion": Measurement("compare hip_flexion", _comparison),
+    "effects": Measurement("effects hip_flexion --set muscle.refinements=0", _omissions),
 }
 TABLES = {
     "verify_groups": _verify_groups,
     "hip_flexion_worst": _comparison_worst,
     "hip_flexion_reference": _reference,
+    "effects_hip_flexion": _omission_rows,
 }
 
 

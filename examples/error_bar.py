@@ -16,4 +16,6 @@ bar = bars.find("deviation", "surface_deviation", "rms")
 assert bar is not None
 for number, value, known in zip(reference.numbers, deviation.values, bar.values, strict=True):
     print(f"frame {number}: {value:.3f} mm, known to {known:.3f} mm")
-print("bar over deviation in the worst frame:", bar.values[deviation.worst] / deviation.values[deviation.worst])
+worst = deviation.worst
+assert worst.error_bar is not None
+print("bar over deviation in the worst frame:", worst.error_bar / worst.value)

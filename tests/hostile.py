@@ -310,7 +310,7 @@ def _make_series(data_format: str) -> Callable[[Path], None]:
 def read_sequence(folder: Path) -> None:
     """A candidate; where it is read, only what is where it was passes its baseline."""
     taken: list[Frame] = []
-    settings = parse(recorded.Settings, {"folder": str(folder), "unit": "mm"}, "case.toml")
+    settings = parse(recorded.RecordedSettings, {"folder": str(folder), "unit": "mm"}, "case.toml")
     recorded.choice(folder)
     recorded.solve(SETUP, settings, taken.append)
     candidate = run("mine", [frame.surface for frame in taken])
@@ -365,7 +365,7 @@ def read_run(folder: Path) -> None:
     store.finished(folder / "run")
     found = store.load(folder / "run")
     found._repr_html_()
-    recorded.solve(SETUP, recorded.Settings(folder=str(folder / "run"), unit="mm"), lambda _frame: None)
+    recorded.solve(SETUP, recorded.RecordedSettings(folder=str(folder / "run"), unit="mm"), lambda _frame: None)
     mesh, fibre = states.read_rest(folder / "run")
     known = results.Results(mesh, (), states.Stored(folder / "run", found.numbers), fibre)
     for number in found.numbers:

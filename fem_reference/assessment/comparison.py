@@ -1,30 +1,20 @@
 """A reference and its candidates, measured and judged: what reports are written from."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from fem_reference.assessment.convergence import Ladder
+from fem_reference.assessment.doubts import doubts
 from fem_reference.assessment.error_bars import ErrorBars, Of
-from fem_reference.assessment.judge import Verdict, Word, overall, resolved, verdict
+from fem_reference.assessment.judge import Verdict, Word, doubted, overall, resolved, verdict
 from fem_reference.assessment.ranking import Ranking, rankings
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.markup import table
-from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import join
-from fem_reference.metrics import Context, Measure, at_rest, context_of, find, measure, names
+from fem_reference.metrics import Context, Measure, at_rest, context_of, described, find, measure, names
 from fem_reference.metrics.fibre_length import extension_error
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case, Expectation
-
-# What a notebook shows of a candidate; the page has it all.
-_SHOWN = (
-    ("volume", "deviation"),
-    ("fibre_length", "rms_percent"),
-    ("surface_deviation", "rms"),
-    ("surface_deviation", "max"),
-    ("difference", "max"),
-    ("l2_error", "norm"),
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,17 +57,14 @@ class Comparison:
     def _repr_html_(self) -> str:
         """What notebooks show: the greatest deviation of each candidate, with its frame and its error bar."""
         rows = [
-            (name, f"{one.metric}.{one.statistic}", f"{one.values[one.worst]:.4g} {one.unit}", self._known(one), number)
+            (name, f"{one.metric}.{one.statistic}", f"{it.value:.4g} {it.unit}", known, it.frame)
             for name, measures in self.deviations.items()
             for one in measures
-            if (one.metric, one.statistic) in _SHOWN
-            for number in [self.reference.numbers[one.worst]]
+            if (one.metric, one.statistic) in described("main")
+            for it in [one.worst]
+            for known in ["" if it.error_bar is None else f"± {it.error_bar:.2g} {it.unit}"]
         ]
         return table(f"{self.scene.name}: {self.word}", ("candidate", "measure", "greatest", "known to", "frame"), rows)
-
-    def _known(self, one: Measure) -> str:
-        bar = self.error_bars and self.error_bars.find("deviation", one.metric, one.statistic)
-        return f"± {bar.values[one.worst]:.2g} {one.unit}" if bar else ""
 
     @property
     def rankings(self) -> tuple[Ranking, ...]:
@@ -85,11 +72,23 @@ class Comparison:
         return rankings(self.deviations, self.error_bars.of_deviations) if self.error_bars else ()
 
     @property
+    def doubts(self) -> list[str]:
+        """Reasons to doubt the reference, in words."""
+        return doubts(self.reference)
+
+    @property
     def word(self) -> Word:
         """The verdict of the case: none that rests on a reference which was denied."""
-        return (
-            "fail" if self.reference.outcome.status == "denied" else overall(verdict.word for verdict in self.verdicts)
-        )
+        if self.reference.outcome.status == "denied":
+            return "fail"
+        return doubted(overall(one.word for one in self.verdicts), self.doubts)
+
+    def word_of(self, name: str) -> Word:
+        """The verdict on a run by its name; the reference fails where it did not converge, whatever of it was met."""
+        found = overall(one.word for one in self.verdicts if one.expectation.of == name)
+        if name != "reference":
+            return found
+        return doubted(found, self.doubts) if self.reference.outcome.status == "converged" else "fail"
 
 
 def compare(
@@ -111,17 +110,15 @@ def compare(
     """
     context, runs = context_of(setup, reference), (reference, *candidates)
     candidate, alone = names(scene.standards("candidates")), names(scene.standards("reference"))
-    deviations = {run.name: measure(run, reference, context, candidate) for run in candidates}
+    deviations = {
+        run.name: _with_bars(measure(run, reference, context, candidate), "deviation", error_bars) for run in candidates
+    }
     changes = {run.name: measure(run, at_rest(run), context, alone) for run in runs}
+    changes["reference"] = _with_bars(changes["reference"], "change", error_bars)
     measured = {"reference": changes["reference"]} | deviations
     _check_expected(scene, measured)
     verdicts = tuple(
-        verdict(
-            expectation.model_copy(update={"of": name}),
-            measured[name],
-            reference.numbers,
-            _bars(error_bars, expectation),
-        )
+        verdict(expectation.model_copy(update={"of": name}), measured[name], reference.numbers)
         for expectation in map(resolved, scene.expect)
         for name in (deviations if expectation.of == "candidates" else [expectation.of])
         if _is_measured(expectation, measured.get(name, ()))
@@ -134,15 +131,24 @@ def compare(
     return Comparison(scene, setup, reference, candidates, context, deviations, changes, error, verdicts, error_bars)
 
 
-def alone(scene: Case, setup: Any, run: Run) -> tuple[tuple[Measure, ...], tuple[Verdict, ...]]:
-    """What can be measured and judged of a ``run`` without a reference: of a muscle nothing, whose measures all take their
-    context from one.
+class Alone(NamedTuple):
+    """A run that nothing was compared with: its ``measures``, the ``verdicts`` on them and their ``word``."""
+
+    measures: tuple[Measure, ...]
+    verdicts: tuple[Verdict, ...]
+    word: Word
+
+
+def alone(scene: Case, setup: Any, run: Run) -> Alone:
+    """The measures and verdicts of a ``run`` without a reference: of a muscle none, whose measures all take their context from
+    one.
     """
     if "reference" in scene.standards("reference"):
-        return (), ()
+        return Alone((), (), "not judged")
     measures = measure(run, run, context_of(setup, run), names(scene.standards("reference")))
     expected = [one for one in map(resolved, scene.expect) if one.of == run.name and _is_measured(one, measures)]
-    return measures, tuple(verdict(one, measures, run.numbers) for one in expected)
+    verdicts = tuple(verdict(one, measures, run.numbers) for one in expected)
+    return Alone(measures, verdicts, doubted(overall(one.word for one in verdicts), doubts(run)))
 
 
 def _check_expected(scene: Case, measured: dict[str, tuple[Measure, ...]]) -> None:
@@ -158,8 +164,9 @@ def _is_measured(expectation: Expectation, measures: tuple[Measure, ...]) -> boo
     return find(measures, expectation.metric, str(expectation.statistic)) is not None
 
 
-def _bars(error_bars: ErrorBars | None, expectation: Expectation) -> Floats | None:
-    """The error bars (f,) of what is expected; None without any of it."""
-    of: Of = "change" if expectation.of == "reference" else "deviation"
-    found = None if error_bars is None else error_bars.find(of, expectation.metric, str(expectation.statistic))
-    return None if found is None else found.values
+def _with_bars(measures: tuple[Measure, ...], of: Of, error_bars: ErrorBars | None) -> tuple[Measure, ...]:
+    """The ``measures``, each with its error bars, as far as there are some."""
+    if error_bars is None:
+        return measures
+    known = [(one, error_bars.find(of, one.metric, one.statistic)) for one in measures]
+    return tuple(one if bar is None else replace(one, error_bars=bar.values) for one, bar in known)

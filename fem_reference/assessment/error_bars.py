@@ -19,7 +19,7 @@ from fem_reference.assessment.differences import carried, typical, typical_chang
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.io import files, texts
-from fem_reference.metrics import Measure, MeasurementContext, change, measure, names, of_itself
+from fem_reference.metrics import Measure, MeasurementContext, change, described, measure, names, of_itself
 from fem_reference.runs.store import Run
 
 Of = Literal["change", "deviation"]
@@ -28,17 +28,14 @@ FORMAT = 2
 # Of a grid convergence index (Roache 1998, Verification and Validation in Computational Science, ch. 5).
 SAFETY = 1.25
 # Longer by this for one fibre alone, of the few that there are: nothing averages there, and a pair of sizes says less than three do
-# (Roache takes 3 for a pair). Chosen so that bars cover the differences from finer solutions (docs/accuracy.md).
+# (Roache takes 3 for a pair). Chosen so that bars cover the differences from finer solutions (docs/error_bars.md).
 LONE_FIBRE = 1.2
 # What is left of an error of first order, when halving its cause changes the result by 1.
 VARIATION = 2.0
 # Of which order in the size of tetrahedra an error is: in general, and of the worst place alone. From rims of attachments, where
 # displacement goes with the root of the distance, order 1 comes, and 2 only where a mesh that resolves them is graded towards them;
-# from elsewhere 2 or more: in general it is between, as three sizes in a row show too (docs/accuracy.md).
+# from elsewhere 2 or more: in general it is between, as three sizes in a row show too (docs/error_bars.md).
 ORDER, ORDER_OF_WORST = 1.5, 1.0
-# Metrics that say as little of what is left as the worst place does: the volume is nearly kept, and fibres are few lines that end
-# at rims, so that one of them may be most of their mean square.
-_OF_WORST = ("volume", "fibre_length")
 TETRAHEDRA, CARRIED = "tetrahedra", "surface in tetrahedra"
 # The measures of a run against another or (None) its rest.
 _Measured = Callable[[Run, Run | None], tuple[Measure, ...]]
@@ -65,7 +62,7 @@ class ErrorBar:
     model: Floats | None = None
 
     @property
-    def worst(self) -> int:
+    def widest(self) -> int:
         """Index of the frame with the greatest bar; one that is not known counts as greatest of all."""
         return int(np.argmax(np.where(np.isnan(self.values), np.inf, self.values)))
 
@@ -111,8 +108,9 @@ class Pair:
 
     def share(self, metric: str, statistic: str) -> float:
         """The error of the fine run over what the two differ by, with the safety of a grid convergence index."""
-        order = ORDER_OF_WORST if metric in _OF_WORST or is_local(statistic) else ORDER
-        safety = self.safety * (LONE_FIBRE if metric == "fibre_length" and is_local(statistic) else 1.0)
+        stated = described()[metric, statistic]
+        order = ORDER_OF_WORST if stated.local else ORDER
+        safety = self.safety * (LONE_FIBRE if stated.lone else 1.0)
         return float(safety / ((self.sizes[1] / self.sizes[0]) ** order - 1))
 
 
@@ -150,11 +148,6 @@ def error_bars(pair: Pair, context: MeasurementContext) -> ErrorBars:
             total = np.sqrt(np.sum([part**2 for part in parts.values()], axis=0))  # of causes that are independent
             bars.append(ErrorBar(of, one.metric, one.statistic, one.unit, total, greatest, model))
     return ErrorBars(pair.fine.numbers, pair.sizes, ORDER, tuple(bars))
-
-
-def is_local(statistic: str) -> bool:
-    """Whether a ``statistic`` is that of the worst place, or of the worst fibre, alone."""
-    return statistic.startswith(("max", "hausdorff"))
 
 
 def _sizes(differences: _Differences, statistics: tuple[Measure, ...], moved: Floats | None = None) -> _Differences:

@@ -1,18 +1,19 @@
-"""measure + truth + tolerance -> pass, fail or inconclusive."""
+"""The judge: measure, truth and tolerance give pass, fail or inconclusive; doubts about the reference make a pass doubtful."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from typing import Literal
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import join
 from fem_reference.foundations.units import quantity
 from fem_reference.metrics import Measure, units
 from fem_reference.scenes.case import Case, Expectation
 
-Word = Literal["pass", "fail", "inconclusive", "not judged"]
+Word = Literal["pass", "doubtful pass", "fail", "inconclusive", "not judged"]
+# What is expected is met: commands end with 0, as they do where nothing is judged or known well enough.
+MET: tuple[Word, ...] = ("pass", "doubtful pass")
 _KINDS = {
     "mm": ("a length", 1.0),
     "%": ("a fraction", 100.0),
@@ -61,10 +62,15 @@ def judge(value: float, truth: float, within: float, error_bar: float = 0.0) -> 
 
 
 def overall(words: Iterable[Word]) -> Word:
-    """Fail if one fails, else inconclusive if one is, else pass; not judged where there is none."""
+    """Fail if one fails, else inconclusive if one is, else a doubtful pass if one is, else pass; not judged where there is none."""
     found = set(words)
-    order: tuple[Word, ...] = ("fail", "inconclusive", "pass")
+    order: tuple[Word, ...] = ("fail", "inconclusive", "doubtful pass", "pass")
     return next((word for word in order if word in found), "not judged")
+
+
+def doubted(word: Word, doubts: Collection[str]) -> Word:
+    """A verdict that rests on a reference, of which there may be ``doubts``: a pass is a doubtful one then."""
+    return "doubtful pass" if word == "pass" and doubts else word
 
 
 def check(scene: Case) -> None:
@@ -101,14 +107,11 @@ def resolved(expectation: Expectation) -> Expectation:
     return expectation.model_copy(update={"statistic": names[0]})
 
 
-def verdict(
-    expectation: Expectation, measures: Iterable[Measure], numbers: tuple[int, ...], bars: Floats | None = None
-) -> Verdict:
-    """The verdict on a checked ``expectation`` from the measures of the run that it is of, over frame ``numbers``; ``bars`` (f,)
-    are the reference's error bars of what it expects, None without any.
-    """
+def verdict(expectation: Expectation, measures: Iterable[Measure], numbers: tuple[int, ...]) -> Verdict:
+    """The verdict on a checked ``expectation`` from the measures of the run that it is of, over frame ``numbers``."""
     name = (expectation.metric, expectation.statistic)
     found = next(measure for measure in measures if (measure.metric, measure.statistic) == name)
+    bars = found.error_bars
     truth, within = (in_unit(text, found.unit) for text in (expectation.truth, expectation.within))
     frames = range(len(numbers)) if expectation.frame == "any" else [numbers.index(expectation.frame)]
     values = [float(found.values[frame]) for frame in frames]

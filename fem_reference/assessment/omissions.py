@@ -5,9 +5,11 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
+from fem_reference.metrics import described, metric
+
 FORMAT = 1
 # What is measured of a run with something left out, against the same solver with all of it.
-MEASURES = ("volume.deviation", "fibre_length.rms_percent", "surface_deviation.rms", "surface_deviation.max")
+MEASURES = tuple(".".join(key) for key in described("main") if metric(key[0]).OF != "field")
 # Where all changes are below this share of the error bar, an omission does not matter.
 NEGLIGIBLE = 0.1
 # Parts of the time of solving that runs may know apart, and what runs call them; the whole of it is a little more.

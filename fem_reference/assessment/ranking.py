@@ -4,14 +4,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from fem_reference.metrics import Measure, find
-
-# What solvers are ranked by: metric, statistic, words.
-RANKED = (
-    ("surface_deviation", "rms", "Surface, rms"),
-    ("fibre_length", "rms_percent", "Fibre length, rms"),
-    ("volume", "deviation", "Volume"),
-)
+from fem_reference.metrics import Measure, described, find
 
 
 @dataclass(frozen=True)
@@ -83,22 +76,22 @@ def _less(one: Deviation, other: Deviation) -> bool:
 
 
 def rankings(measured: dict[str, tuple[Measure, ...]], bars: Iterable[Measure]) -> tuple[Ranking, ...]:
-    """By each statistic of ``RANKED``, those of ``measured`` (measures against the reference by name) that have it; ``bars``: the
-    error bars of deviations; a statistic without one is left out.
+    """The ranking by each statistic that solvers are ranked by, of those of ``measured`` (measures against the reference by name)
+    that have it; ``bars``: the error bars of deviations; a statistic without one is left out.
     """
     known, found = tuple(bars), []
-    for metric, statistic, title in RANKED:
-        bar = find(known, metric, statistic)
-        measures = {name: find(all_of, metric, statistic) for name, all_of in measured.items()}
+    for key, stated in described("rank").items():
+        bar = find(known, *key)
+        measures = {name: find(all_of, *key) for name, all_of in measured.items()}
         if bar is None:
             continue
         places = ranked(
-            Deviation(name, abs(float(one.values[one.worst])), float(bar.values[one.worst]))
+            Deviation(name, abs(one.worst.value), float(bar.values[one.worst.index]))
             for name, one in measures.items()
             if one is not None
         )
         if len(places) > 1:
-            found.append(Ranking(title, bar.unit, places))
+            found.append(Ranking(stated.label, bar.unit, places))
     return tuple(found)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from fem_reference.assessment import judge
 from fem_reference.assessment.baseline import PLACES, POSITION_ROUNDING, Baseline, Positions, Stored
+from fem_reference.assessment.doubts import doubts
 from fem_reference.assessment.judge import Word
 from fem_reference.assessment.measured import CurrentMeasures
 from fem_reference.foundations.errors import InputError
@@ -86,17 +87,18 @@ class Judgement:
 
 @dataclass(frozen=True)
 class Check:
-    """All judgements on a ``candidate``, the worst first, and ``notes`` on how to read them."""
+    """All judgements on a ``candidate``, the worst first, ``notes`` on how to read them, and ``doubts`` about the reference."""
 
     case: str
     candidate: str
     judgements: tuple[Judgement, ...]
     notes: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
 
     @property
     def word(self) -> Word:
-        """Fail if one fails, else inconclusive if one is, else pass."""
-        return judge.overall(one.word for one in self.judgements)
+        """The verdict of all: a pass is doubtful where the reference is."""
+        return judge.doubted(judge.overall(one.word for one in self.judgements), self.doubts)
 
     def answer(self, question: Question) -> Word:
         """The verdict on one question."""
@@ -122,7 +124,8 @@ def check(baseline: Baseline, current: CurrentMeasures) -> Check:
             one.name,
         )
     )
-    return Check(current.scene.name, current.candidate.name, tuple(found), tuple(_notes(baseline, current, found)))
+    notes = tuple(_notes(baseline, current, found))
+    return Check(current.scene.name, current.candidate.name, tuple(found), notes, tuple(doubts(current.reference)))
 
 
 class _Frames(NamedTuple):

@@ -89,7 +89,7 @@ class SolverResult:
     def worst(self, metric: str, statistic: str) -> tuple[float, int] | None:
         """The value of the greatest magnitude over the frames, not-a-number where one frame is, and its frame; None without."""
         found = find(self.measures, metric, statistic)
-        return None if found is None else (float(found.values[found.worst]), self.numbers[found.worst])
+        return None if found is None else (found.worst.value, self.numbers[found.worst.index])
 
 
 @dataclass(frozen=True, eq=False)

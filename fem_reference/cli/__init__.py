@@ -9,21 +9,34 @@ import sys
 import traceback
 from pathlib import Path
 
-from fem_reference.cli._parser import parser
+from fem_reference.cli._parser import names, parser, verb
 from fem_reference.cli._printing import (
     BAD_INPUT,
     BROKEN,
     DONE,
     INTERRUPTED,
-    LONGEST,
     SOLVER_FAILED,
     TERMINATED,
     VERDICT_FAIL,
     out,
 )
 from fem_reference.foundations.errors import InputError, MissingSoftware
+from fem_reference.report.asked import LONGEST
 
-__all__ = ["BAD_INPUT", "BROKEN", "DONE", "INTERRUPTED", "SOLVER_FAILED", "TERMINATED", "VERDICT_FAIL", "entry", "main"]
+__all__ = [
+    "BAD_INPUT",
+    "BROKEN",
+    "DONE",
+    "INTERRUPTED",
+    "SOLVER_FAILED",
+    "TERMINATED",
+    "VERDICT_FAIL",
+    "entry",
+    "main",
+    "names",
+    "parser",
+    "verb",
+]
 
 
 TRACEBACK_SETTING = "FEM_REFERENCE_TRACEBACK"

@@ -8,10 +8,11 @@ from fem_reference.assessment import baseline, versions
 from fem_reference.assessment.measured import CurrentMeasures
 from fem_reference.assessment.versions import Versions
 from fem_reference.cli._choosing import check_names, checked_bench
-from fem_reference.cli._pages import Asked, Part, candidates, case_part, changes, written
+from fem_reference.cli._pages import candidates, case_part, changes, written
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import against_page
+from fem_reference.report.asked import Asked, Part
 from fem_reference.runs.complete import complete
 from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile

@@ -4,8 +4,9 @@ import argparse
 
 from fem_reference import report
 from fem_reference.cli._choosing import check_names, checked_bench, refuse_error_bar
-from fem_reference.cli._pages import Asked, Part, candidates, case_part, changes, written
+from fem_reference.cli._pages import candidates, case_part, changes, written
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, write_output
+from fem_reference.report.asked import Asked, Part
 from fem_reference.report.overview import comparison_text
 from fem_reference.scenes.case import Candidate, Case
 from fem_reference.solvers import fenicsx

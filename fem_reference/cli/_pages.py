@@ -1,58 +1,13 @@
-"""Pages that commands write: their names, which hold what makes each different, and the index of them."""
+"""Pages of the command line: the parts of a command that determine them, and where they are written."""
 
 import argparse
-import hashlib
-import re
-import shlex
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from pathlib import Path
 
-from fem_reference.cli._printing import LONGEST, out
-from fem_reference.report import index_page, pages
+from fem_reference.cli._printing import out
+from fem_reference.report import asked
+from fem_reference.report.asked import Asked, Part
 from fem_reference.scenes.case import HOME, Candidate, Case
-
-
-@dataclass(frozen=True)
-class Part:
-    """Words of a command line that determine what it computes, and what they add to the default name of its page."""
-
-    words: tuple[str, ...]
-    name: str = ""
-
-
-@dataclass(frozen=True)
-class Asked:
-    """A page as it is asked for: the ``verb``, the ``base`` of its default name, what determines it, and the name in its folder,
-    empty where it has no folder of its own.
-    """
-
-    verb: str
-    base: str
-    parts: tuple[Part, ...] = ()
-    page: str = ""
-
-    @property
-    def command(self) -> str:
-        """The command line that makes it, without what changes no number on it."""
-        return shlex.join(["fem-reference", self.verb, *(word for part in self.parts for word in part.words)])
-
-    @property
-    def name(self) -> str:
-        """The default name."""
-        text = "-".join([self.base, *(_plain(part.name) for part in self.parts if part.name)])
-        return (
-            text if len(text) <= LONGEST else f"{text[: LONGEST - 9]}-{hashlib.sha256(text.encode()).hexdigest()[:8]}"
-        )
-
-
-def _plain(text: str) -> str:
-    """What may stand in the name of a file.
-
-    >>> _plain("muscle.tet_size=8 mm"), _plain("effect[0].mu=1 kPa")
-    ('muscle.tet_size=8mm', 'effect0.mu=1kPa')
-    """
-    return re.sub(r"[^\w.=+-]+", "_", re.sub(r"[\s\[\]]+", "", text))
 
 
 def case_part(scene: Case) -> Part:
@@ -61,7 +16,7 @@ def case_part(scene: Case) -> Part:
 
 
 def changes(options: argparse.Namespace) -> tuple[Part, ...]:
-    """What ``--set`` and ``--negative-control`` change of a case."""
+    """The changes of a case by ``--set`` and ``--negative-control``."""
     control = (Part(("--negative-control",), "negative_control"),) if options.negative_control is True else ()
     return (*(Part(("--set", text), text) for text in getattr(options, "set", ())), *control)
 
@@ -80,20 +35,7 @@ def candidates(scene: Case, chosen: Iterable[Candidate]) -> tuple[Part, ...]:
 
 
 def written(
-    options: argparse.Namespace, asked: Asked, write: Callable[[Path, str, str], Path]
+    options: argparse.Namespace, page: Asked, write: Callable[[Path, str, str], Path]
 ) -> tuple[Path, list[str]]:
-    """Write a page by ``write(folder, name, command)`` where nothing else is lost, and the index; its path and what is printed."""
-    folder = out(options)
-
-    def where(name: str) -> Path:
-        return folder / name / f"{asked.page}.html" if asked.page else folder / f"{name}.html"
-
-    name, note = pages.free(where, options.page_name or asked.name, asked.command)
-    parent, file = (folder / name, asked.page) if asked.page else (folder, name)
-    path = write(parent, file, asked.command)
-    notes = [note] if note else []
-    try:
-        index_page.write(folder)
-    except OSError as error:  # the page is there, and worth more than its index
-        notes.append(f"no index: {error}")
-    return path, [f"page: {path}", *(f"  {line}" for line in notes)]
+    """Write a page into ``--out``, by the name of ``--name`` where that is given; its path and what is printed."""
+    return asked.written(page, out(options), options.page_name, write)

@@ -12,13 +12,66 @@ from typing import Any, Protocol, cast
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.version import __version__
 
-RANKS = "MPI processes of the reference (default: 1, or 2 for large bodies where cores are free)"
 _FOLDER = Path(__file__).parent
-UNIT = "unit of length of the frames in DIR (default: that of its candidate.toml, else mm)"
+CASE = "a shipped case (see list), a case folder or a case.toml"
+
+
+def positive(text: str) -> int:
+    """A number of something, of at most nine digits.
+
+    >>> positive("2")
+    2
+    """
+    if not text.isdecimal() or not 0 < len(text.lstrip("0")) < 10:
+        raise argparse.ArgumentTypeError(f'got "{text[:20]}", want a number from 1 to 999999999')
+    return int(text)
+
+
+# The options that several verbs have.
+_SHARED: dict[str, dict[str, Any]] = {
+    "case": {"metavar": "CASE", "help": CASE},
+    "--set": {
+        "action": "append",
+        "default": [],
+        "metavar": "KEY=VALUE",
+        "help": "change a key of the case, such as muscle.tet_size='8 mm'; may be repeated",
+    },
+    "--unit": {"help": "unit of length of the frames in DIR (default: that of its candidate.toml, else mm)"},
+    "--error-bar": {
+        "action": "store_true",
+        "help": "error bars of the reference: solve it on larger tetrahedra too, and with stiffer contact where bones press",
+    },
+    "--negative-control": {
+        "action": "store_true",
+        "help": "with the one change of the case that must turn its verdict to fail",
+    },
+    "--name": {
+        "dest": "page_name",
+        "metavar": "NAME",
+        "help": "name of the page (default: the case with what makes the page different, such as CASE-KEY=VALUE)",
+    },
+    "--ranks": {
+        "type": positive,
+        "metavar": "N",
+        "help": "MPI processes of the reference (default: 1, or 2 for large bodies where cores are free)",
+    },
+    "--workers": {
+        "type": int,
+        "default": 1,
+        "metavar": "N",
+        "help": "how many runs are made at once (default: 1)",
+    },
+}
+
+
+def share(parser: argparse.ArgumentParser, *names: str) -> None:
+    """Add options that several verbs have, by name."""
+    for name in names:
+        parser.add_argument(name, **_SHARED[name])
 
 
 class Verb(Protocol):
-    """What the module of a verb has."""
+    """The contents of the module of a verb."""
 
     HELP: str
 
@@ -57,7 +110,7 @@ def parser(only: str | None = None) -> argparse.ArgumentParser:
 
 
 def _help(name: str) -> str:
-    """What a verb says of itself, read from its file."""
+    """The line that describes a verb, read from its file."""
     assigned = [node for node in ast.parse((_FOLDER / f"{name}.py").read_bytes()).body if isinstance(node, ast.Assign)]
     texts = [ast.literal_eval(node.value) for node in assigned if ast.unparse(node.targets[0]) == "HELP"]
     return str(*texts)
@@ -65,7 +118,7 @@ def _help(name: str) -> str:
 
 def _add(verb: Verb, sub: argparse.ArgumentParser) -> None:
     """The options of a verb."""
-    sub.register("action", None, _Once)
+    sub.register("action", None, _Given)
     sub.set_defaults(verb=verb.run, ranks=None, error_bar=False, negative_control=False, writes=True, page_name=None)
     verb.add_options(sub)
     sub.add_argument("--out", type=Path, metavar="DIR", help="where pages and stored runs go (default: reports)")
@@ -73,49 +126,10 @@ def _add(verb: Verb, sub: argparse.ArgumentParser) -> None:
     sub.add_argument("--quiet", action="store_true", help="show no progress")
 
 
-def add_case(parser: argparse.ArgumentParser) -> None:
-    """The case that a verb is about, and changes of it."""
-    parser.add_argument("case", metavar="CASE", help="a shipped case (see list), a case folder or a case.toml")
-    change = "change a key of the case, such as muscle.tet_size='8 mm'; may be repeated"
-    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help=change)
-
-
-def add_error_bar(parser: argparse.ArgumentParser) -> None:
-    """Whether error bars are made where they take long."""
-    known = "error bars of the reference: solve it on larger tetrahedra too, and with stiffer contact where bones press"
-    parser.add_argument("--error-bar", action="store_true", help=known)
-
-
-def add_negative_control(parser: argparse.ArgumentParser) -> None:
-    """Whether the case is wrong on purpose."""
-    control = "with the one change of the case that must turn its verdict to fail"
-    parser.add_argument("--negative-control", action="store_true", help=control)
-
-
-def add_name(parser: argparse.ArgumentParser) -> None:
-    """What the page is called."""
-    name = "name of the page (default: the case with what makes the page different, such as CASE-KEY=VALUE)"
-    parser.add_argument("--name", dest="page_name", metavar="NAME", help=name)
-
-
-def add_ranks(parser: argparse.ArgumentParser) -> None:
-    """On how many processes the reference is solved."""
-    parser.add_argument("--ranks", type=positive, metavar="N", help=RANKS)
-
-
-def positive(text: str) -> int:
-    """A number of something, of at most nine digits.
-
-    >>> positive("2")
-    2
+class _Given(argparse.Action):
+    """The value of an option, given once: a second one would silently take the place of the first. An option whose default is a
+    list may be repeated, and has each value once.
     """
-    if not text.isdecimal() or not 0 < len(text.lstrip("0")) < 10:
-        raise argparse.ArgumentTypeError(f'got "{text[:20]}", want a number from 1 to 999999999')
-    return int(text)
-
-
-class _Once(argparse.Action):
-    """The value of an option that has one, given once: a second one would silently take the place of the first."""
 
     def __call__(
         self,
@@ -126,30 +140,11 @@ class _Once(argparse.Action):
     ) -> None:
         """Take it."""
         del parser
-        given = namespace.__dict__.setdefault("given", {})
-        if option_string and self.dest in given:
-            raise InputError(option_string, f'"{given[self.dest]}" and "{values}"', "one of them")
-        given[self.dest] = values
+        if option_string and isinstance(self.default, list):
+            values = list(dict.fromkeys([*getattr(namespace, self.dest), values]))
+        else:
+            given = namespace.__dict__.setdefault("given", {})
+            if option_string and self.dest in given:
+                raise InputError(option_string, f'"{given[self.dest]}" and "{values}"', "one of them")
+            given[self.dest] = values
         setattr(namespace, self.dest, values)
-
-
-class Distinct(argparse.Action):
-    """Values of an option that may be repeated, each once."""
-
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: Any,
-        option_string: str | None = None,
-    ) -> None:
-        """Add one."""
-        del parser, option_string
-        before = getattr(namespace, self.dest)
-        setattr(namespace, self.dest, [*before, *([values] if values not in before else [])])
-
-
-def add_workers(parser: argparse.ArgumentParser) -> None:
-    """How many runs are made at once."""
-    count = "how many runs are made at once (default: 1)"
-    parser.add_argument("--workers", type=int, default=1, metavar="N", help=count)

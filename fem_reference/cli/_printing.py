@@ -9,7 +9,6 @@ DONE, VERDICT_FAIL, BAD_INPUT, SOLVER_FAILED = range(4)
 # Our own mistake, EX_SOFTWARE of sysexits.h. Python's own status for it is 1, which here is a verdict.
 BROKEN = 70
 INTERRUPTED, TERMINATED = 130, 143  # what shells report for them
-LONGEST = 100  # characters of the name of a page
 
 
 def lines(facts: dict[str, Any], indent: str = "") -> list[str]:

@@ -11,7 +11,7 @@ from pathlib import Path
 from fem_reference.assessment import baseline, regression
 from fem_reference.assessment.measured import CurrentMeasures
 from fem_reference.cli._choosing import check_names, checked_bench, choose, scene_of
-from fem_reference.cli._parser import UNIT, add_case, add_error_bar, add_ranks
+from fem_reference.cli._parser import share
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, write_output
 from fem_reference.io import files
 from fem_reference.report import regression_texts
@@ -27,18 +27,17 @@ HELP = "judge a candidate by its own past and by the reference, for a pipeline"
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
-    add_case(parser)
+    share(parser, "case", "--set")
     either = "a candidate of the case or a folder of frames"
     parser.add_argument("--candidate", required=True, metavar="NAME|DIR", help=either)
-    parser.add_argument("--unit", help=UNIT)
+    share(parser, "--unit")
     past = "its measures as they were, JSON"
     parser.add_argument("--baseline", type=Path, required=True, metavar="FILE", help=past)
     anew = "write the baseline anew from the current measures; its tolerances and limits stay"
     parser.add_argument("--update", action="store_true", help=anew)
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write the judgements as JUnit XML")
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the worst of them for a pull request")
-    add_error_bar(parser)
-    add_ranks(parser)
+    share(parser, "--error-bar", "--ranks")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -7,7 +7,7 @@ from fem_reference import solvers
 from fem_reference.cli._against import against
 from fem_reference.cli._choosing import choose, scene_of, with_limits
 from fem_reference.cli._judging import judge
-from fem_reference.cli._parser import UNIT, add_case, add_error_bar, add_name, add_negative_control, add_ranks
+from fem_reference.cli._parser import share
 from fem_reference.foundations.errors import InputError
 
 HELP = "measure candidates against the reference and write the page"
@@ -15,22 +15,19 @@ HELP = "measure candidates against the reference and write the page"
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
-    add_case(parser)
+    share(parser, "case", "--set")
     either = "a candidate of the case or a folder of frames; may be repeated"
     parser.add_argument("--candidate", action="append", metavar="NAME|DIR", help=either)
     ours = "a solver of ours as a candidate, with its standard settings where the case has none; may be repeated"
     parser.add_argument("--solver", action="append", default=[], metavar="NAME", help=ours)
     past = "what the candidate was, and write the page of what changed: a baseline of check, a stored run, a folder of frames"
     parser.add_argument("--against", type=Path, metavar="BASELINE", help=past)
-    parser.add_argument("--unit", help=UNIT)
+    share(parser, "--unit")
     limit = (
         "judge every candidate: how far a statistic may deviate, such as surface_deviation.max='5 mm'; may be repeated"
     )
     parser.add_argument("--limit", action="append", default=[], metavar="METRIC.STATISTIC=VALUE", help=limit)
-    add_error_bar(parser)
-    add_negative_control(parser)
-    add_name(parser)
-    add_ranks(parser)
+    share(parser, "--error-bar", "--negative-control", "--name", "--ranks")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -4,7 +4,7 @@ import argparse
 
 from fem_reference.cli._choosing import own_candidates
 from fem_reference.cli._judging import judge
-from fem_reference.cli._parser import add_name, add_ranks
+from fem_reference.cli._parser import share
 from fem_reference.scenes import casefile
 
 MAIN_JOB = "hip_flexion"
@@ -13,8 +13,7 @@ HELP = "the main job: the case hip_flexion, its reference against its candidates
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
-    add_ranks(parser)
-    add_name(parser)
+    share(parser, "--ranks", "--name")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -5,10 +5,11 @@ from functools import partial
 
 from fem_reference import report
 from fem_reference.assessment.omissions import facts
-from fem_reference.cli._pages import Asked, case_part, changes, written
-from fem_reference.cli._parser import add_case, add_name, add_workers
+from fem_reference.cli._pages import case_part, changes, written
+from fem_reference.cli._parser import share
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, out, write_output
 from fem_reference.report import effects_page
+from fem_reference.report.asked import Asked
 from fem_reference.scenes import casefile
 from fem_reference.studies import omissions
 from fem_reference.studies.campaign import Workers
@@ -19,9 +20,7 @@ HELP = "what leaving out each effect of a case changes and saves, for its refere
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """The options that this verb has."""
-    add_case(parser)
-    add_name(parser)
-    add_workers(parser)
+    share(parser, "case", "--set", "--name", "--workers")
 
 
 def run(options: argparse.Namespace) -> int:

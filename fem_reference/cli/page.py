@@ -9,10 +9,11 @@ from fem_reference import report
 from fem_reference.assessment.claims import Cover
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.cli._choosing import check_names, checked_bench, own_candidates
-from fem_reference.cli._pages import Asked, Part, case_part, written
-from fem_reference.cli._parser import UNIT, add_name
+from fem_reference.cli._pages import case_part, written
+from fem_reference.cli._parser import share
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
 from fem_reference.foundations.errors import InputError
+from fem_reference.report.asked import Asked, Part
 from fem_reference.report.claims_page import facts as claims_facts
 from fem_reference.report.overview import comparison_text, ranking_text
 from fem_reference.report.ranking_page import facts as ranking_facts
@@ -42,8 +43,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--case", action="append", default=[], metavar="CASE", help=some)
     foreign = f"for {TABLE}: frames that your solver made of a case; may be repeated"
     parser.add_argument("--candidate", action="append", default=[], metavar="CASE=DIR", help=foreign)
-    parser.add_argument("--unit", help=UNIT)
-    add_name(parser)
+    share(parser, "--unit", "--name")
 
 
 def run(options: argparse.Namespace) -> int:

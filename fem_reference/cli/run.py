@@ -4,10 +4,10 @@ import argparse
 
 from fem_reference.assessment import solver_table
 from fem_reference.assessment.comparison import alone
-from fem_reference.assessment.judge import check, overall
+from fem_reference.assessment.judge import check
 from fem_reference.cli._choosing import refuse_error_bar, scene_of
 from fem_reference.cli._judging import judge, unturned
-from fem_reference.cli._parser import add_case, add_error_bar, add_name, add_negative_control, add_ranks
+from fem_reference.cli._parser import share
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.problems import of_case
@@ -20,12 +20,9 @@ HELP = "solve a case and judge what it expects of the reference"
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
-    add_case(parser)
+    share(parser, "case", "--set")
     parser.add_argument("--solver", metavar="NAME", help="another solver than the case's own reference")
-    add_error_bar(parser)
-    add_ranks(parser)
-    add_negative_control(parser)
-    add_name(parser)
+    share(parser, "--error-bar", "--ranks", "--negative-control", "--name")
     explain = "say of each effect whether the case needs it and why, and solve nothing"
     parser.add_argument("--explain", action="store_true", help=explain)
 
@@ -45,9 +42,9 @@ def run(options: argparse.Namespace) -> int:
     check(scene)
     bench = Bench(scene, out(options) / "runs", options.ranks)
     solved = bench.obtain(*solver_table.choice(scene, options.solver), f"--solver {options.solver}")
-    measures, verdicts = alone(scene, bench.setup(), solved)
-    said = [run_text(solved, measures, verdicts), *unturned(options, overall(one.word for one in verdicts))]
-    write_output(of_run(scene, solved, measures, verdicts), "\n".join(said), options)
+    result = alone(scene, bench.setup(), solved)
+    said = [run_text(solved, result), *unturned(options, result.word)]
+    write_output(of_run(scene, solved, result), "\n".join(said), options)
     if solved.outcome.status != "converged":
         return SOLVER_FAILED
-    return VERDICT_FAIL if any(verdict.word == "fail" for verdict in verdicts) else DONE
+    return VERDICT_FAIL if result.word == "fail" else DONE

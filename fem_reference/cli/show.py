@@ -5,7 +5,7 @@ from functools import singledispatch
 from pathlib import Path
 
 from fem_reference.cli._choosing import checked_bench, own_candidates, scene_of
-from fem_reference.cli._parser import add_case
+from fem_reference.cli._parser import share
 from fem_reference.cli._printing import DONE, lines, write_output
 from fem_reference.io import files
 from fem_reference.problems.muscle import Problem
@@ -17,7 +17,7 @@ HELP = "what a case is made of; with --out also its meshes for ParaView"
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb."""
-    add_case(parser)
+    share(parser, "case", "--set")
 
 
 def run(options: argparse.Namespace) -> int:

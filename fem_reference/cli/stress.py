@@ -5,11 +5,12 @@ from functools import partial
 
 from fem_reference import report
 from fem_reference.assessment.stress import facts
-from fem_reference.cli._pages import Asked, Part, written
-from fem_reference.cli._parser import Distinct, add_name
+from fem_reference.cli._pages import written
+from fem_reference.cli._parser import share
 from fem_reference.cli._printing import DONE, write_output
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import stress_page
+from fem_reference.report.asked import Asked, Part
 from fem_reference.studies.hard import choosing, records, running
 
 PAGE = "stress"
@@ -21,14 +22,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     which = "a hard case, or a folder of several variants, below cases/hard (default: all, about 15 minutes)"
     parser.add_argument("names", metavar="NAME", nargs="*", help=which)
     only = "only this solver; may be repeated (default: all)"
-    parser.add_argument(
-        "--solver", action=Distinct, default=[], choices=list(choosing.choices()), metavar="NAME", help=only
-    )
+    parser.add_argument("--solver", default=[], choices=list(choosing.choices()), metavar="NAME", help=only)
     many = "take the reference to the farthest frame of each case in 1, 10 and 40 load steps as well: the same end, or a status"
     parser.add_argument("--steps", action="store_true", help=many)
     meshes = "run the reference on so many other meshes of each case as well, a little different at random"
     parser.add_argument("--jitters", type=int, default=0, metavar="N", help=meshes)
-    add_name(parser)
+    share(parser, "--name")
 
 
 def run(options: argparse.Namespace) -> int:

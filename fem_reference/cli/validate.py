@@ -7,7 +7,7 @@ import numpy as np
 
 from fem_reference import solvers
 from fem_reference.cli._choosing import checked_bench, own_candidates, scene_of
-from fem_reference.cli._parser import add_case
+from fem_reference.cli._parser import share
 from fem_reference.cli._printing import DONE, lines, write_output
 from fem_reference.problems import guess, of_case
 from fem_reference.problems.muscle import Problem
@@ -22,7 +22,7 @@ HELP = "check all of a case that can be checked before it is solved, and say wha
 def add_options(parser: argparse.ArgumentParser) -> None:
     """The options that this verb has; it writes nothing into ``--out``."""
     parser.set_defaults(writes=False)
-    add_case(parser)
+    share(parser, "case", "--set")
 
 
 def run(options: argparse.Namespace) -> int:

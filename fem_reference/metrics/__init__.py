@@ -1,16 +1,16 @@
 """Metrics: one file each, named as in scene files and JSON. A metric does not know the solver of a run.
 
 Contract (tests/contracts/test_every_metric.py): zero against itself, a known change gives a known value, NaN stays NaN, units
-stated. Each declares the unit of every statistic (``UNITS``), what of a run it is ``OF`` (its surface, its lines, its field) and
+stated. Each describes its ``STATISTICS``, and states what of a run it is ``OF`` (its surface, its lines, its field) and
 what it is measured ``AGAINST``: the reference (or the rest state), the exact solution, or nothing but the run itself.
 """
 
 import importlib
 import pkgutil
-from collections.abc import Collection, Iterable
-from dataclasses import dataclass, replace
-from functools import singledispatch
-from typing import Any, Protocol, cast
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache, singledispatch
+from typing import Any, Literal, Protocol, cast
 
 import numpy as np
 
@@ -23,22 +23,92 @@ from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Part, Standard
 
+# Places that a statistic is shown at: ``main``, notebooks and omissions; ``table``, the first table of a comparison; ``headline``,
+# its sentence; ``curve``, drawings of changes from rest; ``solvers``, the tables of solvers, and ``scenes``, that over all scenes;
+# ``rank``, rankings of solvers; ``claim``, error bars beside true errors.
+Shown = Literal["main", "table", "headline", "curve", "solvers", "scenes", "rank", "claim"]
+
+
+@dataclass(frozen=True)
+class Statistic:
+    """A statistic as its metric describes it.
+
+    ``title`` and ``part``: the words above a group of columns and above its own; ``headline``: a sentence with ``{}`` in place of
+    its value; ``curve``: the title of the drawing of its changes from rest; ``share_of``: what a per cent is of; ``shown``: by
+    place, its position there, the least first; ``local``: True where its error is of the order that it is of at the worst place,
+    ``lone`` where it is the value of one fibre alone.
+    """
+
+    unit: str
+    title: str = ""
+    part: str = ""
+    headline: str = ""
+    curve: str = ""
+    share_of: str = ""
+    shown: Mapping[Shown, int] = field(default_factory=dict)
+    local: bool = False
+    lone: bool = False
+
+    @property
+    def label(self) -> str:
+        """Title and part in one."""
+        return f"{self.title}, {self.part}" if self.part else self.title
+
+    @property
+    def full_unit(self) -> str:
+        """The unit, of a per cent with what it is of."""
+        return f"{self.unit} of {self.share_of}" if self.share_of else self.unit
+
 
 @dataclass(frozen=True, eq=False)
 class Measure:
-    """One statistic of one metric: ``values`` per frame (f,) in ``unit``; ``where`` (f,) says in words where each is worst."""
+    """One statistic of one metric: ``values`` (f,) in ``unit`` at frame ``numbers`` (f,), from 0 on where these are not given;
+    ``where`` (f,), in words, each is worst; ``error_bars`` (f,) of the reference that it is measured against, None without any.
+    """
 
     metric: str
     statistic: str
     unit: str
     values: Floats
     where: tuple[str, ...] = ()
+    numbers: tuple[int, ...] = ()
+    error_bars: Floats | None = None
 
     @property
-    def worst(self) -> int:
-        """Index of the frame with the greatest magnitude; a frame that is not a number counts as worst of all."""
-        magnitudes = np.abs(self.values)
-        return int(np.argmax(np.where(np.isnan(magnitudes), np.inf, magnitudes)))
+    def worst(self) -> "Worst":
+        """The frame with the greatest magnitude; a frame that is not a number counts as worst of all."""
+        return self._at(np.where(np.isnan(self.values), np.inf, np.abs(self.values)))
+
+    @property
+    def worst_number(self) -> "Worst | None":
+        """The worst of the frames whose value is a finite number, None without any."""
+        known = np.isfinite(self.values)
+        return self._at(np.where(known, np.abs(self.values), -1.0)) if known.any() else None
+
+    def _at(self, magnitudes: Floats) -> "Worst":
+        i = int(np.argmax(magnitudes))
+        return Worst(
+            value=float(self.values[i]),
+            frame=self.numbers[i] if self.numbers else i,
+            error_bar=None if self.error_bars is None else float(self.error_bars[i]),
+            unit=self.unit,
+            where=self.where[i] if self.where else "",
+            index=i,
+        )
+
+
+@dataclass(frozen=True)
+class Worst:
+    """A measure at its worst frame: its ``value`` and the ``error_bar`` of the reference there, None without any, in ``unit``, at
+    the number of the ``frame``, the one with this ``index``; ``where`` in words.
+    """
+
+    value: float
+    frame: int
+    error_bar: float | None
+    unit: str
+    where: str
+    index: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,9 +177,9 @@ def _(setup: FieldProblem, reference: Run) -> FieldContext:  # noqa: ARG001
 
 
 class Metric(Protocol):
-    """What the module of a metric has."""
+    """The contents of the module of a metric."""
 
-    UNITS: dict[str, str]
+    STATISTICS: dict[str, Statistic]
     OF: Part
     AGAINST: Standard
 
@@ -128,14 +198,29 @@ def names(against: Collection[Standard] | None = None) -> list[str]:
     return [name for name in found if against is None or metric(name).AGAINST in against]
 
 
+@cache
+def described(where: Shown | None = None) -> dict[tuple[str, str], Statistic]:
+    """Every statistic by metric and name: all, or those that are shown somewhere, in the order that they have there."""
+    found = {(name, one): each for name in names() for one, each in metric(name).STATISTICS.items()}
+    if where is None:
+        return found
+    chosen = {key: each for key, each in found.items() if where in each.shown}
+    return dict(sorted(chosen.items(), key=lambda entry: entry[1].shown[where]))
+
+
+def in_tables() -> tuple[str, ...]:
+    """The metrics of the first table of a comparison."""
+    return tuple(dict.fromkeys(name for name, _ in described("table")))
+
+
 def units(of: Collection[Part] | None = None, against: Collection[Standard] | None = None) -> dict[str, str]:
     """The unit of every ``metric.statistic`` there is: all, or those ``of`` such parts and ``against`` such standards."""
     chosen = {name: metric(name) for name in names(against)}
     return {
-        f"{name}.{statistic}": unit
+        f"{name}.{statistic}": described.unit
         for name, found in chosen.items()
         if of is None or found.OF in of
-        for statistic, unit in found.UNITS.items()
+        for statistic, described in found.STATISTICS.items()
     }
 
 
@@ -150,7 +235,20 @@ def measure(run: Run, reference: Run, context: Context, wanted: Iterable[str] | 
     """
     chosen = map(metric, names() if wanted is None else wanted)
     return tuple(
-        statistic for found in chosen if found.OF in run.carries for statistic in found.measure(run, reference, context)
+        replace(statistic, numbers=run.numbers)
+        for found in chosen
+        if found.OF in run.carries
+        for statistic in found.measure(run, reference, context)
+    )
+
+
+def measures(name: str, values: Mapping[str, Floats], where: Collection[str] = ()) -> tuple[Measure, ...]:
+    """The measures of the metric ``name`` from the ``values`` (f,) of its statistics, all worst at the same places (f,) in words,
+    nowhere in particular without any.
+    """
+    stated = metric(name).STATISTICS
+    return tuple(
+        Measure(name, one, stated[one].unit, each, tuple(where) or ("",) * len(each)) for one, each in values.items()
     )
 
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from fem_reference.metrics import FieldContext, Measure, at_vertices
+from fem_reference.metrics import FieldContext, Measure, Statistic, at_vertices, measures
 from fem_reference.runs.store import Run
 
-UNITS = {"max": "1"}
+STATISTICS = {"max": Statistic("1", headline="off by up to {}", shown={"main": 50, "headline": 40})}
 OF, AGAINST = "field", "reference"
 
 
@@ -14,4 +14,4 @@ def measure(run: Run, reference: Run, _context: FieldContext) -> tuple[Measure, 
     size = np.abs(reference.vertex_values).max(axis=1)
     apart = np.abs(run.vertex_values - reference.vertex_values)
     values = apart.max(axis=1) / np.where(size > 0, size, 1.0)
-    return (Measure("difference", "max", "1", values, at_vertices(run, apart.argmax(axis=1))),)
+    return measures("difference", {"max": values}, at_vertices(run, apart.argmax(axis=1)))

@@ -7,11 +7,20 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.edges import Edges
-from fem_reference.metrics import Measure, MeasurementContext, percentile, rms
+from fem_reference.metrics import Measure, MeasurementContext, Statistic, measures, percentile, rms
 from fem_reference.metrics.edge_extension import worst_edges
 from fem_reference.runs.store import Run
 
-UNITS = dict.fromkeys(("mean", "mean_magnitude", "rms", "p95", "max", "mean_magnitude_of_edges"), "deg")
+STATISTICS = {
+    "mean": Statistic("deg"),
+    "mean_magnitude": Statistic(
+        "deg", curve="Bending at the edges from rest, mean magnitude by area", shown={"curve": 40}
+    ),
+    "rms": Statistic("deg"),
+    "p95": Statistic("deg"),
+    "max": Statistic("deg", local=True),
+    "mean_magnitude_of_edges": Statistic("deg"),
+}
 OF, AGAINST = "surface", "reference"
 
 
@@ -35,8 +44,7 @@ def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Mea
         "max": size.max(axis=1),
         "mean_magnitude_of_edges": size.mean(axis=1),
     }
-    worst = worst_edges(edges, turned, reference)
-    return tuple(Measure("dihedral_angle", name, UNITS[name], each, worst) for name, each in values.items())
+    return measures("dihedral_angle", values, worst_edges(edges, turned, reference))
 
 
 def wrapped(angles: Floats) -> Floats:

@@ -7,10 +7,16 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats, place_of
 from fem_reference.geometry.edges import Edges
-from fem_reference.metrics import Measure, MeasurementContext, percentile, rms
+from fem_reference.metrics import Measure, MeasurementContext, Statistic, measures, percentile, rms
 from fem_reference.runs.store import Run
 
-UNITS = dict.fromkeys(("mean", "rms", "p95", "max", "mean_of_edges"), "%")
+STATISTICS = {
+    "mean": Statistic("%", curve="Extension of the surface's edges from rest, mean by area", shown={"curve": 30}),
+    "rms": Statistic("%"),
+    "p95": Statistic("%"),
+    "max": Statistic("%", local=True),
+    "mean_of_edges": Statistic("%"),
+}
 OF, AGAINST = "surface", "reference"
 
 
@@ -32,8 +38,7 @@ def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Mea
         "max": np.abs(longer).max(axis=1),
         "mean_of_edges": longer.mean(axis=1),
     }
-    worst = worst_edges(edges, longer, reference)
-    return tuple(Measure("edge_extension", name, UNITS[name], each, worst) for name, each in values.items())
+    return measures("edge_extension", values, worst_edges(edges, longer, reference))
 
 
 def worst_edges(edges: Edges, deviations: Floats, reference: Run) -> tuple[str, ...]:

@@ -9,10 +9,28 @@ a straight line is shorter than the fibre. That is its error, and no change of l
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats
-from fem_reference.metrics import Measure, MeasurementContext
+from fem_reference.metrics import Measure, MeasurementContext, Statistic
 from fem_reference.runs.store import Run
 
-UNITS = {"mean": "mm", "rms": "mm", "max": "mm", "mean_percent": "%", "rms_percent": "%", "max_percent": "%"}
+_TITLE = "Fibre length"
+# Fibres are few lines that end at rims, so that one of them may be most of their mean square: all statistics are local.
+STATISTICS = {
+    "mean": Statistic(
+        "mm", curve="Change of fibre length from rest, mean over the fibres", shown={"curve": 20}, local=True
+    ),
+    "rms": Statistic("mm", _TITLE, "rms", shown={"solvers": 20}, local=True),
+    "max": Statistic("mm", _TITLE, "worst fibre", shown={"table": 20}, local=True, lone=True),
+    "mean_percent": Statistic("%", _TITLE, "mean", shown={"claim": 40}, local=True),
+    "rms_percent": Statistic(
+        "%",
+        _TITLE,
+        "rms",
+        headline="lengths of fibres by {} rms",
+        shown={"main": 20, "headline": 20, "solvers": 30, "scenes": 20, "rank": 20, "claim": 50},
+        local=True,
+    ),
+    "max_percent": Statistic("%", _TITLE, "worst fibre", shown={"table": 30, "claim": 60}, local=True, lone=True),
+}
 OF, AGAINST = "lines", "reference"
 # Fibre points of a run this close [mm] to the measurement context's are the same points, after a file of single precision.
 _SAME = 1e-3
@@ -38,7 +56,7 @@ def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Meas
         ("max_percent", np.abs(percent).max(axis=1), percent),
     )
     return tuple(
-        Measure("fibre_length", name, UNITS[name], values, _worst(deviations))
+        Measure("fibre_length", name, STATISTICS[name].unit, values, _worst(deviations))
         for name, values, deviations in statistics
     )
 
@@ -53,7 +71,8 @@ def extension_error(reference: Run, context: MeasurementContext) -> Measure:
         errors = _extended(reference, context) - _direct(reference, context)
     else:
         errors = np.full((len(reference.positions), len(context.fibres)), np.nan)
-    return Measure("fibre_length", "extension_error", "mm", np.abs(errors).max(axis=1), _worst(errors))
+    worst = np.abs(errors).max(axis=1)
+    return Measure("fibre_length", "extension_error", "mm", worst, _worst(errors), reference.numbers)
 
 
 def _carries(run: Run, context: MeasurementContext) -> bool:

@@ -9,10 +9,10 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats, place_of, triangle_areas
 from fem_reference.geometry.windings import outer_windings
-from fem_reference.metrics import Measure, MeasurementContext
+from fem_reference.metrics import Measure, MeasurementContext, Statistic
 from fem_reference.runs.store import Run
 
-UNITS = {"inside_out": "%", "overlapping": "%"}
+STATISTICS = {"inside_out": Statistic("%"), "overlapping": Statistic("%")}
 OF, AGAINST = "surface", "reference"
 
 
@@ -25,7 +25,13 @@ def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Mea
     windings, wanted = _windings(run), _windings(reference)
     areas = triangle_areas(reference.surface.points, reference.surface.triangles)
     return tuple(
-        Measure("inversion", name, UNITS[name], _share(sign * windings, areas) - _share(sign * wanted, areas), where)
+        Measure(
+            "inversion",
+            name,
+            STATISTICS[name].unit,
+            _share(sign * windings, areas) - _share(sign * wanted, areas),
+            where,
+        )
         for name, sign in (("inside_out", -1), ("overlapping", 1))
         for where in [_first(sign * windings, run)]
     )

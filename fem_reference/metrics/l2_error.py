@@ -5,11 +5,11 @@ from functools import partial
 import numpy as np
 
 from fem_reference.geometry.lagrange import l2_distance
-from fem_reference.metrics import FieldContext, Measure
+from fem_reference.metrics import FieldContext, Measure, Statistic, measures
 from fem_reference.problems.scalar import at
 from fem_reference.runs.store import Run
 
-UNITS = {"norm": "1"}
+STATISTICS = {"norm": Statistic("1", headline="L2 error {}", shown={"main": 60, "headline": 50})}
 OF, AGAINST = "field", "exact"
 
 
@@ -19,4 +19,4 @@ def measure(run: Run, _reference: Run, context: FieldContext) -> tuple[Measure, 
         return ()
     exact = partial(at, context.exact)
     norms = np.array([l2_distance(run.mesh, values, exact) for values in run.values])
-    return (Measure("l2_error", "norm", "1", norms, ("",) * len(norms)),)
+    return measures("l2_error", {"norm": norms})

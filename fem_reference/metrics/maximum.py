@@ -1,9 +1,9 @@
 """The greatest value of a field at a vertex."""
 
-from fem_reference.metrics import FieldContext, Measure, at_vertices
+from fem_reference.metrics import FieldContext, Measure, Statistic, at_vertices, measures
 from fem_reference.runs.store import Run
 
-UNITS = {"value": "1"}
+STATISTICS = {"value": Statistic("1")}
 OF, AGAINST = "field", "itself"
 
 
@@ -11,4 +11,4 @@ def measure(run: Run, _reference: Run, _context: FieldContext) -> tuple[Measure,
     """``value``, the greatest over the vertices; NaN where one is not a number."""
     values = run.vertex_values
     where = at_vertices(run, values.argmax(axis=1))
-    return (Measure("maximum", "value", "1", values.max(axis=1), where),)
+    return measures("maximum", {"value": values.max(axis=1)}, where)

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from fem_reference.metrics import FieldContext, Measure, at_vertices
+from fem_reference.metrics import FieldContext, Measure, Statistic, at_vertices, measures
 from fem_reference.problems.scalar import at
 from fem_reference.runs.store import Run
 
-UNITS = {"max": "1"}
+STATISTICS = {"max": Statistic("1")}
 OF, AGAINST = "field", "exact"
 
 
@@ -16,4 +16,4 @@ def measure(run: Run, _reference: Run, context: FieldContext) -> tuple[Measure, 
         return ()
     errors = np.abs(run.vertex_values - at(context.exact, run.points))
     where = at_vertices(run, errors.argmax(axis=1))
-    return (Measure("nodal_error", "max", "1", errors.max(axis=1), where),)
+    return measures("nodal_error", {"max": errors.max(axis=1)}, where)

@@ -8,11 +8,30 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats, place_of
 from fem_reference.geometry.distance import distances
-from fem_reference.metrics import Measure, MeasurementContext, percentile, rms
+from fem_reference.metrics import Measure, MeasurementContext, Statistic, percentile, rms
 from fem_reference.runs.store import Run
 
-_STATISTICS = ("rms", "p95", "max", "distance_mean", "distance_rms", "hausdorff")
-UNITS = dict.fromkeys(_STATISTICS, "mm") | {f"{name}_percent": "%" for name in _STATISTICS}
+_TITLE = "Surface"
+STATISTICS = {
+    "rms": Statistic(
+        "mm",
+        _TITLE,
+        "rms",
+        headline="surface off by up to {} rms",
+        shown={"main": 30, "table": 40, "headline": 10, "solvers": 40, "rank": 10, "claim": 10},
+    ),
+    "p95": Statistic("mm", _TITLE, "95 % below", shown={"table": 50, "claim": 20}),
+    "max": Statistic("mm", _TITLE, "worst vertex", shown={"main": 40, "table": 60, "claim": 30}, local=True),
+    "distance_mean": Statistic("mm"),
+    "distance_rms": Statistic("mm"),
+    "hausdorff": Statistic("mm", _TITLE, "Hausdorff", shown={"table": 70, "solvers": 60}, local=True),
+    "rms_percent": Statistic("%", _TITLE, "rms", share_of="travel", shown={"solvers": 50, "scenes": 30}),
+    "p95_percent": Statistic("%"),
+    "max_percent": Statistic("%", local=True),
+    "distance_mean_percent": Statistic("%"),
+    "distance_rms_percent": Statistic("%"),
+    "hausdorff_percent": Statistic("%", local=True),
+}
 OF, AGAINST = "surface", "reference"
 
 
@@ -38,7 +57,9 @@ def measure(run: Run, reference: Run, context: MeasurementContext) -> tuple[Meas
     values |= {f"{name}_percent": _percent(each, context.travel) for name, each in values.items()}
     worst = [_worst(deviations, reference) for deviations in (material, geometric)]
     return tuple(
-        Measure("surface_deviation", name, UNITS[name], each, worst[name.startswith(("distance", "hausdorff"))])
+        Measure(
+            "surface_deviation", name, STATISTICS[name].unit, each, worst[name.startswith(("distance", "hausdorff"))]
+        )
         for name, each in values.items()
     )
 

@@ -7,12 +7,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fem_reference.assessment.claims import CLAIMED, FINER, LEAST, Claim, Claims, Cover
+from fem_reference.metrics import described
 from fem_reference.report.curves import PALETTE, Curve, drawn, logarithmic
 from fem_reference.report.tables import finite
 from fem_reference.report.templates import template
 from fem_reference.report.words import words
 
-UNITS = {"surface_deviation": "mm", "fibre_length": "%", "volume": "%"}
+UNITS = {metric: one.unit for (metric, _), one in described("claim").items()}
 
 
 def render(claims: Claims) -> str:

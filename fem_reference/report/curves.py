@@ -17,7 +17,7 @@ from matplotlib.ticker import MaxNLocator, NullFormatter
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import Of
 from fem_reference.foundations.mesh import Floats
-from fem_reference.metrics import Measure, find
+from fem_reference.metrics import Measure, described, find
 from fem_reference.report.tables import inversion, runs
 from fem_reference.report.words import number, words
 
@@ -76,29 +76,15 @@ class Curve:
 
 def curves(comparison: Comparison) -> list[Curve]:
     """Every drawing for which the comparison has numbers."""
-    changes = comparison.changes
-    volume = {run.name: find(changes[run.name], "volume", "deviation") for run in runs(comparison)}
-    fibres = {run.name: find(changes[run.name], "fibre_length", "mean") for run in runs(comparison)}
-    edges = {run.name: find(changes[run.name], "edge_extension", "mean") for run in runs(comparison)}
-    angles = {run.name: find(changes[run.name], "dihedral_angle", "mean_magnitude") for run in runs(comparison)}
-    depths = {run.name: find(changes[run.name], "penetration", "deepest") for run in runs(comparison)}
-    inside = {run.name: find(changes[run.name], "penetration", "volume") for run in runs(comparison)}
     drawn = [
-        _of_runs(comparison, "volume", "Change of volume from rest", volume),
-        _of_runs(comparison, "fibres", "Change of fibre length from rest, mean over the fibres", fibres),
+        _surface(comparison, i, f"Surface of {run.name}: distance to the reference")
+        for i, run in enumerate(comparison.candidates)
     ]
-    for i, run in enumerate(comparison.candidates):
-        drawn.append(_surface(comparison, i, f"Surface of {run.name}: distance to the reference"))
+    for key, one in described("curve").items():
+        changes = {run.name: find(comparison.changes[run.name], *key) for run in runs(comparison)}
+        drawn.append(_of_runs(comparison, "-".join(key), one.curve, changes))
     smallest = inversion(comparison.reference)
     drawn.append(_inversion(comparison, smallest, "Smallest det F of the reference (inside out below 0)"))
-    drawn.append(_of_runs(comparison, "edges", "Extension of the surface's edges from rest, mean by area", edges))
-    drawn.append(_of_runs(comparison, "angles", "Bending at the edges from rest, mean magnitude by area", angles))
-    drawn.append(
-        _of_runs(
-            comparison, "depth", "Depth of the muscle inside a bone, beside attachments beyond that at rest", depths
-        )
-    )
-    drawn.append(_of_runs(comparison, "inside", "Volume inside bones, without attached parts", inside))
     return [curve for curve in drawn if curve is not None]
 
 

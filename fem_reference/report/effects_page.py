@@ -17,18 +17,14 @@ from fem_reference.assessment.omissions import (
     in_bars,
     verdict,
 )
+from fem_reference.metrics import described
 from fem_reference.report.curves import BAND, PALETTE, REFERENCE, Curve, drawn
 from fem_reference.report.templates import template
 from fem_reference.report.words import duration, listed, number, words
 
 MAIN = "surface_deviation.rms"
 # By name the head of a column of the table.
-HEADS = {
-    "volume.deviation": "volume",
-    "fibre_length.rms_percent": "fibre length, rms",
-    "surface_deviation.rms": "surface, rms",
-    "surface_deviation.max": "surface, max",
-}
+HEADS = {".".join(key): one.label.lower() for key, one in described("main").items()}
 # A change that is smaller by this factor than the least that is drawn otherwise is drawn there.
 _DEPTH = 10.0
 

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from fem_reference.assessment import second_check
-from fem_reference.assessment.comparison import Comparison
-from fem_reference.assessment.doubts import doubts
+from fem_reference.assessment.comparison import Alone, Comparison
 from fem_reference.assessment.error_bars import ErrorBar
 from fem_reference.assessment.judge import Verdict
 from fem_reference.assessment.solver_table import Table
@@ -18,7 +17,7 @@ from fem_reference.effects import Effect
 from fem_reference.foundations.mesh import Surface, enclosed_volume
 from fem_reference.foundations.motion import RigidMotion, Translation
 from fem_reference.geometry.sectors import attached_area, attached_shares
-from fem_reference.metrics import Measure, find
+from fem_reference.metrics import Measure, described, find
 from fem_reference.problems.muscle import AttachedVertices, RigidBody, Setup
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.report.words import exact
@@ -27,15 +26,7 @@ from fem_reference.scenes.case import Case, Expectation
 from fem_reference.scenes.muscle import MuscleCase
 
 # The statistics that are printed of a comparison; the page, JSON and CSV have them all.
-PRINTED = (
-    ("volume", "deviation"),
-    ("fibre_length", "max"),
-    ("surface_deviation", "rms"),
-    ("surface_deviation", "p95"),
-    ("surface_deviation", "max"),
-    ("surface_deviation", "hausdorff"),
-    ("penetration", "deepest"),
-)
+PRINTED = tuple(key for key in described("table") if not key[1].endswith("_percent"))
 
 
 def case_facts(case: Case, setup: Any) -> dict[str, Any]:
@@ -138,9 +129,7 @@ def comparison_text(result: Comparison, page: Path | None = None) -> str:
     runs = [
         f"{run.name}: {run.outcome.status}, {run.outcome.message}" for run in (result.reference, *result.candidates)
     ]
-    runs += [
-        f"reference: doubtful, {why}" for why in doubts(result.reference) if why != result.reference.outcome.status
-    ]
+    runs += [f"reference: doubtful, {why}" for why in result.doubts if why != result.reference.outcome.status]
     checks = second_check.texts_of(result.reference)
     if checks and result.reference.outcome.status == "converged":
         runs.append(f"second check: passed, {len(checks)} checks")
@@ -186,8 +175,7 @@ def _worst(result: Comparison) -> list[str]:
     lines = []
     for name, measures in result.deviations.items():
         text = [
-            f"{' '.join(key).replace('_', ' ')} {measure.values[measure.worst]:.4g} {measure.unit}"
-            f" (frame {result.reference.numbers[measure.worst]})"
+            f"{' '.join(key).replace('_', ' ')} {measure.worst.value:.4g} {measure.unit} (frame {measure.worst.frame})"
             for key in PRINTED
             if (measure := find(measures, *key)) is not None
         ]
@@ -203,7 +191,7 @@ def _known(result: Comparison) -> list[str]:
     for measure in result.changes[result.reference.name]:
         bar = result.error_bars.find("change", measure.metric, measure.statistic)
         if bar is not None:
-            value = f"{measure.values[measure.worst]:.4g} {measure.unit}"
+            value = f"{measure.worst.value:.4g} {measure.unit}"
             lines.append(f"  {measure.metric} {measure.statistic}: {value}, {_bar(result, bar)}")
     lines.append("error bars of deviations from it (the error bar, where that is widest):")
     deviations = [bar for bar in result.error_bars.bars if bar.of == "deviation"]
@@ -212,14 +200,14 @@ def _known(result: Comparison) -> list[str]:
 
 def _bar(result: Comparison, bar: ErrorBar) -> str:
     assert result.error_bars is not None  # the bar is of them
-    at = f"frame {result.error_bars.numbers[bar.worst]}"
-    return f"\N{PLUS-MINUS SIGN} {bar.values[bar.worst]:.2g} {bar.unit} at {at}"
+    at = f"frame {result.error_bars.numbers[bar.widest]}"
+    return f"\N{PLUS-MINUS SIGN} {bar.values[bar.widest]:.2g} {bar.unit} at {at}"
 
 
-def run_text(run: Run, measures: Iterable[Measure], verdicts: Iterable[Verdict]) -> str:
+def run_text(run: Run, found: Alone) -> str:
     """What came of a run that nothing was compared with, line by line."""
-    printed = [f"{run.name}: {run.outcome.status}, {run.outcome.message}", *_measured(run.name, measures)]
-    return "\n".join([*printed, *map(_judged, verdicts), f"stored in {run.folder}"])
+    printed = [f"{run.name}: {run.outcome.status}, {run.outcome.message}", *_measured(run.name, found.measures)]
+    return "\n".join([*printed, *map(_judged, found.verdicts), f"stored in {run.folder}"])
 
 
 def ranking_text(table: Table) -> str:

@@ -1,16 +1,10 @@
 """The page of a comparison. It contains everything itself, and reads without a network."""
 
-import math
 from functools import partial
 from typing import Any
 
-import numpy as np
-
 from fem_reference.assessment.comparison import Comparison
-from fem_reference.assessment.doubts import doubts
-from fem_reference.assessment.error_bars import Of
-from fem_reference.assessment.judge import overall
-from fem_reference.metrics import Measure, find
+from fem_reference.metrics import described, find
 from fem_reference.report import reached
 from fem_reference.report.at_frames import columns, label
 from fem_reference.report.curves import colour_of, label_of
@@ -23,15 +17,6 @@ from fem_reference.report.viewer import view
 from fem_reference.report.words import listed, number, ratio
 from fem_reference.runs.cost import seconds_per_frame
 from fem_reference.runs.store import Run
-
-# What the headline says of a candidate, and how; of a field the last two.
-_HEADLINE = (
-    ("surface_deviation", "rms", "surface off by up to {} rms"),
-    ("fibre_length", "rms_percent", "lengths of fibres by {} rms"),
-    ("volume", "deviation", "volume by {}"),
-    ("difference", "max", "off by up to {}"),
-    ("l2_error", "norm", "L2 error {}"),
-)
 
 
 def render(comparison: Comparison) -> str:
@@ -82,13 +67,9 @@ def _shared(comparison: Comparison) -> dict[str, Any]:
         "runs": runs(comparison),
         "columns": DEVIATIONS,
         "bars": known(comparison),
-        "bar_at": partial(_bar_at, comparison),
-        "error": None
-        if comparison.extension_error is None
-        else worst(comparison.reference, comparison.extension_error),
+        "error": comparison.extension_error and comparison.extension_error.worst,
         "viewer": view(comparison),
         "colours": ramp(),
-        "worst": worst,
         "find": find,
         "ratio": ratio,
         "label_of": label_of,
@@ -99,64 +80,34 @@ def _shared(comparison: Comparison) -> dict[str, Any]:
     }
 
 
-def worst(run: Run, measure: Measure) -> dict[str, Any]:
-    """A measure at its worst frame: ``value``, ``frame`` number and ``where`` in words.
-
-    Where that value is not a number, ``finite`` is the worst (value, frame) of the frames where it is one, else None.
-    """
-    i = measure.worst
-    known = np.flatnonzero(np.isfinite(measure.values))
-    finite = None
-    if len(known) and not np.isfinite(measure.values[i]):
-        k = known[np.argmax(np.abs(measure.values[known]))]
-        finite = (float(measure.values[k]), run.numbers[k])
-    where = measure.where[i] if measure.where else ""
-    return {"value": float(measure.values[i]), "frame": run.numbers[i], "where": where, "finite": finite}
-
-
-def _bar_at(comparison: Comparison, of: Of, metric: str, statistic: str, frame: int) -> float | None:
-    """The error bar of a statistic at a frame number, None without any."""
-    bars = comparison.error_bars
-    found = None if bars is None else bars.find(of, metric, statistic)
-    return None if bars is None or found is None else float(found.values[bars.numbers.index(frame)])
-
-
 def headlines(comparison: Comparison) -> list[tuple[str, str, str]]:
     """What was asked: by candidate its verdict, "not judged" where nothing is expected of it, and its greatest deviations; then the
     reference's own checks, and what makes it doubtful.
     """
     found = list[tuple[str, str, str]]()
     for run in comparison.candidates:
-        words = [one.word for one in comparison.verdicts if one.expectation.of == run.name]
         ended = "" if run.outcome.status == "converged" else f"{run.outcome.status}; "
-        found.append((run.name, overall(words) if words else "not judged", ended + _greatest(comparison, run)))
+        found.append((run.name, comparison.word_of(run.name), ended + _greatest(comparison, run)))
     words = [one.word for one in comparison.verdicts if one.expectation.of == "reference"]
     checks = f"{words.count('pass')} of {len(words)} of its own checks met" if words else "nothing is expected of it"
-    word: str = overall(words) if words else "not judged"
-    if comparison.reference.outcome.status != "converged":  # whatever of it was met
-        word = "fail"
-    doubtful = doubts(comparison.reference)
-    if word == "pass" and doubtful:
-        word = "doubtful pass"
-    found.append(("reference", word, "; ".join([checks, *doubtful])))
+    found.append(("reference", comparison.word_of("reference"), "; ".join([checks, *comparison.doubts])))
     return found
 
 
 def _greatest(comparison: Comparison, run: Run) -> str:
     """The greatest deviations of a candidate, with the error bars of the reference."""
     said = []
-    for metric, statistic, words in _HEADLINE:
+    for (metric, statistic), described_as in described("headline").items():
         one = find(comparison.deviations.get(run.name, ()), metric, statistic)
         if one is None:
             continue
-        at = worst(run, one)
-        lost = "" if at["finite"] is None else f", and not a number in frame {at['frame']}"
-        value, frame = at["finite"] or (at["value"], at["frame"])
-        if not math.isfinite(value):
+        at = one.worst_number
+        if at is None:
             continue
-        bar = _bar_at(comparison, "deviation", metric, statistic, frame)
-        value = f"{number(value)}{f' ± {number(bar)}' if bar is not None else ''} {one.unit}".strip()
-        said.append(words.format(value) + lost)
+        lost = "" if at.index == one.worst.index else f", and not a number in frame {one.worst.frame}"
+        bar = "" if at.error_bar is None else f" ± {number(at.error_bar)}"
+        value = f"{number(at.value)}{bar} {one.unit}".strip()
+        said.append(described_as.headline.format(value) + lost)
     return "; ".join(said) or "nothing of it can be measured"
 
 

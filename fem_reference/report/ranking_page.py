@@ -13,23 +13,16 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from fem_reference.assessment import ranking
 from fem_reference.assessment.solver_table import SolverResult, Table, report_speeds
+from fem_reference.metrics import described
 from fem_reference.report.curves import LOOK, PALETTE, REFERENCE, Curve, inline
 from fem_reference.report.tables import finite
 from fem_reference.report.templates import template
 from fem_reference.report.words import number
 
 # What is measured: metric, statistic, words above the column, unit.
-COLUMNS = (
-    ("volume", "deviation", "Volume", "%"),
-    ("fibre_length", "rms", "Fibre length, rms", "mm"),
-    ("fibre_length", "rms_percent", "Fibre length, rms", "%"),
-    ("surface_deviation", "rms", "Surface, rms", "mm"),
-    ("surface_deviation", "rms_percent", "Surface, rms", "% of travel"),
-    ("surface_deviation", "hausdorff", "Surface, Hausdorff", "mm"),
-    ("penetration", "deepest", "In bones, deepest", "mm"),
-)
-# Of them in the first table, which is over all scenes.
-OVER_ALL = (COLUMNS[0], COLUMNS[2], COLUMNS[4], COLUMNS[6])
+COLUMNS = tuple((*key, one.label, one.full_unit) for key, one in described("solvers").items())
+# In the first table, which is over all scenes.
+OVER_ALL = tuple((*key, one.label, one.full_unit) for key, one in described("scenes").items())
 _MARKS = "osD^vPX*<>"
 # Beyond the palette of curves: of Tol's muted colours those that are none of its own.
 _MORE = ("#882255", "#999933", "#332288", "#777777")

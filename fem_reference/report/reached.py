@@ -55,6 +55,12 @@ def _run(kept: Ints, run: Run) -> Run:
 
 def _measures(kept: Ints, measures: tuple[Measure, ...]) -> tuple[Measure, ...]:
     return tuple(
-        replace(one, values=one.values[kept], where=tuple(one.where[i] for i in kept) if one.where else ())
+        replace(
+            one,
+            values=one.values[kept],
+            where=tuple(one.where[i] for i in kept) if one.where else (),
+            numbers=tuple(one.numbers[i] for i in kept) if one.numbers else (),
+            error_bars=_pick(kept, one.error_bars),
+        )
         for one in measures
     )

@@ -21,6 +21,7 @@ def facts(check: Check) -> dict[str, Any]:
         "unchanged": check.answer("unchanged"),
         "within": check.answer("within"),
         "notes": list(check.notes),
+        "doubts": list(check.doubts),
         "judgements": [
             {
                 "verdict": one.word,
@@ -47,6 +48,7 @@ def text(check: Check) -> str:
         silent.setdefault(one.why, []).append(_named(one))
     lines += _most([f"inconclusive: {why} ({_few(names)})" for why, names in silent.items()])
     lines += [f"note: {note}" for note in check.notes]
+    lines += [f"reference: doubtful, {why}" for why in check.doubts]
     if _of(check, "fail"):
         lines.append(
             f"what is nearer to the reference and what is further: compare {check.case} --candidate ... --against the baseline"
@@ -62,6 +64,7 @@ def markdown(check: Check) -> str:
     lines += [
         *(f"- {answer}" for answer in _answers(check)),
         *(f"- note: {_escaped(note)}" for note in check.notes),
+        *(f"- reference: doubtful, {_escaped(why)}" for why in check.doubts),
         "",
     ]
     lines += [f"| {' | '.join(_COLUMNS)} |", f"|{'---|' * len(_COLUMNS)}"]
@@ -74,13 +77,16 @@ def markdown(check: Check) -> str:
 
 def junit(check: Check, seconds: float) -> str:
     """One suite for the candidate, one case for each judgement; where nothing can be said, the case is skipped. ``seconds`` is
-    what the whole check took.
+    what the whole check took. The verdict and the doubts about the reference are properties: a doubtful pass is no failure.
     """
     counts = {"tests": len(check.judgements), "failures": check.count("fail"), "errors": 0}
     counts |= {"skipped": check.count("inconclusive")}
     totals = {name: str(count) for name, count in counts.items()} | {"time": f"{seconds:.3f}"}
     root = ElementTree.Element("testsuites", totals)
     suite = ElementTree.SubElement(root, "testsuite", {"name": f"{check.case}.{check.candidate}"} | totals)
+    properties = ElementTree.SubElement(suite, "properties")
+    for name, value in (("verdict", check.word), *(("doubt", why) for why in check.doubts)):
+        ElementTree.SubElement(properties, "property", {"name": name, "value": value})
     for one in check.judgements:
         case = {"classname": f"{check.case}.{check.candidate}", "name": _named(one), "time": "0"}
         element = ElementTree.SubElement(suite, "testcase", case)

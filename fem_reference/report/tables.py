@@ -7,27 +7,17 @@ from collections.abc import Iterable
 from typing import Any
 
 from fem_reference.assessment import ranking, second_check
-from fem_reference.assessment.comparison import Comparison
+from fem_reference.assessment.comparison import Alone, Comparison
 from fem_reference.assessment.convergence import Ladder
-from fem_reference.assessment.doubts import doubts
 from fem_reference.assessment.error_bars import ErrorBar
-from fem_reference.assessment.judge import Verdict, overall
-from fem_reference.metrics import Measure
+from fem_reference.assessment.judge import Verdict
+from fem_reference.metrics import Measure, described
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case
 
 COLUMNS = ("candidate", "metric", "statistic", "frame", "value", "unit")
 # The columns of the first table: metric, statistic, the words above a group and above the column, unit.
-DEVIATIONS = (
-    ("volume", "deviation", "Volume", "", "%"),
-    ("fibre_length", "max", "Fibre length", "worst fibre", "mm"),
-    ("fibre_length", "max_percent", "Fibre length", "worst fibre", "%"),
-    ("surface_deviation", "rms", "Surface", "rms", "mm"),
-    ("surface_deviation", "p95", "Surface", "95 % below", "mm"),
-    ("surface_deviation", "max", "Surface", "worst vertex", "mm"),
-    ("surface_deviation", "hausdorff", "Surface", "Hausdorff", "mm"),
-    ("penetration", "deepest", "In bones", "deepest", "mm"),
-)
+DEVIATIONS = tuple((*key, one.title, one.part, one.unit) for key, one in described("table").items())
 
 
 def summary(comparison: Comparison) -> dict[str, Any]:
@@ -47,7 +37,7 @@ def summary(comparison: Comparison) -> dict[str, Any]:
         "status": reference.outcome.status,
         "message": reference.outcome.message,
         "verdict": comparison.word,
-        "doubts": doubts(reference),
+        "doubts": comparison.doubts,
         "second_check": reference.origin.get(second_check.RECORD, {}),
         "cost": {run.name: {key: finite(value) for key, value in run.outcome.cost.items()} for run in runs(comparison)},
         "measures": from_rest[reference.name] + rows(reference, inversion(reference)) + deviations,
@@ -59,17 +49,17 @@ def summary(comparison: Comparison) -> dict[str, Any]:
     return facts | ({"convergence": [_ladder(ladder) for ladder in comparison.ladders]} if comparison.ladders else {})
 
 
-def of_run(case: Case, run: Run, measures: tuple[Measure, ...], verdicts: tuple[Verdict, ...]) -> dict[str, Any]:
+def of_run(case: Case, run: Run, found: Alone) -> dict[str, Any]:
     """What came of a ``run`` that nothing was compared with, in the words of :func:`summary`."""
     return {
         "case": case.name,
         "solver": run.solver,
         "status": run.outcome.status,
         "message": run.outcome.message,
-        "verdict": overall(verdict.word for verdict in verdicts),
+        "verdict": found.word,
         "cost": {run.name: run.outcome.cost},
-        "measures": rows(run, measures),
-        "verdicts": [_verdict(verdict) for verdict in verdicts],
+        "measures": rows(run, found.measures),
+        "verdicts": [_verdict(verdict) for verdict in found.verdicts],
         "folder": str(run.folder),
     }
 

@@ -46,6 +46,7 @@ class Contents(Record):
     frames: tuple[int, ...]
     numbers: tuple[Annotated[int, Field(ge=0, le=LAST_FRAME)], ...] = Field(min_length=1, max_length=MOST_FRAMES)
     scalars: dict[str, tuple[float | None, ...]]
+    residuals: tuple[tuple[float, ...], ...] = ()
     cost: dict[str, float]
     origin: Origin
     parts: tuple[str, ...]

@@ -53,7 +53,7 @@ def stored(folder: Path, identity: dict[str, Any]) -> dict[str, Any] | None:
 def truncate(state: dict[str, Any], number: int) -> None:
     """Take the frames from ``number`` on, which are solved again, out of a ``state`` as run.json has it."""
     kept = sum(stored < number for stored in state["numbers"])
-    state["numbers"] = state["numbers"][:kept]
+    state["numbers"], state["residuals"] = state["numbers"][:kept], state.get("residuals", [])[:kept]
     state["scalars"] = {name: values[:kept] for name, values in state["scalars"].items()} if kept else {}
 
 

@@ -4,11 +4,14 @@ import ast
 import hashlib
 import importlib.metadata
 import json
+import os
 import platform
 from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
+
+from fem_reference.foundations.version import __version__
 
 PACKAGE = Path(__file__).parent.parent
 # What makes problems of scenes determines every run; some of it is found by name as it runs, which no import shows.
@@ -55,6 +58,17 @@ def sources(solver: str, package: Path = PACKAGE) -> set[Path]:
         modules = {module for path in waiting if path.suffix == ".py" for module in _imported(path, package)}
         waiting = {path for module in modules for path in _module(package, module.split("."))} - found
     return found
+
+
+def machine() -> str:
+    """The machine that this runs on."""
+    return f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores"
+
+
+def made_with(manner: str = "") -> dict[str, str]:
+    """Provenance of what was measured: our version, the machine and the ``manner`` of runs on it, and the versions of packages."""
+    described = ", ".join(filter(None, [machine(), manner]))
+    return {"fem_reference": __version__, "machine": described, **versions()}
 
 
 def versions() -> dict[str, str]:

@@ -21,7 +21,8 @@ class Reached:
     min_cell_volume_ratio and max_cell_volume_ratio, min_cell_fibre_stretch and max_cell_fibre_stretch where a law has a limit
     on it, and outside_law, in how many cells a law is outside its range; with contact the greatest contact_depth [mm] and
     contact_pressure [MPa] and the contact_area at rest [mm2]; ``state``: the
-    unknowns of the cells, where they were asked for.
+    unknowns of the cells, where they were asked for; ``residuals``: the norms [N, mm3] before and after each of Newton's iterations
+    in the last load step to it.
     """
 
     frame: float
@@ -30,6 +31,7 @@ class Reached:
     moments: dict[str, Floats]
     scalars: dict[str, float] = field(default_factory=dict)
     state: NodalState | None = None
+    residuals: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

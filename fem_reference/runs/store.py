@@ -47,7 +47,7 @@ QUIET = 1.0
 class Frame:
     """One requested frame: positions [mm] of the surface (n, 3), None of a solver that moves none, and where the solver has them
     of the fibre points (m, 3) and tet points (k, 3); ``scalars`` by name; ``note`` is what progress says of it; ``state`` the
-    unknowns of the tets, where they were asked for; ``field``, of a scalar problem.
+    unknowns of the tets, where they were asked for; ``field``, of a scalar problem; ``residuals`` of Newton's last load step.
     """
 
     number: int
@@ -58,6 +58,7 @@ class Frame:
     note: str = ""
     state: states.NodalState | None = None
     field: NodalField | None = None
+    residuals: tuple[float, ...] = ()
 
 
 Sink = Callable[[Frame], None]
@@ -83,7 +84,7 @@ class Run:
     ``numbers`` (f,), ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (its rest state), ``fibre_positions``
     (f, m, 3) [mm] of the points of ``fibres`` or None for a surface-only solver, ``scalars`` by name (f,). A solver of lines
     alone moves no surface: ``has_surface`` is False, and every entry of ``positions`` NaN. A scalar run has a ``mesh`` in their
-    place, and ``fields`` by name (f, ...) at its nodes, as :class:`NodalField` has them.
+    place, and ``fields`` by name (f, ...) at its nodes, as :class:`NodalField` has them. ``residuals`` by frame.
     """
 
     name: str
@@ -100,6 +101,7 @@ class Run:
     has_surface: bool = True
     mesh: FieldMesh | None = None
     fields: dict[str, Floats] = field(default_factory=dict)
+    residuals: tuple[tuple[float, ...], ...] = ()
 
     @property
     def carries(self) -> frozenset[Part]:
@@ -125,11 +127,8 @@ class Run:
 
     def _repr_html_(self) -> str:
         """What notebooks show."""
-        cost = {
-            name: value
-            for name, value in self.outcome.cost.items()
-            if name in ("seconds", "newton_iterations", "unknowns")
-        }
+        known = ("seconds", "newton_iterations", "unknowns")
+        cost = {name: value for name, value in self.outcome.cost.items() if name in known}
         facts = {
             "solver": self.solver,
             "status": f"{self.outcome.status}: {self.outcome.message}",
@@ -160,7 +159,7 @@ class Writer:
         """
         self.folder, self.surface, self.fibres, self.mesh, self.directions = folder, surface, fibres, mesh, directions
         self.state: dict[str, Any] = {"format": FORMAT, **identity, "status": "running", "message": "", "numbers": []}
-        self.state |= {"scalars": {}, "cost": {}, "parts": []}
+        self.state |= {"scalars": {}, "residuals": [], "cost": {}, "parts": []}
         self.begin, self.reported = time.perf_counter(), 0.0
         if (stored := cut_off.stored(folder, identity)) is not None:
             self.state = stored | {"name": identity["name"], "origin": identity["origin"]}
@@ -197,6 +196,7 @@ class Writer:
         if (solved := frame.field) is not None:
             parts[fields.FOLDER] = lambda path: fields.write(path, solved)
         self.state["numbers"].append(frame.number)
+        self.state["residuals"].append(frame.residuals)
         self.state["parts"] = sorted([*parts, *stored])
         for part, write in parts.items():
             suffix = ".vtu" if part in ("tets", fields.FOLDER) else ".vtp"
@@ -242,10 +242,9 @@ class Writer:
         done, wanted = len(self.state["numbers"]), len(self.state["frames"])
         passed = time.perf_counter() - self.begin
         left = f", about {passed / (done - 1) * (wanted - done):.0f} s left" if 1 < done < wanted else ""
-        note = f", {frame.note}" if frame.note else ""
         if 1 < done < wanted and passed - self.reported < QUIET:
             return
-        self.reported, name = passed, self.state["name"]
+        self.reported, name, note = passed, self.state["name"], f", {frame.note}" if frame.note else ""
         log.info("%s: frame %d (%d of %d)%s, %.0f s%s", name, frame.number, done, wanted, note, passed, left)
 
 
@@ -258,7 +257,8 @@ def load(folder: Path) -> Run:
     stored = parse(Contents, state, f"{place}: run")
     whose: dict[str, Any] = {"name": stored.name, "solver": stored.solver, "numbers": stored.numbers, "folder": folder}
     whose |= {"outcome": Outcome(stored.status, stored.message, stored.cost), "origin": state["origin"]}
-    whose |= {"scalars": {name: np.asarray(values, float) for name, values in stored.scalars.items()}}
+    scalars = {name: np.asarray(values, float) for name, values in stored.scalars.items()}
+    whose |= {"scalars": scalars, "residuals": stored.residuals}
     if fields.FOLDER in stored.parts:
         mesh, arrays = fields.read(folder, stored.numbers)
         return Run(**whose, has_surface=False, mesh=mesh, fields=arrays)

@@ -1,4 +1,4 @@
-"""As rigid as possible: the surface keeps the shape of every vertex's edges. Report section 5.5.2; Sorkine and Alexa 2007.
+"""ARAP, as rigid as possible: the surface keeps the shape of every vertex's edges. Report section 5.5.2; Sorkine and Alexa 2007.
 
 Frame number n is the state after the bones took their pose of frame n: the vertices attached to a bone go with it exactly, and
 from the state before, the rotations of all cells (local step) and the positions of all other vertices (global step) take
@@ -7,9 +7,9 @@ over its own unknowns, so that the energy never rises; negative weights do not c
 positive one of linear elements. Attachments by springs are exact here, and there is no contact.
 """
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -18,15 +18,15 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
-from fem_reference.foundations.mesh import TET_FACES, Floats, Ints, Surface, enclosed_volume
+from fem_reference.foundations.mesh import Floats, Ints, Surface, enclosed_volume
 from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import PositiveLength
 from fem_reference.problems.muscle import Setup
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers import arap_kernels
-from fem_reference.solvers.common.frame_loop import carry, follow, refused
+from fem_reference.solvers.common.frame_loop import carry, follow, refused, timed
 from fem_reference.solvers.common.protocol import MuscleSolver, Trade
-from fem_reference.solvers.common.state_checks import Trouble, trouble
+from fem_reference.solvers.common.state_checks import Trouble, first_trouble, surface_checks
 
 Symmetric = Literal["cotangent", "clamped cotangent", "kirchhoff"]
 Weights = Literal[Symmetric, "tutte"]
@@ -36,8 +36,8 @@ Fixed = Literal["remove", "ols"]
 _NO_AREA = 1e-6
 
 
-class Settings(Record):
-    """How the alternation is run; every key but ``tolerance`` is required.
+class ArapSettings(Record):
+    """The settings of the alternation; every key but ``tolerance`` is required.
 
     ``weights`` of edges: "cotangent" (eq. 5.13), "clamped cotangent" (the same, the negative ones 0), "kirchhoff" (all 1),
     "tutte" (those, each row divided by its diagonal). A cotangent weight is negative where the angles opposite its edge are
@@ -59,7 +59,7 @@ class Settings(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class Cells:
+class VertexCells:
     """The edges around each vertex, as ``arap_kernels`` has them: ``rest`` (n, 3) [mm], ``starts`` (n + 1,), ``neighbours``
     and ``weights`` (e,).
     """
@@ -97,7 +97,7 @@ class Cells:
 
 
 @dataclass(frozen=True, eq=False)
-class System:
+class GlobalStep:
     """The global step for given ``attached`` (k,) and ``free`` vertices, factorised once.
 
     ``rows`` of the Laplacian are kept, its columns split into ``coupling`` (rows, k) and those of ``factor``; ``fold``, of
@@ -105,7 +105,7 @@ class System:
     attached one: where there are some, or nothing or everything is attached, there is no ``factor`` and nothing else moves.
     """
 
-    cells: Cells
+    cells: VertexCells
     attached: Ints
     free: Ints
     rows: Ints
@@ -115,7 +115,7 @@ class System:
     loose: Ints
 
     @classmethod
-    def of(cls, cells: Cells, attached: Ints, fixed: Fixed) -> Self:
+    def of(cls, cells: VertexCells, attached: Ints, fixed: Fixed) -> Self:
         """The system with the rows of attached vertices removed, or kept for least squares."""
         everything, laplacian = np.arange(len(cells.rest)), cells.laplacian().tocsr()
         free = np.setdiff1d(everything, attached)
@@ -148,42 +148,17 @@ class Relaxed:
     trouble: Trouble | None = None
 
 
-def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
-    """Iterate through every frame number from the first of ``setup.frames``, at rest, to the last."""
-    cost = {"seconds_compile": compile_kernels()}
-    begin = time.perf_counter()
-    system = System.of(Cells.of(setup.surface, settings.weights), setup.attached_vertices, settings.fixed)
-    cost["seconds_setup"] = time.perf_counter() - begin
-    triangles, volume = setup.surface.triangles, enclosed_volume(setup.surface.points, setup.surface.triangles)
-
-    def relax(points: Floats) -> Relaxed:
-        rotations = system.cells.rotations(points)
-        for count in range(1, settings.iterations + 1):
-            if count > 1 and settings.rotations == "each":
-                rotations = system.cells.rotations(points)
-            moved = system.place(points, rotations)
-            if settings.volume_step:
-                moved = scaled(moved, triangles, system.free, volume)
-            displacement, points = farthest(moved - points), moved
-            if settings.tolerance is not None and displacement <= settings.tolerance:
-                return Relaxed(points, count, True)
-        return Relaxed(points, settings.iterations, settings.tolerance is None)
-
-    return alternate(setup, system, relax, sink, cost)
-
-
 class Alternation:
     """A surface going from frame number to frame number, whose free vertices ``relax`` as the attached ones have moved."""
 
     advice = "a slower motion may help"
 
-    def __init__(
-        self, setup: Setup, system: System, relax: Callable[[Floats], Relaxed], cost: dict[str, float]
-    ) -> None:
+    def __init__(self, setup: Setup, system: GlobalStep, relax: Callable[[Floats], Relaxed]) -> None:
         self.setup, self.system, self.relax = setup, system, relax
+        self.checks = surface_checks(setup.surface, system.attached)
         self.relaxed = Relaxed(setup.begin(setup.surface.points), 0, True)
         free = len(setup.surface.points) - len(np.unique(setup.attached_vertices))
-        self.cost = cost | {"unknowns": 3.0 * free, "local_global_steps": 0, "frames_off_tolerance": 0}
+        self.cost: dict[str, float] = {"unknowns": 3.0 * free, "local_global_steps": 0, "frames_off_tolerance": 0}
 
     def move(self, number: int) -> None:
         """Carry the attached vertices there, and relax."""
@@ -194,8 +169,8 @@ class Alternation:
         self.cost["frames_off_tolerance"] += not self.relaxed.met
 
     def trouble(self) -> Trouble | None:
-        """What is wrong with the surface, or with how it relaxed."""
-        return trouble(self.relaxed.points, self.setup.surface, self.system.attached) or self.relaxed.trouble
+        """The trouble with the surface, or with how it relaxed."""
+        return first_trouble(self.checks, self.relaxed.points) or self.relaxed.trouble
 
     def frame(self, number: int) -> Frame:
         """The surface and its energy."""
@@ -212,13 +187,36 @@ class Alternation:
         return Outcome("converged", done)
 
 
-def alternate(
-    setup: Setup, system: System, relax: Callable[[Floats], Relaxed], sink: Sink, cost: dict[str, float]
-) -> Outcome:
-    """Move the attached vertices and ``relax`` the others, frame number by frame number; what it costs is added to ``cost``."""
-    model = Alternation(setup, system, relax, cost)
-    if len(system.loose):
-        why = f"vertex {system.loose[0]}: nothing but triangles without area or weight ties it to a attached vertex"
+def solve(setup: Setup, settings: ArapSettings, sink: Sink) -> Outcome:
+    """Iterate through every frame number from the first of ``setup.frames``, at rest, to the last."""
+    return alternate(partial(_alternation, settings), setup, sink)
+
+
+def _alternation(settings: ArapSettings, setup: Setup) -> Alternation:
+    system = GlobalStep.of(VertexCells.of(setup.surface, settings.weights), setup.attached_vertices, settings.fixed)
+    triangles, volume = setup.surface.triangles, enclosed_volume(setup.surface.points, setup.surface.triangles)
+
+    def relax(points: Floats) -> Relaxed:
+        rotations = system.cells.rotations(points)
+        for count in range(1, settings.iterations + 1):
+            if count > 1 and settings.rotations == "each":
+                rotations = system.cells.rotations(points)
+            moved = system.place(points, rotations)
+            if settings.volume_step:
+                moved = scaled(moved, triangles, system.free, volume)
+            displacement, points = farthest(moved - points), moved
+            if settings.tolerance is not None and displacement <= settings.tolerance:
+                return Relaxed(points, count, True)
+        return Relaxed(points, settings.iterations, settings.tolerance is None)
+
+    return Alternation(setup, system, relax)
+
+
+def alternate(make: Callable[[Setup], Alternation], setup: Setup, sink: Sink) -> Outcome:
+    """Move the attached vertices and relax the others, frame number by frame number."""
+    model = timed(make, setup)
+    if len(loose := model.system.loose):
+        why = f"vertex {loose[0]}: nothing but triangles without area or weight ties it to an attached vertex"
         hint = "kirchhoff weights feel no areas"
         return refused(model, setup.frames[0], sink, Trouble("diverged", f"{why}; {hint}"))
     return follow(model, setup, sink)
@@ -248,15 +246,6 @@ def factorised(matrix: Any) -> Any:
     return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
 
 
-def compile_kernels() -> float:
-    """Run every compiled function once, on a tetrahedron; seconds."""
-    begin = time.perf_counter()
-    cells = Cells.of(Surface(np.vstack([np.zeros(3), np.eye(3)]), TET_FACES), "kirchhoff")
-    cells.right_side(cells.rotations(cells.rest))
-    cells.energy(cells.rest)
-    return time.perf_counter() - begin
-
-
 def cotangents(points: Floats, triangles: Ints) -> Floats:
     """Cotangent of the angle at each corner (m, 3), negative where it is obtuse; 0 in a triangle that has no area."""
     sides = [points[triangles[:, (k + 2) % 3]] - points[triangles[:, (k + 1) % 3]] for k in range(3)]
@@ -270,10 +259,7 @@ def cotangents(points: Floats, triangles: Ints) -> Floats:
 def _edge_weights(surface: Surface, name: Weights) -> Any:
     """The weight of each edge from either end, a sparse matrix (n, n)."""
     triangles, count = surface.triangles, len(surface.points)
-    one, other = (
-        triangles[:, [1, 2, 0]].ravel(),
-        triangles[:, [2, 0, 1]].ravel(),
-    )  # the ends of the edge opposite a corner
+    one, other = triangles[:, [1, 2, 0]].ravel(), triangles[:, [2, 0, 1]].ravel()  # ends of the edge opposite a corner
     ends = (np.concatenate([one, other]), np.concatenate([other, one]))
     halves = np.tile(cotangents(surface.points, triangles).ravel() / 2, 2)
     matrix = sparse.coo_array((halves, ends), shape=(count, count)).tocsr()
@@ -287,7 +273,7 @@ def _edge_weights(surface: Surface, name: Weights) -> Any:
 
 
 def _untied(laplacian: Any, attached: Ints) -> Ints:
-    """The vertices that no chain of edges of a weight other than 0 leads to a attached one; none where nothing is attached."""
+    """The vertices that no chain of edges of a weight other than 0 leads to an attached one; none where nothing is attached."""
     part = connected_components(laplacian != 0, directed=False)[1]
     return np.flatnonzero(~np.isin(part, part[attached])) if len(attached) else np.zeros(0, np.int64)
 
@@ -299,4 +285,4 @@ _EXAMPLE = {
     "volume_step": False,
     "iterations": 3,
 }
-SOLVES = (MuscleSolver(settings=Settings, solve=solve, example=_EXAMPLE),)
+SOLVES = (MuscleSolver(settings=ArapSettings, solve=solve, example=_EXAMPLE),)

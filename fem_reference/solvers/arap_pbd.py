@@ -1,4 +1,4 @@
-"""As rigid as possible with position based dynamics: the two combinations that report 6.2 and 7.2 propose.
+"""ARAP (as rigid as possible) with position based dynamics: the two combinations that report 6.2 and 7.2 propose.
 
 *The volume as a constraint* of the ARAP energy, instead of scaling by turns: the positions of a global step solve
 ``L p' = b + lambda grad V``, with the multiplier lambda for which the enclosed volume is that of rest and the gradient at the
@@ -8,21 +8,21 @@ volume, dihedral angles) start from the ARAP state of the frame; nothing is kept
 projections come last. As in ``arap``, there is no contact.
 """
 
-import time
+from functools import partial
 from typing import Annotated, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from fem_reference.foundations.mesh import TET_FACES, Floats
+from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import PositiveLength
 from fem_reference.problems.muscle import Setup
 from fem_reference.runs.store import Outcome, Sink
-from fem_reference.solvers.arap import Cells, Relaxed, Symmetric, System, alternate, compile_kernels, farthest
+from fem_reference.solvers.arap import Alternation, GlobalStep, Relaxed, Symmetric, VertexCells, alternate, farthest
 from fem_reference.solvers.common.protocol import MuscleSolver, Trade
 from fem_reference.solvers.common.state_checks import Trouble
-from fem_reference.solvers.pbd import Constraints, Stiffness
+from fem_reference.solvers.pbd import PbdConstraints, Stiffness
 from fem_reference.solvers.pbd_kernels import project_dihedrals, project_distances, project_volume, volume
 
 # The volume counts as reached when it is off by this share, and as out of reach after this many steps of Newton's method.
@@ -42,7 +42,7 @@ class Projections(Record):
     bending: Stiffness
 
 
-class Settings(Record):
+class ArapPbdSettings(Record):
     """ARAP with the rows of attached vertices removed and rotations fitted in each iteration, and what keeps its volume.
 
     ``weights``, ``iterations`` and ``tolerance`` as in ``arap``; Tutte's are not offered, as with removed rows they have the
@@ -63,13 +63,14 @@ class Settings(Record):
         return self
 
 
-def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
+def solve(setup: Setup, settings: ArapPbdSettings, sink: Sink) -> Outcome:
     """Iterate through every frame number from the first of ``setup.frames``, at rest, to the last."""
-    cost = {"seconds_compile": compile_kernels() + _compile_projections()}
-    begin = time.perf_counter()
-    system = System.of(Cells.of(setup.surface, settings.weights), setup.attached_vertices, "remove")
-    rest = Constraints.at_rest(setup.surface.points, setup.surface.triangles, system.attached)
-    cost["seconds_setup"] = time.perf_counter() - begin
+    return alternate(partial(_alternation, settings), setup, sink)
+
+
+def _alternation(settings: ArapPbdSettings, setup: Setup) -> Alternation:
+    system = GlobalStep.of(VertexCells.of(setup.surface, settings.weights), setup.attached_vertices, "remove")
+    rest = PbdConstraints.at_rest(setup.surface.points, setup.surface.triangles, system.attached)
 
     def relax(points: Floats) -> Relaxed:
         found = minimise(system, points, settings, rest)
@@ -77,10 +78,10 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
             return found
         return Relaxed(projected(found.points, rest, settings.projections), found.iterations, found.met, found.trouble)
 
-    return alternate(setup, system, relax, sink, cost)
+    return Alternation(setup, system, relax)
 
 
-def minimise(system: System, points: Floats, settings: Settings, rest: Constraints) -> Relaxed:
+def minimise(system: GlobalStep, points: Floats, settings: ArapPbdSettings, rest: PbdConstraints) -> Relaxed:
     """Local and global steps from ``points`` (n, 3) until the settings are met, at the volume of ``rest`` where they say so.
 
     The volume is lost where it is farther from the minimum of a global step than the edge of a cube of that volume: it is kept by
@@ -98,7 +99,7 @@ def minimise(system: System, points: Floats, settings: Settings, rest: Constrain
     return Relaxed(points, count, met or tolerance is None, _lost_volume(points, rest, settings))
 
 
-def at_volume(system: System, minimum: Floats, before: Floats, rest: Constraints) -> Floats:
+def at_volume(system: GlobalStep, minimum: Floats, before: Floats, rest: PbdConstraints) -> Floats:
     """``p + lambda L^-1 grad V`` with lambda such that the volume is that of ``rest``, and the least such lambda.
 
     p is the ``minimum`` (n, 3) of the global step and the gradient that at the positions ``before`` it. The volume is a cubic in
@@ -109,7 +110,7 @@ def at_volume(system: System, minimum: Floats, before: Floats, rest: Constraints
     if system.factor is None:
         return minimum
     direction[system.free] = system.factor.solve(volume(before, rest.triangles)[1][system.free])
-    factor = _least_root(minimum, direction, rest)
+    factor = least_root(minimum, direction, rest)
     if factor is None:
         return minimum
     for _ in range(_STEPS):
@@ -121,7 +122,7 @@ def at_volume(system: System, minimum: Floats, before: Floats, rest: Constraints
     return minimum + factor * direction
 
 
-def _least_root(points: Floats, direction: Floats, rest: Constraints) -> float | None:
+def least_root(points: Floats, direction: Floats, rest: PbdConstraints) -> float | None:
     """The lambda nearest to 0 at which ``points + lambda direction`` (n, 3) have the volume of ``rest``, None where there is none.
 
     Six times the volume is a cubic form: its coefficients are values and slopes at ``points`` and at ``direction``. The greatest
@@ -139,7 +140,7 @@ def _least_root(points: Floats, direction: Floats, rest: Constraints) -> float |
     return float(1 / max(real, key=abs)) if len(real) else None
 
 
-def projected(points: Floats, rest: Constraints, projections: Projections) -> Floats:
+def projected(points: Floats, rest: PbdConstraints, projections: Projections) -> Floats:
     """``points`` (n, 3) after the sweeps of PBD's projections."""
     moved = points.copy()
     for _ in range(projections.sweeps):
@@ -149,22 +150,13 @@ def projected(points: Floats, rest: Constraints, projections: Projections) -> Fl
     return moved
 
 
-def _lost_volume(points: Floats, rest: Constraints, settings: Settings) -> Trouble | None:
-    """What is wrong with the volume of ``points``; None if nothing is, or nobody asked."""
+def _lost_volume(points: Floats, rest: PbdConstraints, settings: ArapPbdSettings) -> Trouble | None:
+    """The trouble with the volume of ``points``; None without, or where nobody asked."""
     ratio = volume(points, rest.triangles)[0] / rest.six_volumes
     if not settings.volume_constraint or abs(ratio - 1) <= _KEPT:
         return None
     return Trouble("diverged", f"no multiplier keeps the volume, it is {ratio:.6g} of that at rest")
 
 
-def _compile_projections() -> float:
-    """Run every compiled function of the projections once, on a tetrahedron; seconds."""
-    begin = time.perf_counter()
-    points, nothing = np.vstack([np.zeros(3), np.eye(3)]), np.zeros(0, np.int64)
-    rest = Constraints.at_rest(points, TET_FACES, nothing)
-    projected(points, rest, Projections(sweeps=1, stretch=1, volume=1, bending=1))
-    return time.perf_counter() - begin
-
-
 _EXAMPLE = {"weights": "clamped cotangent", "iterations": 3, "volume_constraint": True}
-SOLVES = (MuscleSolver(settings=Settings, solve=solve, example=_EXAMPLE),)
+SOLVES = (MuscleSolver(settings=ArapPbdSettings, solve=solve, example=_EXAMPLE),)

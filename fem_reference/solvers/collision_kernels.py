@@ -94,7 +94,8 @@ def sample(coefficients: Floats, origin: Floats, spacing: float, points: Floats)
 
 @compiled
 def approached(points: Floats, pose: Floats, asked_at: Floats, clear: Floats) -> tuple[Ints, Floats]:
-    """Which of ``points`` (n, 3) have gone at least ``clear`` (n,) [mm] from ``asked_at`` (n, 3), seen from a bone at ``pose``.
+    """Those of the ``points`` (n, 3) that have gone ``clear`` (n,) [mm] or more from ``asked_at`` (n, 3), as a bone at ``pose``
+    sees it.
 
     Their numbers (k,) and where they are in the bone's rest frame (k, 3).
     """
@@ -114,13 +115,7 @@ def approached(points: Floats, pose: Floats, asked_at: Floats, clear: Floats) ->
     return found[:count].copy(), places[:count].copy()
 
 
-def compile_all() -> None:
-    """Run every compiled function of this module once."""
-    sample(np.zeros((4, 4, 4)), np.zeros(3), 1.0, np.ones((1, 3)))
-    approached(np.zeros((1, 3)), np.eye(4), np.zeros((1, 3)), np.zeros(1))
-
-
-class Obstacle:
+class CollidingBone:
     """A bone, what it allows each vertex, and what is known of how near each has come.
 
     A vertex is allowed to come within ``gap`` [mm] of the bone, and no nearer than at rest where it is nearer there: nothing
@@ -166,13 +161,13 @@ class Obstacle:
         return distance if self.grid is None else np.minimum(distance, self.grid.margin)
 
 
-def move_out(points: Floats, obstacles: Sequence[Obstacle], stiffness: float) -> None:
+def move_out(points: Floats, bones: Sequence[CollidingBone], stiffness: float) -> None:
     """Move ``points`` (n, 3) [mm] out of all bones in place, each by the sum of the displacements out of every bone that it is in.
 
     ``stiffness`` is the share of each displacement that is applied. The masses cancel: a constraint has one vertex.
     """
     moves = np.zeros_like(points)
-    for one in obstacles:
+    for one in bones:
         near = one.near(points)
         inside = near.value < 0
         moves[near.vertices[inside]] -= stiffness * near.value[inside, None] * near.away[inside]

@@ -47,7 +47,7 @@ class CylinderOn(bones.Rod):
     bone: str
 
 
-class Settings(Record):
+class LineSettings(Record):
     """What lines go through and around; without any key they are straight.
 
     ``via``: points in the order in which a fibre passes them. ``sphere`` or ``cylinder``: an obstacle that every part of a
@@ -104,7 +104,7 @@ class Shortest:
 
     advice = "a smaller radius may help"
 
-    def __init__(self, problem: Problem, settings: Settings) -> None:
+    def __init__(self, problem: Problem, settings: LineSettings) -> None:
         self.problem, self.vias = problem, len(settings.via)
         self.lines, self.wrap = _made(problem, settings, "line_of_action")
         self.cost = {"seconds_compile": 0.0}
@@ -134,17 +134,17 @@ class Shortest:
         return Outcome("converged", f"{len(self.lines.fixed)} lines, {kind}{around}; no surface")
 
 
-def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
+def solve(problem: Problem, settings: LineSettings, sink: Sink) -> Outcome:
     """The lines at every frame wanted, up to one with a fixed point inside the obstacle; InputError where that is the first."""
     return each(Shortest(problem, settings), problem.frames, sink)
 
 
-def check(settings: Settings, problem: Problem, place: str) -> None:
+def check(settings: LineSettings, problem: Problem, place: str) -> None:
     """InputError below ``place`` where lines cannot go through and around what the settings say."""
     _made(problem, settings, place)
 
 
-def _made(problem: Problem, settings: Settings, place: str) -> tuple[Lines, Wrap | None]:
+def _made(problem: Problem, settings: LineSettings, place: str) -> tuple[Lines, Wrap | None]:
     """The lines and the obstacle; InputError below ``place`` where the case has not what they need, or a fixed point is inside the
     obstacle at the first frame.
     """
@@ -181,7 +181,7 @@ def _inside(wrap: Wrap, fixed: Floats, number: int) -> str:
     return "" if depths[line] <= _TOUCHES else f"a fixed point of line {line} {depths[line]:.3g} mm inside"
 
 
-def _wrap(problem: Problem, settings: Settings, place: str) -> Wrap | None:
+def _wrap(problem: Problem, settings: LineSettings, place: str) -> Wrap | None:
     """The obstacle of the settings, None without one."""
     if (ball := settings.sphere) is not None:
         bone = problem.bones[_index(problem.bones, ball.bone, join(place, "sphere.bone"))]
@@ -193,7 +193,7 @@ def _wrap(problem: Problem, settings: Settings, place: str) -> Wrap | None:
     return None
 
 
-def _lines(problem: Problem, settings: Settings, place: str) -> Lines:
+def _lines(problem: Problem, settings: LineSettings, place: str) -> Lines:
     fibres, places = problem.fibres, [0.0, *(via.at for via in settings.via), 1.0]
     vias = [_index(problem.bones, via.bone, join(place, f"via[{i}].bone")) for i, via in enumerate(settings.via)]
     parts, count = len(places) - 1, len(fibres)
@@ -254,4 +254,4 @@ def _index(bodies: tuple[RigidBody, ...], name: str, place: str) -> int:
     return names.index(name)
 
 
-SOLVES = (MuscleSolver(settings=Settings, solve=solve, moves="lines", check_problem=check, example={}),)
+SOLVES = (MuscleSolver(settings=LineSettings, solve=solve, moves="lines", check_problem=check, example={}),)

@@ -14,13 +14,13 @@ from fem_reference.solvers import listing_kernels
 from fem_reference.solvers.common.protocol import FieldSolver
 
 
-class FieldSettings(Record):
+class ListingSettings(Record):
     """``peclet``: the argument of listing 4.1, by default 1 as in its head; listing 4.5 has none."""
 
     peclet: float | None = Field(default=None, gt=0)
 
 
-def solve_field(problem: FieldProblem, settings: FieldSettings) -> Solution:
+def solve_field(problem: FieldProblem, settings: ListingSettings) -> Solution:
     """The listing for the problem's domain, from its mesh and what is fixed; its effects and slopes are the listing's own.
 
     What listing 4.5 draws is minus the norm of its vector unknown; that is the field here, and the vector its components.
@@ -44,7 +44,7 @@ def solve_field(problem: FieldProblem, settings: FieldSettings) -> Solution:
     return Solution(values, Outcome("converged", "as listed", cost), components, form="as listed")
 
 
-def check(settings: FieldSettings, problem: FieldProblem, place: str) -> None:
+def check(settings: ListingSettings, problem: FieldProblem, place: str) -> None:
     """InputError at ``place`` where the listing for the problem's domain has not what the case or the settings ask for."""
     if problem.mesh.cells.shape[1] == 2:
         _check_ends(problem, place)
@@ -63,4 +63,4 @@ def _check_ends(problem: FieldProblem, place: str) -> None:
         raise InputError(join(place, "boundary"), "other conditions", want)
 
 
-SOLVES = (FieldSolver(settings=FieldSettings, solve_field=solve_field, check_problem=check, example={}),)
+SOLVES = (FieldSolver(settings=ListingSettings, solve_field=solve_field, check_problem=check, example={}),)

@@ -8,7 +8,6 @@ of an attachment. Contact acts on the masses of the surface: what is between tho
 
 import math
 import time
-from dataclasses import dataclass
 from itertools import combinations
 from typing import Annotated, Literal
 
@@ -19,15 +18,14 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, bound
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import AccelerationVector, Density, Stiffness, Time, positive
-from fem_reference.geometry.embedding import Embedding, Locator
+from fem_reference.geometry.embedding import Locator
 from fem_reference.problems.muscle import Problem
 from fem_reference.runs.store import Frame, Outcome, Sink
-from fem_reference.solvers import collision_kernels
-from fem_reference.solvers.collision_kernels import Obstacle, move_out
-from fem_reference.solvers.common.frame_loop import follow, other_clock, refused
+from fem_reference.solvers.collision_kernels import CollidingBone, move_out
+from fem_reference.solvers.common.frame_loop import carry, follow, other_clock, refused, tetrahedron
 from fem_reference.solvers.common.protocol import MuscleSolver, Trade
-from fem_reference.solvers.common.state_checks import Trouble, trouble
-from fem_reference.solvers.pbd import Collision
+from fem_reference.solvers.common.state_checks import Trouble, first_trouble, surface_checks
+from fem_reference.solvers.pbd import PbdCollision, colliding_bones
 from fem_reference.solvers.spring_kernels import Network, PrescribedPath, advance, forces
 
 # Where no time step is asked for, it is this share of the greatest that is stable.
@@ -49,8 +47,8 @@ def _damping(text: object) -> float | str:
         raise ValueError(f'"{_REPORT}" or {error}') from error
 
 
-class Settings(Record):
-    """How stiff and heavy the muscle is, and how fast it is moved.
+class MassSpringSettings(Record):
+    """Settings of the muscle, its stiffness and mass, and of its time.
 
     ``stiffness``: of every spring. ``density``: of the muscle, shared out evenly over the masses: equilibrium does
     not depend on them, and a small one would make every time step small.
@@ -66,11 +64,11 @@ class Settings(Record):
     frame_time: Annotated[Time, Trade(("5 ms", "20 ms", "80 ms"))]
     damping: Annotated[float | Literal["eq. 5.5"] | None, BeforeValidator(_damping)] = None
     gravity: AccelerationVector | None = None
-    collision: Collision | None = None
+    collision: PbdCollision | None = None
     time_step: Time | None = None
 
 
-def network_of(mesh: TetMesh, settings: Settings) -> Network:
+def network_of(mesh: TetMesh, settings: MassSpringSettings) -> Network:
     """The masses and springs of a mesh."""
     pairs = np.concatenate([mesh.tets[:, list(pair)] for pair in combinations(range(4), 2)])
     springs = np.unique(np.sort(pairs, axis=1), axis=0)
@@ -85,7 +83,7 @@ def network_of(mesh: TetMesh, settings: Settings) -> Network:
     )
 
 
-def _coefficient(settings: Settings, mass: float) -> float:
+def _coefficient(settings: MassSpringSettings, mass: float) -> float:
     """The damping coefficient c [N s/mm] of settings."""
     if settings.damping is None:
         return 0.0
@@ -117,147 +115,109 @@ def stable_time_step(network: Network, fixed: Ints) -> float:
     return float(np.delete(limits, fixed).min(initial=math.inf))
 
 
-@dataclass(frozen=True, eq=False)
-class Model:
-    """A muscle as masses and springs: its ``network``, the masses of each attachment and all of them together, ``fixed``,
-    the bones as ``obstacles`` with ``stiffness``, and where the ``surface`` and the ``fibres`` are in the tetrahedra.
+class MassSpringModel:
+    """A muscle as masses and springs going from frame number to frame number: its ``network``, the ``fixed`` masses (k,) and the
+    bones that others collide with; masses are at ``points`` (n, 3) [mm], and were at ``previous`` a step before.
     """
 
-    problem: Problem
-    network: Network
-    attached: tuple[Ints, ...]
-    fixed: Ints
-    obstacles: list[Obstacle]
-    stiffness: float
-    surface: Embedding
-    fibres: Embedding
+    def __init__(self, problem: Problem, settings: MassSpringSettings, seconds_compile: float = 0.0) -> None:
+        mesh, collision, locator = problem.mesh, settings.collision, Locator(problem.mesh)
+        self.problem, self.settings, self.network = problem, settings, network_of(mesh, settings)
+        self.attached = [np.unique(mesh.facets[entry.attachment]) for entry in problem.attached]
+        self.fixed = np.unique(np.concatenate([np.zeros(0, np.int64), *self.attached]))
+        self.bones = [] if collision is None else _colliding_bones(problem, self.fixed, collision.gap)
+        self.surface, self.fibres = locator.embed(problem.surface.points), locator.embed(problem.fibres.points)
+        self.points = problem.begin(mesh.points)
+        self.previous = self.points.copy()
+        self.checks = surface_checks(Surface(mesh.points, boundary(mesh.tets)[0]), self.fixed)
+        longest = settings.time_step or SHARE_OF_STABLE * stable_time_step(self.network, self.fixed)
+        self.wanted = settings.frame_time / longest
+        self.steps = max(1, math.ceil(self.wanted - 1e-9))
+        self.time_step = settings.frame_time / self.steps
+        free = len(self.points) - len(self.fixed)
+        self.cost: dict[str, float] = {"seconds_compile": seconds_compile, "unknowns": 3.0 * free, "time_steps": 0}
 
-    @classmethod
-    def of(cls, problem: Problem, settings: Settings) -> "Model":
-        """The model of a problem."""
-        attached = tuple(np.unique(problem.mesh.facets[entry.attachment]) for entry in problem.attached)
-        fixed = np.unique(np.concatenate([np.zeros(0, np.int64), *attached]))
-        locator, collision = Locator(problem.mesh), settings.collision
-        return cls(
-            problem=problem,
-            network=network_of(problem.mesh, settings),
-            attached=attached,
-            fixed=fixed,
-            obstacles=[] if collision is None else _obstacles(problem, fixed, collision.gap),
-            stiffness=0.0 if collision is None else collision.stiffness,
-            surface=locator.embed(problem.surface.points),
-            fibres=locator.embed(problem.fibres.points),
-        )
+    @property
+    def advice(self) -> str:
+        """Advice: a stable time step, else what brings the masses to rest."""
+        limit = stable_time_step(self.network, self.fixed)
+        if self.time_step > limit:
+            return f"the time step of {self.time_step:.3g} s is above the stable one of {limit:.3g} s"
+        return "a longer frame_time or more damping may help"
 
-    def move(self, points: Floats, previous: Floats, number: int, time_step: float, steps: int) -> None:
-        """Take ``points`` and those a step before, (n, 3) [mm], in place from the frame number before to ``number``."""
-        before, after = (self._carried(frame)[self.fixed] for frame in (number - 1, number))
-        if not self.obstacles:
-            for done in range(0, steps, _AT_ONCE):
-                upto = min(done + _AT_ONCE, steps)
-                start, end = ((1 - step / steps) * before + step / steps * after for step in (done, upto))
-                advance(points, previous, self.network, PrescribedPath(self.fixed, start, end), time_step, upto - done)
-            return
-        for share in np.arange(1, steps + 1) / steps:
-            there = (1 - share) * before + share * after
-            advance(points, previous, self.network, PrescribedPath(self.fixed, there, there), time_step, 1)
-            for one in self.obstacles:
-                one.move(number - 1 + share)
-            move_out(points, self.obstacles, self.stiffness)
+    def move(self, number: int) -> None:
+        """Take the steps from the frame number before to ``number``."""
+        before, after = (self.carried(frame)[self.fixed] for frame in (number - 1, number))
+        at_once = 1 if self.bones else _AT_ONCE
+        for done in range(0, self.steps, at_once):
+            upto = min(done + at_once, self.steps)
+            start, end = ((1 - step / self.steps) * before + step / self.steps * after for step in (done, upto))
+            path = PrescribedPath(self.fixed, start, end)
+            advance(self.points, self.previous, self.network, path, self.time_step, upto - done)
+            for bone in self.bones:
+                bone.move(number - 1 + upto / self.steps)
+            if self.settings.collision is not None:
+                move_out(self.points, self.bones, self.settings.collision.stiffness)
+        self.cost["time_steps"] += self.steps
 
-    def _carried(self, number: int) -> Floats:
+    def carried(self, number: int) -> Floats:
         """The masses (n, 3) [mm] at rest, but attached ones where they are at frame ``number``."""
         points = np.array(self.problem.mesh.points)
         for entry, masses in zip(self.problem.attached, self.attached, strict=True):
             points[masses] = apply(entry.bone.pose(number), points[masses])
         return points
 
-    def frame(self, points: Floats, number: int) -> Frame:
-        """What masses at ``points`` (n, 3) make of surface and fibres; attached vertices are where the bones have them.
+    def trouble(self) -> Trouble | None:
+        """The trouble with the boundary of the tetrahedra; None without."""
+        return first_trouble(self.checks, self.points)
+
+    def frame(self, number: int) -> Frame:
+        """Surface and fibres as the masses carry them; attached vertices are where the bones have them.
 
         Scalars: ``unbalanced_max`` [N], the greatest force on a free mass, and ``inverted_tets``, how many are inside
         out.
         """
         given, mesh = self.problem, self.problem.mesh
-        moved = points - mesh.points
+        moved = self.points - mesh.points
         surface = given.surface.points + self.surface.interpolate(mesh, moved)
-        for entry in given.attached:
-            surface[entry.vertices] = apply(entry.bone.pose(number), given.surface.points[entry.vertices])
-        free = np.delete(forces(points, self.network), self.fixed, axis=0)
-        scalars = {
-            "unbalanced_max": float(np.linalg.norm(free, axis=1).max(initial=0.0)),
-            "inverted_tets": float((tet_volumes(points, mesh.tets) <= 0).sum()),
-        }
-        return Frame(
-            number, surface, given.fibres.points + self.fibres.interpolate(mesh, moved), points.copy(), scalars
-        )
+        carry(surface, given, number)
+        free = np.delete(forces(self.points, self.network), self.fixed, axis=0)
+        unbalanced = float(np.linalg.norm(free, axis=1).max(initial=0.0))
+        scalars = {"unbalanced_max": unbalanced, "inverted_tets": float(self._inverted())}
+        fibres = given.fibres.points + self.fibres.interpolate(mesh, moved)
+        return Frame(number, surface, fibres, self.points.copy(), scalars)
 
-
-def _obstacles(problem: Problem, fixed: Ints, gap: float) -> list[Obstacle]:
-    """All bones, as obstacles of the free masses of the surface."""
-    loose = np.zeros(len(problem.mesh.points), bool)
-    loose[boundary(problem.mesh.tets)[0]] = True
-    loose[fixed] = False
-    return [Obstacle(bone, problem.mesh.points, loose, gap) for bone in problem.bones]
-
-
-class Motion:
-    """The masses of a ``model`` going from frame number to frame number, each in as many ``steps`` of the same length."""
-
-    def __init__(self, model: Model, settings: Settings, wanted: float, seconds_compile: float) -> None:
-        """``wanted``: how many steps, rounded up, in a frame number."""
-        self.model, self.settings = model, settings
-        self.points = model.problem.begin(model.problem.mesh.points)
-        self.previous = self.points.copy()
-        self.rest = Surface(model.problem.mesh.points, boundary(model.problem.mesh.tets)[0])
-        self.steps = max(1, math.ceil(wanted - 1e-9))
-        self.time_step = settings.frame_time / self.steps
-        free = len(self.points) - len(model.fixed)
-        self.cost: dict[str, float] = {"seconds_compile": seconds_compile, "unknowns": 3.0 * free, "time_steps": 0}
-
-    @property
-    def advice(self) -> str:
-        """What may help: a stable time step, else what brings the masses to rest."""
-        limit = stable_time_step(self.model.network, self.model.fixed)
-        if self.time_step > limit:
-            return f"the time step of {self.time_step:.3g} s is above the stable one of {limit:.3g} s"
-        return "a longer frame_time or more damping may help"
-
-    def move(self, number: int) -> None:
-        """Take the steps of a frame number."""
-        self.model.move(self.points, self.previous, number, self.time_step, self.steps)
-        self.cost["time_steps"] += self.steps
-
-    def trouble(self) -> Trouble | None:
-        """What is wrong with the boundary of the tetrahedra."""
-        return trouble(self.points, self.rest, self.model.fixed)
-
-    def frame(self, number: int) -> Frame:
-        """What the masses make of surface and fibres."""
-        return self.model.frame(self.points, number)
+    def _inverted(self) -> int:
+        """The number of tetrahedra that are inside out."""
+        return int((tet_volumes(self.points, self.problem.mesh.tets) <= 0).sum())
 
     def ending(self) -> Outcome:
         """Converged, as every step is; how many tetrahedra are inside out in the end, and whether the scene has another clock."""
-        problem, frames = self.model.problem, self.model.problem.frames
-        steps = f"{frames[-1] - frames[0]} frame numbers of {self.steps} steps of {self.time_step:.3g} s"
-        notes = _inverted(self.points, problem.mesh.tets) + other_clock(problem, self.settings.frame_time)
-        return Outcome("converged", steps + notes)
+        frames, count, tets = self.problem.frames, self._inverted(), len(self.problem.mesh.tets)
+        done = f"{frames[-1] - frames[0]} frame numbers of {self.steps} steps of {self.time_step:.3g} s"
+        note = f"; {count} of {tets} tetrahedra are inside out at the last frame" if count else ""
+        return Outcome("converged", done + note + other_clock(self.problem, self.settings.frame_time))
 
 
-def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
+def _colliding_bones(problem: Problem, fixed: Ints, gap: float) -> list[CollidingBone]:
+    """All bones, which the free masses of the surface collide with."""
+    loose = np.zeros(len(problem.mesh.points), bool)
+    loose[boundary(problem.mesh.tets)[0]] = True
+    loose[fixed] = False
+    return [CollidingBone(bone, problem.mesh.points, loose, gap) for bone in problem.bones]
+
+
+def solve(problem: Problem, settings: MassSpringSettings, sink: Sink) -> Outcome:
     """Step from rest at the first of ``problem.frames`` to the last of them; each frame wanted goes into ``sink``."""
-    seconds_compile, model = _compile(settings), Model.of(problem, settings)
-    longest = settings.time_step or SHARE_OF_STABLE * stable_time_step(model.network, model.fixed)
-    wanted = settings.frame_time / longest
-    motion = Motion(model, settings, wanted, seconds_compile)
-    if wanted > _MOST_STEPS:
-        why = Trouble("out of steps", _too_many(wanted, settings, model.network))
-        return refused(motion, problem.frames[0], sink, why)
-    return follow(motion, problem, sink)
+    model = MassSpringModel(problem, settings, _compile(settings))
+    if model.wanted > _MOST_STEPS:
+        why = Trouble("out of steps", _too_many(model.wanted, settings, model.network))
+        return refused(model, problem.frames[0], sink, why)
+    return follow(model, problem, sink)
 
 
-def _too_many(steps: float, settings: Settings, network: Network) -> str:
-    """Why nothing was begun: what makes so many ``steps`` of a frame number."""
+def _too_many(steps: float, settings: MassSpringSettings, network: Network) -> str:
+    """The reason why nothing was begun: what makes so many ``steps`` of a frame number."""
     if settings.time_step is not None:
         return f"{steps:.3g} steps in a frame number, at most {_MOST_STEPS}; a longer time_step may help"
     what = f"a stiffness of {network.stiffness:.3g} N/mm and a damping of {network.damping:.3g} N s/mm"
@@ -265,13 +225,7 @@ def _too_many(steps: float, settings: Settings, network: Network) -> str:
     return f"{what} want {steps:.3g} steps in a frame number, at most {_MOST_STEPS}; {helps}"
 
 
-def _inverted(points: Floats, tets: Ints) -> str:
-    """How many tetrahedra are inside out in the end, empty if none is."""
-    count = int((tet_volumes(points, tets) <= 0).sum())
-    return f"; {count} of {len(tets)} tetrahedra are inside out at the last frame" if count else ""
-
-
-def _compile(settings: Settings) -> float:
+def _compile(settings: MassSpringSettings) -> float:
     """Run every compiled function once, on one spring; seconds."""
     begin = time.perf_counter()
     points, nothing = np.array([[0.0, 0, 0], [1, 0, 0]]), np.zeros((0, 3))
@@ -279,9 +233,9 @@ def _compile(settings: Settings) -> float:
     advance(points, points.copy(), network, PrescribedPath(np.zeros(0, np.int64), nothing, nothing), 0.1, 1)
     forces(points, network)
     if settings.collision is not None:
-        collision_kernels.compile_all()
+        move_out(np.zeros((4, 3)), colliding_bones(tetrahedron(), 0.0), 1.0)
     return time.perf_counter() - begin
 
 
 _EXAMPLE = {"stiffness": "1 N/mm", "density": "1060 kg/m3", "frame_time": "20 ms", "damping": "eq. 5.5"}
-SOLVES = (MuscleSolver(settings=Settings, solve=solve, moves="tetrahedra", example=_EXAMPLE),)
+SOLVES = (MuscleSolver(settings=MassSpringSettings, solve=solve, moves="tetrahedra", example=_EXAMPLE),)

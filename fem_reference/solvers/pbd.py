@@ -7,22 +7,21 @@ the order of the vertices, as it does in the report: constraints are projected o
 in every sweep, where line 13 finds them once.
 """
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated
+from functools import partial
+from typing import Annotated, cast
 
 import numpy as np
 from pydantic import Field
 
-from fem_reference.foundations.mesh import TET_FACES, Floats, Ints, Polylines, diagonal
+from fem_reference.foundations.mesh import Floats, Ints, Polylines, diagonal
 from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import Length
 from fem_reference.problems.muscle import Problem, Setup
 from fem_reference.runs.store import Outcome, Sink
-from fem_reference.solvers import collision_kernels
-from fem_reference.solvers.collision_kernels import Obstacle, move_out
-from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow
+from fem_reference.solvers.collision_kernels import CollidingBone, move_out
+from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow, timed
 from fem_reference.solvers.common.protocol import MuscleSolver, Trade
 from fem_reference.solvers.pbd_kernels import (
     dihedrals,
@@ -39,7 +38,7 @@ Stiffness = Annotated[float, Field(ge=0, le=1)]
 _AS_NEAR = 1e-9
 
 
-class Collision(Record):
+class PbdCollision(Record):
     """Contact of bones with free vertices: ``gap`` [mm], how near vertices may come, or as near as they are at rest;
     ``stiffness``, the share of the displacement out of a bone that one projection makes.
     """
@@ -48,8 +47,8 @@ class Collision(Record):
     stiffness: Stiffness
 
 
-class Settings(Record):
-    """How the algorithm is run; every key is required but those that turn an effect on.
+class PbdSettings(Record):
+    """The settings of the algorithm; every key is required but those that turn an effect on.
 
     ``sub_iterations``: steps of the algorithm in each iteration, 3 in report 6.1. ``solver_iterations``: sweeps over
     all constraints in each step (line 15). ``damping``: share of every velocity that is lost in a step (line 8), 0 for
@@ -67,12 +66,12 @@ class Settings(Record):
     volume: Stiffness
     bending: Stiffness
     anisotropy: Stiffness | None = None
-    collision: Collision | None = None
+    collision: PbdCollision | None = None
 
 
 @dataclass(frozen=True, eq=False)
-class Constraints:
-    """What the surface keeps of its rest state.
+class PbdConstraints:
+    """The constraints of a surface: what it keeps of its rest state.
 
     ``lengths`` (e,) [mm] of ``edges`` (e, 2), of whose stiffness each has its ``share`` (e,); ``six_volumes`` [mm3], six
     times the volume inside ``triangles`` (m, 3); ``angles`` (e,) [rad] of ``hinges`` (e, 4), the two triangles at each
@@ -89,7 +88,7 @@ class Constraints:
     angles: Floats
 
     @classmethod
-    def at_rest(cls, points: Floats, triangles: Ints, attached: Ints) -> "Constraints":
+    def at_rest(cls, points: Floats, triangles: Ints, attached: Ints) -> "PbdConstraints":
         """The constraints of a closed surface whose vertices ``attached`` (k,) are attached; all edges are as stiff."""
         points, triangles = np.array(points), np.array(triangles)  # the compiled functions know writable arrays only
         inverse_masses = np.ones(len(points))
@@ -132,50 +131,51 @@ def along_fibres(points: Floats, edges: Ints, fibres: Polylines) -> Floats:
     return np.asarray(np.minimum(np.abs(np.einsum("ed,ed->e", edge, fibre)) / lengths, 1))
 
 
-def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
+def solve(setup: Setup, settings: PbdSettings, sink: Sink) -> Outcome:
     """Iterate from rest at the first of ``setup.frames`` to the last of them; each frame wanted goes into ``sink``."""
-    seconds_compile = _compile(settings)
-    begin = time.perf_counter()
-    constraints = _constraints(setup, settings)
-    obstacles = [] if settings.collision is None else obstacles_of(setup, settings.collision.gap)
-    cost = {"seconds_compile": seconds_compile, "seconds_setup": time.perf_counter() - begin}
+    return follow(timed(partial(moving_surface, settings), setup), setup, sink)
+
+
+def moving_surface(settings: PbdSettings, setup: Setup) -> MovingSurface:
+    """The surface of ``setup`` with its constraints."""
+    constraints = constraints_of(setup, settings)
+    bones = [] if settings.collision is None else colliding_bones(setup, settings.collision.gap)
 
     def iterate(points: Floats, displacement: Floats, frame: int) -> tuple[Floats, Floats]:
         carry(points, setup, frame)
-        for one in obstacles:
-            one.move(frame)
+        for bone in bones:
+            bone.move(frame)
         for _ in range(settings.sub_iterations):
-            points, displacement = advance(points, displacement, constraints, settings, obstacles)
+            points, displacement = advance(points, displacement, constraints, settings, bones)
         return points, displacement
 
     sweep = len(constraints.edges) + len(constraints.hinges) + 1
-    projections = sweep * settings.solver_iterations * settings.sub_iterations
-    return follow(MovingSurface(setup, iterate, cost, projections), setup, sink)
+    return MovingSurface(setup, iterate, sweep * settings.solver_iterations * settings.sub_iterations)
 
 
-def _constraints(setup: Setup, settings: Settings) -> Constraints:
-    """Those of the surface at rest, with the stiffness that fibres leave to its edges."""
+def constraints_of(setup: Setup, settings: PbdSettings) -> PbdConstraints:
+    """The constraints of the surface at rest, with the stiffness that fibres leave to its edges."""
     surface = setup.surface
-    found = Constraints.at_rest(surface.points, surface.triangles, setup.attached_vertices)
+    found = PbdConstraints.at_rest(surface.points, surface.triangles, setup.attached_vertices)
     if settings.anisotropy is None:
         return found
-    assert isinstance(setup, Problem)  # what a scene is solved from; it has fibres
-    return replace(found, share=1 - settings.anisotropy * along_fibres(surface.points, found.edges, setup.fibres))
+    fibres = cast(Problem, setup).fibres  # as the solver asks for them
+    return replace(found, share=1 - settings.anisotropy * along_fibres(surface.points, found.edges, fibres))
 
 
-def obstacles_of(setup: Setup, gap: float) -> list[Obstacle]:
-    """All bones, as obstacles of free vertices."""
+def colliding_bones(setup: Setup, gap: float) -> list[CollidingBone]:
+    """All bones, which free vertices collide with."""
     loose = np.ones(len(setup.surface.points), bool)
     loose[setup.attached_vertices] = False
-    return [Obstacle(bone, setup.surface.points, loose, gap) for bone in setup.bones]
+    return [CollidingBone(bone, setup.surface.points, loose, gap) for bone in setup.bones]
 
 
 def advance(
     points: Floats,
     displacement: Floats,
-    constraints: Constraints,
-    settings: Settings,
-    obstacles: Sequence[Obstacle] = (),
+    constraints: PbdConstraints,
+    settings: PbdSettings,
+    bones: Sequence[CollidingBone] = (),
 ) -> tuple[Floats, Floats]:
     """Positions (n, 3) [mm] and ``displacement`` = dt v (n, 3) [mm] after one step of Algorithm 1, lines 8 to 20."""
     moved = points + (1 - settings.damping) * displacement
@@ -185,28 +185,15 @@ def advance(
         project_volume(moved, at.inverse_masses, at.triangles, at.six_volumes, settings.volume)
         project_dihedrals(moved, at.inverse_masses, at.hinges, at.angles, settings.bending)
         if settings.collision is not None:
-            move_out(moved, obstacles, settings.collision.stiffness)
+            move_out(moved, bones, settings.collision.stiffness)
     return moved, moved - points
-
-
-def _compile(settings: Settings) -> float:
-    """Run every compiled function once, on a tetrahedron; seconds."""
-    begin = time.perf_counter()
-    points = np.vstack([np.zeros(3), np.eye(3)])
-    rest = Constraints.at_rest(points, TET_FACES, np.zeros(0, np.int64))
-    advance(points, np.zeros((4, 3)), rest, settings)
-    if settings.anisotropy is not None:
-        nearest_segments(points, points, points, 0.0)
-    if settings.collision is not None:
-        collision_kernels.compile_all()
-    return time.perf_counter() - begin
 
 
 _EXAMPLE = {"sub_iterations": 3, "solver_iterations": 2, "damping": 0.1, "stretch": 1.0, "volume": 1.0, "bending": 0.5}
 
 
-def _fibres(settings: Settings) -> bool:
+def _fibres(settings: PbdSettings) -> bool:
     return settings.anisotropy is not None
 
 
-SOLVES = (MuscleSolver(settings=Settings, solve=solve, example=_EXAMPLE, fibres=_fibres),)
+SOLVES = (MuscleSolver(settings=PbdSettings, solve=solve, example=_EXAMPLE, fibres=_fibres),)

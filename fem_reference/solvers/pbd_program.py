@@ -1,4 +1,4 @@
-"""What the report's own program for position based dynamics does, so that its recorded output can be met.
+"""The report's own program for position based dynamics, done again so that its recorded output is met.
 
 The program (github.com/cervenkam/muscle-deformation-PBD) departs from the report's text, section 5.5.3 and Algorithm 1:
 
@@ -32,24 +32,24 @@ Two things are not as there: attached is what the scene says (there: all vertice
 the direction they have (there: it is taken from points read beside their own).
 """
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated
+from functools import partial
+from typing import Annotated, cast
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from fem_reference.foundations.mesh import TET_FACES, Floats, Ints, Surface
+from fem_reference.foundations.mesh import Floats, Ints, Surface
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record
 from fem_reference.problems.muscle import Problem, RigidBody, Setup
 from fem_reference.runs.store import Outcome, Sink
-from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow
+from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow, timed
 from fem_reference.solvers.common.protocol import MuscleSolver, Trade
-from fem_reference.solvers.pbd import Constraints, along_fibres
-from fem_reference.solvers.pbd_kernels import distances, nearest_segments
+from fem_reference.solvers.pbd import PbdConstraints, along_fibres
+from fem_reference.solvers.pbd_kernels import distances
 from fem_reference.solvers.program_kernels import (
     angles_of,
     are_inside,
@@ -69,8 +69,8 @@ STEP = 1e-3
 DIGITS = 12
 
 
-class Settings(Record):
-    """What can be varied in the program; every key is required but those that turn an effect on.
+class ProgramSettings(Record):
+    """The settings of the program; every key is required but those that turn an effect on.
 
     ``sub_iterations``: steps in each iteration, 3 in report 6.1. ``damping``: share of every velocity that is lost in a
     step, 0.01 in the program. ``bending``: factor of the correction of a fold, 0.9 there. ``voxels``: how many, along each
@@ -111,7 +111,7 @@ class Voxels:
         return places * self.size + self.lower
 
 
-class Bone:
+class VoxelBone:
     """The ``voxels`` of a bone in its rest frame, its ``pose``, and its ``last`` motion that was one; both 4 x 4.
 
     The pose is the product of all motions, as there, and not the one ``given``: they differ by rounding.
@@ -161,15 +161,15 @@ def hinges_of(points: Floats, triangles: Ints) -> tuple[Ints, Floats]:
     return hinges, angles_of(normals_of(points, triangles), pairs)
 
 
-def constraints_of(setup: Setup, settings: Settings) -> Constraints:
-    """What the surface keeps of its rest state; every vertex weighs the same."""
+def constraints_of(setup: Setup, settings: ProgramSettings) -> PbdConstraints:
+    """The constraints of the surface at rest; every vertex weighs the same."""
     points, triangles = np.array(setup.surface.points), np.array(setup.surface.triangles)
     edges, (hinges, angles) = half_edges_of(triangles), hinges_of(points, triangles)
     share = np.ones(len(edges))
     if settings.anisotropy is not None:
-        assert isinstance(setup, Problem)  # what a scene is solved from; it has fibres
-        share = (1 - along_fibres(points, edges, setup.fibres)) ** settings.anisotropy
-    return Constraints(
+        fibres = cast(Problem, setup).fibres  # as the solver asks for them
+        share = (1 - along_fibres(points, edges, fibres)) ** settings.anisotropy
+    return PbdConstraints(
         inverse_masses=np.ones(len(points)),
         edges=edges,
         lengths=distances(points, edges),
@@ -181,14 +181,16 @@ def constraints_of(setup: Setup, settings: Settings) -> Constraints:
     )
 
 
-def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
+def solve(setup: Setup, settings: ProgramSettings, sink: Sink) -> Outcome:
     """Iterate from rest at the first of ``setup.frames`` to the last of them; each frame wanted goes into ``sink``."""
-    seconds_compile = _compile(settings)
-    begin = time.perf_counter()
+    return follow(timed(partial(moving_surface, settings), setup), setup, sink)
+
+
+def moving_surface(settings: ProgramSettings, setup: Setup) -> MovingSurface:
+    """The surface of ``setup`` with its constraints."""
     constraints, attached = constraints_of(setup, settings), setup.attached_vertices
     count, first = settings.voxels, setup.frames[0]
-    bones = [] if count is None else [Bone(body, count, first) for body in setup.bones]
-    cost = {"seconds_compile": seconds_compile, "seconds_setup": time.perf_counter() - begin}
+    bones = [] if count is None else [VoxelBone(body, count, first) for body in setup.bones]
 
     def iterate(points: Floats, velocity: Floats, frame: int) -> tuple[Floats, Floats]:
         carry(points, setup, frame)
@@ -202,45 +204,30 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
             points, velocity = reached, (reached - points) * (1 / STEP)
         return points, velocity
 
-    projections = (len(constraints.edges) + len(constraints.hinges) + 1) * settings.sub_iterations
-    return follow(MovingSurface(setup, iterate, cost, projections), setup, sink)
+    sweep = len(constraints.edges) + len(constraints.hinges) + 1
+    return MovingSurface(setup, iterate, sweep * settings.sub_iterations)
 
 
-def project(points: Floats, at: Constraints, bending: float) -> None:
+def project(points: Floats, at: PbdConstraints, bending: float) -> None:
     """One sweep over the constraints, which moves ``points`` (n, 3) [mm] in place."""
     project_edges(points, at.edges, at.lengths, at.share)
     project_volume(points, at.triangles, at.six_volumes)
     project_folds(points, at.hinges, at.angles, bending)
 
 
-def collided(starts: Floats, goals: Floats, bones: Sequence[Bone]) -> Floats:
-    """Where vertices come to be, (n, 3) [mm], that go from ``starts`` to ``goals`` (n, 3) among ``bones``."""
+def collided(starts: Floats, goals: Floats, bones: Sequence[VoxelBone]) -> Floats:
+    """The places (n, 3) [mm] that vertices reach which go from ``starts`` to ``goals`` (n, 3) among ``bones``."""
     reached = goals.copy()
     for bone in bones:
         bone.move_out(reached, starts, goals)
     return reached
 
 
-def _compile(settings: Settings) -> float:
-    """Run every compiled function once, on a tetrahedron; seconds."""
-    begin = time.perf_counter()
-    points = np.vstack([np.zeros(3), np.eye(3)])
-    surface = Surface(points, TET_FACES)
-    setup = Setup(surface, (), (), (0, 1), None)
-    project(points, constraints_of(setup, Settings(sub_iterations=1, damping=0, bending=1)), 1.0)
-    inside = Voxels.of(surface, 2).inside
-    march_out(inside, points, points)
-    are_inside(inside, points)
-    if settings.anisotropy is not None:
-        nearest_segments(points, points, points, 0.0)
-    return time.perf_counter() - begin
-
-
 _EXAMPLE = {"sub_iterations": 3, "damping": 0.01, "bending": 0.9, "voxels": 64, "anisotropy": 1.0}
 
 
-def _fibres(settings: Settings) -> bool:
+def _fibres(settings: ProgramSettings) -> bool:
     return settings.anisotropy is not None
 
 
-SOLVES = (MuscleSolver(settings=Settings, solve=solve, example=_EXAMPLE, fibres=_fibres),)
+SOLVES = (MuscleSolver(settings=ProgramSettings, solve=solve, example=_EXAMPLE, fibres=_fibres),)

@@ -41,7 +41,7 @@ _INDICES = (".pvd", ".xdmf")
 ABOUT = "candidate.toml"
 
 
-class Settings(Record):
+class RecordedSettings(Record):
     """Where the sequence is, and its unit of length.
 
     ``folder``: a folder with one mesh file a frame, numbered by the last digits of their names; a .pvd or .xdmf file or
@@ -101,13 +101,13 @@ def _about_file(path: Path) -> Path:
     return (path if path.is_dir() else path.parent) / ABOUT
 
 
-def origin(settings: Settings) -> dict[str, Any]:
+def origin(settings: RecordedSettings) -> dict[str, Any]:
     """Where a run comes from, as its candidate says."""
     said = about(Path(settings.folder)).model_dump(exclude_none=True, include={"name", "version"})
     return {"candidate": said} if said else {}
 
 
-def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
+def solve(setup: Setup, settings: RecordedSettings, sink: Sink) -> Outcome:
     """Every frame wanted, once all of them are read and known to be of this surface; the cost is what ``candidate.toml`` says.
 
     The times of an index are those of the frames by ``setup.interval`` [s], and frame numbers where that is None.
@@ -135,7 +135,7 @@ def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
     return Outcome("converged", f"read {len(frames)} frames from {source}", {key: float(cost[key]) for key in cost})
 
 
-def _checked_about(settings: Settings) -> About:
+def _checked_about(settings: RecordedSettings) -> About:
     """What is said of the sequence; InputError where its unit is another than that of ``settings``."""
     said = about(Path(settings.folder))
     if said.unit is not None and length_unit(said.unit) != settings.unit:
@@ -276,4 +276,6 @@ def _check_at_rest(place: str, number: int, positions: Floats, rest: Surface) ->
         log.warning("%s: %s, which goes into what is measured", place, got)
 
 
-SOLVES = (MuscleSolver(settings=Settings, solve=solve, moves="nothing", example={"folder": "frames", "unit": "mm"}),)
+SOLVES = (
+    MuscleSolver(settings=RecordedSettings, solve=solve, moves="nothing", example={"folder": "frames", "unit": "mm"}),
+)

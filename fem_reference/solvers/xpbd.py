@@ -12,15 +12,15 @@ Frame number n is the state after iteration n, ``frame_time`` after the one befo
 """
 
 import math
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Annotated
 
 import numpy as np
 from pydantic import Field
 
-from fem_reference.foundations.mesh import TET_FACES, Floats, Ints, Surface, enclosed_volume, triangle_areas
+from fem_reference.foundations.mesh import Floats, Ints, Surface, enclosed_volume, triangle_areas
 from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import (
     AreaStiffness,
@@ -34,16 +34,15 @@ from fem_reference.foundations.units import (
 )
 from fem_reference.problems.muscle import Setup
 from fem_reference.runs.store import Outcome, Sink
-from fem_reference.solvers import collision_kernels
-from fem_reference.solvers.collision_kernels import Obstacle
-from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow, other_clock
+from fem_reference.solvers.collision_kernels import CollidingBone
+from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow, other_clock, timed
 from fem_reference.solvers.common.protocol import MuscleSolver, Trade
-from fem_reference.solvers.pbd import hinges_of, obstacles_of
+from fem_reference.solvers.pbd import colliding_bones, hinges_of
 from fem_reference.solvers.pbd_kernels import dihedrals, distances, volume
 from fem_reference.solvers.xpbd_kernels import pull_dihedrals, pull_distances, pull_volume
 
 
-class Collision(Record):
+class XpbdCollision(Record):
     """Contact of bones with free vertices: ``gap`` [mm], how near vertices may come, or as near as they are at rest;
     ``stiffness`` [MPa/mm]: pressed by p, the surface gets p / stiffness nearer.
     """
@@ -52,8 +51,8 @@ class Collision(Record):
     stiffness: AreaStiffness
 
 
-class Settings(Record):
-    """How the method is run, and what the muscle is like; every key is required but those that turn an effect on.
+class XpbdSettings(Record):
+    """The settings of the method and of the muscle; every key is required but those that turn an effect on.
 
     ``frame_time`` [s]: the solver's own time from a frame number to the next; the scene's interval is the clock of what the
     reference and recorded sequences do in time. ``sub_steps``: time steps in it. ``sweeps``: over all constraints in each time
@@ -72,12 +71,12 @@ class Settings(Record):
     bending: BendingStiffness | None = None
     volume: PositivePressure | None = None
     damping: Rate | None = None
-    collision: Collision | None = None
+    collision: XpbdCollision | None = None
 
 
 @dataclass(frozen=True, eq=False)
-class Constraints:
-    """What a body keeps of its rest state, and how softly: any graph of edges, closed triangles and hinges, or none of a kind.
+class XpbdConstraints:
+    """Soft constraints that keep a body's rest state: any graph of edges, closed triangles and hinges, or none of a kind.
 
     ``inverse_masses`` (n,) [1/t], 0 for what is attached; ``edges`` (e, 2) of ``lengths`` (e,) [mm] and compliances
     ``edge_softness`` (e,) [mm/N]; ``triangles`` (m, 3) around ``six_volumes`` [mm3], ``volume_softness`` [mm5/N]; ``hinges`` (h,
@@ -96,8 +95,8 @@ class Constraints:
     hinge_softness: Floats
 
     @classmethod
-    def at_rest(cls, surface: Surface, attached: Ints, settings: Settings) -> "Constraints":
-        """Those of a closed ``surface`` whose vertices ``attached`` (k,) are attached; none of a kind that has no stiffness.
+    def at_rest(cls, surface: Surface, attached: Ints, settings: XpbdSettings) -> "XpbdConstraints":
+        """Constraints of a closed ``surface`` whose vertices ``attached`` (k,) are attached; none of a kind without stiffness.
 
         In a net of equal triangles, edges of the stiffness ``stretch a / l^2`` of their length l and the area a of both their
         triangles make a membrane of Young's modulus ``stretch`` and Poisson's ratio 1/3, and hinges of ``bending l^2 / a`` bend
@@ -125,7 +124,7 @@ class Constraints:
 
 
 @dataclass(frozen=True)
-class Step:
+class XpbdStep:
     """A time step: ``seconds`` long, ``sweeps`` over all constraints, ``damping`` [1/s], ``acceleration`` [mm/s2] from outside."""
 
     seconds: float
@@ -154,11 +153,11 @@ def pair_areas(points: Floats, hinges: Ints) -> Floats:
     return triangle_areas(points, hinges[:, [0, 1, 2]]) + triangle_areas(points, hinges[:, [0, 1, 3]])
 
 
-class Contact:
-    """An obstacle, its contact softness at each vertex, (n,) [mm/N], and the multipliers (n,) of the present time step."""
+class BoneContact:
+    """A ``bone``, its contact softness at each vertex, (n,) [mm/N], and the multipliers (n,) of the present time step."""
 
-    def __init__(self, obstacle: Obstacle, softness: Floats) -> None:
-        self.obstacle, self.softness = obstacle, softness
+    def __init__(self, bone: CollidingBone, softness: Floats) -> None:
+        self.bone, self.softness = bone, softness
         self.multipliers = np.zeros(len(softness))
 
     def begin(self) -> None:
@@ -167,18 +166,22 @@ class Contact:
 
     def project(self, points: Floats, inverse_masses: Floats, seconds: float) -> Floats:
         """The displacements (n, 3) [mm] of one projection: contact never pulls, so that no multiplier is below 0."""
-        vertices, value, away = self.obstacle.near(points)
+        vertices, value, away = self.bone.near(points)
         soft, before, mass = self.softness[vertices] / seconds**2, self.multipliers[vertices], inverse_masses[vertices]
         after = np.maximum(before - (value + soft * before) / (mass + soft), 0)
         self.multipliers[vertices] = after
-        self.obstacle.watch(vertices[after > 0])
+        self.bone.watch(vertices[after > 0])
         moves = np.zeros_like(points)
         moves[vertices] = ((after - before) * mass)[:, None] * away
         return moves
 
 
 def advance(
-    points: Floats, velocities: Floats, constraints: Constraints, step: Step, contacts: Sequence[Contact] = ()
+    points: Floats,
+    velocities: Floats,
+    constraints: XpbdConstraints,
+    step: XpbdStep,
+    contacts: Sequence[BoneContact] = (),
 ) -> tuple[Floats, Floats]:
     """Positions (n, 3) [mm] and velocities (n, 3) [mm/s] after one time step: their Algorithm 1."""
     at, dt = constraints, step.seconds
@@ -197,48 +200,39 @@ def advance(
     return moved, (moved - points) / dt
 
 
-def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
+def solve(setup: Setup, settings: XpbdSettings, sink: Sink) -> Outcome:
     """Iterate from rest at the first of ``setup.frames`` to the last of them; each frame wanted goes into ``sink``."""
-    seconds_compile = _compile(settings)
-    begin = time.perf_counter()
-    constraints = Constraints.at_rest(setup.surface, setup.attached_vertices, settings)
+    model = timed(partial(moving_surface, settings), setup)
+    outcome = follow(model, setup, sink, settings.sub_steps)
+    return replace(outcome, message=outcome.message + other_clock(setup, settings.frame_time))
+
+
+def moving_surface(settings: XpbdSettings, setup: Setup) -> MovingSurface:
+    """The surface of ``setup`` with its constraints."""
+    constraints = XpbdConstraints.at_rest(setup.surface, setup.attached_vertices, settings)
     contacts = _contacts(setup, settings)
-    step = Step(settings.frame_time / settings.sub_steps, settings.sweeps, settings.damping or 0.0)
-    cost = {"seconds_compile": seconds_compile, "seconds_setup": time.perf_counter() - begin}
+    step = XpbdStep(settings.frame_time / settings.sub_steps, settings.sweeps, settings.damping or 0.0)
 
     def iterate(points: Floats, velocities: Floats, frame: int) -> tuple[Floats, Floats]:
         for number in range(1, settings.sub_steps + 1):
             now = frame - 1 + number / settings.sub_steps
             carry(points, setup, now)
             for contact in contacts:
-                contact.obstacle.move(now)
+                contact.bone.move(now)
             points, velocities = advance(points, velocities, constraints, step, contacts)
         return points, velocities
 
     sweep = len(constraints.edges) + len(constraints.hinges) + (settings.volume is not None)
-    projections = sweep * settings.sweeps * settings.sub_steps
-    outcome = follow(MovingSurface(setup, iterate, cost, projections), setup, sink, settings.sub_steps)
-    return replace(outcome, message=outcome.message + other_clock(setup, settings.frame_time))
+    return MovingSurface(setup, iterate, sweep * settings.sweeps * settings.sub_steps)
 
 
-def _contacts(setup: Setup, settings: Settings) -> list[Contact]:
+def _contacts(setup: Setup, settings: XpbdSettings) -> list[BoneContact]:
     """One of each bone, where there is contact."""
     if settings.collision is None:
         return []
     softness = 1 / (settings.collision.stiffness * vertex_areas(setup.surface))
-    return [Contact(obstacle, softness) for obstacle in obstacles_of(setup, settings.collision.gap)]
-
-
-def _compile(settings: Settings) -> float:
-    """Run every compiled function once, on a tetrahedron; seconds."""
-    begin = time.perf_counter()
-    tetrahedron = Surface(np.vstack([np.zeros(3), np.eye(3)]), TET_FACES)
-    rest = Constraints.at_rest(tetrahedron, np.zeros(0, np.int64), settings)
-    advance(np.array(tetrahedron.points), np.zeros((4, 3)), rest, Step(1.0, 1, 0.0))
-    if settings.collision is not None:
-        collision_kernels.compile_all()
-    return time.perf_counter() - begin
+    return [BoneContact(bone, softness) for bone in colliding_bones(setup, settings.collision.gap)]
 
 
 _EXAMPLE = {"frame_time": "20 ms", "sub_steps": 2, "sweeps": 2, "density": "1060 kg/m3", "stretch": "0.4 N/mm"}
-SOLVES = (MuscleSolver(settings=Settings, solve=solve, example=_EXAMPLE),)
+SOLVES = (MuscleSolver(settings=XpbdSettings, solve=solve, example=_EXAMPLE),)

@@ -34,8 +34,8 @@ _LASTING = ("diverged", "inverted", "collapsed", "limit point", "out of steps")
 
 @dataclass(frozen=True)
 class Workers:
-    """Who solves: so many processes of this machine (``count``), or the workers of the Dask scheduler at ``address``, such as one
-    that dask-jobqueue started on a cluster; these see the same store. InputError where it is fewer than one.
+    """Solvers of runs: so many processes of this machine (``count``), or the workers of the Dask scheduler at ``address``, such as
+    one that dask-jobqueue started on a cluster; these see the same store. InputError where it is fewer than one.
     """
 
     count: int = 1
@@ -46,7 +46,7 @@ class Workers:
             raise InputError("--workers", self.count, "1 or more")
 
     def __str__(self) -> str:
-        """How runs are made, beside what machine it is."""
+        """The manner of runs, beside what machine it is."""
         if self.address is not None:
             return "runs by the workers of a cluster"
         return "runs one after the other" if self.count == 1 else f"runs {self.count} at once"
@@ -54,11 +54,16 @@ class Workers:
 
 @dataclass(frozen=True, eq=False)
 class Made:
-    """What became of a trial: its ``run``, or why there is none (``failure``)."""
+    """A trial with its ``run``, or why there is none (``failure``)."""
 
     trial: Trial
     run: Run | None
     failure: str = ""
+
+    @property
+    def reached(self) -> Run | None:
+        """The run, None where it did not reach all frames."""
+        return self.run if self.run is not None and self.run.outcome.status == "converged" else None
 
 
 def carry_out(trials: Sequence[Trial], store: Path, workers: Workers) -> tuple[Made, ...]:
@@ -82,26 +87,21 @@ def solve(trial: Trial, store: Path) -> Run:
 
 
 @lru_cache(maxsize=2)
-def _cached_bench(key: str, store: Path, case: str) -> "_Kept":  # noqa: ARG001 - they are the key
-    return _Kept()
-
-
-class _Kept:
-    """A bench that is made when it is first needed, so that runs on one scene share its tetrahedra."""
-
-    bench: Bench[MuscleCase] | None = None
+def _kept(key: str, store: Path, case: str) -> list[Bench[MuscleCase]]:  # noqa: ARG001 - they are the key
+    """An empty list, the same each time: a case itself is no key."""
+    return []
 
 
 def shared_bench(scene: MuscleCase, store: Path) -> Bench[MuscleCase]:
-    """The bench that runs on a scene share in this process."""
-    kept = _cached_bench(scene.key, store, str(scene.folder))
-    if kept.bench is None:
-        kept.bench = Bench(scene, store, ranks=1)
-    return kept.bench
+    """The bench, and so the tetrahedra, that runs on a scene share in this process."""
+    kept = _kept(scene.key, store, str(scene.folder))
+    if not kept:
+        kept.append(Bench(scene, store, ranks=1))
+    return kept[0]
 
 
 def _made(trial: Trial, result: Callable[[], Run]) -> Made:
-    """What became of a trial; bad input and what is not installed are no reason to give up the others."""
+    """A trial with its result; bad input and what is not installed are no reason to give up the others."""
     try:
         return Made(trial, result())
     except (InputError, MissingSoftware) as error:
@@ -129,7 +129,7 @@ def _in_parallel(trials: Sequence[Trial], store: Path, workers: Workers) -> tupl
 
 
 def _finished(futures: dict[Future[Path], int], trials: Sequence[Trial]) -> Iterator[tuple[int, Made]]:
-    """What became of each trial as its future ends; the run itself is read from the store."""
+    """Each trial with its result as its future ends; the run itself is read from the store."""
     for future in as_completed(futures):
         i = futures[future]
         yield i, _made(trials[i], lambda future=future, i=i: _loaded(future.result(), trials[i]))  # type: ignore[misc]

@@ -1,9 +1,7 @@
-"""What accuracy costs on a case: its reference and candidates over ladders of settings, each run measured against the truth."""
+"""Accuracy against time on a case: its reference and candidates over ladders of settings, each run measured against the truth."""
 
 import logging
 import math
-import os
-import platform
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,15 +10,14 @@ import numpy as np
 
 from fem_reference import metrics, solvers
 from fem_reference.assessment.claims import Claim
-from fem_reference.assessment.cost_study import CaseStudy, Study
+from fem_reference.assessment.cost_study import CaseStudy, Study, load_all
 from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.assessment.fronts import COSTS, Point
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.version import __version__
-from fem_reference.metrics import MeasurementContext, measure
+from fem_reference.metrics import MeasurementContext, context_of, in_tables, measure
 from fem_reference.runs.complete import complete
 from fem_reference.runs.cost import seconds_per_frame
-from fem_reference.runs.key import versions
+from fem_reference.runs.key import made_with
 from fem_reference.runs.store import Run
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.studies import refinement
@@ -34,11 +31,12 @@ from fem_reference.studies.true_errors import claims_of
 log = logging.getLogger(__name__)
 
 # What is measured on every point.
-METRICS = ("volume", "fibre_length", "surface_deviation", "penetration")
+METRICS = in_tables()
 # Solvers of surfaces are also tried on 4 to these powers as many triangles, whose files are kept beside the runs.
 _POWERS = (-1, 1)
 _MOST_TRIANGLES = 20_000  # above it a run takes minutes, most of a study's time
 SURFACES = "surfaces"
+FILE = "study.json"
 # Error bars of so many of the reference's coarser members are set beside their errors: the finest of those that are cheap.
 _CLAIMING = 4
 
@@ -54,8 +52,17 @@ def study(scenes: Iterable[MuscleCase], store: Path, workers: Workers, only: Col
         except InputError as error:
             log.info("%s is left out: %s", scene.name, error)
             missing[scene.name] = str(error)
-    machine = f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores, {workers}"
-    return Study(tuple(cases), missing, {"fem_reference": __version__, "machine": machine, **versions()})
+    return Study(tuple(cases), missing, made_with(str(workers)))
+
+
+def stored(folder: Path) -> list[CaseStudy]:
+    """The studies below ``folder``, of a case that of its own name before those with another; InputError where there is none."""
+    known = [(study, path.parent.name) for path in sorted(folder.glob(f"*/{FILE}")) for study in load_all(path)]
+    found = {study.case: study for study, name in sorted(known, key=lambda one: one[0].case == one[1])}
+    if not found:
+        want = "a folder with studies: fem-reference study CASE makes one"
+        raise InputError("--out", f'"{folder}", where no study is', want)
+    return list(found.values())
 
 
 def alone(found: Study, case: CaseStudy) -> Study:
@@ -69,8 +76,8 @@ def _of(scene: MuscleCase, store: Path, workers: Workers, only: Collection[str])
     truth = bench.obtain("reference", scene.reference, "reference")
     if truth.outcome.status != "converged" or truth.fibres is None:
         raise InputError(scene.place, f"a reference that {truth.outcome.status}", "one that reaches all frames")
-    bars = refinement.stored(truth) or refinement.obtain(bench, truth, model=False)
-    context = MeasurementContext.of(truth, truth.fibres, bench.setup().bones, bench.setup().exempt)
+    bars = refinement.bars(bench, truth, model=False)
+    context = context_of(bench.setup(), truth)
     trials = list[Trial]()
     if not only or scene.reference.solver in only:
         trials += reference_trials(scene)
@@ -106,29 +113,25 @@ def known(bars: ErrorBars | None) -> dict[str, float]:
     """The error bar of each statistic of a deviation, the greatest over the frames."""
     if bars is None:
         return {}
-    worst = {f"{bar.metric}.{bar.statistic}": float(bar.values[bar.worst]) for bar in bars.of_deviations}
+    worst = {f"{bar.metric}.{bar.statistic}": bar.worst.value for bar in bars.of_deviations}
     return {name: value for name, value in worst.items() if math.isfinite(value)}
 
 
 def _point(scene: MuscleCase, one: Made, truth: Run, context: MeasurementContext) -> Point:
     trial, run = one.trial, one.run
-    choice = {"solver": trial.choice.solver, **settings_of(trial)}
-    if trial.changed:
-        choice["scene"] = trial.changed
-    point = Point(
+    return Point(
         case=scene.name,
         solver=trial.choice.solver,
         name=trial.name,
         knob=trial.knob,
         value=trial.value,
-        choice=choice,
-        status="refused",
-        message=one.failure,
+        choice={"solver": trial.choice.solver, **settings_of(trial)}
+        | ({"scene": trial.changed} if trial.changed else {}),
+        status="refused" if run is None else run.outcome.status,
+        message=one.failure if run is None else run.outcome.message,
+        errors={} if run is None else errors(run, truth, context),
+        costs={} if run is None else costs(run),
     )
-    if run is None:
-        return point
-    status, message = run.outcome.status, run.outcome.message
-    return replace(point, status=status, message=message, errors=errors(run, truth, context), costs=costs(run))
 
 
 def settings_of(trial: Trial) -> dict[str, object]:
@@ -142,22 +145,26 @@ def settings_of(trial: Trial) -> dict[str, object]:
     return {key: value for key, value in given.items() if getattr(own, key) != fields[key].default}
 
 
+def greatest(run: Run, truth: Run, context: MeasurementContext, names: Collection[str]) -> dict[str, float]:
+    """The greatest magnitude over the frames of each deviation of a ``run`` from the ``truth`` by metrics of these ``names``, not a
+    number where one frame is none; by ``metric.statistic``.
+    """
+    found = measure(complete(run, truth.numbers), truth, context, names)
+    return {f"{one.metric}.{one.statistic}": float(np.abs(one.values).max()) for one in found}
+
+
 def errors(run: Run, truth: Run, context: MeasurementContext) -> dict[str, float]:
-    """By ``metric.statistic``, the greatest magnitude over the frames of the deviation of a ``run`` from the ``truth``; nothing of
-    a run that did not reach every frame, and nothing of the truth itself.
+    """The greatest magnitudes of deviations of a ``run`` from the ``truth``; nothing of a run that did not reach every frame, and
+    nothing of the truth itself.
     """
     if run.outcome.status != "converged" or run.folder == truth.folder:
         return {}
-    whole = carried(complete(run, truth.numbers), truth.surface)
-    found = {
-        f"{one.metric}.{one.statistic}": float(np.abs(one.values).max())
-        for one in measure(whole, truth, context, METRICS)
-    }
+    found = greatest(carried(complete(run, truth.numbers), truth.surface), truth, context, METRICS)
     return {name: value for name, value in found.items() if math.isfinite(value)}
 
 
 def costs(run: Run) -> dict[str, float]:
-    """What a run cost: those of ``COSTS`` that are known, and seconds by phase."""
+    """Costs of a run: those of ``COSTS`` that are known, and seconds by phase."""
     cost = run.outcome.cost
     each = seconds_per_frame(run)
     found = {} if each is None else {"seconds_per_frame": each}
@@ -168,19 +175,11 @@ def costs(run: Run) -> dict[str, float]:
 def _claims(made: Sequence[Made], truth: Run, context: MeasurementContext, store: Path) -> tuple[Claim, ...]:
     """The error bars of the reference on coarser tetrahedra, beside its difference from the truth."""
     found = list[Claim]()
-    members = [
-        one
-        for one in made
-        if one.trial.name == "reference"
-        and one.trial.knob == TETRAHEDRA
-        and one.run
-        and one.run.outcome.status == "converged"
-    ]
-    for one in members[-_CLAIMING:]:
-        assert one.run is not None
-        log.info("error bars of %s", one.trial.label)
-        bars = refinement.stored(one.run) or refinement.obtain(Bench(one.trial.scene, store), one.run, model=False)
+    on_tetrahedra = [one for one in made if (one.trial.name, one.trial.knob) == ("reference", TETRAHEDRA)]
+    members = [(one.trial, run) for one in on_tetrahedra if (run := one.reached) is not None]
+    for trial, run in members[-_CLAIMING:]:
+        log.info("error bars of %s", trial.label)
+        bars = refinement.bars(Bench(trial.scene, store), run, model=False)
         if bars is not None:
-            case = f"{one.trial.scene.name}, {one.trial.value}"
-            found += claims_of(case, bars, (one.run, truth), context)
+            found += claims_of(f"{trial.scene.name}, {trial.value}", bars, (run, truth), context)
     return tuple(found)

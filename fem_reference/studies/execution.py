@@ -156,7 +156,7 @@ class Bench[C: Case]:
     def read(self, name: str, choice: SolverChoice, place: str) -> Run:
         """The run that somebody recorded, checked against the setup of the scene; it is read each time and not stored."""
         settings, frames, rest = self.settings(choice, place), list[Frame](), self.setup()
-        assert isinstance(settings, recorded.Settings)
+        assert isinstance(settings, recorded.RecordedSettings)
         outcome = recorded.solve(rest, settings, frames.append)
         positions = np.stack([frame.surface for frame in frames if frame.surface is not None])
         numbers = tuple(frame.number for frame in frames)

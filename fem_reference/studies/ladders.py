@@ -13,6 +13,7 @@ from fem_reference.effects.incompressible_penalty import IncompressiblePenalty
 from fem_reference.foundations.errors import InputError
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.scenes.muscle import MuscleCase
+from fem_reference.studies.scene_changes import on_tetrahedra, with_contact, with_distances
 
 TETRAHEDRA, TRIANGLES = "tetrahedra", "triangles"
 # Sizes of tetrahedra, in those of the case, at each number of refinements up to its own.
@@ -38,7 +39,7 @@ class Trial:
 
     @property
     def label(self) -> str:
-        """What progress calls it."""
+        """Its name in lines of progress."""
         return f"{self.name}, {self.knob} = {self.value}" if self.knob else f"{self.name}, as it is"
 
 
@@ -62,10 +63,8 @@ def candidate_trials(scene: MuscleCase, surfaces: Mapping[str, MuscleCase]) -> I
     """
     known = list[dict[str, Any]]()
     for candidate in (*scene.candidate, *(one for row in solver_kinds() for one in row.candidate)):
-        offer, settings = (
-            solvers.find(candidate.solver, candidate.name),
-            {"solver": candidate.solver} | candidate.settings,
-        )
+        offer = solvers.find(candidate.solver, candidate.name)
+        settings = {"solver": candidate.solver} | candidate.settings
         if offer.moves == "nothing" or settings in known:
             continue
         known.append(settings)
@@ -89,13 +88,12 @@ def _sizes(whole: Trial) -> Iterator[Trial]:
 
 
 def _on(whole: Trial, size: float, refinements: int) -> Trial:
-    scene = whole.scene
-    muscle = scene.muscle.model_copy(update={"tet_size": size, "refinements": refinements})
+    scene = on_tetrahedra(whole.scene, tet_size=size, refinements=refinements)
     changed = {"muscle.tet_size": f"{size:.6g} mm", "muscle.refinements": refinements}
     value = f"{size / 2**refinements:.3g} mm"
-    if scene.muscle.refinements:
+    if whole.scene.muscle.refinements:
         value += f", {_REFINED.get(refinements, f'refined {refinements} times')}"
-    return Trial(scene.model_copy(update={"muscle": muscle}), whole.choice, whole.name, TETRAHEDRA, value, changed)
+    return Trial(scene, whole.choice, whole.name, TETRAHEDRA, value, changed)
 
 
 def _settings(base: Trial) -> Iterator[Trial]:
@@ -142,28 +140,21 @@ def _contact(base: Trial) -> Iterator[Trial]:
     contact = among(scene.effects)
     if contact is None:
         return
-    i = scene.effects.index(contact)
     for factor in _STIFFNESSES:
-        stiffness, effects = factor * contact.stiffness, list(scene.effects)
-        effects[i] = contact.model_copy(update={"stiffness": stiffness})
-        text = f"{stiffness:.3g} MPa/mm"
-        yield _changed(base, {"effect": tuple(effects)}, "contact stiffness", text, f"effect[{i}].stiffness")
-    if any(bone.surface for bone in scene.bone):
+        stiffness, key = factor * contact.stiffness, f"effect[{scene.effects.index(contact)}].stiffness"
+        stiffer = with_contact(scene, stiffness=stiffness)
+        yield _changed(base, stiffer, "contact stiffness", f"{stiffness:.3g} MPa/mm", key)
+    if known := [bone.distance_error for bone in scene.bone if bone.surface]:
         for factor in _DISTANCES:
-            bones = tuple(
-                bone.model_copy(update={"distance_error": factor * bone.distance_error}) if bone.surface else bone
-                for bone in scene.bone
-            )
-            text = f"{max(bone.distance_error for bone in bones if bone.surface):.3g} mm"
-            yield _changed(base, {"bone": bones}, "error of distances to bones", text, "bone[*].distance_error")
+            other, text = with_distances(scene, factor, "distance_error"), f"{factor * max(known):.3g} mm"
+            yield _changed(base, other, "error of distances to bones", text, "bone[*].distance_error")
 
 
-def _changed(base: Trial, update: Mapping[str, Any], knob: str, value: str, key: str) -> Trial:
+def _changed(base: Trial, scene: MuscleCase, knob: str, value: str, key: str) -> Trial:
     """The trial ``base`` with another value in its scene."""
-    scene, changed = base.scene.model_copy(update=dict(update)), base.changed | {key: value}
-    return replace(base, scene=scene, knob=knob, value=value + _beside(base), changed=changed)
+    return replace(base, scene=scene, knob=knob, value=value + _beside(base), changed=base.changed | {key: value})
 
 
 def _beside(base: Trial) -> str:
-    """What a trial has otherwise than its case already, before anything else is varied."""
+    """The difference of a trial from its case, before anything else is varied."""
     return f" ({base.knob} = {base.value})" if base.knob else ""

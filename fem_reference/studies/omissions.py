@@ -1,34 +1,28 @@
-"""What it changes to leave out each effect of a scene in turn, or each optional feature of a solver, and all of them."""
+"""Changes by leaving out each effect of a scene in turn, or each optional feature of a solver, and all of them."""
 
 import logging
 import math
-import os
-import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from fem_reference import metrics, solvers
 from fem_reference.assessment.omissions import MEASURES, Ablation, CaseOmissions, Omission
 from fem_reference.effects import Effect, Energy, Load, Ramped
 from fem_reference.foundations.errors import InputError, MissingSoftware
-from fem_reference.foundations.version import __version__
-from fem_reference.metrics import MeasurementContext, measure
+from fem_reference.metrics import MeasurementContext, context_of
 from fem_reference.problems import of_case
 from fem_reference.problems.body import ELEMENTS
-from fem_reference.runs.complete import complete
-from fem_reference.runs.key import versions
+from fem_reference.runs.key import made_with
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import MACHINE_ONLY, SolverChoice
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx
 from fem_reference.studies import refinement
 from fem_reference.studies.campaign import Made, Workers, carry_out, shared_bench
-from fem_reference.studies.cost import known
+from fem_reference.studies.cost import greatest, known
 from fem_reference.studies.execution import Bench
 from fem_reference.studies.ladders import Trial
 
@@ -39,15 +33,15 @@ LIMIT, COMPILING = 2.0, 60.0
 
 
 @dataclass(frozen=True)
-class Part:
-    """What is left out of a trial: of its scene the ``effects``, of its choice of a solver the ``features``; each by name."""
+class LeftOut:
+    """A part that is left out of a trial: ``effects`` of its scene, ``features`` of its solver; each by name."""
 
     effects: dict[str, Effect]
     features: tuple[str, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What is left out, by name."""
+        """The names of all of it."""
         return *self.effects, *self.features
 
 
@@ -58,35 +52,34 @@ def study(scene: MuscleCase, store: Path, workers: Workers) -> CaseOmissions:
     with fenicsx.shared():
         if workers == Workers():
             _warm_up(scene, store)
-        wholes = carry_out([Trial(scene, *entry) for entry in _choices(scene)], store, workers)
-        reference = wholes[0]
-        trials = {one.trial.name: _omissions(one) for one in wholes if _is_there(one)}
-        made = iter(carry_out([trial for _, trial in _listed(trials)], store, workers))
-        without = {name: [(part, next(made)) for part, _ in entries] for name, entries in trials.items()}
-        bench = shared_bench(scene, store)
-        context = None if not _is_there(reference) else _context(bench, _run(reference))
-        bars, unknown = _bars(bench, reference)
-    ablations = tuple(_ablation(one, without.get(one.trial.name, []), context) for one in wholes)
-    together = "one after the other" if workers == Workers() else f"{workers.count} at once"
-    machine = f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores, runs {together}"
+        wholes = carry_out(_wholes(scene), store, workers)
+        parted = [(whole, part) for whole in wholes if whole.reached for part in parts(whole.trial)]
+        others = carry_out([_limited(without(whole.trial, part), whole) for whole, part in parted], store, workers)
+        bench, truth = shared_bench(scene, store), wholes[0].reached
+        context = None if truth is None or truth.fibres is None else context_of(bench.setup(), truth)
+        bars, unknown = _bars(bench, truth)
+    made = list(zip(parted, others, strict=True))
+    ablations = (
+        _ablation(whole, [(part, other) for (own, part), other in made if own is whole], context) for whole in wholes
+    )
     return CaseOmissions(
         scene.name,
         scene.title,
-        ablations,
+        tuple(ablations),
         {name: unit for name, unit in metrics.units().items() if name in MEASURES},
         bars,
         unknown,
-        {"fem_reference": __version__, "machine": machine, **versions()},
+        made_with(str(workers)),
     )
 
 
 def is_material(effect: Effect) -> bool:
-    """Whether an effect is the material itself, which cannot be left out: an isotropic energy that is stored and always acts."""
+    """True of the material itself, which cannot be left out: an isotropic energy that is stored and always acts."""
     return isinstance(effect, Energy) and effect.stored and not effect.needs and not isinstance(effect, Ramped)
 
 
 def name_of(effect: Effect) -> str:
-    """What scene files call an effect, and where it acts if it does so on a part of the surface only."""
+    """The name of an effect in scene files, and where it acts if it does so on a part of the surface only."""
     name = type(effect).__module__.rpartition(".")[2]
     return f"{name} on {effect.on}" if isinstance(effect, Load) else name
 
@@ -101,31 +94,32 @@ def features(choice: SolverChoice, place: str) -> tuple[str, ...]:
     return tuple(key for key, value in choice.settings.items() if value is not None and key in optional)
 
 
-def parts(scene: MuscleCase, choice: SolverChoice, place: str) -> tuple[Part, ...]:
-    """What can be left out of a choice of a solver: each effect of the scene but its material where the solver simulates them,
-    else each feature of its own; and all of them, where there are several. Something elastic is left in any case.
+def parts(whole: Trial) -> tuple[LeftOut, ...]:
+    """Everything that can be left out of a trial: each effect of the scene but its material where the solver simulates them, else
+    each feature of its own; and all of them, where there are several. Something elastic is left in any case.
     """
-    if not solvers.takes_effects(choice.solver):
-        found = features(choice, place)
-        return *(Part({}, (key,)) for key in found), *([Part({}, found)] if len(found) > 1 else [])
+    if not solvers.takes_effects(whole.choice.solver):
+        found = features(whole.choice, whole.name)
+        return *(LeftOut({}, (key,)) for key in found), *([LeftOut({}, found)] if len(found) > 1 else [])
+    scene = whole.scene
     named = {name_of(effect): effect for effect in scene.effects if not is_material(effect)}
-    every = [Part({name: effect}) for name, effect in named.items()] + ([Part(named)] if len(named) > 1 else [])
-    return tuple(part for part in every if any(isinstance(one, Energy) and one.stored for one in _left(scene, part)))
+    every = [LeftOut({name: effect}) for name, effect in named.items()] + ([LeftOut(named)] if len(named) > 1 else [])
+    return tuple(part for part in every if any(isinstance(one, Energy) and one.stored for one in _kept(scene, part)))
 
 
-def without(whole: Trial, part: Part) -> Trial:
+def without(whole: Trial, part: LeftOut) -> Trial:
     """The trial with a part left out, by an element that suits what is left."""
-    left, choice, instead = _left(whole.scene, part), whole.choice, dict[str, Any]()
-    scene = whole.scene.model_copy(update={"effect": left}) if part.effects else whole.scene
+    kept, choice, instead = _kept(whole.scene, part), whole.choice, dict[str, Any]()
+    scene = whole.scene.model_copy(update={"effect": kept}) if part.effects else whole.scene
     element = getattr(solvers.settings(choice, whole.name), "element", None) if part.effects else None
-    if element is not None and (other := fitting(element, left)) != element:
+    if element is not None and (other := fitting(element, kept)) != element:
         instead["element"] = other
-    kept = {key: value for key, value in dict(choice).items() if key not in part.features}
-    choice = type(choice).model_validate(kept | instead)
+    given = {key: value for key, value in dict(choice).items() if key not in part.features}
+    choice = type(choice).model_validate(given | instead)
     return Trial(scene, choice, whole.name, "without", " and ".join(part.names), instead)
 
 
-def _left(scene: MuscleCase, part: Part) -> tuple[Effect, ...]:
+def _kept(scene: MuscleCase, part: LeftOut) -> tuple[Effect, ...]:
     return tuple(effect for effect in scene.effects if effect not in part.effects.values())
 
 
@@ -139,14 +133,11 @@ def fitting(element: str, effects: Sequence[Effect]) -> str:
     return next((name for name, one in others if (one[2] is not None) == brings))
 
 
-def _choices(scene: MuscleCase) -> list[tuple[SolverChoice, str]]:
+def _wholes(scene: MuscleCase) -> list[Trial]:
     """The reference, and the candidates of which something can be left out."""
-    found = [
-        (candidate, candidate.name)
-        for candidate in scene.candidate
-        if solvers.find(candidate.solver, candidate.name).moves != "nothing" and parts(scene, candidate, candidate.name)
-    ]
-    return [(scene.reference, "reference"), *found]
+    trials = [Trial(scene, candidate, candidate.name) for candidate in scene.candidate]
+    moving = (one for one in trials if solvers.find(one.choice.solver, one.name).moves != "nothing")
+    return [Trial(scene, scene.reference, "reference"), *(one for one in moving if parts(one))]
 
 
 def _warm_up(scene: MuscleCase, store: Path) -> None:
@@ -154,60 +145,32 @@ def _warm_up(scene: MuscleCase, store: Path) -> None:
     processor time is that of solving.
     """
     bench = shared_bench(scene, store)
-    for choice, name in _choices(scene)[1:]:
-        offer = solvers.find(choice.solver, name)
-        if not solvers.takes_effects(choice.solver):
+    for trial in _wholes(scene)[1:]:
+        offer = solvers.find(trial.choice.solver, trial.name)
+        if not solvers.takes_effects(trial.choice.solver):
             with suppress(InputError, MissingSoftware):  # of which its run says more
-                settings = bench.settings(choice, name)
+                settings = bench.settings(trial.choice, trial.name)
                 offer.require(settings)
-                built = bench.made_for(choice.solver, settings)
+                built = bench.made_for(trial.choice.solver, settings)
                 offer.solve(replace(built, frames=built.frames[:2]), settings, lambda _: None)
 
 
-def _is_there(one: Made) -> bool:
-    return one.run is not None and one.run.outcome.status == "converged"
+def _limited(trial: Trial, whole: Made) -> Trial:
+    """The trial of a run with something left out, which gives up after some time where its solver can."""
+    settings = solvers.settings(whole.trial.choice, whole.trial.name)
+    if whole.run is None or "time_limit" not in type(settings).model_fields:
+        return trial
+    seconds = LIMIT * whole.run.outcome.cost.get("seconds", 0.0) + COMPILING
+    limit = min(seconds, getattr(settings, "time_limit", None) or math.inf)
+    return replace(trial, choice=trial.choice.model_copy(update={"time_limit": f"{limit:.6g} s"}))
 
 
-def _run(one: Made) -> Run:
-    assert one.run is not None  # the caller asked
-    return one.run
-
-
-def _omissions(one: Made) -> list[tuple[Part, Trial]]:
-    """Each part of a trial that can be left out, with the trial without it, which has a time limit."""
-    trial, found = one.trial, list[tuple[Part, Trial]]()
-    for part in parts(trial.scene, trial.choice, trial.name):
-        other = without(trial, part)
-        found.append((part, replace(other, choice=other.choice.model_copy(update=_limit(one)))))
-    return found
-
-
-def _limit(one: Made) -> dict[str, str]:
-    """The setting by which a run with something left out gives up, where its solver can."""
-    settings = solvers.settings(one.trial.choice, one.trial.name)
-    if "time_limit" not in type(settings).model_fields:
-        return {}
-    seconds = LIMIT * _run(one).outcome.cost.get("seconds", 0.0) + COMPILING
-    return {"time_limit": f"{min(seconds, getattr(settings, 'time_limit', None) or math.inf):.6g} s"}
-
-
-def _listed(trials: Mapping[str, list[tuple[Part, Trial]]]) -> list[tuple[Part, Trial]]:
-    return [entry for entries in trials.values() for entry in entries]
-
-
-def _context(bench: Bench[MuscleCase], truth: Run) -> MeasurementContext | None:
-    if truth.fibres is None:
-        return None
-    return MeasurementContext.of(truth, truth.fibres, bench.setup().bones, bench.setup().exempt)
-
-
-def _bars(bench: Bench[MuscleCase], reference: Made) -> tuple[dict[str, float], str]:
+def _bars(bench: Bench[MuscleCase], truth: Run | None) -> tuple[dict[str, float], str]:
     """The error bars of the reference, the greatest over the frames; and why there are none."""
-    if not _is_there(reference):
+    if truth is None:
         return {}, "the reference did not reach all frames"
-    truth = _run(reference)
     try:
-        found = known(refinement.stored(truth) or refinement.obtain(bench, truth, model=False))
+        found = known(refinement.bars(bench, truth, model=False))
     except InputError as error:
         log.info("no error bars: %s", error)
         return {}, str(error)
@@ -215,22 +178,22 @@ def _bars(bench: Bench[MuscleCase], reference: Made) -> tuple[dict[str, float], 
     return found, "" if found else "the reference has none"
 
 
-def _ablation(one: Made, omitted: Sequence[tuple[Part, Made]], context: MeasurementContext | None) -> Ablation:
+def _ablation(one: Made, others: Sequence[tuple[LeftOut, Made]], context: MeasurementContext | None) -> Ablation:
     trial = one.trial
     takes_effects = solvers.takes_effects(trial.choice.solver)
     there = tuple(map(name_of, trial.scene.effects)) if takes_effects else features(trial.choice, trial.name)
     found = []
-    for part, other in omitted:
-        changes = {} if context is None else _changes(other, _run(one), context)
+    for part, other in others:
+        changed = {} if context is None or one.run is None else changes(other, one.run, context)
         predicted = _predicted(trial.scene, part) if takes_effects else {}
-        found.append(replace(_omission(other, part.names), changes=changes, predicted=predicted))
-    named = {name for part in parts(trial.scene, trial.choice, trial.name) for name in part.names}
+        found.append(replace(_omission(other, part.names), changes=changed, predicted=predicted))
+    named = {name for part in parts(trial) for name in part.names}
     kept = tuple(name for name in there if name not in named)
     return Ablation(trial.name, trial.choice.solver, kept, _omission(one, ()), tuple(found))
 
 
-def _predicted(scene: MuscleCase, part: Part) -> dict[str, float]:
-    """What the indicator of an effect says of how far the surface moves by it, where that alone is left out."""
+def _predicted(scene: MuscleCase, part: LeftOut) -> dict[str, float]:
+    """The displacement of the surface by an effect, as its indicator estimates it, where that alone is left out."""
     if len(part.effects) != 1:
         return {}
     (left_out,) = part.effects.values()
@@ -239,23 +202,19 @@ def _predicted(scene: MuscleCase, part: Part) -> dict[str, float]:
 
 
 def _omission(one: Made, left_out: tuple[str, ...]) -> Omission:
-    """How a run ended and what it cost."""
+    """The end of a run and its cost."""
     if one.run is None:
         return Omission(left_out, "refused", one.failure, instead=one.trial.changed)
     outcome = one.run.outcome
     return Omission(left_out, outcome.status, outcome.message, costs=dict(outcome.cost), instead=one.trial.changed)
 
 
-def _changes(one: Made, whole: Run, context: MeasurementContext) -> dict[str, float]:
-    """By ``metric.statistic``, the greatest magnitude over the frames of the change from the ``whole``; nothing of a run that did
+def changes(one: Made, whole: Run, context: MeasurementContext) -> dict[str, float]:
+    """The greatest magnitude over the frames of each change from the ``whole``, by ``metric.statistic``; nothing of a run that did
     not reach every frame, or where one is no number.
     """
-    if not _is_there(one):
+    if one.reached is None:
         return {}
-    names = dict.fromkeys(name.split(".")[0] for name in MEASURES)
-    found = {
-        f"{entry.metric}.{entry.statistic}": float(np.abs(entry.values).max())
-        for entry in measure(complete(_run(one), whole.numbers), whole, context, names)
-    }
+    found = greatest(one.reached, whole, context, {name.split(".")[0] for name in MEASURES})
     wanted = {name: found[name] for name in MEASURES if name in found}
     return wanted if all(map(math.isfinite, wanted.values())) else {}

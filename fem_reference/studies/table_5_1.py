@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fem_reference.assessment.solver_table import Scenario, SolverKind, SolverResult, Table, solver_kinds
 from fem_reference.foundations.errors import InputError
-from fem_reference.metrics import Measure, MeasurementContext, measure
+from fem_reference.metrics import Measure, MeasurementContext, in_tables, measure
 from fem_reference.runs.complete import complete
 from fem_reference.runs.cost import seconds_per_frame
 from fem_reference.runs.key import versions
@@ -30,7 +30,7 @@ SCENARIOS = (
     "iliacus_anatomical",
     "adductor_brevis",
 )
-METRICS = ("volume", "fibre_length", "surface_deviation", "penetration")
+METRICS = in_tables()
 REFERENCE = "FEM"
 FOREIGN = "Yours"
 

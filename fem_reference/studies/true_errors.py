@@ -8,7 +8,7 @@ from pathlib import Path
 from fem_reference.assessment.claims import CLAIMED, FINER, Claim, Claims, claimed
 from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.foundations.errors import InputError
-from fem_reference.metrics import MeasurementContext, change, measure
+from fem_reference.metrics import MeasurementContext, change, context_of, measure
 from fem_reference.runs.complete import complete
 from fem_reference.runs.store import Run
 from fem_reference.scenes.muscle import MuscleCase
@@ -49,15 +49,14 @@ def stake(scenes: Iterable[MuscleCase], store: Path) -> Claims:
 def _of(scene: MuscleCase, store: Path) -> list[Claim]:
     bench = Bench(scene, store)
     reference = bench.obtain("reference", scene.reference, "reference")
-    bars = refinement.stored(reference) or refinement.obtain(bench, reference)
+    bars = refinement.bars(bench, reference)
     if bars is None:
         return []
     finer = Bench(refinement.finer(bench, reference, FINER), store)
     run = complete(finer.obtain("finer", scene.reference, "reference"), reference.numbers)
     if reference.fibres is None or run.outcome.status != "converged":
         return []
-    context = MeasurementContext.of(reference, reference.fibres, bench.setup().bones, bench.setup().exempt)
-    return claims_of(scene.name, bars, (reference, run), context)
+    return claims_of(scene.name, bars, (reference, run), context_of(bench.setup(), reference))
 
 
 def claims_of(case: str, bars: ErrorBars, runs: tuple[Run, Run], context: MeasurementContext) -> list[Claim]:

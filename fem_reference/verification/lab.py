@@ -27,7 +27,7 @@ class FemLab:
 
     def second(self, body: Body, element: str, **settings: Any) -> Solved:
         """The states of ``body`` by the second opinion, scikit-fem."""
-        return scikit_fem.solve_body(body, scikit_fem.BodySettings(element=element, **settings))
+        return scikit_fem.solve_body(body, scikit_fem.ScikitBodySettings(element=element, **settings))
 
 
 @contextmanager

@@ -1,5 +1,6 @@
 """A comparison measures every run against the reference and against rest, and judges what it was asked to judge."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -49,6 +50,30 @@ def test_candidates_are_measured_against_the_reference_and_all_against_rest() ->
     assert set(result.deviations) == {"large"}
     # An extension with linear precision makes no error in a linear field.
     assert result.extension_error.values == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("expected", "word", "of_reference"),
+    [
+        ([("reference", "33.1 %")], "doubtful pass", "doubtful pass"),
+        ([("mine", "33.1 %")], "doubtful pass", "not judged"),
+        ([("reference", "33.1 %"), ("mine", "0 %")], "fail", "doubtful pass"),
+        ([("reference", "0 %")], "fail", "fail"),
+        ([], "not judged", "not judged"),
+    ],
+)
+def test_a_pass_that_rests_on_a_doubtful_reference_is_doubtful(expected, word: str, of_reference: str) -> None:
+    grown = run("reference", (1, 1.1))
+    unstable = replace(grown, scalars={"negative_modes": np.array([0.0, 1])})
+    case, mine = scene(*(expectation(*one) for one in expected)), run("mine", (1, 1.21))
+    result = compare(case, SETUP, unstable, (mine,))
+    assert (result.word, result.word_of("reference")) == (word, of_reference)
+    assert result.doubts == ["unstable equilibrium in 1 of 2 frames"]
+    stable = compare(case, SETUP, grown, (mine,))
+    assert (stable.word, stable.doubts) == (word.removeprefix("doubtful "), [])
+    assert stable.word_of("reference") == of_reference.removeprefix("doubtful ")
+    ended = compare(case, SETUP, replace(grown, outcome=Outcome("timed out", "")), (mine,))
+    assert (ended.word, ended.word_of("reference")) == (word, "fail")
 
 
 def test_expectations_meet_the_runs_that_they_are_of() -> None:

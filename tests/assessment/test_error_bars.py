@@ -66,7 +66,7 @@ def test_bars_cover_an_error_of_their_order_with_the_safety_of_the_index(of) -> 
         bar = found.find(of, metric, statistic)
         assert (bar.values, bar.unit) == (pytest.approx(1.25 * 0.1 / left * TIMES, abs=1e-9), "mm")
         assert bar.parts == {"tetrahedra": pytest.approx(2.5 * 0.1 / left)}
-        assert (bar.model, bar.worst) == (None, 2)
+        assert (bar.model, bar.widest) == (None, 2)
     # At the worst place alone it is of first order, as of fibres, which are few and end at rims.
     worst = found.find(of, "surface_deviation", "max")
     assert worst.values == pytest.approx(1.25 * 0.1 * TIMES, abs=1e-9)
@@ -226,7 +226,7 @@ def test_what_is_stored_reads_back(tmp_path) -> None:
         assert (one.model is None) == (other.model is None)
         assert one.model is None or np.array_equal(one.model, other.model)
         assert one.parts == other.parts
-    assert read.bars[3].worst == 1
+    assert read.bars[3].widest == 1
 
 
 def test_what_is_stored_is_of_one_run_and_its_metrics_only(tmp_path) -> None:

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fem_reference.assessment.judge import check, judge, overall, resolved, verdict
+from fem_reference.assessment.judge import MET, check, doubted, judge, overall, resolved, verdict
 from fem_reference.foundations.errors import InputError
 from fem_reference.metrics import Measure
 from fem_reference.scenes.case import Expectation
@@ -43,6 +43,19 @@ def test_pass_only_within_the_tolerance() -> None:
     assert judge(1.0, 1.0, 0.0) == "pass"
     assert judge(1.11, 1.0, 0.1) == "fail"
     assert judge(0.89, 1.0, 0.1) == "fail"
+
+
+@pytest.mark.parametrize("word", ["pass", "doubtful pass", "fail", "inconclusive", "not judged"])
+def test_doubts_change_a_pass_alone(word) -> None:
+    assert doubted(word, []) == word
+    assert doubted(word, ["unstable"]) == ("doubtful pass" if word == "pass" else word)
+    assert (doubted(word, ["unstable"]) in MET) == (word in MET)
+
+
+def test_the_worst_of_several_verdicts_counts() -> None:
+    assert overall(["pass", "doubtful pass"]) == "doubtful pass"
+    assert overall(["doubtful pass", "inconclusive"]) == "inconclusive"
+    assert overall([]) == "not judged"
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
@@ -110,8 +123,8 @@ def test_a_tolerance_below_zero_is_refused() -> None:
 
 def test_a_verdict_takes_the_error_bar_of_each_frame() -> None:
     def with_bars(values, bars, **changes):
-        measure = Measure("volume", "deviation", "%", np.array(values))
-        return verdict(expectation(**changes), [measure], NUMBERS, np.array(bars))
+        measure = Measure("volume", "deviation", "%", np.array(values), error_bars=np.array(bars))
+        return verdict(expectation(**changes), [measure], NUMBERS)
 
     # 0.5 % are allowed.
     found = with_bars([0.1, -0.4, 0.2], [0.0, 0.1, 0.29])

@@ -438,3 +438,23 @@ def test_facts_are_json(mixed) -> None:
     assert (facts["verdict"], facts["unchanged"], facts["within"]) == ("fail", "fail", "fail")
     assert {row["verdict"] for row in facts["judgements"]} == {"pass", "fail", "inconclusive"}
     json.dumps(facts, allow_nan=False)
+
+
+def test_a_pass_by_a_doubtful_reference_is_doubtful_in_all_that_is_written(tmp_path) -> None:
+    """And no failure: JUnit has it as a property, the tests of a pipeline stay green."""
+    unstable = replace(REFERENCE, scalars={"negative_modes": np.array([0.0, 1, 1])})
+    doubtful = current(known=bars(), reference=unstable)
+    found = regression.check(baseline.update(tmp_path / "mine.json", doubtful), doubtful)
+    why = "unstable equilibrium in 2 of 3 frames"
+    assert (found.word, found.doubts) == ("doubtful pass", (why,))
+    assert (regression_texts.facts(found)["verdict"], regression_texts.facts(found)["doubts"]) == (found.word, [why])
+    text = regression_texts.text(found)
+    assert text.endswith("verdict: doubtful pass")
+    assert f"reference: doubtful, {why}" in text
+    markdown = regression_texts.markdown(found)
+    assert markdown.startswith("### doubtful pass: mine on ball")
+    assert f"- reference: doubtful, {why}" in markdown
+    root = ElementTree.fromstring(regression_texts.junit(found, 1.0))
+    stated = [(one.get("name"), one.get("value")) for one in root.iter("property")]
+    assert stated == [("verdict", "doubtful pass"), ("doubt", why)]
+    assert root.get("failures") == "0"

@@ -5,10 +5,9 @@ import argparse
 import pytest
 
 from fem_reference import cli
-from fem_reference.cli import _parser
-from fem_reference.cli._parser import parser
+from fem_reference.cli import parser
 
-VERBS = _parser.names()
+VERBS = cli.names()
 
 
 def options_of(name: str) -> argparse.ArgumentParser:
@@ -19,7 +18,7 @@ def options_of(name: str) -> argparse.ArgumentParser:
 
 @pytest.mark.parametrize("name", VERBS)
 def test_a_verb_has_what_the_command_line_asks_for(name: str) -> None:
-    verb = _parser.verb(name)
+    verb = cli.verb(name)
     assert verb.HELP.strip()
     assert not verb.HELP.endswith(".")
     assert callable(verb.run)

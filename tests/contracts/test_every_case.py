@@ -6,6 +6,7 @@ import os
 import pytest
 
 from fem_reference import cli
+from fem_reference.assessment.judge import MET
 from fem_reference.cli.demo import MAIN_JOB
 from fem_reference.cli.page import PAGES
 from fem_reference.geometry import skins
@@ -133,7 +134,7 @@ def test_main_job(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(casefile, "read", lambda _: scene)
     status = cli.main(["demo", "--out", str(tmp_path), "--json", str(target), "--quiet"])
     facts = json.loads(target.read_text())
-    assert (status, facts["verdict"], facts["status"]) == (cli.DONE, "pass", "converged")
+    assert (status, facts["verdict"] in MET, facts["status"]) == (cli.DONE, True, "converged")
     frames = {row["frame"] for row in facts["measures"] if row["candidate"] == "pbd"}
     assert frames == set(range(0, 201, 10))
     metrics = {row["metric"] for row in facts["measures"] if row["candidate"] == "pbd"}
@@ -164,7 +165,7 @@ def test_gluteus_maximus_against_the_recorded_output(data, tmp_path) -> None:
         ]
     )
     facts = json.loads(target.read_text())
-    assert (status, facts["verdict"], facts["status"]) == (cli.DONE, "pass", "converged")
+    assert (status, facts["verdict"] in MET, facts["status"]) == (cli.DONE, True, "converged")
     volume = rows(facts, "volume", "deviation")
     assert sorted(volume) == list(range(0, 301, 10))
     assert max(map(abs, volume.values())) < 0.5
@@ -200,7 +201,7 @@ def test_muscles_meet_their_expectations(name, tmp_path, monkeypatch, request) -
     if not scene.attachment:
         request.getfixturevalue("coarse_contact")
     status, facts = run(scene, tmp_path, monkeypatch)
-    assert (status, facts["verdict"], facts["status"]) == (cli.DONE, "pass", "converged")
+    assert (status, facts["verdict"] in MET, facts["status"]) == (cli.DONE, True, "converged")
     assert scene.frames.numbers[1:] == tuple(range(100, scene.frames.last + 1, 100))
 
 

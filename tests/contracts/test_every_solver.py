@@ -74,12 +74,12 @@ def test_an_offer_has_an_example_of_its_settings_and_ladders_of_values_that_they
         ("", "solvers/unfinished: SOLVES is None, want a tuple of MuscleSolver, FieldSolver or BodySolver"),
         ("SOLVES = ()", "SOLVES is .., want a tuple"),
         ("SOLVES = len", "SOLVES is <built-in function len>, want a tuple"),
-        ("SOLVES = (MuscleSolver(settings=Settings, solve=len),)", "missing 1 required .* 'example'"),
-        ("SOLVES = (MuscleSolver(settings=Settings, example={}),)", "missing 1 required .* 'solve'"),
+        ("SOLVES = (MuscleSolver(settings=PbdSettings, solve=len),)", "missing 1 required .* 'example'"),
+        ("SOLVES = (MuscleSolver(settings=PbdSettings, example={}),)", "missing 1 required .* 'solve'"),
     ],
 )
 def test_a_file_that_is_no_solver_is_named_with_what_it_lacks(text, problem, tmp_path, monkeypatch) -> None:
-    imports = "from fem_reference.solvers.common.protocol import MuscleSolver\nfrom fem_reference.solvers.pbd import Settings\n"
+    imports = "from fem_reference.solvers.common.protocol import MuscleSolver\nfrom fem_reference.solvers.pbd import PbdSettings\n"
     (tmp_path / "unfinished.py").write_text(imports + text)
     monkeypatch.setattr(solvers, "__path__", [*solvers.__path__, str(tmp_path)])
     monkeypatch.setitem(sys.modules, "fem_reference.solvers.unfinished", None)  # so that it is gone afterwards

@@ -161,7 +161,7 @@ def test_what_a_candidate_says_is_not_passed_over(kind: str, tmp_path: Path) -> 
 def test_a_unit_that_is_empty_is_not_millimetres(tmp_path: Path) -> None:
     assert recorded.choice(tmp_path).settings["unit"] == "mm"
     with pytest.raises(InputError, match='unit: got "", want a unit of length'):
-        parse(recorded.Settings, recorded.choice(tmp_path, "").settings, "case.toml")
+        parse(recorded.RecordedSettings, recorded.choice(tmp_path, "").settings, "case.toml")
 
 
 def test_a_point_beyond_the_world_is_refused() -> None:

@@ -66,7 +66,7 @@ def test_a_law_beyond_where_it_has_a_value_is_no_solution(solver, gent) -> None:
     body = replace(turned(box("Q1", (1, 1, 1)), stretch), effects=(gent,), frames=(0.0, 0.5, 1.0))
     given = {"element": "Q1", "first_step": 1.0}
     if solver == "scikit_fem":
-        solved = scikit_fem.solve_body(body, scikit_fem.BodySettings(**given))
+        solved = scikit_fem.solve_body(body, scikit_fem.ScikitBodySettings(**given))
     else:
         with fenicsx.session() as own:  # whose process knows the law
             solved = own.solve(body, BodySettings(**given))

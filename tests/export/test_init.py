@@ -275,7 +275,7 @@ def test_gluteus_maximus_goes_out_and_comes_back(data: Path, tmp_path: Path) -> 
     subprocess.run([sys.executable, "-I", script, tmp_path / "export", tmp_path / "frames"], check=True)
     assert sum(row[0] == "origin" for row in rows(tmp_path / "export" / "attachments.csv")) == 1218
     taken = []
-    recorded.solve(rest, recorded.Settings(folder=str(tmp_path / "frames"), unit="m"), taken.append)
+    recorded.solve(rest, recorded.RecordedSettings(folder=str(tmp_path / "frames"), unit="m"), taken.append)
     for frame in taken:
         moved = apply(rest.bones[2].pose(frame.number), rest.surface.points)
         assert np.allclose(frame.surface, moved, rtol=0, atol=1e-9)

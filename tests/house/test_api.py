@@ -148,7 +148,7 @@ def test_a_reference_is_compared_exported_and_written(tmp_path) -> None:
     shown = result._repr_html_()
     assert shown.count("<tr>") == 1 + 4
     volume = result["pbd", "volume", "deviation"]
-    assert f"{volume.values[volume.worst]:.4g} %" in shown
+    assert f"{volume.worst.value:.4g} %" in shown
     with pytest.raises(KeyError):
         result["pbd", "surface_deviation", "deepest"]
     assert fr.write_report(result, tmp_path / "page").read_text().startswith("<!DOCTYPE html>")

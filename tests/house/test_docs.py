@@ -15,7 +15,7 @@ import reference_pages
 
 import fem_reference as fr
 from fem_reference import effects, metrics, solvers
-from fem_reference.cli._parser import parser
+from fem_reference.cli import parser
 from fem_reference.foundations.records import keys, parse
 from fem_reference.runs.contents import Status
 from fem_reference.scenes import casefile
@@ -44,7 +44,7 @@ def test_every_status_of_a_run_is_in_the_table() -> None:
 
 
 def test_every_effect_of_a_muscle_is_in_the_table() -> None:
-    text = pages.page("docs/laws.md")
+    text = pages.page("docs/effects.md")
     table = text[text.index("| effect |") :].split("\n\n")[0]
     first = "".join(row.split("|")[1] for row in table.splitlines())
     assert sorted(re.findall(r"`(\w+)`", first)) == effects.names()

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import fem_reference as fr
-from fem_reference.cli._parser import parser
+from fem_reference.cli import parser
 
 ROOT = Path(__file__).parents[2]
 

@@ -38,7 +38,9 @@ def test_what_is_declared_is_what_is_measured() -> None:
     found = measure(reference, reference, EXACT)
     assert {entry.metric for entry in found} == FIELD
     for entry in found:
-        assert {entry.statistic: entry.unit} == metrics.metric(entry.metric).UNITS
+        assert {entry.statistic: entry.unit} == {
+            name: one.unit for name, one in metrics.metric(entry.metric).STATISTICS.items()
+        }
         assert entry.values.shape == (2,)
         assert len(entry.where) == 2
 

@@ -17,7 +17,7 @@ from fem_reference.problems.muscle import AttachedVertices, RigidBody, Setup
 from fem_reference.problems.paths import Affine, Follows, From, Rest, Turn
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers.common.frame_loop import follow
-from fem_reference.solvers.common.load_steps import Attempt, Steps, march
+from fem_reference.solvers.common.load_steps import Attempt, StepSizes, march
 
 ALL, STILL = (0, 1, 2), ((0.0, 0.0, 0.0),) * 3
 NEO_HOOKE = effects.make("neo_hooke", mu="10 kPa")
@@ -132,13 +132,13 @@ def test_what_nobody_can_follow_is_refused(path, message) -> None:
 
 def test_steps_end_at_stops_and_nothing_is_recalled_across_one() -> None:
     tried, asked = [], []
-    steps = Steps(10.0, 0.5, stops=(2.5, 5.0, 10.0))
+    steps = StepSizes(10.0, 0.5, stops=(2.5, 5.0, 10.0))
 
     def recall(frame):
         asked.append((frame, len(tried)))
         return False
 
-    reached = list(march(lambda at: tried.append(at) or Attempt(None, 2), (0, 10, 20), steps, recall))
+    reached = list(march(lambda at: tried.append(at) or Attempt("converged", 2), (0, 10, 20), steps, recall))
     assert tried == [2.5, 5.0, 10.0, 20.0]
     assert [entry.steps for entry in reached] == [3, 1]
     assert asked == [(10, 2), (20, 3)]

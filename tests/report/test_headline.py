@@ -60,6 +60,16 @@ def test_a_candidate_that_nobody_judged_says_so_and_its_numbers(words, tmp_path:
     assert "is meant for in 2 of 5 frames, first in 15" in found
 
 
+def test_a_doubtful_pass_is_one_word_on_the_page_in_json_and_in_the_terminal(words, tmp_path: Path, capsys) -> None:
+    target = tmp_path / "facts.json"
+    assert cli.main([*words, "--json", str(target)]) == cli.DONE
+    assert "verdict: doubtful pass, of the reference; candidates are measured" in capsys.readouterr().out
+    facts = json.loads(target.read_text())
+    assert (facts["verdict"], len(facts["doubts"])) == ("doubtful pass", 3)
+    listed = (tmp_path / "out" / "index.html").read_text()
+    assert '<span class="badge doubtful">doubtful pass</span> <b>reference</b>' in listed
+
+
 @pytest.mark.parametrize("lost", [-0.135, 0.04])
 def test_energy_that_came_from_nowhere_is_judged_where_it_stands(
     lost, words, tmp_path: Path, monkeypatch, capsys

@@ -527,13 +527,6 @@ def test_numbers_as_people_read_them():
     assert [number(float("-inf")), number(None), duration(None)] == [f"{minus}infinite", dash, dash]
 
 
-def test_worst_of_a_measure_with_a_frame_that_is_not_a_number(comparison):
-    torn = comparison.candidates[1]
-    it = page.worst(torn, Measure("volume", "deviation", "%", np.array([0, -3.0, 2, NAN, 1]), tuple("abcde")))
-    assert np.isnan(it["value"])
-    assert (it["frame"], it["where"], it["finite"]) == (30, "d", (-3.0, 10))
-
-
 def test_candidates_share_one_colour_scale_and_one_axis(comparison):
     # quick is 4 mm away at its worst, torn 1.5 mm.
     wanted = gallery.shots(comparison)

@@ -2,21 +2,13 @@
 
 import os
 import re
-from argparse import Namespace
 from pathlib import Path
 
 import pytest
-import small
-import stand_ins
 
-from fem_reference import cli
-from fem_reference.cli import demo
-from fem_reference.cli._pages import LONGEST, Asked, Part, written
 from fem_reference.report import index_page, pages
 from fem_reference.report.pages import About
 from fem_reference.report.templates import template
-from fem_reference.solvers import fenicsx, pbd
-from tests.report import test_headline
 
 TEXT = template("index_page.html").render(entries=[], others=[])
 
@@ -85,20 +77,6 @@ def test_a_page_is_written_over_by_the_same_command_alone(tmp_path: Path) -> Non
     assert pages.free(where, "a", "third")[0] == "a-3"
 
 
-def test_the_name_holds_what_makes_the_page_different_and_ends_somewhere() -> None:
-    parts = (
-        Part(("bar",)),
-        Part(("--set", "muscle.tet_size=8 mm"), "muscle.tet_size=8 mm"),
-        Part(("--candidate", "x"), "x"),
-    )
-    asked = Asked("compare", "bar", parts, "report")
-    assert asked.name == "bar-muscle.tet_size=8mm-x"
-    assert asked.command == "fem-reference compare bar --set 'muscle.tet_size=8 mm' --candidate x"
-    long, other = (Asked("compare", "bar", (Part((), "long" * 40), Part((), last)), "report").name for last in "ab")
-    assert len(long) == LONGEST
-    assert long != other
-
-
 def test_the_index_has_every_page_and_no_other_folder(tmp_path: Path) -> None:
     put(tmp_path / "verify.html", "verify", kind="verification", title="Verified")
     put(tmp_path / "a b" / "report.html", "compare", headlines=(("mine", "fail", "off <b>"), ("reference", "pass", "")))
@@ -122,63 +100,11 @@ def test_an_index_of_somebody_else_stays(tmp_path: Path) -> None:
     assert (tmp_path / "index.html").read_text() == "my own site"
 
 
-def test_where_the_index_cannot_be_written_the_page_is(tmp_path: Path, monkeypatch) -> None:
-    def refuse(_: Path) -> None:
-        raise OSError("no room")
-
-    monkeypatch.setattr(index_page, "write", refuse)
-    options, asked = Namespace(out=tmp_path, page_name=None), Asked("study", "study")
-    path, lines = written(options, asked, lambda folder, name, command: put(folder / f"{name}.html", command))
-    assert path.is_file()
-    assert lines == [f"page: {path}", "  no index: no room"]
-
-
 def test_a_pipe_is_no_page(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "a.html")
     assert pages.read(tmp_path / "a.html") is None
 
 
-def test_the_small_picture_is_the_first_that_can_be_read(tmp_path: Path) -> None:
-    assert pages._small('<img src="data:image/webp;base64,AAAA">') == ""
-    options = Namespace(out=tmp_path, page_name=None)
-    asked = Asked("study", "study", ())
-    path, lines = written(options, asked, lambda folder, name, command: put(folder / f"{name}.html", command))
-    assert (path, lines) == (tmp_path / "study.html", [f"page: {path}"])
-    assert len(written(options, asked, lambda folder, name, command: put(folder / f"{name}.html", command))[1]) == 2
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("without_pictures")
-def test_runs_that_differ_leave_pages_beside_each_other(tmp_path: Path, monkeypatch, capsys) -> None:
-    stand_ins.solve_by(monkeypatch, fenicsx, test_headline.still)
-    stand_ins.unchecked(monkeypatch)
-    stand_ins.solve_by(monkeypatch, pbd, test_headline.shift)
-    case, out = small.write(tmp_path / "bar"), tmp_path / "out"
-    common = [str(case), "--out", str(out), "--quiet"]
-
-    def call(*words: str) -> list[str]:
-        cli.main([words[0], *common, *words[1:]])
-        return [line for line in capsys.readouterr().out.splitlines() if "page" in line]
-
-    def page(name: str) -> str:
-        return f"page: {out / name / 'report.html'}"
-
-    assert call("compare") == [page("bar")]
-    assert call("compare", "--limit", "volume.deviation=1 %")[0] == page("bar")
-    assert call("run") == [page("bar-reference")]
-    monkeypatch.setattr(demo, "MAIN_JOB", str(case))
-    assert cli.main(["demo", "--out", str(out), "--quiet"]) == cli.DONE  # it is the same as to compare
-    assert "written anew" in capsys.readouterr().out
-    assert call("compare", "--set", "frames.every=10") == [page("bar-frames.every=10")]
-    assert call("run", "--negative-control") == [page("bar-negative_control-reference")]
-    assert call("compare", "--name", "mine") == [page("mine")]
-    (again, note) = call("compare", "--name", "mine")
-    assert (again, note.startswith("  written anew")) == (page("mine"), True)
-    assert call("run", "--name", "mine") == [page("mine-2")]
-    text = (out / "index.html").read_text()
-    names = re.findall(r'<a href="([^"]*)">', text)
-    assert len(names) == 6
-    assert (out / "bar" / "measures.json").is_file()
-    for bad in ("runs", "a/b", "", "x" * 101):
-        assert cli.main(["compare", *common, "--name", bad]) == cli.BAD_INPUT
-        assert "--name" in capsys.readouterr().err
+def test_a_picture_that_cannot_be_read_is_none(tmp_path: Path) -> None:
+    (tmp_path / "a.html").write_text(pages.stamped(TEXT + '<img src="data:image/webp;base64,AAAA">', about()), "utf-8")
+    assert pages.read(tmp_path / "a.html").picture == ""

@@ -9,7 +9,6 @@ import pytest
 
 from fem_reference.assessment.cost_study import CaseStudy, Study
 from fem_reference.assessment.fronts import Point
-from fem_reference.assessment.growth import growth
 from fem_reference.report import study_page, write_study
 
 UNITS = {"surface_deviation.rms": "mm", "fibre_length.rms_percent": "%", "volume.deviation": "%"}
@@ -165,14 +164,6 @@ def test_numbers_of_the_page_are_valid_json_with_every_point(tmp_path) -> None:
     text = (tmp_path / "study.html").read_text(encoding="utf-8")
     data = json.loads(re.search(r'id="study">(.*?)</script>', text, re.DOTALL)[1])
     assert len(data["cases"][0]["points"]) == 8
-
-
-def test_growth_is_shown_with_its_exponent_and_what_a_large_problem_would_cost(tmp_path) -> None:
-    # Costs as the square of the size: 1e7 costs 1e14 times what 1 does.
-    grown = growth("pbd", "iteration", (10, 100, 1000), (1e-4, 1e-2, 1.0))
-    text = write_study(Study((study(),), {}, {}, (grown,)), tmp_path, "study").read_text(encoding="utf-8")
-    assert re.search(r"<td>2(\.00)? ± ", text)
-    assert "10⁸" in text
 
 
 def test_settings_are_tried_on_cases_that_they_were_not_chosen_on(tmp_path) -> None:

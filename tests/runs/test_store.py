@@ -23,8 +23,9 @@ def write(folder, *, close=True):
     writer = Writer(folder, IDENTITY, SURFACE, FIBRES, MESH)
     for number in (0, 5):
         shift = np.array([0.1 * number, 0, 0])
-        scalars = {"energy": 2.0 * number}
-        writer.add(Frame(number, SURFACE.points + shift, FIBRES.points + shift, MESH.points + shift, scalars, "well"))
+        scalars, residuals = {"energy": 2.0 * number}, (1.0, 0.1) if number else ()
+        places = SURFACE.points + shift, FIBRES.points + shift, MESH.points + shift
+        writer.add(Frame(number, *places, scalars, "well", residuals=residuals))
     if close:
         writer.close(Outcome("converged", "done", {"newton_iterations": 7.0}))
     return folder
@@ -39,6 +40,7 @@ def test_what_is_written_reads_back(tmp_path) -> None:
     assert np.array_equal(run.fibre_positions[1], FIBRES.points + SHIFT)
     assert run.fibres.offsets.tolist() == [0, 3, 5]
     assert run.scalars["energy"].tolist() == [0, 10]
+    assert run.residuals == ((), (1.0, 0.1))
     assert run.outcome == Outcome("converged", "done", run.outcome.cost)
     assert run.outcome.cost["newton_iterations"] == 7
     assert run.outcome.cost["seconds"] > 0

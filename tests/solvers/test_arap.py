@@ -54,13 +54,13 @@ def attached_setup(low, high, surface=None, last=1, pose=None):
 def run(setup, **changes):
     """The outcome with the usual settings but for ``changes``, and the positions by frame number."""
     frames = []
-    outcome = arap.solve(setup, parse(arap.Settings, USUAL | changes, "candidate[0]"), frames.append)
+    outcome = arap.solve(setup, parse(arap.ArapSettings, USUAL | changes, "candidate[0]"), frames.append)
     return outcome, {frame.number: frame.surface for frame in frames}
 
 
 def system_of(setup, weights="cotangent", fixed="remove"):
     attached = np.concatenate([entry.vertices for entry in setup.attached])
-    return arap.System.of(arap.Cells.of(setup.surface, weights), attached, fixed)
+    return arap.GlobalStep.of(arap.VertexCells.of(setup.surface, weights), attached, fixed)
 
 
 def started(setup, frame=1):
@@ -95,7 +95,7 @@ def test_cotangents_of_known_triangles():
 
 def test_the_cotangent_matrix_is_that_of_libigl():
     surface = muscle(noise=1.0)
-    cells = arap.Cells.of(surface, "cotangent")
+    cells = arap.VertexCells.of(surface, "cotangent")
     assert (cells.weights < 0).any()
     expected = -igl.cotmatrix(surface.points, surface.triangles)
     assert abs(cells.laplacian() - expected).max() < 1e-12  # roundings of cotangents of about 1
@@ -104,19 +104,19 @@ def test_the_cotangent_matrix_is_that_of_libigl():
 def test_negative_weights_leave_the_matrix_positive():
     # It is the matrix of linear elements, v^T L v = integral of |grad v|^2 >= 0, whatever the shape of the triangles.
     for seed in range(3):
-        matrix = arap.Cells.of(muscle(noise=3.0, seed=seed), "cotangent").laplacian().toarray()
+        matrix = arap.VertexCells.of(muscle(noise=3.0, seed=seed), "cotangent").laplacian().toarray()
         assert np.linalg.eigvalsh(matrix)[0] > -1e-12 * np.abs(matrix).max()
 
 
 def test_weights_without_geometry():
     kirchhoff, tutte, clamped = (
-        arap.Cells.of(muscle(noise=1.0), name) for name in ("kirchhoff", "tutte", "clamped cotangent")
+        arap.VertexCells.of(muscle(noise=1.0), name) for name in ("kirchhoff", "tutte", "clamped cotangent")
     )
     assert (kirchhoff.weights == 1).all()
     degrees = np.diff(kirchhoff.starts)
     assert sorted(set(degrees)) == [5, 6]  # a sphere from an icosahedron
     np.testing.assert_array_equal(tutte.weights, 1 / np.repeat(degrees, degrees))
-    kept = arap.Cells.of(muscle(noise=1.0), "cotangent").weights
+    kept = arap.VertexCells.of(muscle(noise=1.0), "cotangent").weights
     np.testing.assert_array_equal(clamped.weights, np.maximum(kept, 0))
 
 
@@ -124,7 +124,7 @@ def test_weights_without_geometry():
 def test_rotations_are_those_of_singular_values(weights):
     # Noise as wide as a cell turns some inside out: there singular values alone give a reflection.
     surface = muscle(noise=1.0)
-    cells = arap.Cells.of(surface, weights)
+    cells = arap.VertexCells.of(surface, weights)
     points = apply(TURN, surface.points) + np.random.default_rng(1).normal(scale=6.0, size=surface.points.shape)
     found = cells.rotations(points)
     np.testing.assert_allclose(found, by_singular_values(surface.points, points, cells), atol=1e-10)
@@ -133,14 +133,14 @@ def test_rotations_are_those_of_singular_values(weights):
 
 def test_a_mirrored_body_is_fitted_by_rotations():
     surface = muscle()
-    found = arap.Cells.of(surface, "cotangent").rotations(surface.points * [1, 1, -1])
+    found = arap.VertexCells.of(surface, "cotangent").rotations(surface.points * [1, 1, -1])
     np.testing.assert_allclose(np.linalg.det(found), 1, rtol=1e-13)
 
 
 def test_cells_in_a_plane_and_without_size_have_a_rotation():
     # The corners of a cube are attached by three faces, its other vertices lie in a plane: least singular value 0.
     surface = shapes.skin(shapes.box((3, 3, 3), (3, 3, 3)))
-    cells = arap.Cells.of(surface, "kirchhoff")
+    cells = arap.VertexCells.of(surface, "kirchhoff")
     found = cells.rotations(apply(TURN, surface.points))
     np.testing.assert_allclose(found, np.broadcast_to(TURN[:3, :3], found.shape), atol=1e-12)
     nothing = cells.rotations(np.zeros(surface.points.shape))
@@ -151,7 +151,7 @@ def test_cells_in_a_plane_and_without_size_have_a_rotation():
 def test_the_equations_are_the_slope_of_the_energy(weights):
     # Quadratic in positions: central differences of step 1 mm have no error but rounding, of energies of about 1e4.
     surface, random = muscle(noise=1.0), np.random.default_rng(2)
-    cells = arap.Cells.of(surface, weights)
+    cells = arap.VertexCells.of(surface, weights)
     points = surface.points + random.normal(size=surface.points.shape)
     rotations = cells.rotations(points)
     slope = 4 * (cells.laplacian() @ points - cells.right_side(rotations))
@@ -187,7 +187,7 @@ def test_the_same_as_libigl(noise):
     igl.arap_precomputation(setup.surface.points, setup.surface.triangles, 3, attached.astype(np.int32), data)
     theirs = igl.arap_solve(frames[1][attached], data, np.array(setup.surface.points))
     assert np.abs(theirs - frames[1]).max() < 1e-6 * 60
-    cells = arap.Cells.of(setup.surface, "cotangent")
+    cells = arap.VertexCells.of(setup.surface, "cotangent")
     assert (cells.weights < 0).any()
     assert cells.energy(theirs) == pytest.approx(cells.energy(frames[1]), rel=1e-9)
 
@@ -221,7 +221,7 @@ def test_least_squares_may_raise_the_energy():
     # They minimise the residual of all equations, those of attached vertices too, and not eq. 5.10: its least value is lower.
     setup = attached_setup(None, JUMP)
     least, squares = (run(setup, fixed=fixed, **EXACT)[1][1] for fixed in ("remove", "ols"))
-    cells = arap.Cells.of(setup.surface, "cotangent")
+    cells = arap.VertexCells.of(setup.surface, "cotangent")
     assert cells.energy(squares) > 1.05 * cells.energy(least)
 
 
@@ -286,7 +286,7 @@ def test_scaling_reaches_the_volume_where_all_is_free():
 def test_the_volume_step_misses_the_volume_and_costs_energy():
     # Report 6.2: attached vertices do not scale, and what scaling gains the next iteration takes back.
     setup = attached_setup(None, SWING, last=10)
-    triangles, cells = setup.surface.triangles, arap.Cells.of(setup.surface, "cotangent")
+    triangles, cells = setup.surface.triangles, arap.VertexCells.of(setup.surface, "cotangent")
     _, plain = run(setup, iterations=200)
     _, scaled = run(setup, iterations=200, volume_step=True)
     rest, without, with_step = (
@@ -322,8 +322,8 @@ def test_frames_wanted_and_cost():
 
 def test_the_energy_of_a_frame_is_reported():
     setup, frames = attached_setup(None, JUMP), []
-    arap.solve(setup, parse(arap.Settings, USUAL, "candidate[0]"), frames.append)
-    cells = arap.Cells.of(setup.surface, "cotangent")
+    arap.solve(setup, parse(arap.ArapSettings, USUAL, "candidate[0]"), frames.append)
+    cells = arap.VertexCells.of(setup.surface, "cotangent")
     rotations = by_singular_values(setup.surface.points, frames[1].surface, cells)
     i = np.repeat(np.arange(162), np.diff(cells.starts))
     rest, moved = (points[i] - points[cells.neighbours] for points in (setup.surface.points, frames[1].surface))
@@ -421,10 +421,10 @@ def test_a_vertex_that_nothing_ties_is_an_outcome():
 )
 def test_settings_out_of_range(key, value):
     with pytest.raises(InputError, match=rf'{key}: got "?{value}"?, want '):
-        parse(arap.Settings, USUAL | {key: value}, "candidate[0]")
+        parse(arap.ArapSettings, USUAL | {key: value}, "candidate[0]")
 
 
 @pytest.mark.parametrize("key", list(USUAL))
 def test_settings_are_all_required(key):
     with pytest.raises(InputError, match=f"{key}: got nothing, want this key"):
-        parse(arap.Settings, {name: value for name, value in USUAL.items() if name != key}, "candidate[0]")
+        parse(arap.ArapSettings, {name: value for name, value in USUAL.items() if name != key}, "candidate[0]")

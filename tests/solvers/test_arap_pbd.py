@@ -12,7 +12,7 @@ from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
 from fem_reference.problems.muscle import AttachedVertices, Setup
 from fem_reference.solvers import arap, arap_pbd
-from fem_reference.solvers.pbd import Constraints
+from fem_reference.solvers.pbd import PbdConstraints
 from fem_reference.solvers.pbd_kernels import distances, volume
 from tests.solvers.test_arap import JUMP, SWING, TURN, attached_setup, muscle, started, system_of
 
@@ -23,7 +23,7 @@ EXACT = {"iterations": 3000, "tolerance": "1e-12 mm"}
 
 
 def settings(usual=CONSTRAINT, **changes):
-    return parse(arap_pbd.Settings, usual | changes, "candidate[0]")
+    return parse(arap_pbd.ArapPbdSettings, usual | changes, "candidate[0]")
 
 
 def run(setup, usual=CONSTRAINT, **changes):
@@ -35,7 +35,7 @@ def run(setup, usual=CONSTRAINT, **changes):
 
 def constraints_of(setup):
     attached = np.concatenate([entry.vertices for entry in setup.attached])
-    return Constraints.at_rest(setup.surface.points, setup.surface.triangles, attached)
+    return PbdConstraints.at_rest(setup.surface.points, setup.surface.triangles, attached)
 
 
 def test_the_volume_is_kept_to_rounding():
@@ -69,7 +69,7 @@ def test_less_energy_than_scaling_by_turns_at_the_same_volume(seed):
     setup = attached_setup(None, motion, muscle(noise=1.0, seed=seed))
     triangles, states = setup.surface.triangles, []
     by_turns = {"weights": "clamped cotangent", "fixed": "remove", "rotations": "each", "volume_step": True}
-    record = parse(arap.Settings, by_turns | {"iterations": 300, "tolerance": "1e-9 mm"}, "candidate[0]")
+    record = parse(arap.ArapSettings, by_turns | {"iterations": 300, "tolerance": "1e-9 mm"}, "candidate[0]")
     arap.solve(setup, record, lambda frame: states.append(frame.surface))
     scaled = states[1]
     rest = replace(constraints_of(setup), six_volumes=volume(scaled, np.array(triangles))[0])
@@ -122,7 +122,7 @@ def test_independent_of_where_the_world_is(usual):
 def test_projections_start_from_the_state_of_arap():
     setup, states = attached_setup(None, JUMP), []
     usual = {"weights": "kirchhoff", "fixed": "remove", "rotations": "each", "volume_step": False}
-    record = parse(arap.Settings, usual | {"iterations": 5}, "candidate[0]")
+    record = parse(arap.ArapSettings, usual | {"iterations": 5}, "candidate[0]")
     arap.solve(setup, record, lambda frame: states.append(frame.surface))
     _, nothing = run(setup, GUESS, weights="kirchhoff", projections=SWEEPS | {"stretch": 0, "volume": 0, "bending": 0})
     np.testing.assert_array_equal(nothing[1], states[1])
@@ -218,7 +218,7 @@ def test_no_number_has_no_root(lost):
     setup = attached_setup(None, SWING)
     points = np.array(setup.surface.points)
     points[5, 0] = lost
-    assert arap_pbd._least_root(points, setup.surface.points * 0.1, constraints_of(setup)) is None
+    assert arap_pbd.least_root(points, setup.surface.points * 0.1, constraints_of(setup)) is None
 
 
 def test_a_tolerance_that_is_not_met_is_reported():
@@ -251,4 +251,6 @@ def test_projections_out_of_range(key, value):
 @pytest.mark.parametrize("key", list(CONSTRAINT))
 def test_settings_are_all_required(key):
     with pytest.raises(InputError, match=f"{key}: got nothing, want this key"):
-        parse(arap_pbd.Settings, {name: value for name, value in CONSTRAINT.items() if name != key}, "candidate[0]")
+        parse(
+            arap_pbd.ArapPbdSettings, {name: value for name, value in CONSTRAINT.items() if name != key}, "candidate[0]"
+        )

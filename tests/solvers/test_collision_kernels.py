@@ -79,7 +79,7 @@ def test_nobody_inside_a_bone_is_missed_and_few_are_asked(grid, kind) -> None:
     body = gridded(grid, turn) if kind == "grid" else RigidBody("ball", BALL, turn, solid=Sphere((0, 0, 0), 20.0))
     points = 60 * random.normal(size=(3000, 3))
     points = points[body.shape.sample(points).distance > 0]
-    obstacle = collision.Obstacle(body, points, np.ones(len(points), bool), 0.0)
+    obstacle = collision.CollidingBone(body, points, np.ones(len(points), bool), 0.0)
     asked = inside = 0
     for frame in range(1, 61):
         points = points + random.normal(scale=0.5, size=points.shape)
@@ -96,7 +96,7 @@ def test_nobody_inside_a_bone_is_missed_and_few_are_asked(grid, kind) -> None:
 def test_a_vertex_takes_the_shortest_path_out() -> None:
     ball = RigidBody("ball", BALL, Translation((1, 0, 0), (0.0, 1.0), (0.0, 30.0)), solid=Sphere((0, 0, 0), 20.0))
     rest = np.array([[40.0, 0, 0], [40, 5, 0], [80, 0, 0], [40, 0, 5]])
-    obstacle = collision.Obstacle(ball, rest, np.array([True, True, True, False]), 0.0)
+    obstacle = collision.CollidingBone(ball, rest, np.array([True, True, True, False]), 0.0)
     obstacle.move(1)
     points = rest.copy()
     collision.move_out(points, [obstacle], 1.0)
@@ -107,7 +107,7 @@ def test_a_vertex_takes_the_shortest_path_out() -> None:
 
 def test_stiffness_is_the_share_of_the_depth() -> None:
     points = np.array([[0.0, 0, 5]])
-    obstacle = collision.Obstacle(floor(), points, np.ones(1, bool), 0.0)
+    obstacle = collision.CollidingBone(floor(), points, np.ones(1, bool), 0.0)
     points[0, 2] = -2.0
     collision.move_out(points, [obstacle], 0.25)
     assert_allclose(points, [[0, 0, -1.5]], atol=1e-15)
@@ -117,7 +117,7 @@ def test_several_obstacles_add_up() -> None:
     # Havlicek's response in report 6.1.1: in the corner of a floor and a wall both act at once.
     points = np.array([[5.0, 0, 5]])
     free = np.ones(1, bool)
-    corner = [collision.Obstacle(floor(normal=normal), points, free, 0.0) for normal in ((0, 0, 1), (1, 0, 0))]
+    corner = [collision.CollidingBone(floor(normal=normal), points, free, 0.0) for normal in ((0, 0, 1), (1, 0, 0))]
     points[:] = [[-3.0, 0, -1]]
     collision.move_out(points, corner, 1.0)
     assert_allclose(points, 0, atol=1e-15)
@@ -125,7 +125,7 @@ def test_several_obstacles_add_up() -> None:
 
 def test_what_is_near_at_rest_may_stay_as_near() -> None:
     rest = np.array([[0.0, 0, -1.5], [0, 0, 0.3], [0, 0, 9]])
-    obstacle = collision.Obstacle(floor(), rest, np.ones(3, bool), 1.0)
+    obstacle = collision.CollidingBone(floor(), rest, np.ones(3, bool), 1.0)
     points = rest.copy()
     collision.move_out(points, [obstacle], 1.0)
     assert_array_equal(points, rest)
@@ -136,7 +136,7 @@ def test_what_is_near_at_rest_may_stay_as_near() -> None:
 
 def test_watched_vertices_are_asked_again() -> None:
     points = np.array([[0.0, 0, 5], [0, 0, 6]])
-    obstacle = collision.Obstacle(floor(), points, np.ones(2, bool), 0.0)
+    obstacle = collision.CollidingBone(floor(), points, np.ones(2, bool), 0.0)
     assert_array_equal(obstacle.near(points).vertices, [0, 1])
     assert len(obstacle.near(points).vertices) == 0
     obstacle.watch(np.array([1]))
@@ -146,7 +146,7 @@ def test_watched_vertices_are_asked_again() -> None:
 def test_in_the_middle_of_a_ball_there_is_no_path_out_but_no_harm() -> None:
     # The gradient of a spline vanishes on a ridge; nothing goes farther than it is deep.
     rest = np.array([[50.0, 0, 0]])
-    obstacle = collision.Obstacle(
+    obstacle = collision.CollidingBone(
         RigidBody("ball", BALL, None, solid=Sphere((0, 0, 0), 20.0)), rest, np.ones(1, bool), 0.0
     )
     points = np.zeros((1, 3))
@@ -156,7 +156,7 @@ def test_in_the_middle_of_a_ball_there_is_no_path_out_but_no_harm() -> None:
 
 def test_vertices_that_are_no_number_stay_so(grid) -> None:
     rest = np.array([[50.0, 0, 0], [0, 50, 0]])
-    obstacle = collision.Obstacle(gridded(grid, None), rest, np.ones(2, bool), 0.0)
+    obstacle = collision.CollidingBone(gridded(grid, None), rest, np.ones(2, bool), 0.0)
     points = np.array([[np.nan, 0, 0], [0, 19.0, 0]])
     collision.move_out(points, [obstacle], 1.0)
     assert np.isnan(points[0, 0])

@@ -41,7 +41,7 @@ def bar(motion=SWING, points: int = 41, bottom=None) -> Problem:
 
 def solved(given: Problem, **settings: object) -> tuple[Outcome, list[Frame]]:
     frames: list[Frame] = []
-    record = parse(line_of_action.Settings, settings, "candidate[0]")
+    record = parse(line_of_action.LineSettings, settings, "candidate[0]")
     return line_of_action.solve(given, record, frames.append), frames
 
 

@@ -204,12 +204,14 @@ def bar(top: Rotation | Translation | None, frames=(0, 5, 10), bottom=None) -> P
 def solved(problem: Problem, **changes: object) -> tuple[Outcome, list[Frame]]:
     frames: list[Frame] = []
     settings = {name: value for name, value in (USUAL | changes).items() if value is not None}
-    return mass_spring.solve(problem, parse(mass_spring.Settings, settings, "candidate[0]"), frames.append), frames
+    return mass_spring.solve(
+        problem, parse(mass_spring.MassSpringSettings, settings, "candidate[0]"), frames.append
+    ), frames
 
 
 def test_a_muscle_is_its_points_edges_and_mass() -> None:
     mesh = shapes.box((2, 2, 4), (10, 10, 30))
-    found = mass_spring.network_of(mesh, parse(mass_spring.Settings, USUAL, "candidate[0]"))
+    found = mass_spring.network_of(mesh, parse(mass_spring.MassSpringSettings, USUAL, "candidate[0]"))
     assert_allclose(found.masses.sum(), 1.06e-9 * 3000, rtol=1e-12)
     # Each cell edge, face diagonal and cell diagonal of Kuhn's tets once: by Euler, V - E + F - T = 1 of a ball.
     triangles = np.unique(np.sort(mesh.tets[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]].reshape(-1, 3)), axis=0)
@@ -371,15 +373,17 @@ def test_too_many_steps_are_not_begun(change, message) -> None:
 def test_steps_in_parts_are_the_steps_at_once() -> None:
     # 450 steps are asked for 200 at a time; ends go as evenly, but for rounding of 30 mm.
     given = bar(BEND)
-    model = mass_spring.Model.of(given, parse(mass_spring.Settings, USUAL, "candidate[0]"))
+    asked = parse(mass_spring.MassSpringSettings, USUAL | {"frame_time": "0.9 ms", "time_step": "2 us"}, "candidate[0]")
+    model = mass_spring.MassSpringModel(given, asked)
+    assert model.steps == 450
     rest = np.array(given.mesh.points)
-    points, previous, at_once, before = (rest.copy() for _ in range(4))
-    model.move(points, previous, 1, 2e-6, 450)
-    ends = [model._carried(number)[model.fixed] for number in (0, 1)]
-    advance(at_once, before, model.network, PrescribedPath(model.fixed, *ends), 2e-6, 450)
-    assert np.abs(points - rest).max() > 0.1
-    assert_allclose(points, at_once, rtol=0, atol=1e-11)
-    assert_allclose(previous, before, rtol=0, atol=1e-11)
+    at_once, before = rest.copy(), rest.copy()
+    model.move(1)
+    ends = [model.carried(number)[model.fixed] for number in (0, 1)]
+    advance(at_once, before, model.network, PrescribedPath(model.fixed, *ends), model.time_step, 450)
+    assert np.abs(model.points - rest).max() > 0.1
+    assert_allclose(model.points, at_once, rtol=0, atol=1e-11)
+    assert_allclose(model.previous, before, rtol=0, atol=1e-11)
 
 
 @pytest.mark.parametrize("damping", [1e-3, 1.0, 1e6, 1e200])

@@ -23,7 +23,7 @@ USUAL = {
     "volume": 1.0,
     "bending": 0.9,
 }
-SETTINGS = pbd.Settings(**USUAL)
+SETTINGS = pbd.PbdSettings(**USUAL)
 TURN = Rotation((1, 2, 3), (5, -4, 7), (0.0, 1.0), (0.0, 2.0)).pose(1)
 CONTACT = {"gap": "0 mm", "stiffness": 1.0}
 SWING = Rotation((1, 0, 0), (0, 20, -10), (0.0, 50.0), (0.0, 0.5))
@@ -64,7 +64,7 @@ def attached_setup(low, high, last=10, every=1, pose=None):
 def run(setup, **changes):
     """The outcome with the usual settings but for ``changes``, and the positions by frame number."""
     frames = []
-    outcome = pbd.solve(setup, pbd.Settings(**USUAL | changes), frames.append)
+    outcome = pbd.solve(setup, pbd.PbdSettings(**USUAL | changes), frames.append)
     return outcome, {frame.number: frame.surface for frame in frames}
 
 
@@ -79,8 +79,8 @@ def test_hinges_are_the_edges_and_the_vertices_opposite():
 def test_free_flight_is_damped():
     # With every stiffness 0 a step loses its share of velocity and moves on: dx_n = (1 - damping)^n dx_0.
     surface = spindle()
-    rest = pbd.Constraints.at_rest(surface.points, surface.triangles, [])
-    settings = pbd.Settings(**USUAL | {"damping": 0.25, "stretch": 0, "volume": 0, "bending": 0})
+    rest = pbd.PbdConstraints.at_rest(surface.points, surface.triangles, [])
+    settings = pbd.PbdSettings(**USUAL | {"damping": 0.25, "stretch": 0, "volume": 0, "bending": 0})
     points, displacement = np.array(surface.points), np.full(surface.points.shape, 2.0)
     for _ in range(5):
         points, displacement = pbd.advance(points, displacement, rest, settings)
@@ -91,7 +91,7 @@ def test_free_flight_is_damped():
 def test_a_turned_rest_state_stays_put():
     surface = spindle()
     turned = apply(TURN, surface.points)
-    rest = pbd.Constraints.at_rest(surface.points, surface.triangles, [])
+    rest = pbd.PbdConstraints.at_rest(surface.points, surface.triangles, [])
     points, displacement = turned.copy(), np.zeros(turned.shape)
     for _ in range(100):
         points, displacement = pbd.advance(points, displacement, rest, SETTINGS)
@@ -267,7 +267,7 @@ def test_with_fibres_independent_of_where_the_world_is():
 def test_edges_along_fibres_are_softer():
     # A bar with its fibre along z: by 40 % less stiff along it, by 40 % of cos 45 degrees less on the diagonals, not across.
     given = shapes.bar((2, 2, 6), (10, 10, 30), {"bottom": None, "top": SWING}, (), (0, 5))
-    found = pbd._constraints(given, pbd.Settings(**USUAL, anisotropy=0.4))
+    found = pbd.constraints_of(given, pbd.PbdSettings(**USUAL, anisotropy=0.4))
     edges = np.diff(given.surface.points[found.edges], axis=1)[:, 0]
     cosine = np.abs(edges[:, 2]) / np.linalg.norm(edges, axis=1)
     np.testing.assert_allclose(found.share, 1 - 0.4 * cosine, rtol=1e-14)
@@ -372,7 +372,7 @@ def test_a_turned_grid_is_felt_by_less_than_a_tenth_of_its_spacing():
 )
 def test_settings_out_of_range(key, value):
     with pytest.raises(InputError, match=f"{key}: got {value}, want "):
-        parse(pbd.Settings, USUAL | {key: value}, "candidate[0]")
+        parse(pbd.PbdSettings, USUAL | {key: value}, "candidate[0]")
 
 
 @pytest.mark.parametrize(
@@ -387,10 +387,10 @@ def test_settings_out_of_range(key, value):
 )
 def test_effects_out_of_range(change, message):
     with pytest.raises(InputError, match=message):
-        parse(pbd.Settings, USUAL | change, "candidate[0]")
+        parse(pbd.PbdSettings, USUAL | change, "candidate[0]")
 
 
 @pytest.mark.parametrize("key", list(USUAL))
 def test_settings_are_all_required(key):
     with pytest.raises(InputError, match=f"{key}: got nothing, want this key"):
-        parse(pbd.Settings, {name: value for name, value in USUAL.items() if name != key}, "candidate[0]")
+        parse(pbd.PbdSettings, {name: value for name, value in USUAL.items() if name != key}, "candidate[0]")

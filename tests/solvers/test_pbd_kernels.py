@@ -11,7 +11,7 @@ from fem_reference.foundations.mesh import TET_FACES, Surface
 from fem_reference.foundations.motion import Rotation, apply
 from fem_reference.solvers import pbd_kernels as kernels
 from fem_reference.solvers.compiled_kernels import kept_code
-from fem_reference.solvers.pbd import Constraints, hinges_of
+from fem_reference.solvers.pbd import PbdConstraints, hinges_of
 
 TET = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 TURN = Rotation((1, 2, 3), (5, -4, 7), (0.0, 1.0), (0.0, 2.0)).pose(1)
@@ -169,7 +169,7 @@ def test_one_projection_turns_a_pair_no_further_than_it_may(angle, rest):
 
 def projections(surface):
     """The three projections of a surface that changed its shape, each a function of points and inverse masses."""
-    rest = Constraints.at_rest(surface.points, surface.triangles, [])
+    rest = PbdConstraints.at_rest(surface.points, surface.triangles, [])
     return {
         "distance": lambda points, masses: kernels.project_distances(
             points, masses, rest.edges, rest.lengths, 0.8 * rest.share

@@ -32,7 +32,7 @@ from fem_reference.solvers.program_kernels import (
 pytestmark = pytest.mark.slow
 
 USUAL = {"sub_iterations": 3, "damping": 0.01, "bending": 0.9, "voxels": 64}
-SETTINGS = pbd_program.Settings(**USUAL)
+SETTINGS = pbd_program.ProgramSettings(**USUAL)
 SWING = Rotation((1, 0, 0), (0, 20, -10), (0.0, 50.0), (0.0, 0.5))
 TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
 
@@ -65,7 +65,7 @@ def attached_setup(low, high, last=10, every=1):
 def run(setup, **changes):
     """The outcome with the usual settings but for ``changes``, and the positions by frame number."""
     frames = []
-    outcome = pbd_program.solve(setup, pbd_program.Settings(**USUAL | changes), frames.append)
+    outcome = pbd_program.solve(setup, pbd_program.ProgramSettings(**USUAL | changes), frames.append)
     return outcome, {frame.number: frame.surface for frame in frames}
 
 
@@ -243,7 +243,7 @@ def test_marching_past_the_start_is_too_far():
 
 def test_who_marches_too_far_ends_at_its_start():
     # The cube of 4 voxels with a shaft of one, which lies as above.
-    bone = pbd_program.Bone(RigidBody("bone", cube(4.0), None), 4, 0)
+    bone = pbd_program.VoxelBone(RigidBody("bone", cube(4.0), None), 4, 0)
     bone.voxels.inside[2, 2] = False
     start = np.array([[2.05, 2.05, 1.0]])
     np.testing.assert_array_equal(pbd_program.collided(start, start + [0.5, -0.5, 0], [bone]), start)
@@ -251,7 +251,7 @@ def test_who_marches_too_far_ends_at_its_start():
 
 def test_the_motions_of_a_bone_add_up():
     # As the program adds up: 0.9 mm a hundred times are not 90 mm.
-    bone = pbd_program.Bone(RigidBody("bone", cube(8.0), Translation((0, -1, 0), (0.0, 100.0), (0.0, 90.0))), 1, 0)
+    bone = pbd_program.VoxelBone(RigidBody("bone", cube(8.0), Translation((0, -1, 0), (0.0, 100.0), (0.0, 90.0))), 1, 0)
     height = 0.0
     for frame in range(1, 101):
         bone.move(frame)
@@ -261,7 +261,7 @@ def test_the_motions_of_a_bone_add_up():
 
 
 def test_a_bone_takes_along_what_it_has_come_over_and_forgets_nothing():
-    bone = pbd_program.Bone(RigidBody("bone", cube(8.0), Translation((0, 0, 1), (0.0, 2.0), (0.0, 3.0))), 8, 0)
+    bone = pbd_program.VoxelBone(RigidBody("bone", cube(8.0), Translation((0, 0, 1), (0.0, 2.0), (0.0, 3.0))), 8, 0)
     starts, goals = np.array([[4.0, 4, 9], [4, 4, 12]]), np.array([[4.0, 5, 8], [4, 5, 12]])
     bone.move(1)  # now its upper face is at 9.5, and the first vertex inside, wherever it goes
     np.testing.assert_allclose(pbd_program.collided(starts, goals, [bone]), [[4, 4, 10.5], [4, 5, 12]])
@@ -271,8 +271,8 @@ def test_a_bone_takes_along_what_it_has_come_over_and_forgets_nothing():
 
 
 def test_of_two_bones_the_later_wins():
-    lower = pbd_program.Bone(RigidBody("lower", cube(8.0), None), 8, 0)
-    upper = pbd_program.Bone(RigidBody("upper", cube(8.0, (0, 0, 4)), None), 8, 0)
+    lower = pbd_program.VoxelBone(RigidBody("lower", cube(8.0), None), 8, 0)
+    upper = pbd_program.VoxelBone(RigidBody("upper", cube(8.0, (0, 0, 4)), None), 8, 0)
     start, goal = np.array([[-1.0, 4, 6]]), np.array([[2.25, 4, 6]])
     only = pbd_program.collided(start, goal, [upper])
     np.testing.assert_array_equal(pbd_program.collided(start, goal, [lower, upper]), only)
@@ -303,7 +303,7 @@ def test_the_same_twice():
 def test_fibres_leave_edges_across_them_stiff():
     # Along z the bar has one fibre: an edge at an angle to it keeps 1 - |cos|, to the power asked for.
     bar = shapes.bar((2, 2, 4), (10, 10, 30), {"bottom": None, "top": SWING}, (), (0, 5))
-    found = pbd_program.constraints_of(bar, pbd_program.Settings(**USUAL, anisotropy=2.0))
+    found = pbd_program.constraints_of(bar, pbd_program.ProgramSettings(**USUAL, anisotropy=2.0))
     edges = bar.surface.points[found.edges[:, 1]] - bar.surface.points[found.edges[:, 0]]
     cosines = np.abs(edges[:, 2]) / np.linalg.norm(edges, axis=1)
     np.testing.assert_allclose(found.share, (1 - cosines) ** 2, atol=1e-12)
@@ -342,13 +342,15 @@ def test_positions_that_are_no_number_are_an_outcome():
 )
 def test_settings_out_of_range(key, value):
     with pytest.raises(InputError, match=f"{key}: got {value}, want "):
-        parse(pbd_program.Settings, USUAL | {key: value}, "candidate[0]")
+        parse(pbd_program.ProgramSettings, USUAL | {key: value}, "candidate[0]")
 
 
 @pytest.mark.parametrize("key", ["sub_iterations", "damping", "bending"])
 def test_settings_without_which_nothing_runs(key):
     with pytest.raises(InputError, match=f"{key}: got nothing, want this key"):
-        parse(pbd_program.Settings, {name: value for name, value in USUAL.items() if name != key}, "candidate[0]")
+        parse(
+            pbd_program.ProgramSettings, {name: value for name, value in USUAL.items() if name != key}, "candidate[0]"
+        )
 
 
 # What follows is compared with what the report's program recorded, every tenth iteration.

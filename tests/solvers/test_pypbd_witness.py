@@ -83,7 +83,7 @@ def test_a_cord_of_springs_falls_as_theirs(steps, rounding):
     cord = replace(graph(INVERSE_MASSES, edges, 0.0, 0.0), lengths=lengths, edge_softness=1 / springs)
     points, velocities = CORD.copy(), np.zeros(CORD.shape)
     for _ in range(steps):
-        points, velocities = xpbd.advance(points, velocities, cord, xpbd.Step(SECONDS, SWEEPS, 0.0, tuple(GRAVITY)))
+        points, velocities = xpbd.advance(points, velocities, cord, xpbd.XpbdStep(SECONDS, SWEEPS, 0.0, tuple(GRAVITY)))
     np.testing.assert_allclose(points, theirs, rtol=0, atol=rounding)
     assert np.abs(points - CORD).max() > (1 if steps == 100 else 0.01)
 
@@ -91,8 +91,8 @@ def test_a_cord_of_springs_falls_as_theirs(steps, rounding):
 @pytest.mark.parametrize(("steps", "rounding"), [(1, 1e-14), (100, 1e-11)])
 def test_a_cord_of_position_based_dynamics_falls_as_theirs(steps, rounding):
     theirs, edges, lengths, share = fallen("distance", SPRINGS / SPRINGS.max(), steps)
-    cord = pbd.Constraints(INVERSE_MASSES, edges, lengths, share, NONE, 0.0, np.zeros((0, 4), np.int64), np.zeros(0))
-    rules = pbd.Settings(sub_iterations=1, solver_iterations=SWEEPS, damping=0, stretch=1, volume=0, bending=0)
+    cord = pbd.PbdConstraints(INVERSE_MASSES, edges, lengths, share, NONE, 0.0, np.zeros((0, 4), np.int64), np.zeros(0))
+    rules = pbd.PbdSettings(sub_iterations=1, solver_iterations=SWEEPS, damping=0, stretch=1, volume=0, bending=0)
     points, displacement = CORD.copy(), np.zeros(CORD.shape)
     for _ in range(steps):
         points, displacement = pbd.advance(points, displacement + np.where(LOOSE, SECONDS**2 * GRAVITY, 0), cord, rules)

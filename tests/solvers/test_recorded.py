@@ -31,7 +31,7 @@ def read(
     folder: Path, frames: tuple[int, ...] = FRAMES, interval: float | None = None, rest: Surface = REST
 ) -> list[Frame]:
     taken: list[Frame] = []
-    settings = recorded.Settings(folder=str(folder), unit="mm")
+    settings = recorded.RecordedSettings(folder=str(folder), unit="mm")
     outcome = recorded.solve(Setup(rest, (), (), frames, interval), settings, taken.append)
     assert outcome.status == "converged"
     assert outcome.message.startswith(f"read {len(frames)} frames from {folder}")
@@ -70,7 +70,7 @@ def test_a_folder_of_meshes(tmp_path: Path, suffix: str, within: float) -> None:
 def test_the_unit_is_applied(tmp_path: Path) -> None:
     save(tmp_path / "0.ply", moved(0) / 1000)
     taken: list[Frame] = []
-    settings = parse(recorded.Settings, {"folder": str(tmp_path), "unit": "m"}, "case.toml")
+    settings = parse(recorded.RecordedSettings, {"folder": str(tmp_path), "unit": "m"}, "case.toml")
     recorded.solve(Setup(REST, (), (), (0,), None), settings, taken.append)
     assert np.allclose(taken[0].surface, moved(0), rtol=0, atol=1e-14 * 60)  # two roundings at 30 mm
 
@@ -192,7 +192,7 @@ def test_a_frame_of_another_surface_is_refused_before_any_is_taken(
 def refuse(folder: Path, match: str, rest: Surface = REST) -> None:
     """InputError with this message, and no frame sunk before it."""
     taken: list[Frame] = []
-    settings = recorded.Settings(folder=str(folder), unit="mm")
+    settings = recorded.RecordedSettings(folder=str(folder), unit="mm")
     with pytest.raises(InputError, match=match):
         recorded.solve(Setup(rest, (), (), FRAMES, None), settings, taken.append)
     assert taken == []
@@ -318,7 +318,7 @@ def said(folder: Path, text: str) -> Path:
 
 def test_what_a_candidate_says_of_itself(tmp_path: Path) -> None:
     sequence(said(tmp_path, 'name = "mine.2"\nversion = "2.1"\nunit = "cm"\nseconds_per_frame = 0.5\nthreads = 4\n'))
-    settings = recorded.Settings(folder=str(tmp_path), unit="cm")
+    settings = recorded.RecordedSettings(folder=str(tmp_path), unit="cm")
     rest = REST.moved_to(10 * REST.points)
     taken: list[Frame] = []
     outcome = recorded.solve(Setup(rest, (), (), FRAMES, None), settings, taken.append)
@@ -335,7 +335,7 @@ def test_what_a_candidate_says_stands_beside_an_index_too(tmp_path: Path) -> Non
 
 def test_a_candidate_may_say_nothing(tmp_path: Path) -> None:
     assert recorded.about(tmp_path) == recorded.about(said(tmp_path, "")) == recorded.About()
-    assert recorded.origin(recorded.Settings(folder=str(tmp_path), unit="mm")) == {}
+    assert recorded.origin(recorded.RecordedSettings(folder=str(tmp_path), unit="mm")) == {}
     check(read(sequence(said(tmp_path, 'unit = "mm"'))))
 
 

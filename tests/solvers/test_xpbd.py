@@ -15,8 +15,8 @@ from fem_reference.foundations.records import parse
 from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere
 from fem_reference.problems.muscle import AttachedVertices, RigidBody, Setup
 from fem_reference.solvers import pbd, xpbd
-from fem_reference.solvers.collision_kernels import Obstacle
-from fem_reference.solvers.xpbd import Constraints, Step
+from fem_reference.solvers.collision_kernels import CollidingBone
+from fem_reference.solvers.xpbd import XpbdConstraints, XpbdStep
 
 USUAL = {
     "frame_time": "10 ms",
@@ -33,14 +33,14 @@ GRAVITY = 9810.0  # [mm/s2]
 NONE = np.zeros((0, 3), np.int64)
 
 
-def settings(**changes) -> xpbd.Settings:
-    return parse(xpbd.Settings, {key: value for key, value in (USUAL | changes).items() if value is not None}, "x")
+def settings(**changes) -> xpbd.XpbdSettings:
+    return parse(xpbd.XpbdSettings, {key: value for key, value in (USUAL | changes).items() if value is not None}, "x")
 
 
-def graph(inverse_masses, edges, lengths, softness) -> Constraints:
+def graph(inverse_masses, edges, lengths, softness) -> XpbdConstraints:
     """Masses and springs without triangles."""
     count = len(edges)
-    return Constraints(
+    return XpbdConstraints(
         inverse_masses=np.asarray(inverse_masses, float),
         edges=np.array(edges, np.int64).reshape(-1, 2),
         lengths=np.full(count, lengths, float),
@@ -75,12 +75,12 @@ STEPS = [(4e-3, 20), (4e-3, 40), (2e-3, 5), (2e-3, 20), (1e-3, 5), (1e-3, 40)]
 def hung(seconds, sweeps):
     """Static extension of the chain by XPBD [mm]; its slowest mode, of 47 / s, is damped critically and gone after 0.8 s."""
     chain = graph(CHAIN_MASSES, CHAIN_EDGES, 10, SOFTNESS)
-    return CHAIN[-1, 2] - settle(CHAIN, chain, Step(seconds, sweeps, 95.0, (0, 0, -GRAVITY)), 0.8)[-1, 2]
+    return CHAIN[-1, 2] - settle(CHAIN, chain, XpbdStep(seconds, sweeps, 95.0, (0, 0, -GRAVITY)), 0.8)[-1, 2]
 
 
 def hung_by_pbd(seconds, sweeps):
     """The same with position based dynamics, springs of half the stiffness that it can have."""
-    chain = pbd.Constraints(
+    chain = pbd.PbdConstraints(
         CHAIN_MASSES,
         CHAIN_EDGES,
         np.full(LINKS, 10.0),
@@ -90,7 +90,9 @@ def hung_by_pbd(seconds, sweeps):
         np.zeros((0, 4), np.int64),
         np.zeros(0),
     )
-    rules = pbd.Settings(sub_iterations=1, solver_iterations=sweeps, damping=0.05, stretch=0.5, volume=0.0, bending=0.0)
+    rules = pbd.PbdSettings(
+        sub_iterations=1, solver_iterations=sweeps, damping=0.05, stretch=0.5, volume=0.0, bending=0.0
+    )
     points, displacement, fall = CHAIN.copy(), np.zeros(CHAIN.shape), np.zeros(CHAIN.shape)
     fall[1:, 2] = -GRAVITY * seconds**2 / (1 - rules.damping)
     for _ in range(1000):
@@ -126,7 +128,7 @@ def test_free_fall():
     dust = graph([1.0, 0.0], [], 0, 0)
     points, velocities = np.zeros((2, 3)), np.zeros((2, 3))
     for _ in range(10):
-        points, velocities = xpbd.advance(points, velocities, dust, Step(0.01, 1, 0.0, (0, 0, -GRAVITY)))
+        points, velocities = xpbd.advance(points, velocities, dust, XpbdStep(0.01, 1, 0.0, (0, 0, -GRAVITY)))
     np.testing.assert_allclose(points, [[0, 0, -GRAVITY * 1e-4 * 55], [0, 0, 0]], rtol=1e-12)
 
 
@@ -134,7 +136,7 @@ def test_free_fall():
 def test_damping_is_a_rate(seconds):
     dust, velocities = graph([1.0], [], 0, 0), np.array([[3.0, 0, 0]])
     for _ in range(round(0.1 / seconds)):
-        _, velocities = xpbd.advance(np.zeros((1, 3)), velocities, dust, Step(seconds, 1, 7.0))
+        _, velocities = xpbd.advance(np.zeros((1, 3)), velocities, dust, XpbdStep(seconds, 1, 7.0))
     assert velocities[0, 0] == pytest.approx(3 * math.exp(-0.7), rel=1e-12)
 
 
@@ -156,7 +158,7 @@ def icosahedron(edge=10.0) -> Surface:
 
 def test_a_net_of_equal_triangles_is_a_membrane_and_a_plate():
     # Seung and Nelson 1988: Y = 2 k / sqrt(3) for springs k, kappa = sqrt(3) / 2 of the hinges' stiffness.
-    found = Constraints.at_rest(icosahedron(), np.zeros(0, np.int64), settings())
+    found = XpbdConstraints.at_rest(icosahedron(), np.zeros(0, np.int64), settings())
     np.testing.assert_allclose(1 / found.edge_softness, 0.4 * math.sqrt(3) / 2, rtol=1e-12)
     np.testing.assert_allclose(1 / found.hinge_softness, 0.3 * 2 / math.sqrt(3), rtol=1e-12)
 
@@ -164,7 +166,7 @@ def test_a_net_of_equal_triangles_is_a_membrane_and_a_plate():
 def test_any_net_resists_being_blown_up_as_its_membrane_does():
     # Of Young's modulus Y (times thickness) and Poisson's ratio 1/3: Y / (1 - 1/3) e^2 of its area when it grows by e all over.
     surface = Surface(shapes.sphere(2, 20.0).points * [1, 2, 0.7], shapes.sphere(2, 20.0).triangles)
-    found = Constraints.at_rest(surface, np.zeros(0, np.int64), settings())
+    found = XpbdConstraints.at_rest(surface, np.zeros(0, np.int64), settings())
     area = xpbd.vertex_areas(surface).sum()
     assert np.sum(found.lengths**2 / found.edge_softness) / 2 == pytest.approx(1.5 * 0.4 * area, rel=1e-12)
 
@@ -182,17 +184,17 @@ def test_a_balloon_is_as_large_as_membrane_and_filling_agree():
     # 1.5 Y A (s - 1)^2 + K (s^3 V - V1)^2 / (2 V1), with the volume V1 that its filling wants, is zero.
     surface, rules = icosahedron(), settings(volume="50 kPa", bending=None)
     area, volume = xpbd.vertex_areas(surface).sum(), enclosed_volume(surface.points, surface.triangles)
-    empty, wanted = Constraints.at_rest(surface, np.zeros(0, np.int64), rules), 1.2 * volume
+    empty, wanted = XpbdConstraints.at_rest(surface, np.zeros(0, np.int64), rules), 1.2 * volume
 
     def slope(s):
         return 2 * 1.5 * 0.4 * area * (s - 1) + 0.05 * (s**3 * volume - wanted) / wanted * 3 * s**2 * volume
 
     growth = brentq(slope, 1, 1.2) - 1
     assert growth == pytest.approx(0.03, abs=0.001)
-    full = Constraints(**(vars(empty) | {"six_volumes": 6 * wanted, "volume_softness": 36 * wanted / 0.05}))
+    full = XpbdConstraints(**(vars(empty) | {"six_volumes": 6 * wanted, "volume_softness": 36 * wanted / 0.05}))
     errors = []
     for seconds, sweeps in ((4e-4, 5), (2e-4, 5), (1e-4, 5), (2e-4, 20)):
-        points = settle(surface.points, full, Step(seconds, sweeps, 200.0), 0.3, still=False)
+        points = settle(surface.points, full, XpbdStep(seconds, sweeps, 200.0), 0.3, still=False)
         size = np.linalg.norm(points - points.mean(axis=0), axis=1) / np.linalg.norm(surface.points, axis=1)
         errors.append(np.abs(size - 1 - growth).max() / growth)
     # A sweep takes the directions that the one before left, not those of the end: of first order in the time step, at least.
@@ -214,8 +216,8 @@ def test_a_flap_hangs_where_its_weight_and_its_hinge_agree(seconds, sweeps):
         "angles": np.array([math.pi - lift]),
         "hinge_softness": np.array([1 / stiffness]),
     }
-    flap = Constraints(**(vars(springs) | hinge))
-    end = settle(points, flap, Step(seconds, sweeps, 100.0, (0, 0, -GRAVITY)), 1.0)
+    flap = XpbdConstraints(**(vars(springs) | hinge))
+    end = settle(points, flap, XpbdStep(seconds, sweeps, 100.0, (0, 0, -GRAVITY)), 1.0)
     angle = brentq(lambda t: stiffness * (lift - t) - mass * GRAVITY * 10 * math.cos(t), -1.5, 1.5)
     assert 0.1 < angle < lift - 0.1  # dihedral angles cannot distinguish the two sides of a fold
     assert math.atan2(end[3, 2], end[3, 0]) == pytest.approx(angle, rel=2e-3)
@@ -226,8 +228,8 @@ def test_a_weight_lies_as_deep_as_the_bone_yields(seconds, sweeps):
     # The contact force is the gap's depth over the compliance: alone on it, one mass is solved by one projection.
     weight = graph([1 / MASS], [], 0, 0)
     bone = RigidBody("floor", icosahedron(), None, solid=HalfSpace((0, 0, 0), (0, 0, 1)))
-    contact = xpbd.Contact(Obstacle(bone, np.array([[0.0, 0, 1]]), np.ones(1, bool), 0.0), np.array([2.0]))
-    end = settle([[0.0, 0, 1]], weight, Step(seconds, sweeps, 300.0, (0, 0, -GRAVITY)), 0.5, [contact])
+    contact = xpbd.BoneContact(CollidingBone(bone, np.array([[0.0, 0, 1]]), np.ones(1, bool), 0.0), np.array([2.0]))
+    end = settle([[0.0, 0, 1]], weight, XpbdStep(seconds, sweeps, 300.0, (0, 0, -GRAVITY)), 0.5, [contact])
     assert end[0, 2] == pytest.approx(-2.0 * MASS * GRAVITY, rel=1e-6)
 
 
@@ -235,18 +237,18 @@ def test_bones_never_pull():
     weight = graph([1 / MASS], [], 0, 0)
     bone = RigidBody("floor", icosahedron(), None, solid=HalfSpace((0, 0, 0), (0, 0, 1)))
     points = np.array([[0.0, 0, 1]])
-    contact = xpbd.Contact(Obstacle(bone, points, np.ones(1, bool), 0.0), np.array([1e-3]))
+    contact = xpbd.BoneContact(CollidingBone(bone, points, np.ones(1, bool), 0.0), np.array([1e-3]))
     velocities = np.array([[0.0, 0, -2000]])
     heights = []
     for _ in range(10):
-        points, velocities = xpbd.advance(points, velocities, weight, Step(1e-3, 3, 0.0), [contact])
+        points, velocities = xpbd.advance(points, velocities, weight, XpbdStep(1e-3, 3, 0.0), [contact])
         heights.append(points[0, 2])
     assert (
         -0.02 < min(heights) < 0
     )  # of a path of 2 mm the share a / (w + a) = 0.01 at most, with a = 1e-3 mm/N / (1e-3 s)^2
     assert velocities[0, 2] >= 0
     away = np.array([[0.0, 0, 5000]])
-    points, velocities = xpbd.advance(points, away, weight, Step(1e-3, 3, 0.0), [contact])
+    points, velocities = xpbd.advance(points, away, weight, XpbdStep(1e-3, 3, 0.0), [contact])
     np.testing.assert_allclose(velocities, away)
 
 
@@ -384,10 +386,10 @@ def test_positions_that_are_no_number_are_an_outcome():
 )
 def test_settings_out_of_range(change, message):
     with pytest.raises(InputError, match=message):
-        parse(xpbd.Settings, USUAL | change, "candidate[0]")
+        parse(xpbd.XpbdSettings, USUAL | change, "candidate[0]")
 
 
 @pytest.mark.parametrize("key", ["frame_time", "sub_steps", "sweeps", "density"])
 def test_settings_that_are_required(key):
     with pytest.raises(InputError, match=f"{key}: got nothing, want this key"):
-        parse(xpbd.Settings, {name: value for name, value in USUAL.items() if name != key}, "candidate[0]")
+        parse(xpbd.XpbdSettings, {name: value for name, value in USUAL.items() if name != key}, "candidate[0]")

@@ -11,7 +11,7 @@ from fem_reference.assessment.error_bars import ErrorBar, ErrorBars
 from fem_reference.foundations.mesh import Polylines
 from fem_reference.metrics import MeasurementContext
 from fem_reference.runs.store import Outcome, Run
-from fem_reference.studies import cost, growth
+from fem_reference.studies import cost
 
 BALL = shapes.sphere(1, 10.0)
 LINE = Polylines(np.array([[0.0, 0, -8], [0, 0, 8]]), np.array([0, 2]))
@@ -44,16 +44,3 @@ def test_errors_are_those_of_the_worst_frame_and_none_of_the_truth_itself() -> N
     found = cost.errors(run("other", 0, -1, 2, 2.5), truth, context)
     assert found["surface_deviation.rms"] == pytest.approx(2.0, rel=1e-12)
     assert cost.errors(run("truth", 0, 1, 2, 3), truth, context) == {}
-
-
-def test_an_iteration_costs_what_more_of_them_take_longer(monkeypatch: pytest.MonkeyPatch) -> None:
-    """5 s to begin and 0.25 s an iteration, disturbed in all but the first repeat."""
-    calls = list[int]()
-
-    def spent(_solver, _settings, _setup, iterations: int) -> float:
-        calls.append(iterations)
-        return 5 + 0.25 * iterations + 3 * (len(calls) > 4)
-
-    monkeypatch.setattr(growth, "_spent", spent)
-    found = growth._costs("pbd", None, growth.ellipsoid(1))
-    assert found["iteration"] == pytest.approx(0.25, rel=1e-12)

@@ -22,7 +22,7 @@ from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx.processes import installed
 from fem_reference.studies import omissions
 from fem_reference.studies.ladders import Trial
-from fem_reference.studies.omissions import Part
+from fem_reference.studies.omissions import LeftOut
 
 GRAVITY = """
 [[effect]]
@@ -48,7 +48,7 @@ def scene_in(folder: Path, more: str = "") -> MuscleCase:
 
 def test_each_effect_but_the_material_is_left_out_in_turn_and_then_all(tmp_path) -> None:
     scene = scene_in(tmp_path / "bar", GRAVITY.format(g=-9.81) + CONTACT + FIBRES)
-    found = omissions.parts(scene, scene.reference, "reference")
+    found = omissions.parts(Trial(scene, scene.reference, "reference"))
     single = [("gravity",), ("contact",), ("fibre_passive",)]
     assert [part.names for part in found] == [*single, ("gravity", "contact", "fibre_passive")]
     assert [omissions.name_of(effect) for effect in scene.effects if omissions.is_material(effect)] == [
@@ -59,15 +59,15 @@ def test_each_effect_but_the_material_is_left_out_in_turn_and_then_all(tmp_path)
 
 def test_a_scene_of_its_material_alone_has_nothing_to_leave_out(tmp_path) -> None:
     scene = scene_in(tmp_path / "bar")
-    assert omissions.parts(scene, scene.reference, "reference") == ()
+    assert omissions.parts(Trial(scene, scene.reference, "reference")) == ()
     fibres = scene.model_copy(update={"effect": (make("guccione", c="1 kPa", bf=8.0, bt=2.0, bfs=4.0),)})
-    assert omissions.parts(fibres, scene.reference, "reference") == ()  # nothing elastic would be left
+    assert omissions.parts(Trial(fibres, scene.reference, "reference")) == ()  # nothing elastic would be left
 
 
 def test_what_is_left_is_the_scene_that_one_would_write_without_it(tmp_path) -> None:
     scene = scene_in(tmp_path / "bar", GRAVITY.format(g=-9.81) + CONTACT)
     written = scene_in(tmp_path / "written", CONTACT)
-    (gravity, *_) = omissions.parts(scene, scene.reference, "reference")
+    (gravity, *_) = omissions.parts(Trial(scene, scene.reference, "reference"))
     trial = omissions.without(Trial(scene, scene.reference, "reference"), gravity)
     assert trial.scene.key == written.key
     assert (trial.choice, trial.label) == (scene.reference, "reference, without = gravity")
@@ -85,7 +85,7 @@ def test_an_element_has_a_pressure_only_as_long_as_an_effect_brings_it(tmp_path)
     assert omissions.fitting("P1", (matrix, volume)) == "P1/P1"
     assert omissions.fitting("Q1/P0", (matrix, volume)) == "Q1/P0"
     scene = scene_in(tmp_path / "bar")
-    part = Part({"incompressible": scene.effects[1]})
+    part = LeftOut({"incompressible": scene.effects[1]})
     trial = omissions.without(Trial(scene, scene.reference, "reference"), part)
     assert (trial.choice.settings["element"], trial.changed) == ("P2", {"element": "P2"})
 
@@ -94,9 +94,9 @@ def test_features_of_a_candidate_are_its_optional_settings_that_are_no_numerics(
     scene = scene_in(tmp_path / "bar")
     chosen = SolverChoice(**XPBD, volume="1 MPa", damping=None, collision={"gap": "0 mm"})
     assert omissions.features(chosen, "xpbd") == ("volume", "collision")
-    names = [part.names for part in omissions.parts(scene, chosen, "xpbd")]
+    names = [part.names for part in omissions.parts(Trial(scene, chosen, "xpbd"))]
     assert names == [("volume",), ("collision",), ("volume", "collision")]
-    trial = omissions.without(Trial(scene, chosen, "xpbd"), Part({}, ("volume",)))
+    trial = omissions.without(Trial(scene, chosen, "xpbd"), LeftOut({}, ("volume",)))
     assert set(trial.choice.settings) == set(chosen.settings) - {"volume"}
     numerics = SolverChoice(
         solver="fenicsx", largest_step=2.0, quadrature_degree=4, time_limit="9 s", precision="double"

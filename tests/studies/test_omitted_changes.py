@@ -25,9 +25,9 @@ def test_a_change_in_the_middle_counts() -> None:
     """All vertices are 3 mm off at frame 5 and 1 mm at the last."""
     whole = run("whole", 0, 1, 2, 3)
     context = MeasurementContext.of(whole, LINE, (), np.ones(len(BALL.points), bool))
-    found = omissions._changes(Made(None, run("without", 0, -2, 2, 2)), whole, context)
+    found = omissions.changes(Made(None, run("without", 0, -2, 2, 2)), whole, context)
     assert found["surface_deviation.rms"] == pytest.approx(3.0, rel=1e-12)
     assert found["surface_deviation.max"] == pytest.approx(3.0, rel=1e-12)
     assert found["volume.deviation"] == pytest.approx(0.0, abs=1e-10)
-    assert omissions._changes(Made(None, run("without", 0, 1, 2, 3, status="diverged")), whole, context) == {}
-    assert omissions._changes(Made(None, run("without", 0, np.nan, 2, 3)), whole, context) == {}
+    assert omissions.changes(Made(None, run("without", 0, 1, 2, 3, status="diverged")), whole, context) == {}
+    assert omissions.changes(Made(None, run("without", 0, np.nan, 2, 3)), whole, context) == {}

@@ -19,7 +19,7 @@ from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx, recorded
-from fem_reference.solvers.common.load_steps import Attempt, Steps, march
+from fem_reference.solvers.common.load_steps import Attempt, StepSizes, march
 from fem_reference.solvers.fenicsx import Settings
 from fem_reference.studies import refinement
 from fem_reference.studies.execution import Bench
@@ -88,9 +88,7 @@ def test_the_bar_covers_an_error_that_is_known(case, capsys, monkeypatch) -> Non
     status, facts = call(case, "run", "--error-bar")
     assert (status, facts["verdict"]) == (cli.DONE, "inconclusive")
     scene = casefile.read_muscle(case)
-    fine, coarse = (
-        Bench(one, case.parent / "out" / "runs").problem() for one in (scene, refinement._coarser(scene)[0])
-    )
+    fine, coarse = (Bench(one, case.parent / "out" / "runs").problem() for one in (scene, refinement.coarser(scene)[0]))
     tets = [built.mesh_facts["tets"] for built in (fine, coarse)]
     surface = fine.surface
     areas = vertex_areas(surface.points, surface.triangles)
@@ -114,7 +112,7 @@ def test_tetrahedra_larger_than_the_radius_of_an_attachment_make_bars_longer(cas
     scene = scene_of(case)
     muscle = scene.muscle.model_copy(update={"tet_size": size})
     bench = Bench(scene.model_copy(update={"muscle": muscle}), case.parent / "out" / "runs")
-    assert refinement._safety(bench) == pytest.approx(error_bars.SAFETY * more)
+    assert refinement.safety(bench) == pytest.approx(error_bars.SAFETY * more)
 
 
 def test_it_is_kept_with_its_run_until_the_metrics_change_or_the_file_is_damaged(case, monkeypatch, capsys) -> None:
@@ -208,13 +206,13 @@ def test_load_steps_are_at_most_half_as_long(case, every, largest) -> None:
     scene = scene_of(case)
     frames = scene.frames.model_copy(update={"last": 90, "every": every})
     settings = Settings(first_step=5.0, largest_step=largest)
-    changed = refinement._finer_steps(scene.model_copy(update={"frames": frames}), settings)["reference"].settings
+    changed = refinement.half_steps(scene.model_copy(update={"frames": frames}), settings)(scene).reference.settings
     taken = [0.0]
     list(
         march(
-            lambda at: taken.append(at) or Attempt(None, 2),
+            lambda at: taken.append(at) or Attempt("converged", 2),
             frames.numbers,
-            Steps(changed["first_step"], 0.1, changed["largest_step"]),
+            StepSizes(changed["first_step"], 0.1, changed["largest_step"]),
         )
     )
     assert max(np.diff(taken)) <= min(every, largest or every) / 2
@@ -222,23 +220,23 @@ def test_load_steps_are_at_most_half_as_long(case, every, largest) -> None:
 
 
 def test_load_steps_are_varied_where_time_matters(case) -> None:
-    assert refinement.variations(scene_of(case), Settings()) == ()
+    assert refinement.variations(scene_of(case), Settings()) == {}
     path = case / "case.toml"
     path.write_text(path.read_text().replace("every = 5", 'every = 5\ninterval = "20 ms"'))
     timed = scene_of(case, VISCOSITY)
-    assert [entry.name for entry in refinement.variations(timed, Settings())] == ["load steps"]
-    assert refinement.variations(timed, recorded.Settings(folder="frames", unit="mm")) == ()
+    assert list(refinement.variations(timed, Settings())) == ["load steps"]
+    assert refinement.variations(timed, recorded.RecordedSettings(folder="frames", unit="mm")) == {}
 
 
 def test_where_no_bone_pressed_contact_has_no_error(case) -> None:
     scene = scene_of(case, CONTACT)
-    assert refinement.variations(scene, Settings(), pressed=False) == ()
+    assert refinement.variations(scene, Settings(), pressed=False) == {}
     bench = Bench(scene, case.parent / "runs")
     reference = bench.obtain("reference", scene.reference, "reference")
-    assert len(refinement._needed(bench, reference)) == 3
+    assert len(refinement.needed(bench, reference)) == 3
     for area, count in ((0.0, 0), (2.0, 3)):
         pressed = replace(reference, scalars={"contact_area": np.array([0.0, area, 0, 0, np.nan])})
-        assert len(refinement._needed(bench, pressed)) == count
+        assert len(refinement.needed(bench, pressed)) == count
 
 
 def test_a_bar_that_is_cheap_is_made_without_being_asked_for(case) -> None:
@@ -257,23 +255,23 @@ def test_a_bar_that_is_cheap_is_made_without_being_asked_for(case) -> None:
 def test_the_coarse_member_of_a_pair_has_the_tetrahedra_before_their_last_refinement(case) -> None:
     scene = scene_of(case)
     nested = scene.model_copy(update={"muscle": scene.muscle.model_copy(update={"refinements": 2})})
-    coarser, sizes = refinement._coarser(nested)
+    coarser, sizes = refinement.coarser(nested)
     assert (coarser.muscle.refinements, sizes) == (1, (1.5, 3.0))
-    coarser, sizes = refinement._coarser(scene)
+    coarser, sizes = refinement.coarser(scene)
     assert (coarser.muscle.tet_size, sizes) == (9.0, (6.0, 9.0))
 
 
 def test_contact_is_varied_cause_by_cause(case) -> None:
     scene = scene_of(case, CONTACT)
-    varied = {entry.name: entry.changes for entry in refinement.variations(scene, Settings(first_step=5.0))}
+    varied = {name: vary(scene) for name, vary in refinement.variations(scene, Settings(first_step=5.0)).items()}
     assert list(varied) == ["contact stiffness", "contact smoothing", "distances to bones"]
-    assert [effect.stiffness for effect in varied["contact stiffness"]["effect"][2:]] == [pytest.approx(0.2)]
-    assert [effect.smoothing for effect in varied["contact smoothing"]["effect"][2:]] == [pytest.approx(0.1)]
-    assert varied["contact stiffness"]["effect"][:2] == scene.effects[:2]
-    assert [bone.distance_error for bone in varied["distances to bones"]["bone"]] == [0.025, 0.025]
-    assert [bone.distance_rounding for bone in varied["distances to bones"]["bone"]] == [0.5, 0.5]
+    assert [effect.stiffness for effect in varied["contact stiffness"].effects[2:]] == [pytest.approx(0.2)]
+    assert [effect.smoothing for effect in varied["contact smoothing"].effects[2:]] == [pytest.approx(0.1)]
+    assert varied["contact stiffness"].effects[:2] == scene.effects[:2]
+    assert [bone.distance_error for bone in varied["distances to bones"].bone] == [0.025, 0.025]
+    assert [bone.distance_rounding for bone in varied["distances to bones"].bone] == [0.5, 0.5]
     # Each is another scene with another key, or has other settings: no run is mistaken for another.
-    keys = {scene.model_copy(update=changes).key for changes in varied.values()}
+    keys = {changed.key for changed in varied.values()}
     assert len(keys | {scene.key}) == 4
 
 

@@ -1,19 +1,21 @@
-"""The loop over frame numbers that the fast solvers share, and how a surface goes along with its bones."""
+"""The loop over frame numbers that the fast solvers share, and surfaces that go along with their bones."""
 
 import math
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats, diagonal
+from fem_reference.foundations.mesh import TET_FACES, Floats, Polylines, Surface, TetMesh, diagonal
 from fem_reference.foundations.motion import apply
-from fem_reference.problems.muscle import Setup
+from fem_reference.geometry.signed_distance import Grid
+from fem_reference.problems.muscle import AttachedVertices, Problem, RigidBody, Setup
 from fem_reference.problems.resolved_paths import posed, skipped
 from fem_reference.runs.store import Frame, Outcome, Sink
-from fem_reference.solvers.common.state_checks import Trouble, trouble
+from fem_reference.solvers.common.state_checks import StateCheck, Trouble, first_trouble, surface_checks
 
 # Parts of a frame in which motions are looked at; what is seen in these is seen in more.
 _PARTS = 16
@@ -21,33 +23,33 @@ _PARTS = 16
 Iterate = Callable[[Floats, Floats, int], tuple[Floats, Floats]]
 
 
-class Model(Protocol):
+class FrameModel(Protocol):
     """A muscle that goes from frame number to frame number."""
 
     @property
     def cost(self) -> dict[str, float]:
-        """What it has cost so far, to which the loop adds."""
+        """The cost so far, to which the loop adds."""
 
     @property
     def advice(self) -> str:
-        """What may help where a run ends in trouble."""
+        """Advice where a run ends in trouble."""
 
     def move(self, number: int, /) -> None:
         """Go to the frame ``number``: what this takes is the time of solving."""
 
     def trouble(self) -> Trouble | None:
-        """What is wrong with the present state; None if nothing is."""
+        """The trouble with the present state; None without."""
 
     def frame(self, number: int, /) -> Frame:
         """The present state, which is that of the frame ``number``."""
 
     def ending(self) -> Outcome:
-        """How a run ended that reached every frame."""
+        """The outcome of a run that reached every frame."""
 
 
-def follow(model: Model, setup: Setup, sink: Sink, per_frame: int = 1) -> Outcome:
-    """Take ``model`` from rest at the first frame of ``setup`` through every frame number to the last, each in ``per_frame`` parts
-    at whose ends it sees where bones are; ``sink`` gets the frames. Out of steps where bones do what nobody sees in between.
+def follow(model: FrameModel, setup: Setup, sink: Sink, per_frame: int = 1) -> Outcome:
+    """Take a ``model`` from rest at the first frame of ``setup`` through every frame number to the last, each in ``per_frame``
+    parts at whose ends it sees where bones are; ``sink`` gets the frames. Out of steps where bones do what nobody sees in between.
     """
     frames = setup.frames
     if _unseen(setup, 1) and (why := _unseen(setup, min(per_frame, _PARTS))):
@@ -77,18 +79,18 @@ def _unseen(setup: Setup, per_frame: int) -> Trouble | None:
     )
 
 
-def each(model: Model, frames: tuple[int, ...], sink: Sink) -> Outcome:
+def each(model: FrameModel, frames: tuple[int, ...], sink: Sink) -> Outcome:
     """Take ``model``, whose states do not depend on those before, to ``frames`` alone, the first like all others."""
     return _go(model, frames, frames, sink)
 
 
-def refused(model: Model, first: int, sink: Sink, why: Trouble) -> Outcome:
+def refused(model: FrameModel, first: int, sink: Sink, why: Trouble) -> Outcome:
     """A loop that is not begun, and ``why``; ``sink`` gets the ``first`` frame, which is rest."""
     sink(model.frame(first))
     return Outcome(why.status, why.sentence, _begun(model))
 
 
-def _go(model: Model, numbers: Iterable[int], wanted: tuple[int, ...], sink: Sink) -> Outcome:
+def _go(model: FrameModel, numbers: Iterable[int], wanted: tuple[int, ...], sink: Sink) -> Outcome:
     cost = _begun(model)
     for number in numbers:
         begin = time.perf_counter()
@@ -104,10 +106,38 @@ def _go(model: Model, numbers: Iterable[int], wanted: tuple[int, ...], sink: Sin
     return Outcome(ending.status, ending.message, cost)
 
 
-def _begun(model: Model) -> dict[str, float]:
+def _begun(model: FrameModel) -> dict[str, float]:
     cost = model.cost
     cost |= {"seconds_solve": 0.0, "iterations": 0, "threads": 1}
     return cost
+
+
+def timed[M: FrameModel](make: Callable[[Setup], M], setup: Setup) -> M:
+    """The model that ``make`` makes of ``setup``. Its cost says in which ``seconds_setup``; and in which ``seconds_compile`` one
+    frame of a tetrahedron was solved before, for which every compiled function is called.
+    """
+    begin = time.perf_counter()
+    first = make(tetrahedron())
+    first.move(1)
+    first.frame(1)
+    compiled = time.perf_counter()
+    model = make(setup)
+    model.cost["seconds_compile"] = compiled - begin
+    model.cost["seconds_setup"] = time.perf_counter() - compiled
+    return model
+
+
+def tetrahedron() -> Problem:
+    """A tetrahedron with a fibre, attached at a vertex to a bone."""
+    corners = np.vstack([np.zeros(3), np.eye(3)])
+    surface, facets = Surface(corners, TET_FACES), {"end": TET_FACES[:1]}
+    clear = Grid(np.ones((5, 5, 5)), (-1.0, -1.0, -1.0), 1.0, 1.0, 0.0, 0.0)
+    bone = RigidBody("bone", surface, None, solid=clear)
+    attached = (AttachedVertices("end", bone, np.zeros(1, np.int64)),)
+    mesh, fibre = TetMesh(corners, np.arange(4)[None], facets), Polylines(corners[:2], np.array([0, 2]))
+    return Problem(
+        surface, (bone,), attached, (0, 1), None, mesh=mesh, effects=(), fibres=fibre, mesh_facts={}, seconds=0.0
+    )
 
 
 @dataclass(eq=False)
@@ -118,9 +148,9 @@ class MovingSurface:
 
     setup: Setup
     iterate: Iterate
-    cost: dict[str, float]
     projections: int = 0
     advice: str = "a slower motion, more steps or a lower stiffness may help"
+    cost: dict[str, float] = field(default_factory=dict)
     points: Floats = field(init=False)
     kept: Floats = field(init=False)
 
@@ -136,8 +166,12 @@ class MovingSurface:
         self.cost["projections"] += self.projections
 
     def trouble(self) -> Trouble | None:
-        """What is wrong with the surface; None if nothing is."""
-        return trouble(self.points, self.setup.surface, self.setup.attached_vertices)
+        """The trouble with the surface; None without."""
+        return first_trouble(self._checks, self.points)
+
+    @cached_property
+    def _checks(self) -> tuple[StateCheck, ...]:
+        return surface_checks(self.setup.surface, self.setup.attached_vertices)
 
     def frame(self, number: int) -> Frame:
         """The surface."""
@@ -155,7 +189,7 @@ def carry(points: Floats, setup: Setup, frame: float) -> None:
 
 
 def other_clock(setup: Setup, frame_time: float) -> str:
-    """What is to be said where the scene has an interval [s] other than a solver's ``frame_time`` [s]; empty where it has not."""
+    """A note where the scene has an interval [s] other than a solver's ``frame_time`` [s]; empty where it has not."""
     if setup.interval is None or math.isclose(setup.interval, frame_time):
         return ""
     return f"; from a frame number to the next it takes {frame_time:g} s, the scene {setup.interval:g} s"

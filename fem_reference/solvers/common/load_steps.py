@@ -2,9 +2,10 @@
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fem_reference.runs.contents import Status
+from fem_reference.solvers.common.state_checks import Trouble
 
 EASY = 5  # Newton iterations up to which the next step may grow
 GROWTH = 1.5
@@ -12,32 +13,43 @@ GROWTH = 1.5
 
 @dataclass(frozen=True)
 class Attempt:
-    """How the solve at one load went: ``failure`` is None where it converged, else the status that it would end the run with."""
+    """The record of a solve at one load by Newton's method: its ``status``, the one that it would end the run with where it failed;
+    the ``iterations``; the norms of the ``residuals`` [N, mm3] before the first of them and after each; and, of a failure, a
+    ``detail``: a sentence that begins with its subject.
+    """
 
-    failure: Status | None
+    status: Status
     iterations: int
-    sentence: str = ""
+    residuals: tuple[float, ...] = ()
+    detail: str = ""
+
+    @property
+    def converged(self) -> bool:
+        """A state in equilibrium was found, and no check refused it."""
+        return self.status == "converged"
+
+    def refused(self, why: Trouble) -> "Attempt":
+        """The attempt, which converged, to a state that a check refuses."""
+        return replace(self, status=why.status, detail=f"Newton's method converged, but {why.sentence}")
 
 
 @dataclass(frozen=True)
 class Step:
-    """The steps to a requested frame: load steps, Newton iterations and cut-backs since the last one. Where it could not be
-    reached, ``status`` and ``sentence`` are those of the last attempt, and the last good state is ``at`` a frame. ``size``: of
-    the load step that comes next.
+    """The steps to a requested frame: load steps, Newton iterations and cut-backs since the last one. The ``last`` attempt says how
+    it ended, and the last good state is ``at`` a frame; ``size``: of the load step that comes next.
     """
 
     frame: float
-    steps: int
-    iterations: int
-    cutbacks: int
-    status: Status = "converged"
-    sentence: str = ""
+    steps: int = 0
+    iterations: int = 0
+    cutbacks: int = 0
+    last: Attempt = Attempt("converged", 0)
     at: float = 0.0
     size: float = 0.0
 
 
 @dataclass(frozen=True)
-class Steps:
+class StepSizes:
     """The ``first`` load step, and between which sizes they may be, in frame numbers; one ends at each of ``stops``, in order."""
 
     first: float
@@ -54,7 +66,7 @@ class Steps:
 def march(
     attempt: Callable[[float], Attempt],
     frames: tuple[float, ...],
-    steps: Steps,
+    steps: StepSizes,
     recall: Callable[[float], bool] = lambda _: False,
     last_resort: Callable[[], bool] = lambda: False,
 ) -> Iterator[Step]:
@@ -67,6 +79,7 @@ def march(
     at, step = float(frames[0]), min(steps.first, largest)
     for frame in frames[1:]:
         taken = iterations = cutbacks = 0
+        result = Attempt("converged", 0)
         for goal in steps.goals(at, frame):
             if goal == frame and recall(frame):
                 at = goal
@@ -75,19 +88,19 @@ def march(
                 then = goal if size == goal - at else at + size
                 result = attempt(then)
                 iterations += result.iterations
-                if result.failure is not None:
+                if not result.converged:
                     cutbacks += 1
                     step = size / 2
                     if step < steps.smallest and last_resort():
                         step = min(steps.first, largest)
                     elif step < steps.smallest:
-                        yield Step(frame, taken, iterations, cutbacks, result.failure, result.sentence, at)
+                        yield Step(frame, taken, iterations, cutbacks, result, at)
                         return
                     continue
                 at = then
                 taken += 1
                 step = step * GROWTH if result.iterations <= EASY else size
-        yield Step(frame, taken, iterations, cutbacks, at=at, size=step)
+        yield Step(frame, taken, iterations, cutbacks, result, at, step)
 
 
 def _size(left: float, step: float, largest: float) -> float:

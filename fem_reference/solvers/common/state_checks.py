@@ -1,6 +1,8 @@
-"""Whether a state can be a muscle at all: what the fast solvers ask after each frame number, before they go on."""
+"""Checks that a state is one a body can be in, asked one after the other: the first that finds trouble ends it."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -23,22 +25,61 @@ class Trouble:
     sentence: str
 
 
-def trouble(points: Floats, rest: Surface, attached: Ints) -> Trouble | None:
-    """What is wrong with ``points`` (n, 3) [mm] of a closed surface, with ``attached`` vertices (k,); None if nothing is."""
-    lost = np.flatnonzero(~np.isfinite(points).all(axis=1))
-    if len(lost):
+class StateCheck(Protocol):
+    """A check of states (n, 3) [mm], or of what they are made of (n,)."""
+
+    def trouble(self, state: Floats, /) -> Trouble | None:
+        """The trouble with a ``state``, or with the step that was taken from it; None without."""
+
+
+def first_trouble(checks: Iterable[StateCheck], state: Floats) -> Trouble | None:
+    """The trouble that the first of the ``checks`` finds which finds some; those after it are not asked."""
+    return next((found for check in checks if (found := check.trouble(state)) is not None), None)
+
+
+class Finite:
+    """All positions are numbers."""
+
+    def trouble(self, state: Floats, /) -> Trouble | None:
+        """Diverged where a position is not a number."""
+        lost = np.flatnonzero(~np.isfinite(state).all(axis=1))
+        if len(lost) == 0:
+            return None
         return Trouble("diverged", f"the position of {len(lost)} points is not a number (point {lost[0]} for one)")
-    wide, at_rest, between = _spread(points), _spread(rest.points), _spread(points[attached])
-    if wide > _WIDE * max(at_rest, between):
-        return Trouble("diverged", f"the muscle is spread over {wide:.3g} mm, at rest {at_rest:.3g} mm")
-    ratio = enclosed_volume(points, rest.triangles) / enclosed_volume(rest.points, rest.triangles)
-    if ratio <= 0:
-        return Trouble("inverted", "the surface is turned inside out")
-    if ratio > _LARGE * max(1, between / at_rest):
+
+
+class Width:
+    """No surface is spread much wider than at ``rest``, or than its ``attached`` vertices (k,)."""
+
+    def __init__(self, rest: Surface, attached: Ints) -> None:
+        self.attached, self.at_rest = attached, diagonal(rest.points)
+
+    def trouble(self, state: Floats, /) -> Trouble | None:
+        """Diverged where the box around the surface is too large."""
+        wide, between = diagonal(state), diagonal(state[self.attached]) if len(self.attached) else 0.0
+        if wide <= _WIDE * max(self.at_rest, between):
+            return None
+        return Trouble("diverged", f"the muscle is spread over {wide:.3g} mm, at rest {self.at_rest:.3g} mm")
+
+
+class Volume:
+    """No surface is turned inside out, or encloses much more than at ``rest``."""
+
+    def __init__(self, rest: Surface, attached: Ints) -> None:
+        self.rest, self.attached = rest, attached
+        self.at_rest = enclosed_volume(rest.points, rest.triangles)
+
+    def trouble(self, state: Floats, /) -> Trouble | None:
+        """Inverted where it is turned inside out, diverged where it is too large."""
+        ratio = enclosed_volume(state, self.rest.triangles) / self.at_rest
+        if ratio <= 0:
+            return Trouble("inverted", "the surface is turned inside out")
+        between = diagonal(state[self.attached]) if len(self.attached) else 0.0
+        if ratio <= _LARGE * max(1, between / diagonal(self.rest.points)):
+            return None
         return Trouble("diverged", f"the surface encloses {ratio:.3g} times its volume at rest")
-    return None
 
 
-def _spread(points: Floats) -> float:
-    """Diagonal of the box around points [mm], 0 without any."""
-    return diagonal(points) if len(points) else 0.0
+def surface_checks(rest: Surface, attached: Ints) -> tuple[StateCheck, ...]:
+    """The checks of a closed surface with ``attached`` vertices (k,), in their order: without positions there is no volume."""
+    return Finite(), Width(rest, attached), Volume(rest, attached)

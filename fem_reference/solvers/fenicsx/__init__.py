@@ -236,7 +236,9 @@ def _frame(event: dict[str, Any]) -> Frame:
             sums = [arrays[name] for name in arrays if name.startswith(f"{kind} ")]
             pulls[f"net_{kind}"] = float(np.linalg.norm(np.sum(sums, axis=0)))
         places = arrays["surface"], arrays["fibres"], arrays["nodes"]
-        return Frame(event["frame"], *places, scalars | pulls, note, stored_state(arrays))
+        return Frame(
+            event["frame"], *places, scalars | pulls, note, stored_state(arrays), residuals=tuple(event["residuals"])
+        )
 
 
 SOLVES = (

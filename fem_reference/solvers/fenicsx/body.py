@@ -15,6 +15,7 @@ from fem_reference.effects import Energy, Ramped
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import Body, Prescribed
 from fem_reference.solvers.common.load_steps import Attempt
+from fem_reference.solvers.common.state_checks import StateCheck, Trouble, first_trouble
 from fem_reference.solvers.fenicsx import choice, compiling, contact_points, forms, meshes
 from fem_reference.solvers.fenicsx.boundary_conditions import PointSprings, PrescribedRegion
 from fem_reference.solvers.fenicsx.clock import Clock
@@ -24,7 +25,7 @@ from fem_reference.solvers.fenicsx.known import Known, State
 from fem_reference.solvers.fenicsx.linear import Factorised
 from fem_reference.solvers.fenicsx.newton import Newton
 from fem_reference.solvers.fenicsx.nodal import Nodal
-from fem_reference.solvers.fenicsx.path import Path, on_the_way, settle
+from fem_reference.solvers.fenicsx.path import Path, settle
 from fem_reference.solvers.fenicsx.reactions import Reactions
 from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.spent import Spent
@@ -33,7 +34,18 @@ from fem_reference.solvers.fenicsx.system import System
 from fem_reference.solvers.fenicsx.tabulated import Displacement
 from fem_reference.solvers.fenicsx.validity import Validity
 
-_NO_ENERGY = "to a state in which the energy is no number: a law is beyond where it has a value"
+
+class FiniteEnergy:
+    """The ``energy`` of a state is a number."""
+
+    def __init__(self, energy: Callable[[], float]) -> None:
+        self.energy = energy
+
+    def trouble(self, _: Floats, /) -> Trouble | None:
+        """Diverged where a law is beyond where it has a value."""
+        if np.isfinite(self.energy()):
+            return None
+        return Trouble("diverged", "to a state in which the energy is no number: a law is beyond where it has a value")
 
 
 class AssembledBody:
@@ -73,6 +85,8 @@ class AssembledBody:
         self.contact = self.system.contact = self._contact(body, form) if body.contact else None
         self.system.balance_units()
         self.path = Path(self.system, self.determinants)
+        inside: tuple[StateCheck, ...] = self.determinants, self.validity, self.path, FiniteEnergy(self.energy)
+        self.checks: tuple[StateCheck, ...] = inside if self.contact is None else (self.contact, *inside)
         self.reactions = Reactions(self.system, self.conditions, self.contact)
         self.known = Known(self.comm)
         self.recalled: State | None = None
@@ -100,7 +114,7 @@ class AssembledBody:
             points = contact_points.on_facets(space, parents, body.mesh, facets, form.degree)
         else:
             points = contact_points.on_skin(space, parents, law.on, self.local)
-        return ContactForces(law, body.obstructions, points, self.unknowns, body.frames[0])
+        return ContactForces(law, body.obstructions, points, self.unknowns, body.frames[0], self.spent)
 
     def start(self, moved: Callable[[Floats], Floats]) -> None:
         """Begin with the nodes where ``moved`` takes rest points (n, 3) [mm]."""
@@ -115,37 +129,21 @@ class AssembledBody:
         return int(self.unknowns.function_space.dofmap.index_map.size_global)
 
     def attempt(self, frame: float) -> Attempt:
-        """Solve at ``frame`` from the present state; on failure go back to it. A state in which det F is not positive, at a
-        quadrature point or a vertex, is inverted whatever Newton's method says, and one in which cells have lost most of their
-        volume is collapsed.
-        """
+        """Solve at ``frame`` from the present state; go back to it where Newton's method fails or a check refuses its result."""
         before = np.array(self.unknowns.x.array)
         if self.clock.begins():
             self._begin(before)
         self.clock.start(frame, before)
         self.set_frame(frame)
         self.recalled = None
-        failure, iterations = self.newton.solve_among(self.contact, frame)
-        smallest = self.determinants.smallest()
-        with self.spent.on("contact"):
-            through = self.contact.lost(self.comm) if self.contact and failure is None else None
-        good = failure is None and smallest.value > 0
-        lost, energy = (self.validity.collapsed(), self.energy()) if good else (None, 0.0)
-        jump = self.path.jumped(before) if good else None
-        if good and through is None and lost is None and jump is None and np.isfinite(energy):
+        found = self.newton.solve_among(self.contact, frame)
+        if found.converged and (trouble := first_trouble(self.checks, before)) is not None:
+            found = found.refused(trouble)
+        if found.converged:
             settle(self, before, frame)
-            return Attempt(None, iterations)
-        self.go_back(before)
-        if through is not None:
-            return Attempt("diverged", iterations, f"Newton's method converged, but {through}")
-        if lost is not None:
-            return Attempt("collapsed", iterations, f"Newton's method converged, but {lost}")
-        if jump is not None:
-            return Attempt("diverged", iterations, f"Newton's method converged, but {on_the_way(jump)}")
-        if not np.isfinite(energy):
-            return Attempt("diverged", iterations, f"Newton's method converged, but {_NO_ENERGY}")
-        how = failure or f"converged, but det F fell to {smallest}"
-        return Attempt("diverged" if smallest.value > 0 else "inverted", iterations, f"Newton's method {how}")
+        else:
+            self.go_back(before)
+        return found
 
     def go_back(self, before: Floats) -> None:
         """Take up the last good state again, whose unknowns are those of ``before``."""
@@ -221,7 +219,7 @@ class AssembledBody:
 
     def scalars(self) -> dict[str, float]:
         """The smallest det F at quadrature points and vertices, V/V0, and the energies [N mm]."""
-        contact = self.contact.scalars(self.comm) if self.contact else {}
+        contact = self.contact.scalars() if self.contact else {}
         moving = {} if self.kinetic_form is None else {"kinetic_energy": self.integral(self.kinetic_form)}
         gap = {"energy_gap": self.path.take_gap()} if self.conserves else {}
         own = {

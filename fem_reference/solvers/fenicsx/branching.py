@@ -25,8 +25,8 @@ def leave(body: AssembledBody, frame: float, share: float) -> float | None:
         body.unknowns.x.scatter_forward()
         if body.contact:
             body.contact.update(frame)
-        failure, _ = body.newton.solve(frame)
-        if failure is None and body.determinants.smallest().value > 0 and body.stability.negative_modes() < modes:
+        found = body.newton.solve(frame)
+        if found.converged and body.determinants.smallest().value > 0 and body.stability.negative_modes() < modes:
             body.path.settle(body.energy(), connected=False)
             if body.contact:
                 body.contact.settle()

@@ -16,8 +16,10 @@ from fem_reference.foundations.mesh import Floats, Ints, place_of
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.rigid_bodies import Sampled
 from fem_reference.problems.contact import Contact, Obstruction, nearest_on_path
+from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.fenicsx.broad_phase import Nearby, Patches
 from fem_reference.solvers.fenicsx.contact_points import ContactPoints
+from fem_reference.solvers.fenicsx.spent import Spent
 
 # A point deeper in an obstruction than this share of its half thickness is as good as through.
 _GIVEN_WAY = 0.75
@@ -54,9 +56,11 @@ class ContactForces:
         points: ContactPoints,
         unknowns: fem.Function,
         frame: float,
+        spent: Spent,
     ) -> None:
         """``frame``: where the body rests."""
         self.law, self.obstructions, self.points, self.unknowns, self.frame = law, obstructions, points, unknowns, frame
+        self.comm, self.spent = unknowns.function_space.mesh.comm, spent
         patches = Patches(points)
         self.nearby = [Nearby(entry.shape, law.smoothing, patches) for entry in obstructions]
         self.overlaps = [np.zeros(len(points.areas)) for _ in obstructions]
@@ -68,10 +72,11 @@ class ContactForces:
         self.settle()
 
     def update(self, frame: float) -> None:
-        """What obstructions do with the unknowns as they are and the obstructions where they are at ``frame``."""
-        self.frame, carried = frame, self.points.carried
-        self.moved = self.unknowns.x.array[carried.dofs]
-        self.now = [self._pressed(i, carried.rest + self.moved) for i in range(len(self.obstructions))]
+        """Find the pressures with the unknowns as they are and the bones where they are at ``frame``."""
+        with self.spent.on("contact"):
+            self.frame, carried = frame, self.points.carried
+            self.moved = self.unknowns.x.array[carried.dofs]
+            self.now = [self._pressed(i, carried.rest + self.moved) for i in range(len(self.obstructions))]
 
     def _pressed(self, i: int, nodes: Floats) -> Pressed:
         """What an obstruction does, with the ``nodes`` (m, 3) [mm] that carry the points; these feel what overlaps at rest less."""
@@ -95,9 +100,9 @@ class ContactForces:
         """Where ``some`` points (k,) are, with nodes ``moved`` (m, 3): (k, 3) [mm]."""
         return np.asarray(self.points.rest[some] + self.points.carried.shares[some] @ moved)
 
-    def presses(self, comm: MPI.Comm) -> bool:
+    def presses(self) -> bool:
         """Whether an obstruction presses a point, of any rank."""
-        return bool(comm.allreduce(any(len(one.pressed) for one in self.now), MPI.LOR))
+        return bool(self.comm.allreduce(any(len(one.pressed) for one in self.now), MPI.LOR))
 
     def tractions(self) -> Tractions:
         """What all of them do."""
@@ -143,12 +148,12 @@ class ContactForces:
             found[entry.name] = forces.sum(axis=0), np.cross(places, forces).sum(axis=0)
         return found
 
-    def scalars(self, comm: MPI.Comm) -> dict[str, float]:
+    def scalars(self) -> dict[str, float]:
         """The greatest ``contact_depth`` [mm] and largest ``contact_pressure`` [MPa] at a point, the rest area in contact,
         ``contact_area`` [mm2], how many ``contact_points`` that is and how many were asked for their distance,
         ``contact_points_near``, and how deep the deepest point in contact was at rest, ``overlap_at_rest`` [mm].
         """
-        touched = np.zeros(len(self.points.areas), bool)
+        comm, touched = self.comm, np.zeros(len(self.points.areas), bool)
         depth = pressure = overlap = 0.0
         for one, before in zip(self.now, self.overlaps, strict=True):
             touched[one.pressed] = True
@@ -164,14 +169,14 @@ class ContactForces:
         }
         return found | ({"overlap_at_rest": comm.allreduce(max(overlap, 0.0), MPI.MAX)} if self.law.relaxed else {})
 
-    def deepest(self, comm: MPI.Comm) -> str:
-        """Where the deepest point is, and in which obstruction."""
+    def deepest(self) -> str:
+        """The depth of the deepest point, the bone that it is in, and its place."""
         mine = [
             (float(-one.gap.min()), entry.name, self._places(self.moved, one.near[[np.argmin(one.gap)]])[0].tolist())
             for entry, one in zip(self.obstructions, self.now, strict=True)
             if len(one.near)
         ]
-        found = [one for rank in comm.allgather(mine) for one in rank]
+        found = [one for rank in self.comm.allgather(mine) for one in rank]
         if not found:
             return "nowhere"
         depth, name, at = max(found)
@@ -187,27 +192,29 @@ class ContactForces:
         """Take up the settled state again, as the unknowns have."""
         self.now, self.frame, self.moved = self.settled
 
-    def lost(self, comm: MPI.Comm) -> str | None:
-        """Why contact is not what it should be since the last settled state, None where it is."""
-        return self.tunnelled(comm) or self.yielded(comm)
+    def trouble(self, _: Floats, /) -> Trouble | None:
+        """Diverged where a point went through a bone since the last settled state, or is pressed near to the middle of one."""
+        with self.spent.on("contact"):
+            why = self.tunnelled() or self.yielded()
+        return Trouble("diverged", why) if why else None
 
-    def yielded(self, comm: MPI.Comm) -> str | None:
-        """Where a point that is pressed is near the middle of an obstruction, from where it would leave on any side."""
+    def yielded(self) -> str | None:
+        """The bone near whose middle a point is pressed, from where it would leave on any side; None without."""
         mine, allowed = list[tuple[float, str]](), self.law.allowance(self.frame)
         for entry, one, before in zip(self.obstructions, self.now, self.overlaps, strict=True):
             depth = float((-one.gap - allowed * before[one.near]).max(initial=0.0))
             half = entry.shape.half_thickness
             said = f'contact gives way: the surface is {depth:.2g} mm deep in "{entry.name}", whose middle is at {half:.2g} mm'
             mine += [(depth / half, said)] if depth > _GIVEN_WAY * half else []
-        found = [one for rank in comm.allgather(mine) for one in rank]
+        found = [one for rank in self.comm.allgather(mine) for one in rank]
         return max(found)[1] if found else None
 
-    def tunnelled(self, comm: MPI.Comm) -> str | None:
-        """Where a point went through an obstruction since the last settled state: on its straight path through the obstruction's
-        frame it was inside, deeper than at both ends, and it left on the other side. None where none did.
+    def tunnelled(self) -> str | None:
+        """The point that went through a bone since the last settled state: on its straight path through the bone's frame it was
+        inside, deeper than at both ends, and it left on the other side. None where none did.
         """
         mine = [one for i in range(len(self.obstructions)) if (one := self._through(i))]
-        found: list[tuple[float, str]] = [one for rank in comm.allgather(mine) for one in rank]
+        found: list[tuple[float, str]] = [one for rank in self.comm.allgather(mine) for one in rank]
         return max(found)[1] if found else None
 
     def _through(self, i: int) -> tuple[float, str] | None:

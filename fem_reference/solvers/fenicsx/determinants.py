@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints, place_of
 from fem_reference.problems.body import Kind, reference_nodes
+from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.fenicsx import compiling
 from fem_reference.solvers.fenicsx.tabulated import Displacement, geometry
 
@@ -45,6 +46,11 @@ class Determinants:
         """The smallest det F at points of one kind, ``"quadrature point"`` or ``"vertex"``, or at both; NaN counts as smallest."""
         return self._least([self._mine(name, self._at(name)) for name in ([where] if where else self.points)])
 
+    def trouble(self, _: Floats, /) -> Trouble | None:
+        """Inverted where det F is not positive somewhere."""
+        smallest = self.smallest()
+        return None if smallest.value > 0 else Trouble("inverted", f"det F fell to {smallest}")
+
     def smallest_of(self, values: Floats) -> Smallest:
         """The smallest of other ``values`` (p,) at the quadrature points of this rank's cells, and where; NaN is smallest."""
         where = "quadrature point"
@@ -59,11 +65,11 @@ class Determinants:
         return self._at("quadrature point").ravel()
 
     def everywhere(self, good: NDArray[np.bool_]) -> bool:
-        """Whether what is asked of this rank's points (p,) is so on all ranks."""
+        """All of this rank's points (p,) are ``good``, and those of the others."""
         return bool(self.mesh.comm.allreduce(bool(good.all()), MPI.LAND))
 
     def _at(self, where: str) -> Floats:
-        """By cell of this rank and point of a kind."""
+        """Det F by cell of this rank and point of a kind."""
         if len(self.cells) == 0:
             return np.zeros((0, len(self.points[where])))
         if where == "vertex":

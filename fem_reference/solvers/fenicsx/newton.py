@@ -1,8 +1,10 @@
-"""Newton's method: inexact where exactness is not worth its time, and damped where a whole step would turn a cell inside out."""
+"""Newton's method: inexact where exactness is not worth its time, and damped where a full step would turn a cell inside out."""
 
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats
+from fem_reference.runs.contents import Status
+from fem_reference.solvers.common.load_steps import Attempt
 from fem_reference.solvers.fenicsx.contact import ContactForces, Tractions
 from fem_reference.solvers.fenicsx.determinants import Determinants
 from fem_reference.solvers.fenicsx.linear import LinearSolveError, LinearSolver
@@ -22,8 +24,8 @@ _PAST = 1e-2
 
 
 class Newton:
-    """Solves a ``system`` by whole steps of ``linear``; a line search would weigh forces [N] against volumes [mm3]: it stalls where
-    bodies bend or are soft.
+    """Newton's method on a ``system``, by full steps of ``linear``; a line search would weigh forces [N] against volumes [mm3]: it
+    stalls where bodies bend or are soft.
     """
 
     def __init__(
@@ -34,62 +36,68 @@ class Newton:
         self.step = system.b.duplicate()
         self.thrown = 0
 
-    def solve_among(self, contact: ContactForces | None, frame: float) -> tuple[str | None, int]:
-        """As ``solve``; at first without ``contact`` where nothing is pressed in the state that is there. That stands where it
-        converged and nothing is pressed either: then it is what would have been found with contact. Else it is thrown away, and
-        its iterations, which are no sign of how hard the load step is, count as ``thrown``.
+    def solve_among(self, contact: ContactForces | None, frame: float) -> Attempt:
+        """Solve as ``solve`` does; at first without ``contact`` where nothing is pressed in the state that is there. That stands
+        where it converged and nothing is pressed either: then it is what would have been found with contact. Else it is thrown
+        away, and its iterations, which are no sign of how hard the load step is, count as ``thrown``.
         """
-        system, comm = self.system, self.system.unknowns.function_space.mesh.comm
-        before = np.array(system.unknowns.x.array)
-        system.contact = contact if contact and contact.presses(comm) else None
-        failure, iterations = self.solve(frame)
+        system, before = self.system, np.array(self.system.unknowns.x.array)
+        system.contact = contact if contact and contact.presses() else None
+        found = self.solve(frame)
         if contact is None or system.contact is not None:
-            return failure, iterations
-        if failure is None:
-            with self.spent.on("contact"):
-                contact.update(frame)
-            if not contact.presses(comm):
-                return None, iterations
+            return found
+        if found.converged:
+            contact.update(frame)
+            if not contact.presses():
+                return found
         system.unknowns.x.array[:], system.contact = before, contact
         contact.go_back()
-        self.thrown += iterations
+        self.thrown += found.iterations
         return self.solve(frame)
 
-    def solve(self, frame: float) -> tuple[str | None, int]:
-        """Solve at ``frame``: why it did not succeed (None: it did), and the iterations. Where every step turns a cell inside out,
-        it ends there.
-        """
-        iterations, last = 0, np.nan
-        best, since = np.inf, 0
-        smallest = self.determinants.values_now()
-        norm = self._begin(frame)
-        while not norm <= self.residual or self.system.lacking():
-            if not np.isfinite(norm):
-                return f"went where a law, or what is prescribed, has no value in {iterations} iterations", iterations
-            if iterations == self.most:
-                return f"did not converge in {iterations} iterations", iterations
-            best, since = (norm, 0) if norm < _PROGRESS * best else (best, since + 1)
-            if since > _PATIENCE:
-                return f"made no progress in {since} iterations, of {iterations}", iterations
+    def solve(self, frame: float) -> Attempt:
+        """Solve at ``frame``. It ends where every step turns a cell inside out."""
+        smallest, last = self.determinants.values_now(), np.nan
+        residuals = [self._begin(frame)]
+        while not residuals[-1] <= self.residual or self.system.lacking():
+            if (why := self._hopeless(residuals)) is not None:
+                return self._failed(residuals, why)
             scaled = self.system.b.norm()
             try:
                 self.linear.solve(self.system.b, self.step, self._tolerance(scaled, last))
-            except LinearSolveError as why:
-                return f"met a tangent that cannot be solved with ({why}) in iteration {iterations + 1}", iterations
-            smallest = self._take(smallest)
-            iterations, last = iterations + 1, scaled
+            except LinearSolveError as error:
+                return self._failed(
+                    residuals, f"met a tangent that cannot be solved with ({error}) in iteration {len(residuals)}"
+                )
+            smallest, last = self._take(smallest), scaled
             if not self.determinants.everywhere(smallest > 0):
-                return f"turned a cell inside out in iteration {iterations}, however short its step", iterations
+                why = f"turned a cell inside out in iteration {len(residuals)}, however short its step"
+                return self._failed([*residuals, np.nan], why)
             self._meet(frame)
             norm = self.system.residual()
-            if norm > self.residual:
-                norm = self._linearise()
-        return None, iterations
+            residuals.append(norm if norm <= self.residual else self._linearise())
+        return Attempt("converged", len(residuals) - 1, tuple(residuals))
+
+    def _hopeless(self, residuals: list[float]) -> str | None:
+        """The reason to iterate no more after ``residuals``, None where there is none."""
+        iterations = len(residuals) - 1
+        if not np.isfinite(residuals[-1]):
+            return f"went where a law, or what is prescribed, has no value in {iterations} iterations"
+        if iterations == self.most:
+            return f"did not converge in {iterations} iterations"
+        if (since := stalled(residuals)) > _PATIENCE:
+            return f"made no progress in {since} iterations, of {iterations}"
+        return None
+
+    def _failed(self, residuals: list[float], why: str) -> Attempt:
+        """The record of an attempt that failed: inverted where det F is not positive in the state that it ended with."""
+        status: Status = "diverged" if self.determinants.smallest().value > 0 else "inverted"
+        return Attempt(status, len(residuals) - 1, tuple(residuals), f"Newton's method {why}")
 
     def _begin(self, frame: float) -> float:
-        """The first iteration's system. Obstructions at their next poses would meet points that have not moved yet, and forces
+        """Make the first iteration's system. Bones at their next poses would meet points that have not moved yet, and forces
         without meaning would lead it astray: it starts from the contact pressures of the last state, and is linear in the
-        motion of the obstructions.
+        motion of the bones.
         """
         moves = -self.system.missing()
         if self.system.contact is None:
@@ -107,17 +115,17 @@ class Newton:
 
     def _meet(self, frame: float) -> None:
         if self.system.contact is not None:
-            with self.spent.on("contact"):
-                self.system.contact.update(frame)
+            self.system.contact.update(frame)
 
     def _tolerance(self, norm: float, last: float) -> float:
-        """Of the linear system whose right-hand side has a ``norm``, relative to it; ``last`` is the norm of the one before."""
+        """The tolerance of the linear system whose right-hand side has a ``norm``, relative to it; ``last`` is the norm of the one
+        before.
+        """
         if norm == 0 or last == 0:
             return _FIRST
         wanted = _FIRST if np.isnan(last) else float(np.clip(_FACTOR * (norm / last) ** 2, _TIGHTEST, _LOOSEST))
-        enough = self.residual * min(
-            1.0, self.system.tangent.unit
-        )  # for pressures too, which weigh less in linear systems
+        # Pressures weigh less in linear systems.
+        enough = self.residual * min(1.0, self.system.tangent.unit)
         if wanted * norm < enough:
             wanted = min(wanted, _PAST * enough / norm)
         return max(wanted, 1e-13)
@@ -136,3 +144,15 @@ class Newton:
                 return now
             share /= 2
             self.spent.counts["halved_steps"] += 1
+
+
+def stalled(residuals: list[float]) -> int:
+    """The number of the last ``residuals`` since one fell to half of the best before it.
+
+    >>> stalled([1.0]), stalled([1.0, 0.4, 0.1]), stalled([1.0, 0.4, 0.3, 2.0])
+    (0, 0, 2)
+    """
+    best, since = np.inf, 0
+    for norm in residuals:
+        best, since = (norm, 0) if norm < _PROGRESS * best else (best, since + 1)
+    return since

@@ -9,6 +9,7 @@ from mpi4py import MPI
 
 from fem_reference.foundations.limits import ENERGY_GAP
 from fem_reference.foundations.mesh import Floats, place_of
+from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.fenicsx.determinants import Determinants, Smallest
 from fem_reference.solvers.fenicsx.system import System
 
@@ -43,6 +44,15 @@ class Path:
         ends = np.minimum(values[0], values[-1])
         found = self.determinants.smallest_of(least(np.array(values)) / np.where(ends > 0, ends, np.nan))
         return None if found.value > KEPT else found
+
+    def trouble(self, before: Floats, /) -> Trouble | None:
+        """Diverged where the step from the unknowns ``before`` leads to another path."""
+        jump = self.jumped(before)
+        if jump is None:
+            return None
+        place = f"in cell {jump.cell} at {place_of(jump.at)}"
+        way = "on the straight way from the last one det F falls to"
+        return Trouble("diverged", f"to a state on another path: {way} {jump.value:.2g} of itself, {place}")
 
     def settle(self, energy: float, halfway: Callable[[], bool] | None = None, *, connected: bool = True) -> None:
         """The state at present, with an ``energy`` [N mm] of what acts inside, is the next one; where it is ``connected`` with the
@@ -97,9 +107,9 @@ def settle(body: "AssembledBody", before: Floats, frame: float) -> None:
         looked.append((body.at + frame) / 2)
         body.go_back(before)
         body.set_frame(looked[0])
-        failure, iterations = body.newton.solve_among(body.contact, looked[0])
-        body.newton.thrown += iterations
-        return failure is None and body.determinants.smallest().value > 0
+        found = body.newton.solve_among(body.contact, looked[0])
+        body.newton.thrown += found.iterations
+        return found.converged and body.determinants.smallest().value > 0
 
     looks = body.judged and body.conserves and not body.clock.matters
     body.path.settle(body.energy(), halfway if looks else None)
@@ -143,11 +153,3 @@ def least(values: Floats) -> Floats:
         share = np.where(inside, turn, 0.0)
         found = np.minimum(found, ((coefficients[0] * share + b) * share + c) * share + coefficients[3])
     return np.asarray(found)
-
-
-def on_the_way(jump: Smallest) -> str:
-    """What is wrong with a step through ``jump``."""
-    return (
-        f"to a state on another path: on the straight way from the last one det F falls to {jump.value:.2g} of itself, "
-        f"in cell {jump.cell} at {place_of(jump.at)}"
-    )

@@ -81,7 +81,8 @@ def _state(event: dict[str, Any]) -> Reached:
             {name.removeprefix(kind): arrays[name] for name in arrays if name.startswith(kind)}
             for kind in ("force ", "moment ")
         )
-        state = Reached(event["frame"], arrays["nodes"], forces, moments, event["scalars"], stored_state(arrays))
+        solved = event["scalars"], stored_state(arrays), tuple(event["residuals"])
+        state = Reached(event["frame"], arrays["nodes"], forces, moments, *solved)
     path.unlink()
     return state
 

@@ -16,6 +16,7 @@ from mpi4py import MPI
 from fem_reference.foundations.limits import Limit
 from fem_reference.foundations.mesh import Floats, place_of
 from fem_reference.problems.body import Body
+from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.fenicsx import compiling
 from fem_reference.solvers.fenicsx.determinants import Determinants
 from fem_reference.solvers.fenicsx.forms import Form, Rule
@@ -106,14 +107,15 @@ class Validity:
         present, rest = self.mesh.comm.allreduce(np.array([now, self.volumes.sum()]), MPI.SUM)
         return float(present / rest)
 
-    def collapsed(self) -> str | None:
-        """How much of the body has lost too much of its volume, and where most, None where that is none or next to none."""
+    def trouble(self, _: Floats, /) -> Trouble | None:
+        """Collapsed where more than next to nothing of the body has lost too much of its volume."""
         means = self._means("V/V0")
         volumes = self.volumes.sum(axis=1)
         lost, whole = self.mesh.comm.allreduce(np.array([volumes[means < COLLAPSED].sum(), volumes.sum()]), MPI.SUM)
         if lost <= SHARE * whole:
             return None
-        return f"{100 * lost / whole:.0f} % of the body collapsed: V/V0 is {self._least(means)}, below {COLLAPSED:g}"
+        why = f"{100 * lost / whole:.0f} % of the body collapsed: V/V0 is {self._least(means)}, below {COLLAPSED:g}"
+        return Trouble("collapsed", why)
 
     def examine(self, frame: float) -> tuple[dict[str, float], list[Outside]]:
         """Of the present state, that of a ``frame``: the extremes of the means and in how many cells a law is outside its range,

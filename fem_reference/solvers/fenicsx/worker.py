@@ -23,7 +23,7 @@ from fem_reference.solvers.fenicsx.branching import leave  # isort: skip
 from fem_reference.solvers.fenicsx.limit_points import ahead  # isort: skip
 from fem_reference.solvers.fenicsx.restart import Restart  # isort: skip
 from fem_reference.solvers.fenicsx.validity import Ranges  # isort: skip
-from fem_reference.solvers.common.load_steps import Attempt, Step, Steps, march  # isort: skip
+from fem_reference.solvers.common.load_steps import Attempt, Step, StepSizes, march  # isort: skip
 
 
 _COUNTED = ("factorisations", "factorisation_flops", "krylov_iterations", "halved_steps")
@@ -54,12 +54,12 @@ class Worker:
         self.earlier: dict[str, float] = {}  # what processes before this one cost
         self.restart = Restart(self.body, job.kept) if job.kept else None
 
-    def begin(self) -> tuple[tuple[float, ...], Steps]:
+    def begin(self) -> tuple[tuple[float, ...], StepSizes]:
         """The frames to march through and the load steps: from rest, or from where a process before this one was cut off."""
         frames, settings = self.job.body.frames, self.settings
         first, good = settings.first_step, () if self.restart is None else self.restart.good()
         if self.restart is None or not good:
-            self.report_frame(Step(frames[0], 0, 0, 0, size=first))
+            self.report_frame(Step(frames[0], size=first))
         else:
             facts = self.restart.go_on(good)
             first, self.earlier = facts["size"], facts["cost"]
@@ -68,7 +68,7 @@ class Worker:
             if facts["exact"]:
                 self.solve_exactly()
             frames = tuple(frame for frame in frames if frame >= good[-1])
-        return frames, Steps(first, settings.smallest_step, settings.largest_step, self.job.body.stops)
+        return frames, StepSizes(first, settings.smallest_step, settings.largest_step, self.job.body.stops)
 
     def run(self) -> None:
         """March through the frames and report how it ended."""
@@ -80,7 +80,7 @@ class Worker:
                 ("cut_backs", reached.cutbacks),
             ):
                 self.counts[name] += count
-            if reached.status != "converged":
+            if not reached.last.converged:
                 status, message = self.failure(reached)
                 self.report(status=status, message=message, cost=self.cost())
                 return
@@ -97,8 +97,8 @@ class Worker:
         result = self.body.attempt(frame)
         self.solving += time.perf_counter() - begin
         self.solving_processor += time.process_time() - processor
-        if result.failure in (None, "collapsed"):
-            self.collapse = result.sentence
+        if result.status in ("converged", "collapsed"):
+            self.collapse = result.detail
         return result
 
     def solve_exactly(self) -> bool:
@@ -152,7 +152,7 @@ class Worker:
             return "collapsed", self.sentence(reached)
         limit = ahead(self.body, self.settings.smallest_step)
         if limit is None:
-            return reached.status, self.sentence(reached)
+            return reached.last.status, self.sentence(reached)
         return "limit point", f"{limit}; {self.sentence(reached)}"
 
     def sentence(self, reached: Step) -> str:
@@ -160,7 +160,8 @@ class Worker:
         other = "a larger bulk modulus" if self.collapse else "smaller cells"
         self.ranges.add(reached.at, self.body.validity.examine(reached.at)[1])
         return (
-            f"{self.collapse or reached.sentence} beyond frame {reached.at:.2f} with steps down to {self.settings.smallest_step}; "
+            f"{self.collapse or reached.last.detail} beyond frame {reached.at:.2f} "
+            f"with steps down to {self.settings.smallest_step}; "
             f"in the last good state det F is smallest, {self.body.determinants.smallest()}{self.deepest()}"
             f"{self.instability().replace('of them', 'of the frames reached')}{self.ranges}; "
             f"try a smaller motion or {other}"
@@ -169,7 +170,7 @@ class Worker:
     def deepest(self) -> str:
         """Where contact is deepest, if there is any."""
         contact = self.body.contact
-        return f", and contact is deepest, {contact.deepest(self.body.comm)}" if contact else ""
+        return f", and contact is deepest, {contact.deepest()}" if contact else ""
 
     def report_frame(self, reached: Step) -> None:
         """Write the frame's positions and forces beside the job and report it."""
@@ -195,7 +196,7 @@ class Worker:
         if self.restart is not None and reached.frame >= self.job.body.first:
             facts = {"size": reached.size, "exact": self.exact, "cost": self.cost(), "ranges": self.ranges.facts()}
             self.restart.write(reached.frame, facts | {"unstable": list(self.unstable.items())})
-        self.report(frame=reached.frame, file=str(path), scalars=scalars)
+        self.report(frame=reached.frame, file=str(path), scalars=scalars, residuals=reached.last.residuals)
 
     def report(self, **event: Any) -> None:
         """A line for the parent process."""

@@ -16,8 +16,9 @@ from fem_reference.problems.body import ELEMENTS, Body, Prescribed, check_quadra
 from fem_reference.problems.checks import check
 from fem_reference.runs.solved import Reached, Solved
 from fem_reference.runs.store import Outcome
-from fem_reference.solvers.common.load_steps import Attempt, Step, Steps, march
+from fem_reference.solvers.common.load_steps import Attempt, Step, StepSizes, march
 from fem_reference.solvers.common.protocol import Trade
+from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.scikit_fem.equations import Equations
 
 log = logging.getLogger(__name__)
@@ -27,7 +28,7 @@ _ROUNDING = 1e-14  # of what is prescribed, over the size of the body
 _GROWTH = 10.0  # of the out-of-balance forces, above which a Newton step is halved
 
 
-class BodySettings(Record):
+class ScikitBodySettings(Record):
     """Numerics of a body; steps are in frame numbers.
 
     ``element``: one of ``body.ELEMENTS``. ``first_step`` and ``smallest_step`` bound the load step, by default one to each
@@ -45,7 +46,7 @@ class BodySettings(Record):
     quadrature_degree: int | None = Field(default=None, gt=0)
 
 
-def solve_body(body: Body, settings: BodySettings) -> Solved:
+def solve_body(body: Body, settings: ScikitBodySettings) -> Solved:
     """The states of ``body`` at its frames, as far as they can be reached."""
     check(body, settings.element)
     check_quadrature(settings.element, settings.quadrature_degree, "quadrature_degree")
@@ -61,21 +62,21 @@ def solve_body(body: Body, settings: BodySettings) -> Solved:
     if timed:
         raise InputError("effects", ", ".join(timed), "effects without rates, as this solver knows no time")
     begin = time.perf_counter()
-    march_of = _March(body, settings)
-    states = [march_of.state(Step(body.frames[0], 0, 0, 0))]
+    march_of = March(body, settings)
+    states = [march_of.state(Step(body.frames[0]))]
     counts = {"newton_iterations": 0.0, "load_steps": 0.0, "cut_backs": 0.0}
 
     def cost() -> dict[str, float]:
         return counts | {"seconds": time.perf_counter() - begin, "unknowns": float(march_of.equations.space.size)}
 
     for step in march(
-        march_of.attempt, body.frames, Steps(settings.first_step, settings.smallest_step, stops=body.stops)
+        march_of.attempt, body.frames, StepSizes(settings.first_step, settings.smallest_step, stops=body.stops)
     ):
         for name, count in zip(counts, (step.iterations, step.steps, step.cutbacks), strict=True):
             counts[name] += count
-        if step.status != "converged":
-            sentence = f"{step.sentence} beyond frame {step.at:.4g}; try other cells or a smaller motion"
-            return Solved(tuple(states), Outcome(step.status, sentence, cost()))
+        if not step.last.converged:
+            sentence = f"{step.last.detail} beyond frame {step.at:.4g}; try other cells or a smaller motion"
+            return Solved(tuple(states), Outcome(step.last.status, sentence, cost()))
         states.append(march_of.state(step))
         log.debug("frame %g: %d Newton iterations", step.frame, step.iterations)
     return Solved(tuple(states), Outcome("converged", f"all {len(states)} frames reached", cost()))
@@ -98,10 +99,10 @@ class _Tangent:
         return step
 
 
-class _March:
+class March:
     """The unknowns of a body along the path of its frames."""
 
-    def __init__(self, body: Body, settings: BodySettings) -> None:
+    def __init__(self, body: Body, settings: ScikitBodySettings) -> None:
         self.body, self.settings = body, settings
         self.equations = Equations(body, settings.element, settings.quadrature_degree)
         self.unknowns = np.zeros(self.equations.space.size)
@@ -113,44 +114,48 @@ class _March:
         """
         with np.errstate(all="ignore"):  # what is not finite is a failed step
             attempt, unknowns = self._newton(frame)
-        if attempt.failure is not None:
-            return attempt
-        smallest = np.min(self.equations.smallest_determinants(unknowns))
-        if not smallest > 0:
-            why = f"Newton's method converged, but det F fell to {smallest:.3g}"
-            return Attempt("inverted", attempt.iterations, why)
-        with np.errstate(all="ignore"):
-            energy = self.equations.energy(unknowns, frame)
-        if not np.isfinite(energy):
-            why = "Newton's method converged, but to a state in which the energy is no number"
-            return Attempt("diverged", attempt.iterations, why)
-        self.unknowns = unknowns
+            if attempt.converged and (trouble := self._trouble(unknowns, frame)) is not None:
+                attempt = attempt.refused(trouble)
+        self.unknowns = unknowns if attempt.converged else self.unknowns
         return attempt
 
+    def _trouble(self, unknowns: Floats, frame: float) -> Trouble | None:
+        """The trouble with a state in equilibrium: cells inside out, or no energy."""
+        smallest = np.min(self.equations.smallest_determinants(unknowns))
+        if not smallest > 0:
+            return Trouble("inverted", f"det F fell to {smallest:.3g}")
+        if not np.isfinite(self.equations.energy(unknowns, frame)):
+            return Trouble("diverged", "to a state in which the energy is no number")
+        return None
+
     def _newton(self, frame: float) -> tuple[Attempt, Floats]:
-        fixed, wanted = self._fixed(frame)
+        """The record of Newton's method at ``frame``, and the unknowns (N,) that it ends with."""
+        fixed, wanted = self.fixed(frame)
         free = np.setdiff1d(np.arange(len(self.unknowns)), fixed)
         now, allowed = self._tangent(self.unknowns.copy(), frame), self.settings.newton_iterations
         rounding = _ROUNDING * np.ptp(self.equations.space.rest, axis=0).max()
-        for iteration in range(allowed + 1):
+        residuals: list[float] = []
+
+        def ended(why: str) -> tuple[Attempt, Floats]:
+            return Attempt("diverged", len(residuals) - 1, tuple(residuals), why), now.unknowns
+
+        while True:
             gap = wanted - now.unknowns[fixed]
             gap[np.abs(gap) < rounding] = 0
-            size = float(np.linalg.norm(now.residual[free]))
-            if size < self.settings.residual and not gap.any():
+            residuals.append(float(np.linalg.norm(now.residual[free])))
+            if residuals[-1] < self.settings.residual and not gap.any():
                 now.unknowns[fixed] = wanted
-                return Attempt(None, iteration), now.unknowns
-            if iteration == allowed:
-                break
+                return Attempt("converged", len(residuals) - 1, tuple(residuals)), now.unknowns
+            if len(residuals) > allowed:
+                return ended(f"Newton's method did not converge in {allowed} iterations")
             try:
                 step = now.step(free, fixed, gap)
             except RuntimeError:  # what SuperLU raises where a pivot is zero
-                return Attempt("diverged", iteration, "the equations have no unique solution"), now.unknowns
-            then = self._along(now, step, free, np.inf if gap.any() else _GROWTH * size, frame)
+                return ended("the equations have no unique solution")
+            then = self._along(now, step, free, np.inf if gap.any() else _GROWTH * residuals[-1], frame)
             if then is None:
-                return Attempt("diverged", iteration, "no part of a Newton step has bounded forces"), now.unknowns
+                return ended("no part of a Newton step has bounded forces")
             now = then
-        why = f"Newton's method did not converge in {allowed} iterations"
-        return Attempt("diverged", allowed, why), now.unknowns
 
     def _along(self, now: "_Tangent", step: Floats, free: Ints, limit: float, frame: float) -> "_Tangent | None":
         """The equations after as much of ``step`` as leaves the forces on ``free`` unknowns below ``limit``."""
@@ -163,7 +168,7 @@ class _March:
     def _tangent(self, unknowns: Floats, frame: float) -> "_Tangent":
         return _Tangent(unknowns, *self.equations.assembled(unknowns, frame))
 
-    def _fixed(self, frame: float) -> tuple[Ints, Floats]:
+    def fixed(self, frame: float) -> tuple[Ints, Floats]:
         """The unknowns that are prescribed exactly, each once, and their values at ``frame``."""
         values: dict[int, float] = {}
         for entry in self.body.prescribed:
@@ -175,7 +180,7 @@ class _March:
         return np.array(list(values), np.int64), np.array(list(values.values()))
 
     def state(self, step: Step) -> Reached:
-        """The note on the present unknowns."""
+        """The present unknowns as a state."""
         equations, unknowns = self.equations, self.unknowns
         places = equations.space.rest + unknowns[: equations.space.rest.size].reshape(-1, 3)
         residual, _ = equations.assembled(unknowns, step.frame, springs=False)
@@ -194,6 +199,7 @@ class _March:
                 "newton_iterations": float(step.iterations),
                 "cut_backs": float(step.cutbacks),
             },
+            residuals=step.last.residuals,
         )
 
     def _force(self, entry: Prescribed, places: Floats, residual: Floats) -> tuple[Floats, Floats]:

@@ -32,7 +32,7 @@ _ELEMENTS = {
 }
 
 
-class FieldSettings(Record):
+class ScikitFieldSettings(Record):
     """``form``: as the ``scene`` has it, or plain ``galerkin`` whatever the scene says, to show what stabilisation is for."""
 
     form: Literal["scene", "galerkin"] = "scene"
@@ -96,7 +96,7 @@ def assemble(problem: FieldProblem) -> tuple[Any, Floats]:
     return A, b + _fluxes(problem)
 
 
-def solve_field(problem: FieldProblem, settings: FieldSettings) -> Solution:
+def solve_field(problem: FieldProblem, settings: ScikitFieldSettings) -> Solution:
     """Assemble and solve."""
     if settings.form == "galerkin":
         return replace(_solved(replace(problem, tau=None)), form="galerkin")

@@ -19,8 +19,9 @@ from fem_reference.geometry.skins import attached_skin, spacing
 from fem_reference.geometry.tessellation import tessellated
 from fem_reference.problems.contact import check_exempt
 from fem_reference.problems.muscle import AttachedVertices, Problem, RigidBody, Setup, solid
+from fem_reference.problems.paths import Along
 from fem_reference.scenes.bones import Bone
-from fem_reference.studies.hard.records import FACES, Block, Face, Hard, Hold, Start
+from fem_reference.studies.hard.records import FACES, Face, Hard, Hold, Lattice, Start
 
 # What blocks are of where a case says nothing else: muscle's usual matrix.
 MATERIAL = (effects.make("neo_hooke", mu="10 kPa"), effects.make("incompressible", bulk="10 MPa"))
@@ -28,18 +29,6 @@ _LINES, _POINTS = 4, 9  # measured lines of each block, and points of each
 # The bones of held faces are balls of this share of the block's size, so far away that nothing meets them.
 _BALL, _AWAY = 0.01, 50.0
 _SAME = 1e-9  # of the block's size: rounding of what two holds do alike
-
-
-@dataclass(frozen=True, eq=False)
-class Along:
-    """One fibre direction (3,) everywhere."""
-
-    direction: tuple[float, float, float]
-
-    def __call__(self, cells: Ints, points: Floats) -> Floats:  # noqa: ARG002
-        """The directions (n, 3) at ``points`` (n, 3)."""
-        unit = np.asarray(self.direction) / np.linalg.norm(self.direction)
-        return np.broadcast_to(unit, (len(points), 3)).copy()
 
 
 def problem(hard: Hard) -> Problem:
@@ -50,7 +39,7 @@ def problem(hard: Hard) -> Problem:
     nodes, tets = kuhn(block.cells)
     points = _placed(block, nodes)
     skin_nodes, triangles = lattice_skin(block.cells)
-    index = _index(block, skin_nodes)
+    index: Ints = np.ravel_multi_index(tuple(skin_nodes.T), tuple(np.add(block.cells, 1)))
     surface = Surface(points[index], triangles, f"the block of {hard.name}")
     ends = [_held(block, hold, skin_nodes, surface) for hold in hard.hold]
     _check_held(hard, ends, surface)
@@ -69,14 +58,14 @@ def problem(hard: Hard) -> Problem:
 
 @dataclass(frozen=True, eq=False)
 class Moved:
-    """What a ``start`` makes of a block about its ``middle`` (3,) [mm], whose cells have a size of ``cell`` [mm]."""
+    """A block about its ``middle`` (3,) [mm], its cells of a size of ``cell`` [mm], moved as ``start`` describes."""
 
     start: Start
     middle: Floats
     cell: float
 
     def __call__(self, points: Floats) -> Floats:
-        """Where rest points (n, 3) [mm] are; a point is moved at random alike, whichever others are asked for."""
+        """Positions of rest points (n, 3) [mm]; a point is moved at random alike, whichever others are asked for."""
         match self.start.kind:
             case "point":
                 return np.broadcast_to(self.middle, points.shape).copy()
@@ -89,18 +78,19 @@ class Moved:
         return np.asarray(points + self.start.amount * self.cell * moves.reshape(-1, 3))
 
 
-def _start(block: Block, start: Start | None) -> Moved | None:
+def _start(block: Lattice, start: Start | None) -> Moved | None:
     if start is None:
         return None
     size = np.asarray(block.size)
     return Moved(start, np.asarray(block.corner) + size / 2, float((size / block.cells).min()))
 
 
-def _problem(block: Block, setup: Setup, mesh: TetMesh, acting: tuple[effects.Effect, ...]) -> Problem:
+def _problem(block: Lattice, setup: Setup, mesh: TetMesh, acting: tuple[effects.Effect, ...]) -> Problem:
     if among(acting) is not None:
         check_exempt(setup.exempt, "hold")
     apart = block.points_apart or spacing(setup.surface)
-    fibre = Along(block.fibre) if any("fibre" in effect.needs for effect in acting) else None
+    x, y, z = (np.asarray(block.fibre) / np.linalg.norm(block.fibre)).tolist()
+    fibre = Along((x, y, z)) if any("fibre" in effect.needs for effect in acting) else None
     return Problem(
         setup.surface,
         setup.bones,
@@ -123,8 +113,8 @@ def _problem(block: Block, setup: Setup, mesh: TetMesh, acting: tuple[effects.Ef
     )
 
 
-def _placed(block: Block, nodes: Ints) -> Floats:
-    """Where the lattice's ``nodes`` (n, 3) are [mm]."""
+def _placed(block: Lattice, nodes: Ints) -> Floats:
+    """Positions [mm] of the lattice's ``nodes`` (n, 3)."""
     axes = [_ticks(count, ratio) for count, ratio in zip(block.cells, block.grading, strict=True)]
     shares = np.column_stack([ticks[nodes[:, k]] for k, ticks in enumerate(axes)])
     if block.jitter:
@@ -135,15 +125,9 @@ def _placed(block: Block, nodes: Ints) -> Floats:
 
 
 def _ticks(count: int, ratio: float) -> Floats:
-    """From 0 to 1 in ``count`` cells, the last of them ``ratio`` times as long as the first."""
+    """Shares from 0 to 1 in ``count`` cells, the last of them ``ratio`` times as long as the first."""
     lengths = ratio ** (np.arange(count) / max(count - 1, 1))
     return np.concatenate([[0.0], np.cumsum(lengths) / lengths.sum()])
-
-
-def _index(block: Block, nodes: Ints) -> Ints:
-    """Where ``nodes`` (n, 3) stand among all of the lattice."""
-    _, y, z = block.cells
-    return np.asarray(nodes @ [(y + 1) * (z + 1), z + 1, 1])
 
 
 def _upright(points: Floats, tets: Ints) -> Ints:
@@ -153,13 +137,13 @@ def _upright(points: Floats, tets: Ints) -> Ints:
     return tets
 
 
-def _on(block: Block, nodes: Ints, face: Face) -> Ints:
-    """Which of ``nodes`` (n, 3) of the lattice are on a ``face``, (k,)."""
+def _on(block: Lattice, nodes: Ints, face: Face) -> Ints:
+    """Indices (k,) of those ``nodes`` (n, 3) of the lattice that are on a ``face``."""
     axis = "xyz".index(face[0])
     return np.flatnonzero(nodes[:, axis] == (block.cells[axis] if face[1] == "1" else 0))
 
 
-def _held(block: Block, hold: Hold, nodes: Ints, surface: Surface) -> AttachedVertices:
+def _held(block: Lattice, hold: Hold, nodes: Ints, surface: Surface) -> AttachedVertices:
     axis, high = "xyz".index(hold.face[0]), hold.face[1] == "1"
     vertices = _on(block, nodes, hold.face)
     if hold.middle:
@@ -198,7 +182,7 @@ def _bone(hard: Hard, i: int, surface: Surface) -> RigidBody:
     return RigidBody(bone.name, tessellated(form, surface.points, join(hard.place, f"bone[{i}]")), motion, solid=form)
 
 
-def _lines(block: Block) -> Polylines:
+def _lines(block: Lattice) -> Polylines:
     """Straight lines through the block along its fibres' greatest axis."""
     axis = int(np.argmax(np.abs(block.fibre)))
     shares = np.full((_LINES, _POINTS, 3), 0.5)

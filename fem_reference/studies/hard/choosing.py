@@ -5,6 +5,7 @@ from typing import Any
 from fem_reference import solvers
 from fem_reference.assessment.solver_table import solver_kinds
 from fem_reference.scenes.case import SolverChoice
+from fem_reference.solvers.common.protocol import Task
 
 REFERENCE, SECOND = "fenicsx", "scikit_fem"
 LIMIT = 120.0  # [s] of processor time of a run
@@ -16,7 +17,7 @@ _OWN: dict[str, dict[str, Any]] = {
 
 
 def choices() -> dict[str, SolverChoice]:
-    """By solver, the settings that hard cases are solved with: those of the first candidate of Table 5.1 that has it."""
+    """Settings that hard cases are solved with, by solver: those of the first candidate of Table 5.1 that has it."""
     found: dict[str, SolverChoice] = {}
     for candidate in (one for kind in solver_kinds() for one in kind.candidate):
         found.setdefault(candidate.solver, SolverChoice(solver=candidate.solver, **candidate.settings))
@@ -25,3 +26,8 @@ def choices() -> dict[str, SolverChoice]:
             found.setdefault(name, SolverChoice(solver=name, **_OWN.get(name, {})))
     first = [name for name in (REFERENCE, SECOND) if name in found]
     return {name: found[name] for name in (*first, *sorted(set(found) - {*first}))}
+
+
+def task_of(solver: str, task: Task) -> Task:
+    """The task that a solver is asked for in a case of a ``task``: the second solver has none for muscles but that of bodies."""
+    return "solve_body" if task == "solve" and solver == SECOND else task

@@ -35,8 +35,8 @@ def jittered(hard: Hard, number: int) -> Hard:
 
 
 def compare(hard: Hard, first: tuple[Outcome, Followed], count: int, solve: Solve) -> SameEnd:
-    """How ``count`` runs of a case on other meshes end, beside the ``first``: all alike converged or not, and how far apart at
-    most over frames, in per cent of the body's size; at points of the same material.
+    """Compare ``count`` runs of a case on other meshes with the ``first``: all alike converged or not, and the greatest distance
+    over frames, in per cent of the body's size; at points of the same material.
     """
     begin, elsewhere, outcome, followed = time.process_time(), 0.0, *first
     ended, off, reached = Counter[str](), list[float](), list[int]()

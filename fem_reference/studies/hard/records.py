@@ -1,4 +1,4 @@
-"""A hard case as a file below ``cases/hard`` says it, and its variants."""
+"""Hard cases as files below ``cases/hard`` describe them, with their variants."""
 
 import math
 from collections.abc import Iterator
@@ -19,9 +19,8 @@ from fem_reference.scenes import casefile
 from fem_reference.scenes.bones import Bone, Motion
 from fem_reference.scenes.case import HOME, Case, SolverChoice
 from fem_reference.scenes.muscle import Frames
-from fem_reference.scenes.scalar import ScalarCase
 from fem_reference.solvers.common.protocol import Task
-from fem_reference.studies.hard.choosing import SECOND, choices
+from fem_reference.studies.hard.choosing import choices, task_of
 
 FOLDER = HOME / "cases" / "hard"
 Face = Literal["x0", "x1", "y0", "y1", "z0", "z1"]
@@ -29,7 +28,7 @@ FACES: tuple[Face, ...] = get_args(Face)
 _MOST_CELLS = 50_000  # of a block, more than any solver takes in its time
 
 
-class Block(Record):
+class Lattice(Record):
     """A block of ``size`` from its ``corner``, in so many ``cells`` along each axis, each cut into six tetrahedra.
 
     ``grading``: along each axis, the last cell over the first. ``jitter``: how far nodes are moved at random inside the block and
@@ -69,7 +68,7 @@ class Hold(Record):
 
 
 class Start(Record):
-    """What the body is at the first frame in place of its rest state: points moved at ``random`` by an ``amount`` of the size of
+    """The body at the first frame in place of its rest state: points moved at ``random`` by an ``amount`` of the size of
     a cell, or the whole body collapsed to its middle ``point`` or ``plane`` across z or turned ``inside out``.
     """
 
@@ -90,7 +89,7 @@ class Shipped(Record):
         return casefile.read(self.case, changes=quick | self.changes)
 
 
-class Steps(Record):
+class StepCounts(Record):
     """Numbers of even load steps (``counts``) in which the reference goes to the frame ``until``: they shall end alike."""
 
     until: int
@@ -110,7 +109,7 @@ class Hard(Record):
     title: str
     healthy: str
     bound: tuple[Bound, ...] = Field(min_length=1)
-    block: Block | None = None
+    block: Lattice | None = None
     hold: tuple[Hold, ...] = ()
     bone: tuple[Bone, ...] = ()
     effect: tuple[Effect, ...] = ()
@@ -123,7 +122,7 @@ class Hard(Record):
     contrast: str = ""
     by_effects: bool = False
     settings: dict[str, dict[str, Any]] = Field(default_factory=dict)
-    steps: Steps | None = None
+    steps: StepCounts | None = None
     name: FileName = Field(exclude=True)
     place: str = Field(exclude=True)
 
@@ -218,28 +217,23 @@ def _hard(table: dict[str, Any], name: str, where: str) -> Hard:
         want = 'nothing beside "no_solution", which no run should reach the end of'
         raise InputError(join(where, "contrast"), f'"{hard.contrast}"', want)
     scene = hard.shipped.read() if hard.shipped else None
-    scalar = isinstance(scene, ScalarCase)
+    task: Task = scene.task if scene else "solve"
     for i, bound in enumerate(hard.bound):
-        if (bound.quantity == "overshoot") != scalar:
+        if (bound.quantity == "overshoot") != (task == "solve_field"):
             want = "overshoot for a scalar field, and only there"
             raise InputError(join(where, f"bound[{i}].quantity"), f'"{bound.quantity}"', want)
     if hard.frames is not None:
         casefile.check_acting(hard.effect, [bone.name for bone in hard.bone], hard.frames, where)
-    _check_solvers(hard, scalar=scalar)
-    _check_steps(hard, scene)
+    _check_solvers(hard, task)
+    timed = hard.frames or scene
+    assert timed is not None  # a Hard record has one of the two
+    if hard.steps is not None and hard.steps.until not in range(timed.numbers[0] + 1, timed.numbers[-1] + 1):
+        want = f"a frame after {timed.numbers[0]}, up to {timed.numbers[-1]}"
+        raise InputError(join(where, "steps.until"), hard.steps.until, want)
     return hard
 
 
-def _check_steps(hard: Hard, scene: Case | None) -> None:
-    """InputError where load steps lead to no frame after the first."""
-    timed = hard.frames or scene
-    assert timed is not None  # a Hard record has one of the two
-    first, last = timed.numbers[0], timed.numbers[-1]
-    if hard.steps is not None and not first < hard.steps.until <= last:
-        raise InputError(join(hard.place, "steps.until"), hard.steps.until, f"a frame after {first}, up to {last}")
-
-
-def _check_solvers(hard: Hard, *, scalar: bool) -> None:
+def _check_solvers(hard: Hard, task: Task) -> None:
     """InputError where a solver is named that hard cases are not solved by, or a setting that it has not."""
     known = choices()
     named = [(f"only[{i}]", name) for i, name in enumerate(hard.only)]
@@ -247,9 +241,9 @@ def _check_solvers(hard: Hard, *, scalar: bool) -> None:
         if name not in known:
             raise InputError(join(hard.place, key), f'"{name}"', f"one of {', '.join(known)}")
     for name, changes in hard.settings.items():
-        given = changes if scalar else known[name].settings | changes
-        task: Task = "solve_field" if scalar else "solve_body" if name == SECOND else "solve"
-        parse(solvers.find(name, hard.place, task).settings, given, join(hard.place, f"settings.{name}"))
+        given = changes if task == "solve_field" else known[name].settings | changes
+        record = solvers.find(name, hard.place, task_of(name, task)).settings
+        parse(record, given, join(hard.place, f"settings.{name}"))
 
 
 def _merged(table: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:

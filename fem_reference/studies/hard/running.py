@@ -1,8 +1,6 @@
 """Every solver on every hard case: runs, and what became of them."""
 
 import logging
-import os
-import platform
 import re
 import signal
 import time
@@ -19,13 +17,12 @@ from fem_reference.assessment.health import Followed
 from fem_reference.assessment.stress import Cell, HardCase, Scene, Stress
 from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.foundations.mesh import Floats
-from fem_reference.foundations.version import __version__
 from fem_reference.geometry.embedding import Locator
 from fem_reference.problems import of_case
 from fem_reference.problems.muscle import Problem
 from fem_reference.problems.muscle_body import as_body
 from fem_reference.problems.scalar import FieldProblem
-from fem_reference.runs.key import versions
+from fem_reference.runs.key import made_with
 from fem_reference.runs.store import NO_SURFACE, Frame, Outcome
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.scenes.scalar import ScalarCase
@@ -98,10 +95,8 @@ def run(hard: Sequence[Hard], only: Sequence[str] = (), *, in_steps: bool = Fals
                 log.info(
                     "case %d of %d: %s, %s: %s: %s", i + 1, len(hard), one.name, name, found.verdict, found.sentence
                 )
-    machine = f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores"
-    origin = {"fem_reference": __version__, "machine": machine, **versions()}
     rows = tuple(Posed(one).row for one in hard)
-    return Stress(rows, tuple(chosen), tuple(cells), time.perf_counter() - begin, origin)
+    return Stress(rows, tuple(chosen), tuple(cells), time.perf_counter() - begin, made_with())
 
 
 def cell(posed: Posed, choice: SolverChoice) -> Cell:

@@ -10,7 +10,7 @@ from fem_reference.problems.muscle import Problem
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.solvers import fenicsx
-from fem_reference.studies.hard.records import Steps
+from fem_reference.studies.hard.records import StepCounts
 
 SAME = 0.01  # [%] of the body's size: states that differ by more are different
 _CUTS = 64  # a load step is cut to this part of itself before it is given up
@@ -22,19 +22,19 @@ class StalledError(Exception):
 
 @dataclass(frozen=True)
 class SameEnd:
-    """Whether all runs that reached the end ended alike, and what became of each in words."""
+    """A comparison of runs that should end alike: ``same`` where those that reached the end did; a ``sentence`` on each."""
 
     same: bool
     sentence: str
 
 
-def farthest(followed: Followed) -> Steps | None:
-    """To the frame at which a run is farthest from its first state; None of a run that did not leave it."""
+def farthest(followed: Followed) -> StepCounts | None:
+    """Load steps to the frame at which a run is farthest from its first state; None of a run that did not leave it."""
     moved = np.linalg.norm(followed.positions[1:] - followed.positions[0], axis=2).max(axis=1, initial=0.0)
-    return Steps(until=followed.numbers[1 + int(np.argmax(moved))]) if len(moved) and moved.max() > 0 else None
+    return StepCounts(until=followed.numbers[1 + int(np.argmax(moved))]) if len(moved) and moved.max() > 0 else None
 
 
-def compare(built: Problem, choice: SolverChoice, steps: Steps) -> SameEnd:
+def compare(built: Problem, choice: SolverChoice, steps: StepCounts) -> SameEnd:
     """The reference up to a frame in several numbers of even load steps; the finest run that got there is the standard."""
     ends, words = dict[int, Floats](), list[str]()
     for count in steps.counts:
@@ -47,17 +47,13 @@ def compare(built: Problem, choice: SolverChoice, steps: Steps) -> SameEnd:
         return SameEnd(True, f"no number of load steps reaches frame {steps.until} ({', '.join(words)})")
     standard, size = ends[max(ends)], diagonal(built.surface.points)
     off = {count: 100 * float(np.linalg.norm(end - standard, axis=1).max()) / size for count, end in ends.items()}
-    words = [
-        f"{count}: {share:.2g} % from that of {max(ends)}" for count, share in off.items() if count != max(ends)
-    ] + words
-    return SameEnd(
-        max(off.values()) <= SAME,
-        f"end state at frame {steps.until} by number of load steps: {', '.join(words) or 'one only'}",
-    )
+    apart = [f"{count}: {share:.2g} % from that of {max(ends)}" for count, share in off.items() if count != max(ends)]
+    listed = ", ".join(apart + words) or "one only"
+    return SameEnd(max(off.values()) <= SAME, f"end state at frame {steps.until} by number of load steps: {listed}")
 
 
 def _end(built: Problem, choice: SolverChoice, until: int, count: int) -> tuple[str, Floats | None]:
-    """How a run in ``count`` steps ended, and where the tetrahedra's points (n, 3) [mm] are, None where it did not get there."""
+    """The status of a run in ``count`` steps, and the tetrahedra's points (n, 3) [mm], None where it did not get there."""
     span = until - built.frames[0]
     step = {"first_step": span / count, "largest_step": span / count, "smallest_step": span / count / _CUTS}
     settings = fenicsx.Settings(**{**choice.settings, **step})

@@ -5,11 +5,28 @@ import pytest
 import shapes
 
 from fem_reference.foundations.motion import Rotation, apply
-from fem_reference.solvers.common.state_checks import trouble
+from fem_reference.solvers.common.state_checks import Finite, Trouble, first_trouble, surface_checks
 
 REST = shapes.sphere(1, 10.0)
 NONE = np.zeros(0, np.int64)
 TURN = Rotation((1, 2, 3), (5, -4, 700), (0.0, 1.0), (0.0, 2.0)).pose(1)
+
+
+def trouble(points, rest, attached) -> Trouble | None:
+    return first_trouble(surface_checks(rest, attached), points)
+
+
+class Unasked:
+    """A check that must not be reached."""
+
+    def trouble(self, _) -> Trouble | None:
+        raise AssertionError("asked after one that found trouble")
+
+
+def test_checks_are_asked_in_their_order_up_to_the_first_that_finds_trouble():
+    lost = np.full((2, 3), np.nan)
+    assert first_trouble((Finite(), Unasked()), lost).status == "diverged"
+    assert first_trouble((Finite(), Finite()), np.zeros((2, 3))) is None
 
 
 def scaled(*factors):

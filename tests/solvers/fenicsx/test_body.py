@@ -88,7 +88,7 @@ def test_a_stabilised_pressure_needs_quadrature_that_sees_it(session) -> None:
     with pytest.raises(InputError, match="quadrature_degree: got 1, want 2 or more for P1/P1"):
         session.solve(body, BodySettings(**given))
     with pytest.raises(InputError, match="quadrature_degree: got 1, want 2 or more for P1/P1"):
-        scikit_fem.solve_body(body, scikit_fem.BodySettings(**given))
+        scikit_fem.solve_body(body, scikit_fem.ScikitBodySettings(**given))
     with pytest.raises(InputError, match=r"case\.toml: reference\.quadrature_degree: got 1, want 2 or more for P1/P1"):
         fenicsx.check_effects(fenicsx.Settings(**given), FLESH, "case.toml: reference")
 

@@ -65,7 +65,7 @@ def test_what_is_far_away_does_nothing(fem_lab) -> None:
 
 
 def test_the_second_opinion_knows_no_contact() -> None:
-    settings = scikit_fem.BodySettings(element="Q2/Q1")
+    settings = scikit_fem.ScikitBodySettings(element="Q2/Q1")
     with pytest.raises(InputError, match="contact: got obstructions, want a body without"):
         scikit_fem.solve_body(block(), settings)
 

@@ -13,6 +13,7 @@ from fem_reference.geometry.tessellation import tessellated
 from fem_reference.problems.contact import Contact, Obstruction
 from fem_reference.solvers.fenicsx.contact import ContactForces
 from fem_reference.solvers.fenicsx.contact_points import ContactPoints
+from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.verification.contact import Slide
 
 # Around a capsule along z, beside it and at its ends, at gaps from below -SMOOTHING to above 0.
@@ -20,14 +21,20 @@ SMOOTHING = 0.2
 PLACES = np.array([[1.1, 0, 1], [0.6, 0.7, 2], [-0.9, 0.2, 0.5], [0, -1.0, 3], [0.3, 0.4, 4.8], [-0.5, 0.1, -0.75]])
 
 
+def nodes_of(count: int) -> SimpleNamespace:
+    """Unknowns of so many nodes, as a function of one process has them."""
+    space = SimpleNamespace(mesh=SimpleNamespace(comm=SimpleNamespace(allgather=lambda one: [one])))
+    return SimpleNamespace(x=SimpleNamespace(array=np.zeros(3 * count)), function_space=space)
+
+
 def moved(points: np.ndarray, pose: Slide) -> ContactForces:
     """One capsule in a ``pose``, and ``points`` (n, 3) that are unknowns each."""
     count = len(points)
     dofs = np.arange(3 * count).reshape(count, 1, 3)
     own = ContactPoints(points, np.ones(count), np.arange(count), np.ones((count, 1)), points[:, None, :], dofs)
-    unknowns = SimpleNamespace(x=SimpleNamespace(array=np.zeros(3 * count)))
+    unknowns = nodes_of(count)
     capsule = Obstruction("capsule", Capsule((0.0, 0, 0), (0.0, 0, 4), 1.0), pose)
-    return ContactForces(Contact("skin", 3.0, SMOOTHING), (capsule,), own, unknowns, 0.0)
+    return ContactForces(Contact("skin", 3.0, SMOOTHING), (capsule,), own, unknowns, 0.0, Spent())
 
 
 @pytest.mark.parametrize("turned", [(0.0, 0.0, 0.0), (0.7, -0.4, 1.1)])
@@ -68,14 +75,14 @@ def passage(ball: Obstacle, every: bool) -> list[tuple[list[float], str | None, 
     of balance, whether a point went through, and how many points were looked at. With ``every``, all of them are.
     """
     heights = [*np.linspace(60, 3.6, 20), *[3.6] * 5, -40, *np.linspace(-40, -3.7, 12), *np.linspace(-4, -60, 8)]
-    own, unknowns = sheet(), SimpleNamespace(x=SimpleNamespace(array=np.zeros(3 * 13**2)))
+    own, unknowns = sheet(), nodes_of(13**2)
     obstruction = Obstruction("ball", ball, lambda frame: Slide((0, 0, 0), (0, 0, heights[int(frame)]), (0, 0.1, 0))(0))
     forces, random, found = (
-        ContactForces(Contact("skin", 3.0, SMOOTHING), (obstruction,), own, unknowns, 0.0),
+        ContactForces(Contact("skin", 3.0, SMOOTHING), (obstruction,), own, unknowns, 0.0, Spent()),
         rng(),
         [],
     )
-    (nearby,), serial, looked = forces.nearby, SimpleNamespace(allgather=lambda one: [one]), []
+    (nearby,), looked = forces.nearby, []
     clearance = nearby.clearance
     nearby.clearance = lambda points: (looked.append(len(points)), clearance(points))[1]
     for frame in range(len(heights)):
@@ -86,7 +93,7 @@ def passage(ball: Obstacle, every: bool) -> list[tuple[list[float], str | None, 
         forces.update(frame)
         count, residual = sum(looked), np.zeros(3 * 13**2)
         forces.add_residual(residual, None)
-        found.append((residual.tolist(), forces.tunnelled(serial), count))
+        found.append((residual.tolist(), forces.tunnelled(), count))
         forces.settle()
     return found
 
@@ -117,8 +124,9 @@ def test_what_stays_out_of_reach_is_not_looked_at(monkeypatch) -> None:
         Contact("skin", 3.0, SMOOTHING),
         (Obstruction("ball", balls()["grid"], far),),
         sheet(),
-        SimpleNamespace(x=SimpleNamespace(array=np.zeros(3 * 13**2))),
+        nodes_of(13**2),
         0.0,
+        Spent(),
     )
     nearby = forces.nearby[0]
     nearby.clearance = lambda points: pytest.fail("looked at") if len(points) else np.zeros(0)
@@ -128,5 +136,5 @@ def test_what_stays_out_of_reach_is_not_looked_at(monkeypatch) -> None:
         forces.update(0.0)
         forces.add_residual(np.zeros(3 * 13**2), None)
         assert list(forces.tangent()) == []
-        assert forces.tunnelled(SimpleNamespace(allgather=lambda one: [one])) is None
+        assert forces.tunnelled() is None
         forces.settle()

@@ -12,7 +12,7 @@ from fem_reference.problems.checks import check
 from fem_reference.problems.paths import Affine, Rest
 from fem_reference.scenes import casefile
 from fem_reference.solvers.fenicsx import BodySettings
-from fem_reference.solvers.scikit_fem import BodySettings as OtherSettings
+from fem_reference.solvers.scikit_fem import ScikitBodySettings as OtherSettings
 from fem_reference.solvers.scikit_fem import solve_body
 from tests.solvers.fenicsx.test_stability import LENGTH, STILL, THIN, column, critical, effect, flesh, session  # noqa: F401 - a fixture
 

@@ -29,7 +29,7 @@ DIFFUSION = {"name": "diffusion", "coefficient": 0.7}
 def assert_agrees(problem: FieldProblem) -> Solution:
     """Both discretisations are the same and their quadrature exact for the formulas here: they differ by rounding, 1e-9 at most."""
     solution = fenicsx.solve_field(problem, FieldSettings())
-    peer = scikit_fem.solve_field(problem, scikit_fem.FieldSettings())
+    peer = scikit_fem.solve_field(problem, scikit_fem.ScikitFieldSettings())
     assert (solution.outcome.status, peer.outcome.status) == ("converged", "converged")
     assert np.abs(solution.values - peer.values).max() <= 1e-9 * np.abs(peer.values).max()
     assert solution.outcome.cost["unknowns"] == peer.outcome.cost["unknowns"]

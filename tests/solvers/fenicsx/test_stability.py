@@ -15,11 +15,10 @@ from fem_reference.foundations.records import parse
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
-from fem_reference.problems.paths import Affine, Rest
+from fem_reference.problems.paths import Affine, Along, Rest
 from fem_reference.runs.store import Frame
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import BodySettings, Settings
-from fem_reference.studies.hard.blocks import Along
 from fem_reference.verification.parts import SYMMETRY
 
 pytestmark = pytest.mark.slow

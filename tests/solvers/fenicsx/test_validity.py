@@ -174,7 +174,7 @@ def test_a_body_that_collapses_ends_as_collapsed(element, session) -> None:
 
 
 def test_a_low_determinant_at_a_vertex_is_no_collapse(fem_lab) -> None:
-    solved = squeeze._glued(fem_lab, "P2/P1", 2, squeeze.GLUED_TO)
+    solved = squeeze.glued(fem_lab, "P2/P1", 2, squeeze.GLUED_TO)
     assert solved.outcome.status == "converged"
     assert "outside" not in solved.outcome.message
     scalars = solved.last.scalars

@@ -14,7 +14,7 @@ from fem_reference.problems.checks import check
 from fem_reference.problems.paths import Affine, Turn
 from fem_reference.scenes import casefile
 from fem_reference.solvers.fenicsx import BodySettings
-from fem_reference.solvers.scikit_fem import BodySettings as OtherSettings
+from fem_reference.solvers.scikit_fem import ScikitBodySettings as OtherSettings
 from fem_reference.solvers.scikit_fem import solve_body
 from fem_reference.verification.parts import SYMMETRY
 from tests.solvers.fenicsx.test_stability import STILL, THIN, column, critical, effect, flesh, session  # noqa: F401 - a fixture

@@ -10,13 +10,13 @@ from scipy.sparse.linalg import eigsh
 from fem_reference.geometry.lagrange import l2_distance
 from fem_reference.problems.scalar import at, build
 from fem_reference.solvers import scikit_fem
-from fem_reference.solvers.scikit_fem import FieldSettings
+from fem_reference.solvers.scikit_fem import ScikitFieldSettings
 
 ENDS = [{"on": "left", "value": 0}, {"on": "right", "value": 1}]
 
 
 def solved(problem):
-    solution = scikit_fem.solve_field(problem, FieldSettings())
+    solution = scikit_fem.solve_field(problem, ScikitFieldSettings())
     assert solution.outcome.status == "converged"
     return solution.values
 
@@ -179,7 +179,7 @@ def test_a_matrix_without_a_solution_is_a_status(tmp_path) -> None:
         effect=[DIFFUSION, {"name": "reaction", "rate": -10.8}],
         boundary=[{"on": "left", "value": 0}, {"on": "right", "value": 0}],
     )
-    solution = scikit_fem.solve_field(build(scene), FieldSettings())
+    solution = scikit_fem.solve_field(build(scene), ScikitFieldSettings())
     assert solution.outcome.status == "diverged"
     assert "no unique solution" in solution.outcome.message
     assert np.isnan(solution.values).all()

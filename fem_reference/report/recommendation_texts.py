@@ -1,0 +1,74 @@
+"""A recommended setting in words: as text and as JSON."""
+
+from fem_reference.assessment.recommendation import Expected, Recommendation
+from fem_reference.report.study_page import title_of
+from fem_reference.report.words import duration, listed, number
+
+
+def facts(found: Recommendation, metric: str) -> dict[str, object]:
+    """A recommendation as valid JSON."""
+    best, near = found.best, found.nearest
+    return {
+        "metric": metric,
+        "recommended": None if best is None else best.point.choice,
+        "error": None if best is None else best.error,
+        "bar": None if best is None or not found.measured else best.bar,
+        "seconds_per_frame": None if best is None else best.time,
+        "nearest": None
+        if near is None
+        else {"choice": near.point.choice, "error": near.error, "bar": near.bar, "seconds_per_frame": near.time},
+        "settings_considered": found.count,
+        "measured_on": list(found.of),
+        "margin_error": found.margins.error,
+        "margin_time": found.margins.time,
+    }
+
+
+def text(found: Recommendation, case: str, metric: str, unit: str, limit: float) -> str:
+    """The setting, its error in a ``unit`` and its time, and the cases it was measured on. Where none meets the ``limit`` of the
+    error (infinite without one), the nearest.
+    """
+    alike = "the studied case" if len(found.of) == 1 else "the studied cases"
+    measured = "measured on it" if found.measured else f"expected from {listed(list(found.of))}, {alike} most like it"
+    one, lines = found.best or found.nearest, list[str]()
+    if found.best is None:
+        lines.append(f"none of {found.count} settings meets what is asked on {case} ({measured})")
+    if one is None:
+        return lines[0]
+    lines.append(f"{'' if found.best else 'the nearest: '}{one.point.solver}: {_settings(one)}")
+    error = f"{title_of(metric)} at most {number(one.error)} {unit}{_parts(one, unit, measured=found.measured)}"
+    lines.append(f"{error}, {duration(one.time)} a frame, {measured}")
+    if found.best is None and found.measured:
+        lines += _reason(one, unit, limit)
+    if not found.measured:
+        margins = found.margins
+        lines.append(f"margins in it: {number(margins.error)} times the error, {number(margins.time)} times the time")
+    return "\n".join(lines)
+
+
+def _parts(one: Expected, unit: str, *, measured: bool) -> str:
+    """The parts of an error: measured on the case itself, and the bar of the truth."""
+    if not measured:
+        return " with margins and the bars of the truths"
+    if not one.bar > 0:
+        return " (as measured: the truth has no error bar)"
+    if one.point.is_truth:
+        return " (the truth itself, by its error bar)"
+    return f" ({number(one.error - one.bar)} {unit} measured, and {number(one.bar)} {unit}, the error bar of the truth)"
+
+
+def _reason(one: Expected, unit: str, limit: float) -> list[str]:
+    """The bar of the truth as the reason why the nearest setting does not meet the ``limit`` of the error, where it is that."""
+    if one.bar >= limit:
+        known = f"{number(one.bar)} {unit}"
+        return [f"the truth is known no better than {known}: nothing can be said to be nearer than that"]
+    if one.error > limit >= one.error - one.bar:
+        within = f"{number(limit)} {unit}"
+        return [f"without the bar it would be within the {within}: the truth is not known well enough to say so"]
+    return []
+
+
+def _settings(one: Expected) -> str:
+    choice = {name: value for name, value in one.point.choice.items() if name not in ("solver", "scene", "name")}
+    changed = one.point.choice.get("scene", {})
+    return ", ".join(f"{name} = {value}" for name, value in (*changed.items(), *choice.items())) or one.point.label

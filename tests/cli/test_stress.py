@@ -1,0 +1,32 @@
+"""The verb ``stress``: its page, and runs that nobody would make."""
+
+import json
+
+import pytest
+
+from fem_reference import cli
+
+
+@pytest.mark.parametrize(
+    ("words", "got"),
+    [
+        (["--jitters", "-1"], "--jitters: got -1, want 0 or more"),
+        (["--steps", "--solver", "pbd"], "--steps: got it with pbd alone, want --solver fenicsx too"),
+        (["--jitters", "2", "--solver", "pbd", "--solver", "arap"], "--jitters: got it with pbd, arap alone, want"),
+    ],
+)
+def test_runs_of_the_reference_that_nobody_would_make_are_refused(words, got, tmp_path, capsys) -> None:
+    assert cli.main(["stress", "at_rest.millimetres", "--out", str(tmp_path), *words]) == cli.BAD_INPUT
+    assert got in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_verb_and_its_page(tmp_path, capsys) -> None:
+    words = ["stress", "at_rest.millimetres", "--solver", "pbd", "--solver", "xpbd", "--out", str(tmp_path)]
+    assert cli.main([*words, "--json", str(tmp_path / "facts.json"), "--quiet"]) == cli.DONE
+    assert "1 hard cases by 2 solvers: 2 ok, 0 degraded, 0 failed, 0 refused, 0 inconclusive" in capsys.readouterr().out
+    page = (tmp_path / "stress-at_rest.millimetres-pbd-xpbd.html").read_text(encoding="utf-8")
+    assert page.count('class="cell"') == 2
+    assert page.count('src="data:image/webp') == 2
+    facts = json.loads((tmp_path / "facts.json").read_text())
+    assert [entry["verdict"] for entry in facts["cells"]] == ["ok", "ok"]

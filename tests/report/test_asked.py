@@ -1,0 +1,94 @@
+"""Pages have names that hold what makes them different, and none is lost to another."""
+
+import re
+from pathlib import Path
+
+import pytest
+import small
+import stand_ins
+
+from fem_reference import cli
+from fem_reference.cli import demo
+from fem_reference.report import index_page, pages
+from fem_reference.report.asked import LONGEST, Asked, Part, written
+from fem_reference.report.pages import About
+from fem_reference.report.templates import template
+from fem_reference.solvers import fenicsx, pbd
+from tests.report import test_headline
+
+TEXT = template("index_page.html").render(entries=[], others=[])
+
+
+def put(folder: Path, name: str, command: str) -> Path:
+    """A page as a verb writes it."""
+    path = folder / f"{name}.html"
+    path.write_text(pages.stamped(TEXT, About("study", "A title", (), command)), encoding="utf-8")
+    return path
+
+
+def test_the_name_holds_what_makes_the_page_different_and_ends_somewhere() -> None:
+    parts = (
+        Part(("bar",)),
+        Part(("--set", "muscle.tet_size=8 mm"), "muscle.tet_size=8 mm"),
+        Part(("--candidate", "x"), "x"),
+    )
+    asked = Asked("compare", "bar", parts, "report")
+    assert asked.name == "bar-muscle.tet_size=8mm-x"
+    assert asked.command == "fem-reference compare bar --set 'muscle.tet_size=8 mm' --candidate x"
+    long, other = (Asked("compare", "bar", (Part((), "long" * 40), Part((), last)), "report").name for last in "ab")
+    assert len(long) == LONGEST
+    assert long != other
+
+
+def test_where_the_index_cannot_be_written_the_page_is(tmp_path: Path, monkeypatch) -> None:
+    def refuse(_: Path) -> None:
+        raise OSError("no room")
+
+    monkeypatch.setattr(index_page, "write", refuse)
+    path, lines = written(Asked("study", "study"), tmp_path, None, put)
+    assert path.is_file()
+    assert lines == [f"page: {path}", "  no index: no room"]
+
+
+def test_the_command_that_made_a_page_makes_it_anew(tmp_path: Path) -> None:
+    asked = Asked("study", "study", ())
+    assert written(asked, tmp_path, None, put) == (tmp_path / "study.html", [f"page: {tmp_path / 'study.html'}"])
+    assert len(written(asked, tmp_path, None, put)[1]) == 2
+    assert written(asked, tmp_path, "mine", put)[0] == tmp_path / "mine.html"
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("without_pictures")
+def test_runs_that_differ_leave_pages_beside_each_other(tmp_path: Path, monkeypatch, capsys) -> None:
+    stand_ins.solve_by(monkeypatch, fenicsx, test_headline.still)
+    stand_ins.unchecked(monkeypatch)
+    stand_ins.solve_by(monkeypatch, pbd, test_headline.shift)
+    case, out = small.write(tmp_path / "bar"), tmp_path / "out"
+    common = [str(case), "--out", str(out), "--quiet"]
+
+    def call(*words: str) -> list[str]:
+        cli.main([words[0], *common, *words[1:]])
+        return [line for line in capsys.readouterr().out.splitlines() if "page" in line]
+
+    def page(name: str) -> str:
+        return f"page: {out / name / 'report.html'}"
+
+    assert call("compare") == [page("bar")]
+    assert call("compare", "--limit", "volume.deviation=1 %")[0] == page("bar")
+    assert call("run") == [page("bar-reference")]
+    monkeypatch.setattr(demo, "MAIN_JOB", str(case))
+    assert cli.main(["demo", "--out", str(out), "--quiet"]) == cli.DONE  # it is the same as to compare
+    assert "written anew" in capsys.readouterr().out
+    assert call("compare", "--set", "frames.every=10") == [page("bar-frames.every=10")]
+    assert call("run", "--negative-control") == [page("bar-negative_control-reference")]
+    assert call("compare", "--name", "mine") == [page("mine")]
+    (again, note) = call("compare", "--name", "mine")
+    assert (again, note.startswith("  written anew")) == (page("mine"), True)
+    assert call("run", "--name", "mine") == [page("mine-2")]
+    text = (out / "index.html").read_text()
+    names = re.findall(r'<a href="([^"]*)">', text)
+    assert len(names) == 6
+    assert (out / "bar" / "measures.json").is_file()
+    for bad in ("runs", "a/b", "", "x" * 101):
+        assert cli.main(["compare", *common, "--name", bad]) == cli.BAD_INPUT
+        assert "--name" in capsys.readouterr().err

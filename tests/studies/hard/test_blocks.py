@@ -1,0 +1,51 @@
+"""Blocks are whole, held where they can be, and moved at random alike."""
+
+import numpy as np
+import pytest
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import tet_volumes
+from fem_reference.problems.muscle_body import as_body
+from fem_reference.studies.hard import blocks, choosing, records, running
+
+CASES = {hard.name: hard for hard in records.read_all()}
+
+
+@pytest.mark.parametrize("hard", [hard for hard in CASES.values() if hard.block], ids=lambda hard: hard.name)
+def test_blocks_are_whole(hard) -> None:
+    problem = blocks.problem(hard)
+    assert tet_volumes(problem.mesh.points, problem.mesh.tets).min() > 0
+    assert all(len(problem.mesh.facets[entry.attachment]) for entry in problem.attached)
+    assert np.isin(problem.surface.points, problem.mesh.points).all()
+    assert hard.healthy
+
+
+def test_holds_that_would_tear_an_edge_are_refused() -> None:
+    """Whichever came last would win at the vertices that faces share."""
+    hard = CASES["twist.whole_turn"]
+    bottom, top = hard.hold
+    for other in ("x0", "y1"):
+        torn = hard.model_copy(update={"hold": (top, bottom.model_copy(update={"face": other}))})
+        with pytest.raises(
+            InputError, match=rf"hold\[1\]\.face: got {other}, which shares 4 vertices with z1 and moves other"
+        ):
+            blocks.problem(torn)
+        found = running.cell(running.Posed(torn), choosing.choices()["pbd"])
+        assert (found.verdict, "moves otherwise" in found.sentence) == ("refused", True)
+    # Faces that move alike may meet, as may the middle of one.
+    alike = (top, top.model_copy(update={"face": "x0"}))
+    assert len(blocks.problem(hard.model_copy(update={"hold": alike})).attached) == 2
+    middle = (top, bottom.model_copy(update={"face": "x0", "middle": True}))
+    assert len(blocks.problem(hard.model_copy(update={"hold": middle})).attached) == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "got", "want"),
+    [
+        ("bones.deep_overlap", "5.9 mm of overlap with the muscle at rest", "its middle is 6 mm deep"),
+        ("degenerate.coincident", r"2.8e\+07 times as long as thick", "double precision"),
+    ],
+)
+def test_what_no_mesh_and_no_direction_resolves_is_refused(name, got, want) -> None:
+    with pytest.raises(InputError, match=f"got {got}, want less.*{want}"):
+        as_body(blocks.problem(CASES[name]))
