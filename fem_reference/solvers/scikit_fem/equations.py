@@ -1,4 +1,4 @@
-"""The equations of a body: out-of-balance forces and their tangent, summed from what acts, each differentiated by jets."""
+"""The equations of a body: residual and tangent, summed from what acts, each differentiated by jets."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -63,7 +63,7 @@ class Equations:
         self.stabilising = self._projection() if is_stabilised(element) else None
 
     def assembled(self, unknowns: Floats, frame: float, springs: bool = True) -> tuple[Floats, Any]:
-        """The out-of-balance forces (N,) [N, mm3] and their tangent (N, N), with the pull of ``springs`` or without."""
+        """The residual (N,) [N, mm3] and its tangent (N, N), with the pull of ``springs`` or without."""
         residual = np.zeros(len(unknowns))
         blocks = []
         for part in self.parts + (self.springs if springs else []):

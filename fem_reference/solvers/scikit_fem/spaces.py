@@ -67,7 +67,7 @@ class Points:
 
     @property
     def rates(self) -> Floats:
-        """How the variables at each point change with the unknowns of its cell, (m, q, 13, 3 k + l)."""
+        """The slopes of the variables at each point by the unknowns of its cell, (m, q, 13, 3 k + l)."""
         m, q, k = self.values.shape
         rates = np.zeros((m, q, VARIABLES, 3 * k + self.pressures.shape[2]))
         for i in range(3):
@@ -123,7 +123,7 @@ class Space:
         return self._points(corners, np.ones(corners.shape[1]), np.arange(len(self.corners)))
 
     def sides(self, region: str) -> list[tuple[Ints, Ints]]:
-        """By number of the side in the reference cell: its corners there, and the cells that have it in ``region``."""
+        """The sides in the reference cell: their corners there, and the cells that have it in ``region``."""
         wanted = np.unique(np.sort(self.cells.facets[region], axis=1), axis=0)
         found = []
         for side in self.nodal.refdom.facets:
