@@ -63,8 +63,9 @@ class Iteration:
             raise NotImplementedError(str(error)) from error
         self.solver = SOLVERS[solver].solver
         self.settings = self.bench.settings(SOLVERS[solver], solver)
-        self.made: Any = self.bench.given(solvers.find(self.solver, self.solver), self.settings)
-        spent(self.solver, self.settings, self.made, WARM_UP)
+        made: Any = self.bench.given(solvers.find(self.solver, self.solver), self.settings)
+        self.made = made
+        spent(self.solver, self.settings, made, WARM_UP)
 
     @over(case=CASES, solver=SOLVERS)
     def track_seconds(self, case: str, solver: str) -> float:  # noqa: ARG002

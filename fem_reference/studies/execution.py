@@ -82,6 +82,10 @@ class Bench[C: Case]:
         """The problem of the case, meshed."""
         return self._problem()
 
+    def watch(self) -> Watch | None:
+        """The watch for effects that the case left out; None where it left out none."""
+        return self._watch()
+
     def of_muscle(self) -> "Bench[MuscleCase]":
         """The bench itself, where its case is one of a muscle; else InputError."""
         casefile.muscle(self.scene)
