@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from fem_reference.assessment.baseline import SAMPLED
 from fem_reference.assessment.versions import ORDER, Change, Versions
 from fem_reference.foundations.mesh import Floats
-from fem_reference.problems.muscle import Setup
+from fem_reference.problems.setup import Setup
 from fem_reference.report import gallery
 from fem_reference.report.at_frames import label
 from fem_reference.report.drawings import BAND, PALETTE, Drawing, over_frames

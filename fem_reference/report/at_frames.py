@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fem_reference.foundations.motion import Rotation, Translation
-from fem_reference.problems.muscle import RigidBody
+from fem_reference.problems.setup import RigidBody
 from fem_reference.report.words import number
 from fem_reference.scenes.case import Case
 

@@ -10,7 +10,8 @@ from fem_reference.assessment.comparison import Alone, Comparison
 from fem_reference.assessment.error_bars import ErrorBar
 from fem_reference.assessment.judge import Verdict
 from fem_reference.metrics import Measure, described, find
-from fem_reference.problems.description import contents
+from fem_reference.problems import of_case
+from fem_reference.problems.of_case import CaseSetup
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case, Expectation
 
@@ -18,13 +19,13 @@ from fem_reference.scenes.case import Case, Expectation
 PRINTED = tuple(key for key in described("table") if not key[1].endswith("_percent"))
 
 
-def case_facts(case: Case, setup: Any) -> dict[str, Any]:
+def case_facts(case: Case, setup: CaseSetup) -> dict[str, Any]:
     """Everything that a person asks of a case before solving it, as words and numbers by name."""
     return {
         "case": case.name,
         "title": case.title,
         "proves": case.proves,
-        **contents(setup, case),
+        **of_case.facts(case, setup),
         "reference": " ".join([case.reference.solver, *(f"{k}={v}" for k, v in case.reference.settings.items())]),
         "candidates": {candidate.name: candidate.solver for candidate in case.candidate},
         "expects": [f"{_what(e)}: {e.truth} within {e.within} ({e.kind})" for e in case.expect],

@@ -20,7 +20,7 @@ from fem_reference.assessment import local_fields
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.mesh import Floats, Polylines
 from fem_reference.metrics import MeasurementContext
-from fem_reference.problems.muscle import RigidBody
+from fem_reference.problems.setup import RigidBody
 from fem_reference.report.at_frames import motions
 from fem_reference.report.tables import finite
 from fem_reference.runs.store import Run

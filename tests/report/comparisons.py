@@ -12,7 +12,7 @@ from fem_reference.assessment.error_bars import ErrorBar, ErrorBars, Of
 from fem_reference.assessment.judge import Verdict
 from fem_reference.foundations.mesh import Polylines, Surface
 from fem_reference.metrics import Measure, MeasurementContext
-from fem_reference.problems.muscle import RigidBody, Setup
+from fem_reference.problems.setup import RigidBody, Setup
 from fem_reference.report import comparison_page, gallery
 from fem_reference.runs.store import Outcome, Run
 from fem_reference.scenes import casefile

@@ -1,54 +1,49 @@
-"""A recommended setting in words: its error, its time, and the reason where none meets the limit."""
+"""A recommended setting in words: its error with the bar of the truth, and the reason where none is near enough."""
 
-import json
+import math
 
 import pytest
 
-from fem_reference.assessment.fronts import Point
-from fem_reference.assessment.recommendation import Expected, Margins, Recommendation
-from fem_reference.report import recommendation_texts
-
-NAME = "surface_deviation.rms"
-POINT = Point("hip", "pbd", "pbd", "sweeps", "8", {"solver": "pbd", "sweeps": 8}, "converged", "", {NAME: 1.5}, {})
-ONE = Expected(POINT, 2.0, 0.25, ("hip",), 0.5)
+from fem_reference.assessment.recommendation import recommend
+from fem_reference.report.recommendation_texts import facts, text
+from tests.assessment.test_recommendation import RMS, features, own_study
 
 
-def text(found: Recommendation, limit: float = float("inf")) -> list[str]:
-    return recommendation_texts.text(found, "hip", NAME, "mm", limit).splitlines()
-
-
-def test_a_setting_that_was_measured_on_the_case_has_its_error_in_parts() -> None:
-    found = Recommendation(ONE, None, 7, Margins(), ("hip",), measured=True)
-    parts = "(1.50 mm measured, and 0.500 mm, the error bar of the truth)"
-    error = f"surface deviation, rms at most 2 mm {parts}, 250 ms a frame, measured on it"
-    assert text(found) == ["pbd: sweeps = 8", error]
-    facts = json.loads(json.dumps(recommendation_texts.facts(found, NAME), allow_nan=False))
-    assert (facts["recommended"], facts["error"], facts["bar"], facts["nearest"]) == (POINT.choice, 2.0, 0.5, None)
-
-
-def test_what_is_expected_from_other_cases_names_them_and_the_margins() -> None:
-    found = Recommendation(ONE, None, 7, Margins(1.5, 2.0), ("knee", "jaw"), measured=False)
-    *_, error, margins = text(found)
-    assert error.endswith("expected from knee and jaw, the studied cases most like it")
-    assert margins == "margins in it: 1.50 times the error, 2 times the time"
-    assert recommendation_texts.facts(found, NAME)["bar"] is None
+def said(bar: float, **limits: float) -> str:
+    """The words on the case that was studied."""
+    found = recommend(features(50), "bar", [own_study(features(50), bar=bar)], RMS, limits)
+    return text(found, "bar", RMS, "mm", limits.get("error", math.inf))
 
 
 @pytest.mark.parametrize(
-    ("limit", "reason"),
+    ("bar", "words"),
     [
-        (0.4, "the truth is known no better than 0.500 mm: nothing can be said to be nearer than that"),
-        (1.8, "without the bar it would be within the 1.80 mm: the truth is not known well enough to say so"),
+        (
+            2.0,
+            "surface deviation, rms at most 7 mm (5 mm measured, and 2 mm, the error bar of the truth), 3 ms a frame",
+        ),
+        (0.0, "surface deviation, rms at most 5 mm (as measured: the truth has no error bar), 3 ms a frame"),
     ],
 )
-def test_where_none_meets_the_limit_the_nearest_and_the_reason_are_named(limit: float, reason: str) -> None:
-    lines = text(Recommendation(None, ONE, 7, Margins(), ("hip",), measured=True), limit)
-    assert lines[0] == "none of 7 settings meets what is asked on hip (measured on it)"
-    assert lines[1] == "the nearest: pbd: sweeps = 8"
-    assert lines[-1] == reason
+def test_an_error_is_shown_with_the_bar_and_without(bar: float, words: str) -> None:
+    assert said(bar, error=7.0) == f"pbd: sweeps = 3\n{words}, measured on it"
 
 
-def test_without_any_setting_one_sentence_stands_there() -> None:
-    found = Recommendation(None, None, 0, Margins(), ("hip",), measured=True)
-    assert text(found) == ["none of 0 settings meets what is asked on hip (measured on it)"]
-    assert recommendation_texts.facts(found, NAME)["recommended"] is None
+def test_the_reason_is_the_bar_where_it_is() -> None:
+    assert "without the bar it would be within the 2.50 mm" in said(2.0, error=2.5, time=0.01)
+    assert "the truth is known no better than 2 mm" in said(2.0, error=1.0)
+    nearest = said(2.0, time=0.0005)
+    assert nearest.splitlines()[1] == "the nearest: pbd: sweeps = 1"
+    assert "bar it would" not in nearest
+
+
+def test_facts_have_the_nearest_where_none_is_good_enough() -> None:
+    found = recommend(features(50), "bar", [own_study(features(50), bar=2.0)], RMS, {"error": 2.5, "time": 0.01})
+    table = facts(found, RMS)
+    assert (table["recommended"], table["error"], table["settings_considered"]) == (None, None, 4)
+    assert table["nearest"] == {
+        "choice": {"solver": "pbd", "sweeps": 10},
+        "error": 3.0,
+        "bar": 2.0,
+        "seconds_per_frame": 0.01,
+    }

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import shapes
 
-from fem_reference.problems.muscle import RigidBody
+from fem_reference.problems.setup import RigidBody
 from fem_reference.report import comparison_page, viewer, viewer_fields
 from tests.report.comparisons import NAN, NUMBERS, html
 from tests.report.packed import positions, top, unpacked

@@ -1,6 +1,5 @@
-"""Contents of a case in words and numbers, as a person asks for them before it is solved."""
+"""The contents of a case in words and numbers: what a person asks of it before solving it."""
 
-from functools import singledispatch
 from typing import Any
 
 import numpy as np
@@ -10,20 +9,14 @@ from fem_reference.foundations.markup import exact
 from fem_reference.foundations.mesh import Surface, enclosed_volume
 from fem_reference.foundations.motion import RigidMotion, Translation
 from fem_reference.geometry.sectors import attached_area, attached_shares
-from fem_reference.problems.muscle import AttachedVertices, RigidBody, Setup
 from fem_reference.problems.scalar import FieldProblem
+from fem_reference.problems.setup import AttachedVertices, RigidBody, Setup
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
 
 
-@singledispatch
-def contents(setup: object, case: Case) -> dict[str, Any]:
-    """The contents of a case by name, from its ``setup``: meshes, bones, attachments, effects and frames."""
-    raise TypeError(f"{type(setup).__name__} is no setup of {case.name}")
-
-
-@contents.register
-def _(setup: Setup, case: MuscleCase) -> dict[str, Any]:
+def of_muscle(setup: Setup, case: MuscleCase) -> dict[str, Any]:
+    """The muscle, its bones, attachments, effects and frames."""
     surface = setup.surface
     return {
         "muscle": {
@@ -45,8 +38,8 @@ def _(setup: Setup, case: MuscleCase) -> dict[str, Any]:
     }
 
 
-@contents.register
-def _(setup: FieldProblem, case: Case) -> dict[str, Any]:
+def of_field(setup: FieldProblem, case: Case) -> dict[str, Any]:
+    """The domain, the element, the weak form and the effects."""
     mesh, fixed = setup.mesh, int(np.isfinite(setup.fixed).sum())
     return {
         "domain": f"{len(mesh.cells)} cells, {len(mesh.points)} vertices, size {mesh.sizes.sum():.6g}",
@@ -68,7 +61,7 @@ def _parameters(effect: Effect) -> dict[str, str]:
 
 
 def _shape(bone: RigidBody) -> str:
-    """The number of triangles of a bone, or its closed form."""
+    """How fine the surface of a bone is, or what its closed form is."""
     if bone.solid is None:
         return f"{len(bone.surface.triangles)} triangles"
     kind = "".join(f" {letter.lower()}" if letter.isupper() else letter for letter in type(bone.solid).__name__)
