@@ -15,7 +15,7 @@ from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
 
 
-def of_muscle(setup: Setup, case: MuscleCase) -> dict[str, Any]:
+def of_muscle(setup: Setup, case: MuscleCase) -> dict[str, object]:
     """The muscle, its bones, attachments, effects and frames."""
     surface = setup.surface
     return {
@@ -38,7 +38,7 @@ def of_muscle(setup: Setup, case: MuscleCase) -> dict[str, Any]:
     }
 
 
-def of_field(setup: FieldProblem, case: Case) -> dict[str, Any]:
+def of_field(setup: FieldProblem, case: Case) -> dict[str, object]:
     """The domain, the element, the weak form and the effects."""
     mesh, fixed = setup.mesh, int(np.isfinite(setup.fixed).sum())
     return {

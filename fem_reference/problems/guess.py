@@ -1,7 +1,6 @@
 """Where a muscle goes by the motion of its bones, guessed before it is solved, and its shape as a beam."""
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -76,9 +75,9 @@ def strain(points: Floats, moved: Floats) -> float:
     return float(min(1.0, np.linalg.norm(now - turned) / np.linalg.norm(rest)))
 
 
-def rms(vectors: Floats) -> Any:
+def rms(vectors: Floats) -> Floats:
     """The root mean square of ``vectors`` (n, 3), or (f,) of (f, n, 3), over n."""
-    return np.sqrt((vectors**2).sum(axis=-1).mean(axis=-1))
+    return np.asarray(np.sqrt((vectors**2).sum(axis=-1).mean(axis=-1)))
 
 
 def centres(rest: Setup, frame: float | None = None) -> list[Floats]:

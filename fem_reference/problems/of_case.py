@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Callable
-from typing import Any, Protocol, overload
+from typing import Protocol, overload
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.geometry.exemption import Exemption
@@ -68,7 +68,7 @@ def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[
     return decisions(case, known)
 
 
-def facts(case: Case, setup: CaseSetup) -> dict[str, Any]:
+def facts(case: Case, setup: CaseSetup) -> dict[str, object]:
     """Everything that a person asks of what a case is made of, as words and numbers by name."""
     if isinstance(case, MuscleCase) and isinstance(setup, Setup):
         return contents.of_muscle(setup, case)
@@ -76,7 +76,7 @@ def facts(case: Case, setup: CaseSetup) -> dict[str, Any]:
     return contents.of_field(setup, case)
 
 
-def known(case: Case, setup: CaseSetup) -> dict[str, Any]:
+def known(case: Case, setup: CaseSetup) -> dict[str, object]:
     """What the motion of its bones does to a muscle, and why it needs its effects, in words; nothing of a scalar field."""
     if not isinstance(case, MuscleCase) or not isinstance(setup, Setup):
         return {}

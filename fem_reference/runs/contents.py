@@ -25,6 +25,8 @@ Status = Literal[
     "stopped",
 ]
 FORMAT = 1
+# The contents of run.json while a run is made.
+RunJson = dict[str, Any]
 
 
 class Origin(Record):

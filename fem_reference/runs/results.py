@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fem_reference.effects import Effect, State
 from fem_reference.foundations.errors import InputError
@@ -56,7 +57,7 @@ class Results:
         """The frame numbers that there are."""
         return tuple(self.states)
 
-    def evaluate(self, points: Any, frame: float, names: Sequence[str] | None = None) -> dict[str, Floats]:
+    def evaluate(self, points: ArrayLike, frame: float, names: Sequence[str] | None = None) -> dict[str, Floats]:
         """Results at points inside the muscle.
 
         Parameters

@@ -30,7 +30,7 @@ from fem_reference.scenes import casefile
 from fem_reference.scenes.case import MACHINE_ONLY, Case, SolverChoice
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import recorded
-from fem_reference.solvers.common.protocol import Solver
+from fem_reference.solvers.common.protocol import AnySolver
 from fem_reference.studies import expected_cost, run_folders, watched
 
 log = logging.getLogger(__name__)
@@ -43,7 +43,7 @@ class Wanted:
     name: str
     choice: SolverChoice
     place: str
-    offer: Solver[Any, Any]
+    offer: AnySolver
     settings: Record
     folder: Path
 
@@ -198,7 +198,7 @@ class Bench[C: Case]:
         _write(Writer(wanted.folder, identity, given.rest), wanted, given, self._watched(wanted.choice.solver))
         return store.load(wanted.folder)
 
-    def given(self, offer: Solver[Any, Any], settings: Record) -> CaseSetup:
+    def given(self, offer: AnySolver, settings: Record) -> CaseSetup:
         """What a solver is given: the problem, or the setup of a muscle that it does not need filled."""
         return self._problem() if offer.fills(settings) else self._setup()
 
@@ -220,7 +220,7 @@ class Bench[C: Case]:
         numerics = {name: value for name, value in settings.model_dump(mode="json").items() if name not in MACHINE_ONLY}
         return key(self.scene.key, solver, numerics)
 
-    def origin(self, solver: str, settings: Record) -> dict[str, Any]:
+    def origin(self, solver: str, settings: Record) -> dict[str, object]:
         """Where a run comes from, for people and for doubt."""
         acting = self.scene.acting if self.scene.task != "solve" or solvers.takes_effects(solver) else {}
         return {

@@ -122,6 +122,9 @@ class BodySolver[S: Record](Solver[Body, S]):
     solves = "finite element bodies"
 
 
+AnySolver = Solver[Any, Any]
+
+
 def solved[P, S: Record](solve: Solve[P, S], problem: P, settings: S) -> Run:
     """The run of a problem, in memory."""
     frames: list[Frame] = []
