@@ -61,7 +61,7 @@ def _parameters(effect: Effect) -> dict[str, str]:
 
 
 def _shape(bone: RigidBody) -> str:
-    """How fine the surface of a bone is, or what its closed form is."""
+    """The fineness of the surface of a bone, or its closed form."""
     if bone.solid is None:
         return f"{len(bone.surface.triangles)} triangles"
     kind = "".join(f" {letter.lower()}" if letter.isupper() else letter for letter in type(bone.solid).__name__)

@@ -20,7 +20,7 @@ ENDED_EARLY = ("running", "crashed")
 
 @dataclass(frozen=True)
 class CutOff:
-    """What there is of a run: the ``numbers`` of its stored frames, none of one that begins, and the ``folder`` that its solver may
+    """The kept part of a run: the ``numbers`` of its stored frames, none of one that begins, and the ``folder`` that its solver may
     use until it ends.
     """
 
@@ -29,7 +29,7 @@ class CutOff:
 
 
 def stored(folder: Path, identity: RunJson) -> RunJson | None:
-    """What run.json says of a run in ``folder`` that was cut off and can go on as the one of ``identity``, if there is one."""
+    """The run.json of a run in ``folder`` that was cut off and can go on as the one of ``identity``, if there is one."""
     place = folder / "run.json"
     with suppress(InputError):
         state = texts.read_json(place, "a run")

@@ -101,7 +101,7 @@ def _module(package: Path, parts: list[str]) -> set[Path]:
 
 @cache
 def _imported(path: Path, package: Path) -> tuple[str, ...]:
-    """What the file at ``path`` imports of ``package``, anywhere in it: modules and what may be modules, without its name."""
+    """Names that the file at ``path`` imports of ``package``, anywhere in it: modules and what may be modules, without its name."""
     return tuple(_names(ast.parse(path.read_bytes()), path, package))
 
 

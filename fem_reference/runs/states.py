@@ -42,7 +42,7 @@ class NodalState:
 
     @property
     def arrays(self) -> Arrays:
-        """What is written of it, by name."""
+        """Arrays that are written, by name."""
         return {name: getattr(self, name) for name in _ARRAYS}
 
     @classmethod
