@@ -27,7 +27,7 @@ SOLVERS = {one.name: one for row in solver_kinds() for one in row.candidate}
 ITERATIONS, WARM_UP, REPEATS = 100, 2, 3
 
 
-def spent(solver: str, settings: Record, setup: muscles.Setup, iterations: int) -> float:
+def spent(solver: str, settings: Record, setup: Any, iterations: int) -> float:
     """Processor time [s] of so many iterations from the first frame; not a number where the solver failed."""
     first = setup.frames[0]
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.polynomial import Chebyshev
 from scipy.optimize import brentq, minimize_scalar
 
-from fem_reference.assessment.catalogue import Entry, Lab, Ladder
+from fem_reference.assessment.catalogue import Entry, Lab, Refinement
 from fem_reference.effects import Effect, make
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
@@ -37,7 +37,7 @@ Reading = tuple[
 
 
 def stretches(largest: float, count: int) -> tuple[float, ...]:
-    """From 1 to the largest, closer at both ends: where a polynomial through values is good in between."""
+    """Stretches from 1 to the largest, closer at both ends: where a polynomial through values is good in between."""
     along = (1 - np.cos(np.linspace(0, np.pi, count))) / 2
     return tuple((1 + (largest - 1) * along).tolist())
 
@@ -162,7 +162,7 @@ ENTRIES: tuple[Entry, ...] = (
         truth=lambda: true_pressure(laws.neo_hooke(MU)),
         within=2e-4,
         because="discretisation of order 4, 5e-5 with 6 cells through the wall; the polynomial of the energy adds 1e-6",
-        ladder=Ladder((1, 2, 3), INNER / 2, order=4),
+        refinement=Refinement((1, 2, 3), INNER / 2, order=4),
         slow=True,
         slow_negative_control=True,
     ),
@@ -177,7 +177,7 @@ ENTRIES: tuple[Entry, ...] = (
         truth=lambda: true_pressure(laws.neo_hooke(MU)),
         within=4e-4,
         because="discretisation of order 4, 1.1e-4 with 4 cells through the wall; the polynomial of the energy adds 1e-6",
-        ladder=Ladder((1, 2), INNER / 2, order=4),
+        refinement=Refinement((1, 2), INNER / 2, order=4),
         slow=True,
     ),
     FINITE(
@@ -205,7 +205,7 @@ ENTRIES: tuple[Entry, ...] = (
         truth=true_pressed,
         within=4e-4,
         because="discretisation of order 4, 8e-5 with 4 cells through the wall (P2/P1)",
-        ladder=Ladder((1, 2), INNER / 2, order=4),
+        refinement=Refinement((1, 2), INNER / 2, order=4),
     ),
     LIMIT(
         name="inflation_limit_pressure",
@@ -255,7 +255,7 @@ ENTRIES: tuple[Entry, ...] = (
         truth=lambda: true_tube(0),
         within=5e-5,
         because="discretisation of order 4, 1.1e-5 with 6 cells through the wall (Q2/Q1)",
-        ladder=Ladder((1, 2, 3), INNER / 2, order=4),
+        refinement=Refinement((1, 2, 3), INNER / 2, order=4),
         slow=True,
     ),
     FINITE(
@@ -269,6 +269,6 @@ ENTRIES: tuple[Entry, ...] = (
         truth=lambda: true_tube(1),
         within=5e-5,
         because="discretisation of order 4, 1e-5 with 6 cells through the wall (P2/P1)",
-        ladder=Ladder((1, 2, 3), INNER / 2, order=4),
+        refinement=Refinement((1, 2, 3), INNER / 2, order=4),
     ),
 )

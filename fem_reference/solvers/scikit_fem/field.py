@@ -156,7 +156,7 @@ def _slope_weights(basis: Any) -> Floats:
 
 
 def _order(problem: FieldProblem, basis: Any) -> Any:
-    """Which of scikit-fem's unknowns stands at each node of the problem."""
+    """The unknown of scikit-fem that stands at each node of the problem."""
     vertices = basis.nodal_dofs[0]
     if problem.order == 1:
         return vertices
@@ -170,7 +170,7 @@ def _order(problem: FieldProblem, basis: Any) -> Any:
 
 
 def _fluxes(problem: FieldProblem) -> Floats:
-    """What flows in over the boundary, (N,): the integral of k slope times each hat function, by Gauss's rule of 3 points."""
+    """The flow over the boundary (N,): the integral of k slope times each hat function, by Gauss's rule of 3 points."""
     b = np.zeros(len(problem.fixed))
     for flux in problem.fluxes:
         ends = problem.mesh.points[flux.facets]
