@@ -44,8 +44,8 @@ class Outline(Record):
 
 
 class Attachment(Record):
-    """Which part of the muscle surface is attached to a bone: exactly one of ``vertices``, ``within`` (of the bone), ``outline``;
-    and how: by springs of a ``stiffness`` over its area, without it exactly.
+    """The part of the muscle surface that is attached to a bone: exactly one of ``vertices``, ``within`` (of the bone),
+    ``outline``; and how: by springs of a ``stiffness`` over its area, without it exactly.
     """
 
     name: Name
@@ -151,7 +151,7 @@ class MuscleCase(Case):
 
     @property
     def facts(self) -> dict[str, str]:
-        """What the case is made of, in words, by name."""
+        """The contents of the case in words, by name."""
         return {
             "muscle": f"{self.muscle.surface}, tetrahedra of {self.muscle.tet_size / 2**self.muscle.refinements:g} mm",
             "bones": ", ".join(bone.name for bone in self.bone),
