@@ -7,7 +7,7 @@ from typing import Literal, Protocol
 
 from fem_reference.assessment.judge import judge
 from fem_reference.problems.body import Body
-from fem_reference.runs.solved import Solved
+from fem_reference.runs.store import Run
 
 Kind = Literal["closed form", "published", "second solver", "property"]
 
@@ -15,12 +15,12 @@ Kind = Literal["closed form", "published", "second solver", "property"]
 class Lab(Protocol):
     """The solvers that measure entries."""
 
-    def solve(self, body: Body, element: str, **settings: float) -> Solved:
+    def solve(self, body: Body, element: str, **settings: float) -> Run:
         """The states of ``body`` by the reference, FEniCSx, with an element of ``body.ELEMENTS``; settings as in
         ``BodySettings`` (first_step, smallest_step, newton_iterations, residual [N, mm3]).
         """
 
-    def second(self, body: Body, element: str, **settings: float) -> Solved:
+    def second(self, body: Body, element: str, **settings: float) -> Run:
         """The same by the second opinion, scikit-fem."""
 
 

@@ -11,7 +11,7 @@ from fem_reference.assessment.catalogue import Entry, Lab, Refinement
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
-from fem_reference.runs.solved import Reached
+from fem_reference.runs.store import Frame
 from fem_reference.verification.parts import neo_hooke, sliding
 from fem_reference.verification.truths import find
 
@@ -21,7 +21,7 @@ THICKNESS, LENGTH, WIDTH = 10.0, 20.0, 2.5  # [mm]
 ANGLE = 1.0  # [rad], between the ends: the faces are at 15.7 and 25.4 mm
 
 
-Reading = Callable[[Floats, Reached], float]
+Reading = Callable[[Floats, Frame], float]
 
 
 @dataclass(frozen=True)

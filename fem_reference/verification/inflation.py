@@ -17,7 +17,7 @@ from fem_reference.effects import Effect, make
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
 from fem_reference.problems.paths import Radial
-from fem_reference.runs.solved import Solved
+from fem_reference.runs.store import Run
 from fem_reference.verification.parts import SYMMETRY, clamped, mooney_rivlin, neo_hooke, ramp
 from fem_reference.verification.truths import find
 
@@ -48,10 +48,10 @@ def sphere(element: str, n: int, degree: int) -> Cells:
     return shapes.sphere_octant(INNER, OUTER, n, 2 * n, ELEMENTS[element][0], degree)
 
 
-def slope(solved: Solved) -> Chebyshev:
+def slope(solved: Run) -> Chebyshev:
     """The slope of the energy over the frames [N mm]."""
-    end = solved.last.frame
-    frames, energies = zip(*((state.frame, state.scalars["energy"]) for state in solved.states), strict=True)
+    end = solved.last.number
+    frames, energies = zip(*((state.number, state.scalars["energy"]) for state in solved.states), strict=True)
     return Chebyshev.fit(frames, energies, len(frames) - 1, domain=[frames[0], end]).deriv()
 
 
@@ -81,7 +81,7 @@ def pressed(lab: Lab, n: int, mu: float) -> float:
     return float(np.linalg.norm(state.points[inside], axis=1).mean() / INNER)
 
 
-def tube(lab: Lab, n: int, element: str, ends: tuple[str, ...] = ("bottom", "top"), degree: int = 2) -> Solved:
+def tube(lab: Lab, n: int, element: str, ends: tuple[str, ...] = ("bottom", "top"), degree: int = 2) -> Run:
     """A quarter of the tube, whose inner face is moved out to STRETCH, and whose ``ends`` stay in their planes."""
     mesh = shapes.tube_quarter(INNER, OUTER, LENGTH, (2 * n, 2 * n, 1), ELEMENTS[element][0], degree)
     grown = Prescribed("inner", "inner", (0, 1), Radial(1.0, (1.0, 1.0, 0.0), ((1.0, 0.0), (2.0, 1.0))))

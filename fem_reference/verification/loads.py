@@ -10,7 +10,7 @@ from fem_reference.effects import Effect, make
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
 from fem_reference.problems.paths import Turn
-from fem_reference.runs.solved import Solved
+from fem_reference.runs.store import Run
 from fem_reference.verification.homogeneous import BULK, MU, NEO, SIZE, STEPS, Specimen, stretch_entry
 from fem_reference.verification.parts import SURFACE, SYMMETRY, clamped, farthest, neo_hooke, ramp, sliding
 from fem_reference.verification.truths import find
@@ -55,7 +55,7 @@ def loaded(
     prescribed: tuple[Prescribed, ...],
     frames: int = 1,
     bulk: float = BULK,
-) -> Solved:
+) -> Run:
     """The states of a block under a ``load``, up to so many ``frames``."""
     body = Body(wet_block(wet), (*neo_hooke(MU, bulk), load), prescribed, tuple(range(frames + 1)))
     return lab.solve(body, "P2/P1", **STEPS)

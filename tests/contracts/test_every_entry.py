@@ -8,8 +8,7 @@ import pytest
 
 from fem_reference.assessment.catalogue import Entry, Kind, result
 from fem_reference.problems.body import Body
-from fem_reference.runs.solved import Reached, Solved
-from fem_reference.runs.store import Outcome
+from fem_reference.runs.store import Frame, Outcome, Run, collected
 from fem_reference.verification import runner
 
 ENTRIES = runner.entries()
@@ -53,16 +52,15 @@ class Reading:
     def __init__(self) -> None:
         self.cells = defaultdict[str, list[int]](list)
 
-    def solve(self, body: Body, element: str, **settings: float) -> Solved:  # noqa: ARG002
+    def solve(self, body: Body, element: str, **settings: float) -> Run:  # noqa: ARG002
         self.cells[body.mesh.kind].append(len(body.mesh.cells))
         around = {entry.name: np.ones(3) for entry in (*body.prescribed, *body.obstructions)}
-        return Solved(
-            tuple(
-                Reached(frame, body.mesh.points + (frame - body.frames[0]), around, around, defaultdict(lambda: 1.0))
-                for frame in body.frames
-            ),
-            Outcome("converged", "", {}),
-        )
+        points, scalars = body.mesh.points, defaultdict[str, float](lambda: 1.0)
+        states = [
+            Frame(number, points=points + (number - body.frames[0]), forces=around, moments=around, scalars=scalars)
+            for number in body.frames
+        ]
+        return collected(states, Outcome("converged", "", {}))
 
     second = solve
 

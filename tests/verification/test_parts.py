@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from fem_reference.runs.solved import Reached, Solved
 
 from fem_reference.problems.paths import Rest
-from fem_reference.runs.solved import Reached, Solved
 from fem_reference.runs.store import Outcome
 from fem_reference.verification import parts
 
