@@ -22,8 +22,8 @@ from fem_reference.geometry.signed_distance import Grid
 from fem_reference.geometry.skins import spacing
 from fem_reference.problems.body import Body
 from fem_reference.problems.checks import SAME
-from fem_reference.problems.muscle import AttachedVertices, Problem, RigidBody
-from fem_reference.runs.solved import Solved
+from fem_reference.problems.muscle import Problem
+from fem_reference.problems.setup import AttachedVertices, RigidBody
 from fem_reference.runs.store import Run
 
 # What is in place to this share of the size of a body is in place: rounding of what is stored is a thousandth of it.
@@ -78,28 +78,28 @@ RunChecks = tuple[RunCheck, ...]
 Nodes = Callable[[int], Floats | None]
 
 
-def of_body(body: Body, solved: Solved) -> RunChecks:
+def of_body(body: Body, solved: Run) -> RunChecks:
     """All states there and finite, and what is prescribed exactly met at its nodes."""
-    numbers, points = tuple(state.frame for state in solved.states), [state.points for state in solved.states]
+    numbers, points = tuple(state.number for state in solved.states), [state.points for state in solved.states]
     found = (_complete(body.frames, numbers), _finite(numbers, points))
     if not all(one.met for one in found):
         return found
     return (*found, *_worst(_prescribed(body, solved)))
 
 
-def _prescribed(body: Body, solved: Solved) -> Iterator[RunCheck]:
+def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
     begun = body.start is not None  # its first state is where it is put
     for state in solved.states[1:] if begun else solved.states:
         for entry in body.prescribed:
             if entry.stiffness is None and isinstance(entry.on, str):
                 nodes = np.unique(body.mesh.facets[entry.on])
                 rest, along = body.mesh.points[nodes], list(entry.components)
-                wanted = entry.displacements(rest, state.frame)
+                wanted = entry.displacements(rest, state.number)
                 off = np.abs((state.points[nodes] - rest - wanted)[:, along]).max(axis=1)
                 allowed = SAME * (
                     body.size + float(np.abs(wanted).max())
                 )  # by which regions may contradict where they meet
-                yield _at(f"prescribed at {entry.name}", off, np.full(len(off), allowed), state.frame, rest)
+                yield _at(f"prescribed at {entry.name}", off, np.full(len(off), allowed), state.number, rest)
 
 
 def of_muscle(problem: Problem, run: Run, nodes: Nodes = lambda _: None) -> RunChecks:

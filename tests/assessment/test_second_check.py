@@ -32,8 +32,7 @@ from fem_reference.problems.body import Body, Prescribed
 from fem_reference.problems.muscle import Problem
 from fem_reference.problems.paths import Affine
 from fem_reference.runs import store
-from fem_reference.runs.solved import Reached, Solved
-from fem_reference.runs.store import Outcome, Run
+from fem_reference.runs.store import Frame, Outcome, Run, collected
 from fem_reference.scenes import casefile
 from fem_reference.studies.execution import Bench
 from fem_reference.verification import second_check as catalogue
@@ -355,10 +354,10 @@ def test_bodies_reach_their_frames_and_meet_what_is_prescribed() -> None:
     path = Affine(((0.0, 0.0, 0.5), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
     body = Body(mesh, (), (Prescribed("top", "z1", (0, 1), path),), (0.0, 0.5, 1.0))
 
-    def solved(points: list, frames=(0.0, 0.5, 1.0)) -> Solved:
-        return Solved(tuple(Reached(f, p, {}, {}) for f, p in zip(frames, points, strict=True)), CONVERGED)
+    def solved(points: list, frames=(0.0, 0.5, 1.0)) -> Run:
+        return collected([Frame(f, points=p) for f, p in zip(frames, points, strict=True)], CONVERGED)
 
-    def wrong(one: Solved) -> list[str]:
+    def wrong(one: Run) -> list[str]:
         return [check.name for check in of_body(body, one) if not check.met]
 
     true = [mesh.points + path(mesh.points, frame) for frame in body.frames]
@@ -432,5 +431,5 @@ def test_a_path_that_writes_into_its_points_is_asked_like_any_other() -> None:
         return np.multiply(points, 0, out=points)
 
     body = Body(mesh, (effects.make("neo_hooke", mu=0.01),), (Prescribed("low", "z0", (0, 1, 2), still),), (0.0,))
-    solved = Solved((Reached(0.0, mesh.points, {}, {}),), Outcome("converged", ""))
+    solved = collected([Frame(0.0, points=mesh.points)], Outcome("converged", ""))
     assert all(one.met for one in of_body(body, solved))
