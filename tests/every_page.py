@@ -37,7 +37,6 @@ def write(folder: Path, comparison: Comparison, alone: Comparison) -> dict[str, 
     folder.mkdir(exist_ok=True)
     examples = (test_field_page.rod(folder / "rod"), test_field_page.plate(folder / "plate", lambda base: 3 * base))
     left_out = test_study_page.points("arap", 0.5, 9.0)
-    growth = test_study_page.growth("pbd", "iteration", (10, 100, 1000), (1e-4, 1e-2, 1.0))
     cases = tuple(test_study_page.study(case, *left_out) for case in ("hip", "knee", "jaw"))
     results = [
         test_table_5_1.solver_result(case, *values) for case, values in (("case0", (1.0, 4.0)), ("case1", (2.0, 3.0)))
@@ -61,7 +60,7 @@ def write(folder: Path, comparison: Comparison, alone: Comparison) -> dict[str, 
             test_verify_page.verification(*entries), folder, "verify", "fem-reference verify"
         ),
         "study": report.write_study(
-            Study(cases, {"lost": "why"}, {"machine": "this one"}, (growth,)),
+            Study(cases, {"lost": "why"}, {"machine": "this one"}),
             folder,
             "study",
             "fem-reference study hip knee jaw",

@@ -23,7 +23,7 @@ LIST = Path(__file__).with_suffix(".toml")
 
 
 class Fault(NamedTuple):
-    """In a ``file`` of the package, ``new`` in place of ``old``, which is there once, and the ``tests`` that should notice."""
+    """In a ``file`` of the package or project ``new`` in place of ``old``, which is there once, and ``tests`` that notice it."""
 
     name: str
     file: str
@@ -35,9 +35,15 @@ class Fault(NamedTuple):
 FAULTS = [Fault(*row) for row in tomllib.loads(LIST.read_text(encoding="utf-8"))["faults"]]
 
 
+def place(root: Path, fault: Fault) -> Path:
+    """The file of a fault in the project below ``root``."""
+    in_package = root / "fem_reference" / fault.file
+    return in_package if in_package.is_file() else root / fault.file
+
+
 def misplaced(fault: Fault) -> list[str]:
     """Sentences on what keeps a fault from being planted: its file, its place there, or a file of tests that is not there."""
-    path = ROOT / "fem_reference" / fault.file
+    path = place(ROOT, fault)
     if not path.is_file():
         return [f"{fault.name}: no file {fault.file}"]
     found = path.read_text(encoding="utf-8").count(fault.old)
@@ -48,7 +54,7 @@ def misplaced(fault: Fault) -> list[str]:
 
 def plant(fault: Fault, copy: Path) -> tuple[bool, str]:
     """Whether a test noticed the fault, planted in ``copy`` for as long, and which or what was said; the quick tests come first."""
-    path = copy / "fem_reference" / fault.file
+    path = place(copy, fault)
     text = path.read_text(encoding="utf-8")
     path.write_text(text.replace(fault.old, fault.new), encoding="utf-8")
     try:

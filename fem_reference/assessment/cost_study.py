@@ -9,7 +9,6 @@ from pydantic import TypeAdapter, ValidationError
 from fem_reference import metrics
 from fem_reference.assessment.claims import Claim
 from fem_reference.assessment.fronts import TETRAHEDRA, Amount, Point
-from fem_reference.assessment.growth import Growth
 from fem_reference.foundations.errors import InputError
 from fem_reference.io import texts
 
@@ -70,14 +69,11 @@ class CaseStudy:
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """Studies of cases; ``missing``: by case, why it was left out; ``origin``: with what and on what it was measured; ``growth`` of
-    costs with size, where that was measured too.
-    """
+    """Studies of cases; ``missing``: by case, why it was left out; ``origin``: with what and on what it was measured."""
 
     cases: tuple[CaseStudy, ...]
     missing: dict[str, str] = field(default_factory=dict)
     origin: dict[str, str] = field(default_factory=dict)
-    growth: tuple[Growth, ...] = ()
 
     @property
     def points(self) -> tuple[Point, ...]:
@@ -98,7 +94,7 @@ def load(path: Path) -> CaseStudy:
 def load_all(path: Path) -> list[CaseStudy]:
     """The study of a case, or those of several, from a file; InputError as of :func:`load`."""
     found = texts.read_json(path, _WANT)
-    if isinstance(found, list):
+    if isinstance(found, list) and found:
         return [_read(one, f"{path}: [{i}]") for i, one in enumerate(found)]
     return [_read(found, f"{path}")]
 

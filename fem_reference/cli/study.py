@@ -1,8 +1,6 @@
 """The verb ``study``: what accuracy costs in time on cases."""
 
 import argparse
-import logging
-from dataclasses import replace
 from functools import partial
 
 from fem_reference import report, solvers
@@ -14,10 +12,8 @@ from fem_reference.report import study_page
 from fem_reference.report.asked import Asked, Part
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
-from fem_reference.studies import cost, growth
+from fem_reference.studies import cost
 from fem_reference.studies.campaign import Workers
-
-log = logging.getLogger(__name__)
 
 PAGE = "study"
 HELP = "what accuracy costs in time: reference and candidates over ladders of settings, and the page"
@@ -35,8 +31,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scheduler", metavar="ADDRESS", help=cluster)
     only = "only this solver; may be repeated (default: the reference and every candidate)"
     parser.add_argument("--solver", default=[], choices=solvers.names("solve"), metavar="NAME", help=only)
-    grown = "measure too how costs grow with the size of the problem, on bodies of our own making (about 5 minutes)"
-    parser.add_argument("--growth", action="store_true", help=grown)
     share(parser, "--name")
 
 
@@ -46,8 +40,6 @@ def run(options: argparse.Namespace) -> int:
     scenes = [casefile.read_muscle(case, changes) for case in options.cases]
     workers = Workers(options.workers, options.scheduler)
     found = cost.study(scenes, out(options) / "runs", workers, options.solver)
-    if options.growth:
-        found = replace(found, growth=growth.measure(log.info))
     printed = {"cases": [facts(case, found.origin) for case in found.cases], "missing": found.missing}
     write_output(printed, "\n".join([study_page.text(found), *_written(found, scenes, options)]), options)
     return SOLVER_FAILED if found.missing else DONE
@@ -56,7 +48,6 @@ def run(options: argparse.Namespace) -> int:
 def _written(found: Study, scenes: list[MuscleCase], options: argparse.Namespace) -> list[str]:
     """Write the pages, that of all cases last where there are several, which then has the name that was given."""
     more = [*changes(options), *(Part(("--solver", name), name) for name in options.solver)]
-    more += [Part(("--growth",), "growth")] if options.growth else []
     parts, several = {scene.name: case_part(scene) for scene in scenes}, len(found.cases) != 1
     lines = list[str]()
     for case in found.cases:

@@ -35,7 +35,6 @@ TIME = "seconds_per_frame"
 # What the fronts, the sentences and the tables are about, and what tables are matched by.
 SHOWN = tuple(map(".".join, described("rank")))
 MAIN = SHOWN[0]
-LARGE = 1e7  # the size that growth is extrapolated to
 MATCHED = (TIME, "peak_memory_mb", "unknowns")
 _COLOURS = ("#222222", *PALETTE, "#7f7f7f", "#8c564b", "#17becf")
 
@@ -60,8 +59,6 @@ def render(study: Study) -> str:
         data=json.dumps(_data(study)).replace("<", "\\u003c"),
         cover=lambda case: Cover.of(case.claims),
         claims=lambda case: [claims_drawing(case.claims, metric, case.case) for metric in CLAIMED_UNITS],
-        large=LARGE,
-        growth_drawing=_growth(study) if study.growth else None,
         transfers=moved,
         losses=sorted(one.loss for one in moved),
     )
@@ -151,23 +148,6 @@ def _front(case: CaseStudy, error: str) -> Curve:
             figure.legend(loc="outside lower center", ncols=3, fontsize="small")
 
     return drawn(f"front-{case.case}-{error.replace('.', '-')}", title, (4.9, 4.2), draw)
-
-
-def _growth(study: Study) -> Curve:
-    """Times over sizes, the whole of the reference and an iteration of each candidate."""
-    title = "Time of a load step of the reference and of an iteration of candidates"
-
-    def draw(figure: Figure, axes: Axes) -> None:
-        shown = [one for one in study.growth if one.cost in ("total", "iteration")]
-        for i, one in enumerate(shown):
-            label = f"{one.solver}, {one.counted}: {one.exponent:.2f}"
-            axes.plot(one.sizes, one.values, ".-", color=_COLOURS[i % len(_COLOURS)], linewidth=1.2, label=label)
-        logarithmic(axes)
-        axes.set_xlabel("size")
-        axes.set_ylabel("s")
-        figure.legend(loc="outside lower center", ncols=3, fontsize="small")
-
-    return drawn("growth", title, (6.4, 4.2), draw)
 
 
 def _shown(case: CaseStudy) -> list[tuple[Point, Point]]:

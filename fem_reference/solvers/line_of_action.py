@@ -16,8 +16,9 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record, join
-from fem_reference.geometry.wrapping import Cylinder, Obstacle, Paths, Sphere, straight
-from fem_reference.problems.muscle import Problem, RigidBody
+from fem_reference.geometry.wrapping import Paths, WrappingCylinder, WrappingSphere, WrappingSurface, straight
+from fem_reference.problems.muscle import Problem
+from fem_reference.problems.setup import RigidBody
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.scenes import bones
 from fem_reference.solvers.common.frame_loop import each
@@ -94,7 +95,7 @@ class Lines:
 class Wrap:
     """An ``obstacle``, given at rest, on a ``bone``; ``name`` is what messages call it."""
 
-    obstacle: Obstacle
+    obstacle: WrappingSurface
     bone: RigidBody
     name: str
 
@@ -185,11 +186,11 @@ def _wrap(problem: Problem, settings: LineSettings, place: str) -> Wrap | None:
     """The obstacle of the settings, None without one."""
     if (ball := settings.sphere) is not None:
         bone = problem.bones[_index(problem.bones, ball.bone, join(place, "sphere.bone"))]
-        return Wrap(Sphere(ball.centre, ball.radius), bone, "sphere")
+        return Wrap(WrappingSphere(ball.centre, ball.radius), bone, "sphere")
     if (roll := settings.cylinder) is not None:
         x, y, z = (float(entry) for entry in np.subtract(roll.end, roll.start))
         bone = problem.bones[_index(problem.bones, roll.bone, join(place, "cylinder.bone"))]
-        return Wrap(Cylinder(roll.start, (x, y, z), roll.radius), bone, "cylinder")
+        return Wrap(WrappingCylinder(roll.start, (x, y, z), roll.radius), bone, "cylinder")
     return None
 
 

@@ -17,7 +17,7 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, check_finite, 
 from fem_reference.foundations.records import FileName, Name, Record, parse
 from fem_reference.foundations.units import LengthUnit, length_unit
 from fem_reference.io import files, texts
-from fem_reference.problems.muscle import Setup
+from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.scenes.case import Candidate
 from fem_reference.solvers.common.protocol import MuscleSolver

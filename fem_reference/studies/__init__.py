@@ -1,1 +1,1 @@
-"""Studies of many solutions: error bars, rankings of solvers, convergence, benchmarks."""
+"""Studies of many solutions: error bars, rankings of solvers, convergence."""

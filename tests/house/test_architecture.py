@@ -50,9 +50,6 @@ DOORS = {
     "matplotlib": ["report/"],
     "jinja2": ["report/"],
     "pint": ["foundations/units.py"],
-    "felupe": ["studies/benchmark/peers/felupe.py"],
-    "sfepy": ["studies/benchmark/peers/sfepy.py"],
-    "pypardiso": ["studies/benchmark/peers/felupe.py"],
 }
 TRUTHS_MAY = {"numpy", "scipy", "math", "dataclasses", "collections", "typing", "validation"}
 LINES, FUNCTION, ARGUMENTS = 310, 60, 6

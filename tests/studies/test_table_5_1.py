@@ -1,4 +1,4 @@
-"""The kinds of solvers in Table 5.1 on scenes: who is measured, how fast, how far off, and what the page and the command say."""
+"""The kinds of solvers in Table 5.1 on scenes: who is measured, how fast, how far off, and what the page says."""
 
 import json
 import math
@@ -19,10 +19,8 @@ from fem_reference.runs import store
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Candidate
-from fem_reference.solvers import fenicsx, pbd
+from fem_reference.solvers import fenicsx
 from fem_reference.studies import table_5_1
-from fem_reference.studies.benchmark import candidates
-from fem_reference.studies.execution import Bench
 
 pytestmark = pytest.mark.slow
 
@@ -55,7 +53,6 @@ def case(tmp_path, monkeypatch):
     stand_ins.solve_by(monkeypatch, fenicsx, shift)
     stand_ins.unchecked(monkeypatch)
     monkeypatch.setattr(table_5_1, "solver_kinds", lambda: ROWS)
-    monkeypatch.setattr(candidates, "solver_kinds", lambda: ROWS)
     return small.write(tmp_path / "bar")
 
 
@@ -217,50 +214,6 @@ def test_of_a_reference_that_failed_one_sentence_stands_there_and_no_table() -> 
 def test_the_page_is_whole_or_not_there(tmp_path) -> None:
     path = report.write_ranking(table(solver_result("case0", 1.0)), tmp_path / "new", "table-5-1")
     assert sorted(file.name for file in path.parent.iterdir()) == ["table-5-1.html", "table-5-1.json"]
-
-
-def test_the_benchmark_times_what_iterates(case, capsys, monkeypatch) -> None:
-    monkeypatch.setattr(candidates, "REPEATS", 2)
-    target = case.parent / "speed.json"
-    assert cli.main(["benchmark", str(case), "--json", str(target), "--quiet"]) == cli.DONE
-    facts = json.loads(target.read_text())
-    assert [(one["name"], one["case"], one["limit"]) for one in facts["timings"]] == [
-        ("pbd", "bar", None),
-        ("still", "bar", None),
-    ]
-    assert all(len(one["seconds"]) == 2 for one in facts["timings"])
-    assert min(facts["machine"].values()) > 0
-    printed = capsys.readouterr().out
-    assert "iterations a second of CPU time" in printed
-
-
-def test_a_ratio_is_reported_where_the_report_has_a_speed() -> None:
-    timing = candidates.Timing("gluteus_maximus", "pbd", "pbd", 19752, (0.02, 0.01), 33.0)
-    assert (timing.per_second, timing.ratio) == pytest.approx((100.0, 100 / 33))
-    printed = candidates.text([timing], candidates.Machine(10.0, 2.0))
-    assert "pbd 50 to 100, 3.03 times the report's program (33 a second)" in printed
-
-
-def test_a_solver_that_fails_has_no_time(case, monkeypatch) -> None:
-    stand_ins.solve_by(monkeypatch, pbd, lambda *_: Outcome("diverged", "lost"))
-    timings, machine = candidates.measure([Bench(casefile.read_muscle(case), case.parent)])
-    assert [one.per_second for one in timings] == [None, None]
-    assert "pbd failed" in candidates.text(timings, machine)
-    json.dumps(candidates.facts(timings, machine), allow_nan=False)
-    assert cli.main(["benchmark", str(case), "--quiet"]) == cli.DONE  # it is printed, not judged
-
-
-def test_lines_do_not_iterate_and_a_short_scene_cannot_be_timed(case, capsys) -> None:
-    path = case / "case.toml"
-    line = '[[candidate]]\nname = "pb_line"\nsolver = "line_of_action"\n\n'
-    path.write_text(path.read_text().replace("[[expect]]", f"{line}[[expect]]"))
-    assert [entry.name for entry, _ in candidates._candidates(Bench(casefile.read_muscle(case), case.parent))] == [
-        "pbd",
-        "still",
-    ]
-    path.write_text(path.read_text().replace("last = 20\nevery = 5", "last = 2\nevery = 1"))
-    assert cli.main(["benchmark", str(case), "--quiet"]) == cli.BAD_INPUT
-    assert "frames.last: got 2, want more than 2 frame numbers" in capsys.readouterr().err
 
 
 def test_bad_input_is_not_an_empty_table(capsys) -> None:

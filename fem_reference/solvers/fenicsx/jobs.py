@@ -3,13 +3,14 @@
 import json
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, fingerprint
 from fem_reference.problems.body import Body
+from fem_reference.problems.problem import Task
 from fem_reference.runs.cut_off import CutOff
 from fem_reference.runs.states import NodalState, read_arrays
 from fem_reference.solvers.fenicsx.settings import BodySettings
@@ -55,9 +56,11 @@ class Job:
     ``kept``: where states are kept, if they are.
     """
 
+    task: ClassVar[Task] = "solve_body"
+
     body: Body
     settings: BodySettings
-    samples: dict[str, tuple[Ints, Floats]]
+    samples: dict[str, tuple[Ints, Floats]] = field(default_factory=dict)
     kept: Kept | None = None
 
 

@@ -5,6 +5,7 @@ import json
 import pickle
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 
 from fem_reference.foundations.subprocesses import end_with_starter
 from fem_reference.foundations.usage import forget_peak_memory, peak_memory
+from fem_reference.problems.problem import Task
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.solvers.fenicsx import dolfinx_door  # noqa: F401 - first
 from fem_reference.solvers.fenicsx.jobs import Job
@@ -240,6 +242,14 @@ def solve_field(problem: FieldProblem, folder: Path) -> None:
     report(**outcome)
 
 
+def solve_body(job: Job, folder: Path) -> None:
+    """March a body through its frames."""
+    Worker(job, folder).run()
+
+
+_SOLVE: dict[Task, Callable[[Any, Path], None]] = {"solve_field": solve_field, "solve_body": solve_body}
+
+
 def report(**event: Any) -> None:
     """A line for the process that started this one."""
     sys.stdout.write(f"{MARK}{json.dumps(event)}\n")
@@ -254,10 +264,7 @@ def main(argument: str) -> None:
     for line in sys.stdin if argument == "-" else [argument]:
         path = Path(line.strip())
         job = pickle.loads(path.read_bytes())
-        if isinstance(job, FieldProblem):
-            solve_field(job, path.parent)
-        else:
-            Worker(job, path.parent).run()
+        _SOLVE[job.task](job, path.parent)
         gc.collect()
 
 

@@ -55,7 +55,7 @@ def test_a_process_that_dies_is_a_status(tmp_path, monkeypatch) -> None:
     solution = solved_by("import sys; sys.exit('no memory')", FieldSettings(), tmp_path, monkeypatch)
     assert solution.outcome.status == "crashed"
     assert "exit status 1 (no memory); 0 fields are kept" in solution.outcome.message
-    assert solution.values.shape == (3,)
+    assert solution.values[0].shape == (3,)
     assert np.isnan(solution.values).all()
 
 

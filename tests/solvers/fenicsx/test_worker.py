@@ -35,7 +35,7 @@ def test_an_old_factorisation_serves_as_long_as_it_is_worth_it(bent) -> None:  #
         lagged, found = solved(problem, ranks=1, linear_solver="lagged", precision=precision)
         assert lagged.cost["factorisations"] <= direct.cost["factorisations"] / 2
         for one, other in zip(frames, found, strict=True):
-            assert np.abs(one.tets - other.tets).max() < 1e-9
+            assert np.abs(one.points - other.points).max() < 1e-9
             assert one.scalars["negative_modes"] == other.scalars["negative_modes"]
 
 

@@ -9,7 +9,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import parse
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed, reference_nodes
-from fem_reference.runs.solved import Solved
+from fem_reference.runs.store import Run
 from fem_reference.solvers.scikit_fem import ScikitBodySettings, solve_body
 from fem_reference.solvers.scikit_fem.body import March
 from fem_reference.solvers.scikit_fem.spaces import Space
@@ -55,7 +55,7 @@ def moved(name: str, on: str, components: tuple[int, ...], by=nowhere, **keys) -
 SLIDING = (moved("x", "x0", (0,)), moved("y", "y0", (1,)), moved("z", "z0", (2,)))
 
 
-def solved(body: Body, element: str, **settings) -> Solved:
+def solved(body: Body, element: str, **settings) -> Run:
     solution = solve_body(body, ScikitBodySettings(element=element, **settings))
     assert solution.outcome.status == "converged", solution.outcome.message
     return solution

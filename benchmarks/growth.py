@@ -1,0 +1,128 @@
+"""Growth of costs with size, on bodies of our own making: of the reference by phase, and of the fast solvers of Table 5.1.
+
+The reference is measured against its unknowns in one load step, in wall time; candidates, with the settings of the table, against
+triangles or tetrahedra in an iteration, in processor time. Memory is that which a run takes beyond that of the process before.
+"""
+
+import ctypes
+import gc
+from contextlib import suppress
+from dataclasses import replace
+from math import nan
+
+from benchmarks import over
+from benchmarks.bodies import ellipsoid, fusiform, spindle
+from benchmarks.candidates import SOLVERS, per_iteration, spent
+from benchmarks.power_law import PowerLaw, fit
+from benchmarks.reference import solve_fusiform
+from fem_reference import solvers
+from fem_reference.foundations.usage import forget_peak_memory, peak_memory
+from fem_reference.problems import setup as problem_setup
+from fem_reference.solvers import fenicsx
+
+# Subdivisions of the icosahedron of an ellipsoid; rings and slices of spindles of tetrahedra, and of those of the reference.
+SUBDIVISIONS = (2, 3, 4, 5, 6)
+SPINDLES = ((1, 6), (2, 9), (2, 18), (3, 24), (4, 36))
+BODIES = ((1, 4), (1, 10), (2, 16), (3, 24), (4, 36))
+ELEMENT = "P2/P1"
+# Iterations of a short and of a longer run, and how often each is made.
+COUNTS, REPEATS = (1, 5), 2
+# The size at which a cost is extrapolated, and how a fit is shown.
+LARGE = 1e7
+NUMBERS = ("exponent", "standard error", "at 1e7", "at 1e7, at least", "at 1e7, at most")
+OF_REFERENCE = ("seconds_wall", "seconds_assembly", "seconds_factorisation", "seconds_krylov", "memory")
+OF_CANDIDATES = ("iteration", "memory")
+
+# Costs at a size, which stands among them.
+Point = dict[str, float]
+
+
+def of_reference(sizes: tuple[tuple[int, int], ...] = BODIES) -> list[Point]:
+    """The reference in one load step [s, MB]."""
+    with fenicsx.session() as own:
+        # The first, which is small, compiles and loads.
+        bodies = [replace(fusiform(ELEMENT, *size), frames=(0.0, 1.0)) for size in ((1, 2), *sizes)]
+        begin, *found = [solve_fusiform(own, body, ELEMENT) for body in bodies]
+    return [one | {"size": one["unknowns"], "memory": one["peak_memory_mb"] - begin["peak_memory_mb"]} for one in found]
+
+
+def of_candidate(name: str, most: int | None = None) -> list[Point]:
+    """A candidate in an iteration [s], and its memory [MB], with the first ``most`` sizes, by default all."""
+    chosen = SOLVERS[name]
+    settings, tets = solvers.settings(chosen, name), chosen.solver == "mass_spring"
+    made: list[problem_setup.Setup] = (
+        [spindle(*size) for size in SPINDLES] if tets else [ellipsoid(k) for k in SUBDIVISIONS]
+    )
+    points = []
+    for setup in made[:most]:
+        size = len(setup.rest.mesh.tets if setup.rest.mesh else setup.surface.triangles)
+        spent(chosen.solver, settings, setup, 1)  # what is compiled is loaded
+        _give_back()
+        forget_peak_memory()
+        before = peak_memory()
+        spent(chosen.solver, settings, setup, 1)
+        memory = peak_memory() - before
+        iteration = per_iteration(chosen.solver, settings, setup, COUNTS, REPEATS)
+        points.append({"size": size, "iteration": iteration, "memory": memory})
+    return points
+
+
+def _give_back() -> None:
+    """Give memory that is free back to the system, which else would serve again and not be seen; the C library of Linux can."""
+    gc.collect()
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).malloc_trim(0)
+
+
+def law(points: list[Point], cost: str) -> PowerLaw | None:
+    """The growth of a cost, None where it is above zero at fewer than three sizes."""
+    return fit([one["size"] for one in points], [one[cost] for one in points])
+
+
+def shown(found: PowerLaw | None, number: str) -> float:
+    """One of the ``NUMBERS`` of a fit."""
+    if found is None:
+        return nan
+    return dict(zip(NUMBERS, (found.exponent, found.uncertainty, *found.at(LARGE)), strict=True))[number]
+
+
+class Reference:
+    """The growth of the reference, and the costs to which it is fitted."""
+
+    timeout = 7200
+    unit = "s, MB or 1"
+
+    def setup_cache(self) -> list[Point]:
+        """The costs at all sizes."""
+        return of_reference()
+
+    @over(cost=OF_REFERENCE, number=NUMBERS)
+    def track_growth(self, points: list[Point], cost: str, number: str) -> float:
+        """A number of the fit of a cost."""
+        return shown(law(points, cost), number)
+
+    @over(body=range(len(BODIES)), cost=("size", *OF_REFERENCE))
+    def track_cost(self, points: list[Point], body: int, cost: str) -> float:
+        """A cost of a body."""
+        return points[body][cost]
+
+
+class Candidates:
+    """The growth of the fast solvers, and the costs to which it is fitted."""
+
+    timeout = 7200
+    unit = "s, MB or 1"
+
+    def setup_cache(self) -> dict[str, list[Point]]:
+        """The costs of each at all sizes."""
+        return {name: of_candidate(name) for name in SOLVERS}
+
+    @over(solver=SOLVERS, cost=OF_CANDIDATES, number=NUMBERS)
+    def track_growth(self, points: dict[str, list[Point]], solver: str, cost: str, number: str) -> float:
+        """A number of the fit of a cost."""
+        return shown(law(points[solver], cost), number)
+
+    @over(solver=SOLVERS, body=range(len(SUBDIVISIONS)), cost=("size", *OF_CANDIDATES))
+    def track_cost(self, points: dict[str, list[Point]], solver: str, body: int, cost: str) -> float:
+        """A cost of a body."""
+        return points[solver][body][cost]

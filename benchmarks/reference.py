@@ -1,0 +1,155 @@
+"""Costs of the finite element reference by phase: on fusiform bodies of our own making, and on muscles among bones."""
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from math import nan
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks import over
+from benchmarks.bodies import fusiform
+from fem_reference import solvers
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.usage import processor_times
+from fem_reference.problems.body import Body
+from fem_reference.runs.store import Frame, Outcome
+from fem_reference.scenes import casefile
+from fem_reference.solvers import fenicsx
+from fem_reference.solvers.fenicsx.session import Session
+from fem_reference.studies.execution import Bench
+
+# Rings and slices of the fusiform body by element: 25 000 to 29 000 unknowns.
+BODIES = {"Q1/P0": (4, 30), "P2/P0": (2, 18), "P2/P1": (2, 20)}
+# Muscle cases: the last frame (None: that of the case) and the MPI processes (None: as the case has it).
+MUSCLES: dict[str, tuple[str, int | None, int | None]] = {
+    "hip_flexion": ("hip_flexion", None, None),
+    "gluteus_maximus to frame 100": ("gluteus_maximus", 100, None),
+    "gluteus_maximus to frame 100 on 2 ranks": ("gluteus_maximus", 100, 2),
+    "gluteus_maximus": ("gluteus_maximus", None, None),
+}
+# Costs as outcomes have them [s, MB, counts]; wall time is that of the parts that contain the phases, ``moved`` [mm] the root mean
+# square of the final displacement, by which two commits are seen to solve the same.
+PARTS = ("seconds_set_up", "seconds_solve", "seconds_stability")
+PHASES = ("seconds_assembly", "seconds_contact", "seconds_factorisation", "seconds_krylov")
+COUNTS = ("factorisations", "krylov_iterations", "newton_iterations", "load_steps", "cut_backs", "unknowns")
+COSTS = ("seconds_wall", "seconds_processor", *PARTS, *PHASES, *COUNTS, "peak_memory_mb", "moved_mm")
+REPEATS = 3
+
+Costs = dict[str, float]
+
+
+def processor() -> float:
+    """Processor time [s] of this process and of those that it started and that run."""
+    return sum(processor_times(os.getpid()).values())
+
+
+def costs(outcome: Outcome, moved: Floats) -> Costs:
+    """The cost of a solution that displaced its nodes by ``moved`` (n, 3) [mm]; RuntimeError where it did not converge."""
+    if outcome.status != "converged":
+        raise RuntimeError(f"{outcome.status}: {outcome.message}")
+    more = {
+        "seconds_wall": sum(outcome.cost[part] for part in PARTS),
+        "moved_mm": float(np.sqrt((moved**2).mean() * 3)),
+    }
+    return {**outcome.cost, **more}
+
+
+def median(repeats: list[Costs]) -> Costs:
+    """The median of each cost over repeats."""
+    return {name: float(np.median([one[name] for one in repeats])) for name in repeats[0]}
+
+
+def solve_fusiform(own: Session, body: Body, element: str) -> Costs:
+    """The costs of a fusiform body in the process of a session."""
+    solved = own.solve(body, fenicsx.BodySettings(element=element, first_step=1.0))
+    return costs(solved.outcome, solved.states[-1].points - body.mesh.points)
+
+
+@contextmanager
+def prepared(element: str) -> Iterator[Callable[[], Costs]]:
+    """A function that solves the fusiform body in a process of its own, which has compiled and loaded what that needs."""
+    body = fusiform(element, *BODIES[element])
+    with fenicsx.session() as own:
+        solve_fusiform(own, replace(body, frames=body.frames[:1]), element)
+        yield lambda: solve_fusiform(own, body, element)
+
+
+def solve_muscle(case: str, last: int | None, ranks: int | None) -> Costs:
+    """The costs of a muscle by its reference, which is not stored; InputError where its data is not here."""
+    bench = Bench(casefile.read_muscle(case), Path(), ranks)
+    settings, problem = bench.settings(bench.scene.reference, "reference"), bench.problem()
+    frames = tuple(frame for frame in problem.frames if last is None or frame <= last)
+    reached = list[Frame]()
+    solve = solvers.find(bench.scene.reference.solver, bench.scene.place).solve
+    outcome = solve(replace(problem, frames=frames), settings, reached.append)
+    rest, tets = problem.mesh.points, reached[-1].points if reached else None
+    return costs(outcome, rest - rest if tets is None else tets - rest)
+
+
+class Fusiform:
+    """The reference on fusiform bodies."""
+
+    timeout = 3600
+    unit = "s, MB, mm or 1"
+
+    def setup_cache(self) -> dict[str, Costs]:
+        """The costs by element, medians over repeats."""
+        found = {}
+        for element in BODIES:
+            with prepared(element) as solve:
+                found[element] = median([solve() for _ in range(REPEATS)])
+        return found
+
+    @over(element=BODIES, cost=COSTS)
+    def track_cost(self, found: dict[str, Costs], element: str, cost: str) -> float:
+        """A cost."""
+        return found[element].get(cost, nan)
+
+
+class Muscle:
+    """The reference on muscles among bones, each solved once; not a number where the data of one is not here."""
+
+    timeout = 7200
+    unit = "s, MB, mm or 1"
+
+    def setup_cache(self) -> dict[str, Costs]:
+        """The costs by muscle; what is compiled is made before, for the first two frames."""
+        found = {}
+        for name, (case, last, ranks) in MUSCLES.items():
+            try:
+                solve_muscle(case, casefile.read_muscle(case).numbers[1], ranks)
+                found[name] = solve_muscle(case, last, ranks)
+            except InputError:
+                found[name] = {}
+        return found
+
+    @over(muscle=MUSCLES, cost=COSTS)
+    def track_cost(self, found: dict[str, Costs], muscle: str, cost: str) -> float:
+        """A cost."""
+        return found[muscle].get(cost, nan)
+
+
+class Interleaved:
+    """The reference on fusiform bodies as asv times it: commits in turn, so that what else the machine does meets both."""
+
+    timeout = 3600
+    number, repeat, rounds, warmup_time = 1, 1, 3, 0
+    timer = staticmethod(processor)
+
+    def setup(self, element: str) -> None:
+        """A process that has compiled and loaded what it needs."""
+        self.stack = ExitStack()
+        self.solve = self.stack.enter_context(prepared(element))
+
+    @over(element=BODIES)
+    def time_solve(self, element: str) -> None:  # noqa: ARG002
+        """Processor time [s] of a solution."""
+        self.solve()
+
+    def teardown(self, element: str) -> None:  # noqa: ARG002
+        """End the process."""
+        self.stack.close()
