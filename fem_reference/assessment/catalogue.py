@@ -1,32 +1,32 @@
 """Entries of the verification catalogue, problems whose answers are known, and their results."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from fem_reference.assessment.judge import judge
 from fem_reference.problems.body import Body
-from fem_reference.runs.solved import Solved
+from fem_reference.runs.store import Run
 
 Kind = Literal["closed form", "published", "second solver", "property"]
 
 
 class Lab(Protocol):
-    """Where entries are measured."""
+    """The solvers that measure entries."""
 
-    def solve(self, body: Body, element: str, **settings: float) -> Solved:
+    def solve(self, body: Body, element: str, **settings: float) -> Run:
         """The states of ``body`` by the reference, FEniCSx, with an element of ``body.ELEMENTS``; settings as in
         ``BodySettings`` (first_step, smallest_step, newton_iterations, residual [N, mm3]).
         """
 
-    def second(self, body: Body, element: str, **settings: float) -> Solved:
+    def second(self, body: Body, element: str, **settings: float) -> Run:
         """The same by the second opinion, scikit-fem."""
 
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """What was measured: the ``value``; on a ladder of meshes the ``order`` at which its error falls, with the ``ladder`` of
+    """A measurement: the ``value``; on a ladder of meshes the ``order`` at which its error falls, with the ``ladder`` of
     (mesh size [mm], value) from coarse to fine; ``note``: what else a reader should know.
     """
 
@@ -37,12 +37,38 @@ class Finding:
 
 
 @dataclass(frozen=True, eq=False)
+class Refinement:
+    """Meshes, or steps in time, from coarse to fine.
+
+    ``counts`` are of cells or steps, each of ``size / count`` [mm] or [s]. The error falls at ``order`` by theory, to within a
+    half; None: no order is measured. Where ``extrapolated``, the value is that of the last two counts without their error of
+    first order. ``note``: what else a reader should know.
+    """
+
+    counts: tuple[int, ...]
+    size: float
+    order: float | None
+    extrapolated: bool = False
+    note: str = ""
+
+    @property
+    def needed(self) -> tuple[int, ...]:
+        """The counts that the value needs."""
+        return self.counts[-2 if self.extrapolated else -1 :]
+
+    def value(self, found: Sequence[float]) -> float:
+        """The value that is judged, of those ``found`` from coarse to fine."""
+        return 2 * found[-1] - found[-2] if self.extrapolated else found[-1]
+
+
+@dataclass(frozen=True, eq=False)
 class Entry:
     """A problem whose answer is known.
 
-    ``measure`` finds the number that ``truth`` gives, both in ``unit``; it must come within ``within`` (of the truth's size where
-    ``relative``, else in ``unit``), ``because`` says why so far and no further. ``source`` is where the truth is from, ``kind``
-    what it is. ``with_negative_control`` measures the same with one thing wrong, which ``negative_control`` names: it must fail.
+    ``measure`` finds the number that ``truth`` states, both in ``unit``: it is called with a lab, with each count of a
+    ``refinement`` where there is one, and with what is ``given`` by name. The number must come within ``within`` (in ``unit``, or
+    of the truth's size where ``relative``); ``because`` gives the reason for this tolerance. ``source`` is where the truth is from,
+    ``kind`` what it is. ``negative_control`` names one thing wrong, by which ``wrong`` replaces a part of ``given``: it must fail.
     ``slow`` where a measurement takes above some 4 s, or is like another one, ``slow_negative_control`` where that does: tests
     leave it to the verb verify.
     """
@@ -51,22 +77,45 @@ class Entry:
     group: str
     title: str
     unit: str
-    truth: Callable[[], float]
+    measure: Callable[..., "float | Finding"]
+    given: Mapping[str, object]
+    negative_control: str
+    wrong: Mapping[str, object]
+    truth: float | Callable[[], float]
     within: float
-    relative: bool
     because: str
     kind: Kind
     source: str
-    measure: Callable[[Lab], Finding]
-    negative_control: str
-    with_negative_control: Callable[[Lab], Finding]
+    relative: bool = False
+    refinement: Refinement | None = None
     slow: bool = False
     slow_negative_control: bool = False
+
+    def known(self) -> float:
+        """The truth, in the unit of the entry."""
+        return float(self.truth() if callable(self.truth) else self.truth)
+
+    def find(self, lab: Lab, *, with_negative_control: bool = False) -> Finding:
+        """The finding; with the negative control on the finest of a refinement alone."""
+        given = {**self.given, **(self.wrong if with_negative_control else {})}
+        if self.refinement is None:
+            return _finding(self.measure(lab, **given))
+        needed = self.refinement.needed if with_negative_control else self.refinement.counts
+        steps = tuple((self.refinement.size / n, _finding(self.measure(lab, n, **given)).value) for n in needed)
+        value = self.refinement.value([found for _, found in steps])
+        if with_negative_control:
+            return Finding(value)
+        fall = None if self.refinement.order is None else order(steps, self.known())
+        return Finding(value, fall, steps, self.refinement.note)
+
+
+def _finding(found: float | Finding) -> Finding:
+    return found if isinstance(found, Finding) else Finding(found)
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What came of an entry: ``word`` is pass or fail, or inconclusive where there is no truth; ``error`` the absolute error and
+    """The result of an entry: ``word`` is pass or fail, or inconclusive where there is no truth; ``error`` the absolute error and
     ``within`` its bound, both in the unit of the entry; NaN where nothing was measured or there is no truth, and then the
     finding's note says why.
     """
@@ -91,7 +140,7 @@ class Result:
 
 def result(entry: Entry, finding: Finding, seconds: float, *, with_negative_control: bool) -> Result:
     """The finding of an entry beside its truth."""
-    truth = entry.truth()
+    truth = entry.known()
     within = entry.within * (abs(truth) if entry.relative else 1.0)
     return Result(entry, finding, truth, within, seconds, with_negative_control)
 

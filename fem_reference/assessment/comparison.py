@@ -11,7 +11,17 @@ from fem_reference.assessment.ranking import Ranking, rankings
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.markup import table
 from fem_reference.foundations.records import join
-from fem_reference.metrics import Context, Measure, at_rest, context_of, described, find, measure, names
+from fem_reference.metrics import (
+    Context,
+    Measure,
+    MeasurementContext,
+    at_rest,
+    context_of,
+    described,
+    find,
+    measure,
+    names,
+)
 from fem_reference.metrics.fibre_length import extension_error
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case, Expectation
@@ -127,7 +137,7 @@ def compare(
         verdicts = tuple(
             replace(one, word="fail" if one.expectation.of == "reference" else "inconclusive") for one in verdicts
         )
-    error = extension_error(reference, context) if "lines" in reference.carries else None
+    error = extension_error(reference, context) if isinstance(context, MeasurementContext) else None
     return Comparison(scene, setup, reference, candidates, context, deviations, changes, error, verdicts, error_bars)
 
 

@@ -10,12 +10,9 @@ from fem_reference.cli._printing import DONE, SOLVER_FAILED, lines, out, write_o
 from fem_reference.export import paraview
 from fem_reference.export.folders import check
 from fem_reference.foundations.errors import InputError
-from fem_reference.report.words import duration
-from fem_reference.runs import states
-from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
-from fem_reference.studies import judging, refinement
+from fem_reference.studies import judging, kept_states, refinement
 from fem_reference.studies.execution import Bench
 
 HELP = "write all that a solver needs which is not ours, in open formats; or runs for ParaView"
@@ -25,9 +22,8 @@ PARAVIEW = "paraview"
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of the verb: where to, and in which formats."""
     share(parser, "case", "--set")
-    parser.add_argument(
-        "--to", type=Path, required=True, metavar="DIR", help="a folder that is not there yet, or empty"
-    )
+    folder = "a folder that is not there yet, or empty"
+    parser.add_argument("--to", type=Path, required=True, metavar="DIR", help=folder)
     forms = "open formats alone (default); FEBio's own besides; or the reference, solved, and candidates for ParaView"
     parser.add_argument("--format", choices=(*export.FORMATS, PARAVIEW), default="open", help=forms)
     either = f"for {PARAVIEW}: a candidate of the case, a folder of frames or a solver; may be repeated"
@@ -54,35 +50,15 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _runs(scene: MuscleCase, options: argparse.Namespace) -> int:
-    """The reference, with its states, and candidates."""
+    """Write the reference, with its states, and candidates for ParaView."""
     check(options.to)
     chosen = [choose(scene, text, options.unit) for text in options.candidate]
     check_names([entry.name for entry, _ in chosen])
     bench = checked_bench(scene, options, chosen)
-    reference = _reference(bench, scene, solve=options.solve)
+    reference = kept_states.reference(bench, again=options.solve)
     runs = [bench.obtain(entry.name, entry, place) for entry, place in chosen]
     result = judging.compare(bench, reference, runs, refinement.stored(reference))
     written = paraview.write(result, options.to)
     facts = {"case": scene.name, "index": str(options.to / paraview.INDEX), "files": len(written)}
     write_output(facts, "\n".join(lines(facts)), options)
     return DONE if all(one.outcome.status == "converged" for one in result.runs) else SOLVER_FAILED
-
-
-def _reference(bench: Bench[MuscleCase], scene: MuscleCase, *, solve: bool) -> Run:
-    """The reference with its states, where its solver has any; InputError where it was solved without them, and nobody asked to
-    ``solve`` it again.
-    """
-    choice = scene.reference
-    if not hasattr(bench.settings(choice, "reference"), "store_state"):
-        return bench.obtain("reference", choice, "reference")
-    known = bench.known("reference", choice.model_copy(update={"store_state": None}), "reference")
-    if (
-        known is not None
-        and known.folder is not None
-        and not solve
-        and not states.are_kept(known.folder, known.numbers)
-    ):
-        took = duration(known.outcome.cost.get("seconds"))
-        got = f"a reference that was solved before without its states ({known.folder}), which stress and pressure follow from"
-        raise InputError("export", got, f"--solve, which solves it again (that took {took})")
-    return bench.obtain("reference", choice.model_copy(update={"store_state": True}), "reference")

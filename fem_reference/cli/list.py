@@ -8,7 +8,6 @@ from typing import Any
 
 from fem_reference import metrics, solvers
 from fem_reference.cli._printing import DONE, out, write_output
-from fem_reference.foundations.records import Record
 from fem_reference.runs import store
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import DATA_SETTING, Case
@@ -41,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _data(scene: Case) -> str | None:
-    """Why the data of a case is not here, nothing where it is; None of a case that needs none."""
+    """The reason why the data of a case is not here, "" where it is; None of a case that needs none."""
     root = os.environ.get(DATA_SETTING)
     if not scene.needed_data:
         return None
@@ -52,7 +51,7 @@ def _data(scene: Case) -> str | None:
 
 
 def _mark(missing: str | None) -> str:
-    """What stands behind the title of a case that needs data."""
+    """A remark behind the title of a case that needs data."""
     if missing is None:
         return ""
     return f" [needs data: {missing}]" if missing else " [needs data, which is here]"
@@ -62,35 +61,19 @@ def _settings(name: str) -> dict[str, Any]:
     """The settings of a solver with their defaults, of all that it solves."""
     found: dict[str, Any] = {}
     for offer in solvers.offers(name):
-        found |= _defaults(offer.settings)
+        fields = offer.settings.model_fields
+        found |= {key: REQUIRED for key, field in fields.items() if field.is_required()}
+        found |= offer.settings.model_construct().model_dump(mode="json", warnings=False)
     return found
 
 
-def _defaults(record: type[Record]) -> dict[str, Any]:
-    needed = {key: REQUIRED for key, field in record.model_fields.items() if field.is_required()}
-    optional = {key: field for key, field in record.model_fields.items() if not field.is_required()}
-    return needed | {key: _plain(field.get_default(call_default_factory=True)) for key, field in optional.items()}
-
-
-def _plain(value: Any) -> Any:
-    """A default as JSON has it."""
-    return (
-        value.model_dump(mode="json")
-        if isinstance(value, Record)
-        else list(value)
-        if isinstance(value, tuple)
-        else value
-    )
-
-
 def _in_words(settings: dict[str, Any]) -> str:
-    needed = [key for key, value in settings.items() if value == REQUIRED]
-    given = [
-        f"{key} = {'none' if value is None else json.dumps(value)}"
-        for key, value in settings.items()
-        if value != REQUIRED
-    ]
-    return "; ".join(filter(None, [f"{', '.join(needed)} (required)" if needed else "", ", ".join(given)])) or "none"
+    needed = ", ".join(key for key, value in settings.items() if value == REQUIRED)
+    given = {
+        key: "none" if value is None else json.dumps(value) for key, value in settings.items() if value != REQUIRED
+    }
+    known = ", ".join(f"{key} = {value}" for key, value in given.items())
+    return "; ".join(filter(None, [f"{needed} (required)" if needed else "", known])) or "none"
 
 
 def _stored(folder: Path) -> str:

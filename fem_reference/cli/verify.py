@@ -5,18 +5,14 @@ import time
 from functools import partial
 
 from fem_reference import report
-from fem_reference.assessment.catalogue import Result
 from fem_reference.cli._pages import written
 from fem_reference.cli._parser import share
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, write_output
 from fem_reference.foundations.version import __version__
 from fem_reference.report.asked import Asked, Part
-from fem_reference.report.verify_page import Verification, facts
+from fem_reference.report.verify_page import Verification, facts, text
 from fem_reference.runs.key import versions
 from fem_reference.verification import runner
-
-_HEADS = ("entry", "value", "truth", "unit", "error", "within", "order", "seconds", "verdict")
-
 
 HELP = "measure problems whose answers are known and write the page"
 
@@ -34,7 +30,7 @@ def run(options: argparse.Namespace) -> int:
     """Measure problems whose answers are known."""
     measured = _verify(options.names, options.negative_control)
     # Measurements are printed even if the page fails.
-    write_output(facts(measured), "\n".join([*_lines(measured.results), measured.summary]), options)
+    write_output(facts(measured), text(measured), options)
     parts = [Part((name,), name) for name in options.names]
     parts += [Part(("--negative-control", name), f"negative_control={name}") for name in options.negative_control]
     print(
@@ -56,28 +52,3 @@ def _verify(names: list[str], with_negative_control: list[str]) -> Verification:
     results = runner.run(wanted, lab, wrong)
     made_with = {"fem_reference": __version__, **versions()}
     return Verification(results, time.perf_counter() - begin, made_with)
-
-
-def _lines(results: tuple[Result, ...]) -> list[str]:
-    """One line for each result, in columns below their heads."""
-    rows = [_HEADS, *map(_cells, results)]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    left = [head in ("entry", "unit", "verdict") for head in _HEADS]
-    return [
-        "  ".join(
-            f"{cell:{'<' if first else '>'}{width}}" for cell, first, width in zip(row, left, widths, strict=True)
-        ).rstrip()
-        for row in rows
-    ]
-
-
-def _cells(one: Result) -> tuple[str, ...]:
-    order = "" if one.finding.order is None else f"{one.finding.order:.2f}"
-    numbers = (f"{one.finding.value:.6g}", f"{one.truth:.6g}", one.entry.unit, f"{one.error:.2g}", f"{one.within:.2g}")
-    return (
-        one.entry.name,
-        *numbers,
-        order,
-        f"{one.seconds:.1f}",
-        one.word + (" (negative control)" if one.with_negative_control else ""),
-    )

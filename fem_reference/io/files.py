@@ -19,11 +19,9 @@ from fem_reference.foundations.errors import NO_ROOM, InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh
 from fem_reference.foundations.subprocesses import lives
 from fem_reference.io import soup, xdmf
-from fem_reference.io.blocks import Tree
 from fem_reference.io.formats import Format, formats, vtk
-from fem_reference.io.references import beside, parsed_xml
 from fem_reference.io.soup import Lines
-from fem_reference.io.texts import check_size, is_file
+from fem_reference.io.texts import beside, check_size, is_file, parsed_xml
 
 # The most bytes of a mesh, a table or an index: a million triangles, which no mesher and no solver of ours takes. What is read
 # of a text takes up to thirty times as much.
@@ -38,7 +36,7 @@ def surface_suffixes() -> tuple[str, ...]:
 
 
 def shares_points(place: str) -> bool:
-    """Whether triangles read from ``place`` have points in common, in the order of the file; else each has three of its own."""
+    """True where triangles read from ``place`` have points in common, in the order of the file; else each has three of its own."""
     found = formats().get(Path(place).suffix.lower())
     return found is None or found.shares_points
 
@@ -76,22 +74,16 @@ def read_polylines(path: Path, unit: float) -> Polylines:
 
 
 def read_moved_polylines(path: Path, unit: float) -> Polylines:
-    """As ``read_polylines``, of what a solver made of the lines: points not finite and lines of no length as well."""
-    return _polylines(path, unit, lambda _points, _lines: None)
+    """Lines as ``read_polylines`` reads them, as a solver moved them: with points not finite and lines of no length as well."""
+    return _polylines(path, unit, lambda lines: lines)
 
 
-def _polylines(path: Path, unit: float, check: Callable[[Floats, list[list[int]]], None]) -> Polylines:
+def _polylines(path: Path, unit: float, checked: Callable[[Lines], Lines]) -> Polylines:
     known = _suffixes_of_lines()
     want = f"polylines, whole, as {' or '.join(known)}"
-    reader = _format(path, want, known).read_lines
-
-    def read(file: Path) -> Lines:
-        assert reader is not None  # of a suffix in ``lines``
-        points, lines = reader(file)
-        check(points, lines)
-        return points, lines
-
-    points, lines = _attempt(read, path, want)
+    read = _format(path, want, known).read_lines
+    assert read is not None  # of a suffix in ``lines``
+    points, lines = _attempt(lambda file: checked(read(file)), path, want)
     offsets = np.cumsum([0, *(len(line) for line in lines)])
     return Polylines(points[np.concatenate(lines)] * unit, offsets)
 
@@ -158,7 +150,7 @@ def write_tets(path: Path, mesh: TetMesh, positions: Floats) -> None:
         vtk.write_tets(part, TetMesh(positions, mesh.tets, mesh.facets), positions - mesh.points)
 
 
-def write_blocks(path: Path, blocks: Tree) -> None:
+def write_blocks(path: Path, blocks: vtk.Tree) -> None:
     """VTM of ``blocks`` by name, with a folder of their files beside it; not whole or not at all, as it is more than one file."""
     vtk.write_blocks(path, blocks)
 
@@ -222,7 +214,7 @@ def make_folder(path: Path) -> None:
 
 
 def _unwritten(path: Path, error: OSError) -> OSError:
-    """Why ``path``, a file or a folder, could not be written, in a sentence."""
+    """The error that says in a sentence why ``path``, a file or a folder, could not be written."""
     why = error.strerror or str(error)
     if error.errno in (None, *NO_ROOM):  # numpy does not say why
         free = shutil.disk_usage(path.parent).free
@@ -242,7 +234,7 @@ def clear(path: Path) -> None:
 
 
 def _attempt[T](read: Callable[[Path], T], path: Path, want: str) -> T:
-    """What ``read`` makes of the file; whatever a reader raises over a damaged file becomes an InputError."""
+    """The result of ``read`` for a file; whatever a reader raises over a damaged file becomes an InputError."""
     if not is_file(path):
         raise InputError(path, "no file", want)
     check_size(path, MOST_BYTES, want)

@@ -1,4 +1,4 @@
-"""What points, triangles and lines of any format must be."""
+"""Points, triangles and lines as readers of any format return them: checks that they all share."""
 
 from collections import Counter
 from typing import Any
@@ -36,14 +36,16 @@ def check_lines(points: Floats, lines: list[list[int]]) -> None:
             raise ValueError(f"line {number} with a point that does not exist, of {len(points)}")
 
 
-def check_lengths(points: Floats, lines: list[list[int]]) -> None:
-    """ValueError where one of ``points`` (n, 3) is not finite or a line has no length."""
+def check_lengths(read: Lines) -> Lines:
+    """The points (n, 3) and lines that were ``read``; ValueError where a point is not finite or a line has no length."""
+    points, lines = read
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if len(bad):
         raise ValueError(f"a point that is not finite (point {bad[0]})")
     for number, line in enumerate(lines):
         if (points[line] == points[line[0]]).all():
             raise ValueError(f"line {number} of zero length")
+    return read
 
 
 def joined(cells: list[list[int]]) -> list[list[int]]:

@@ -1,6 +1,6 @@
-"""TOML and JSON from files that anybody may have written: bounded in size and depth, so that reading them ends.
+"""TOML, JSON and XML from files that anybody may have written: bounded in size and depth, so that reading them ends.
 
-What is read is refused where it is no such text, is too large, or is nested deeper than anything of ours.
+A file is refused where it is no such text, is too large, is nested deeper than anything of ours, or names files elsewhere.
 """
 
 import json
@@ -8,6 +8,7 @@ import re
 import tomllib
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 from fem_reference.foundations.errors import InputError
 
@@ -16,6 +17,8 @@ MOST_TOML = 2**21
 MOST_JSON = 2**25
 # How deep tables and lists may be nested; scenes go to 6.
 DEEPEST = 32
+# A mesh file defines no entities: they can multiply a text a billion times, or stand for other files.
+_FORBIDDEN = (b"<!DOCTYPE", b"<!ENTITY")
 # What in TOML is no key: strings of its four kinds, and comments.
 _NO_KEYS = re.compile(r'"""(?:\\.|[^\\])*?"""|\'\'\'.*?\'\'\'|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'|#[^\n]*', re.DOTALL)
 # A dotted key of so many parts takes the square of its length to read.
@@ -64,8 +67,29 @@ def read_json(path: Path, want: str) -> Any:
     return value
 
 
+def parsed_xml(path: Path) -> ElementTree.Element:
+    """The root of an XML file; ValueError where it defines entities."""
+    text = path.read_bytes()
+    check_no_entities(text)
+    return ElementTree.fromstring(text)
+
+
+def check_no_entities(text: bytes) -> None:
+    """ValueError where an XML text has a document type."""
+    if any(one in text for one in _FORBIDDEN):
+        raise ValueError("a document type, which no mesh file needs")
+
+
+def beside(path: Path, name: str) -> Path:
+    """The file ``name`` that the file at ``path`` refers to; ValueError where that, links followed, is not in its folder."""
+    found = path.parent / name
+    if not found.resolve().is_relative_to(path.parent.resolve()):
+        raise ValueError(f'a reference to "{name}", outside the folder of the file')
+    return found
+
+
 def is_file(path: Path) -> bool:
-    """Whether it is one; not where a name is longer than names of files can be."""
+    """True where it is one; False also where a name is longer than names of files can be."""
     try:
         return path.is_file()
     except OSError:

@@ -7,7 +7,7 @@ from xml.etree.ElementTree import Element
 
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.io import soup
-from fem_reference.io.references import beside, parsed_xml
+from fem_reference.io.texts import beside, parsed_xml
 
 # The most numbers of one array: ten million points.
 _MOST = 3 * 10**7

@@ -12,6 +12,8 @@ from fem_reference.report.tables import finite
 from fem_reference.report.templates import template
 from fem_reference.report.words import duration
 
+_HEADS = ("entry", "value", "truth", "unit", "error", "within", "order", "seconds", "verdict")
+
 
 @dataclass(frozen=True, eq=False)
 class Verification:
@@ -60,6 +62,25 @@ def render(verification: Verification) -> str:
         overview=verify_figures.overview(verification.groups),
         ladders=[verify_figures.convergence(one) for one in results if verify_figures.drawable(one)],
     )
+
+
+def text(verification: Verification) -> str:
+    """One line for each result, in columns below their heads, and the verdict."""
+    rows = [_HEADS, *map(_cells, verification.results)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    sides = ["<" if head in ("entry", "unit", "verdict") else ">" for head in _HEADS]
+    layout = list(zip(sides, widths, strict=True))
+    lines = [
+        "  ".join(f"{cell:{side}{width}}" for cell, (side, width) in zip(row, layout, strict=True)) for row in rows
+    ]
+    return "\n".join([*(line.rstrip() for line in lines), verification.summary])
+
+
+def _cells(one: Result) -> tuple[str, ...]:
+    numbers = (f"{one.finding.value:.6g}", f"{one.truth:.6g}", one.entry.unit, f"{one.error:.2g}", f"{one.within:.2g}")
+    order = "" if one.finding.order is None else f"{one.finding.order:.2f}"
+    note = " (negative control)" if one.with_negative_control else ""
+    return (one.entry.name, *numbers, order, f"{one.seconds:.1f}", one.word + note)
 
 
 def facts(verification: Verification) -> dict[str, Any]:

@@ -80,7 +80,7 @@ def of_surfaces(folder: Path, muscle: Path, bones: Sequence[Path], unit: str | N
         raise InputError("--bone", f"the names {', '.join(names)}", "files of different names, none of them muscle")
     _new(folder)
     body, *others = (files.read_surface(path, 1.0) for path in (muscle, *bones))
-    used = _unit(body, others) if unit is None else Unit(unit)
+    used = guessed_unit(body, others) if unit is None else Unit(unit)
     factor = _factor(used.name)
     ends = {name: _welded(one, factor) for name, one in zip(names, others, strict=True)}
     write(folder, check_closed(_welded(body, factor)), ends)
@@ -142,7 +142,7 @@ def _factor(unit: str) -> float:
         raise InputError("--unit", f'"{unit}"', str(error)) from error
 
 
-def _unit(muscle: Surface, bones: Sequence[Surface]) -> Unit:
+def guessed_unit(muscle: Surface, bones: Sequence[Surface]) -> Unit:
     """The unit of coordinates of which each surface, by its own size, may be; InputError where that leaves none or several."""
     fitting, said = list[set[str]](), list[str]()
     for surface, kind in ((muscle, "muscle"), *((bone, "bone") for bone in bones)):
@@ -172,7 +172,7 @@ def _welded(surface: Surface, unit: float) -> Surface:
 
 
 def _attachments(muscle: Surface, bones: dict[str, Surface]) -> tuple[_Attached, _Attached]:
-    """Where the muscle is nearest to the two bones that it is nearest to, without a vertex that both would have."""
+    """Attachments to the two bones that the muscle is nearest to, at its vertices nearest to each, none of them in both."""
     away = {name: distances(muscle.points, bone).distance for name, bone in bones.items()}
     first, second = sorted(away, key=lambda name: float(np.quantile(away[name], _ATTACHED[-1])))[:2]
     for name in (first, second):

@@ -1,8 +1,8 @@
 """Contact of bodies with rigid ones: a plate on a block, and a ball on a large body, as Hertz has it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -12,11 +12,10 @@ from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere, Vector
 from fem_reference.problems import shapes
-from fem_reference.problems.body import ELEMENTS, Body, Prescribed
+from fem_reference.problems.body import ELEMENTS, Body
 from fem_reference.problems.contact import Contact, Obstruction
-from fem_reference.problems.paths import Rest
-from fem_reference.runs.solved import Reached
-from fem_reference.verification.parts import SYMMETRY, neo_hooke
+from fem_reference.runs.store import Frame
+from fem_reference.verification.parts import SYMMETRY, clamped, neo_hooke
 from fem_reference.verification.truths import find
 
 MU = 0.01  # [MPa]
@@ -53,7 +52,7 @@ def plate(lab: Lab, element: str, stiffness: float) -> Finding:
     return Finding(float(state.forces["plate"][2]), note=f"{state.scalars['contact_depth']:.4f} mm deep")
 
 
-def _plate_truth() -> float:
+def known_plate() -> float:
     """The block's own force where the plate, a spring beyond its smoothing, has the same."""
     force = partial(find("loads").squeeze_force, MU, PLATE_BULK, area=1.0)
 
@@ -63,65 +62,45 @@ def _plate_truth() -> float:
     return float(force(stretch=brentq(apart, 1 - PLATE_TRAVEL, 1.0, xtol=1e-15)))
 
 
-def pressed(lab: Lab, n: int, radius: float = RADIUS) -> Reached:
+def pressed(lab: Lab, n: int, radius: float) -> Frame:
     """A quarter of a large body, z >= 0, into which a ball of ``radius`` [mm] is pressed by APPROACH."""
     mesh = shapes.ball_octant(CORE, FAR, n, 2 * n + 2, "hexahedron", 2)
     law = Contact("z0", BALL_STIFFNESS, 5e-4)
     ball = Obstruction("ball", Sphere((0.0, 0.0, -radius), radius), Slide((0.0, 0.0, APPROACH)))
-    fixed = (*SYMMETRY[:2], Prescribed("far", "outer", (0, 1, 2), Rest()))
-    body = Body(mesh, neo_hooke(MU, BULK), fixed, (0.0, 1.0), contact=law, obstructions=(ball,))
+    body = Body(
+        mesh, neo_hooke(MU, BULK), (*SYMMETRY[:2], *clamped("outer")), (0.0, 1.0), contact=law, obstructions=(ball,)
+    )
     return lab.solve(body, "Q2/Q1", first_step=0.5, residual=1e-10, newton_iterations=25).last
 
 
-def _force(state: Reached) -> float:
+def force(state: Frame) -> float:
+    """The force of the whole ball [N]."""
     return 4 * float(state.forces["ball"][2])
 
 
-def _contact_radius(state: Reached) -> float:
-    """From the lever of the force on the quarter: Hertz's pressures have their middle at 3/8 of the radius."""
+def contact_radius(state: Frame) -> float:
+    """The radius [mm] from the lever of the force on the quarter: Hertz's pressures have their middle at 3/8 of it."""
     return 8 / 3 * float(-state.moments["ball"][1] / state.forces["ball"][2])
 
 
-def _peak(state: Reached) -> float:
+def peak_pressure(state: Frame) -> float:
+    """The greatest pressure [MPa]."""
     return float(state.scalars["contact_pressure"])
 
 
-def _measured(lab: Lab, n: int, value: Any, radius: float = RADIUS) -> Finding:
-    state = pressed(lab, n, radius)
-    return Finding(
-        value(state), note=f"the ball is {1000 * state.scalars['contact_depth']:.1f} micrometres deep in the body"
-    )
+def ball(lab: Lab, value: Callable[[Frame], float], radius: float) -> Finding:
+    """A ``value`` of the pressed body."""
+    state = pressed(lab, 4, radius)
+    depth = 1000 * state.scalars["contact_depth"]
+    return Finding(value(state), note=f"the ball is {depth:.1f} micrometres deep in the body")
 
 
-def _hertz() -> Any:
+def known_ball(name: str) -> float:
     """The closed form for a rigid ball on a body of the same moduli."""
     young, poisson = 9 * BULK * MU / (3 * BULK + MU), (3 * BULK - 2 * MU) / (2 * (3 * BULK + MU))
     hertz = find("hertz")
-    return hertz.rigid_sphere(RADIUS, young, poisson, hertz.force_at(RADIUS, young, poisson, APPROACH))
-
-
-def _hertz_truth(name: str) -> float:
-    return float(getattr(_hertz(), name))
-
-
-def _hertz_entry(name: str, title: str, unit: str, attribute: str, value: Any) -> Entry:
-    return Entry(
-        name=f"hertz_{name}",
-        group="contact",
-        title=f"A rigid ball pressed into a large body: {title}",
-        unit=unit,
-        truth=partial(_hertz_truth, attribute),
-        within=0.02,
-        relative=True,
-        because="the mesh leaves 1 to 1.5 %, strains of a tenth, the end of the body and the depth of the ball in it less each",
-        kind="closed form",
-        source="Hertz 1882; validation/hertz.py",
-        measure=partial(_measured, n=4, value=value),
-        negative_control="a ball of twice the radius",
-        with_negative_control=partial(_measured, n=4, value=value, radius=2 * RADIUS),
-        slow=True,
-        slow_negative_control=True,
-    )
+    known = hertz.rigid_sphere(RADIUS, young, poisson, hertz.force_at(RADIUS, young, poisson, APPROACH))
+    return float(getattr(known, name))
 
 
 ENTRIES = (
@@ -131,19 +110,42 @@ ENTRIES = (
             group="contact",
             title=f"A smooth plate on a block, by {element}: its force at half the height",
             unit="N",
-            truth=_plate_truth,
+            measure=plate,
+            given={"element": element, "stiffness": PLATE_STIFFNESS},
+            negative_control="a plate 1 % stiffer",
+            wrong={"stiffness": 1.01 * PLATE_STIFFNESS},
+            truth=known_plate,
             within=1e-9,
             relative=True,
             because="the state is homogeneous and the plate a spring: what is left is Newton's residual of 1e-12 N",
             kind="closed form",
             source="validation/loads.py: the squeeze of a block, in series with the spring",
-            measure=partial(plate, element=element, stiffness=PLATE_STIFFNESS),
-            negative_control="a plate 1 % stiffer",
-            with_negative_control=partial(plate, element=element, stiffness=1.01 * PLATE_STIFFNESS),
         )
         for element in ("P2/P1", "Q2/Q1", "Q1/P0")
     ),
-    _hertz_entry("force", "its force", "N", "force", _force),
-    _hertz_entry("radius", "the radius of the contact", "mm", "contact_radius", _contact_radius),
-    _hertz_entry("pressure", "the greatest pressure", "MPa", "peak_pressure", _peak),
+    *(
+        Entry(
+            name=f"hertz_{name}",
+            group="contact",
+            title=f"A rigid ball pressed into a large body: {words}",
+            unit=unit,
+            measure=ball,
+            given={"value": value, "radius": RADIUS},
+            negative_control="a ball of twice the radius",
+            wrong={"radius": 2 * RADIUS},
+            truth=partial(known_ball, value.__name__),
+            within=0.02,
+            relative=True,
+            because="the mesh leaves 1 to 1.5 %, strains of a tenth, the end of the body and the depth of the ball in it less each",
+            kind="closed form",
+            source="Hertz 1882; validation/hertz.py",
+            slow=True,
+            slow_negative_control=True,
+        )
+        for name, words, unit, value in (
+            ("force", "its force", "N", force),
+            ("radius", "the radius of the contact", "mm", contact_radius),
+            ("pressure", "the greatest pressure", "MPa", peak_pressure),
+        )
+    ),
 )

@@ -6,21 +6,19 @@ what the energy grows by. The energy is a polynomial through those of a few stre
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.polynomial import Chebyshev
 from scipy.optimize import brentq, minimize_scalar
 
-from fem_reference.assessment.catalogue import Entry, Lab
-from fem_reference.effects import make
+from fem_reference.assessment.catalogue import Entry, Lab, Refinement
+from fem_reference.effects import Effect, make
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
-from fem_reference.problems.paths import Radial, Rest
-from fem_reference.runs.solved import Solved
-from fem_reference.verification import truths
-from fem_reference.verification.parts import SYMMETRY, ladder, mooney_rivlin, neo_hooke, once, ramp
-from fem_reference.verification.torsion import Material
+from fem_reference.problems.paths import Radial
+from fem_reference.runs.store import Run
+from fem_reference.verification.parts import SYMMETRY, clamped, mooney_rivlin, neo_hooke, ramp
+from fem_reference.verification.truths import find
 
 # [MPa]; C1 and C2 make a Mooney-Rivlin law of the shear modulus MU. Pressures are proportional to the moduli.
 MU, BULK = 1.0, 1e4
@@ -31,11 +29,15 @@ STRETCH, BEYOND = 1.5, 2.2  # a / A of the inner face; the pressure of the spher
 PRESSED = 0.7  # [MPa], of 0.82 that the sphere can bear
 RESIDUAL = 1e-8  # [N, mm3], where forces are some 100 N
 
+Material = tuple[Effect, ...]
 Pressures = Callable[[float], float]  # [MPa] by the stretch a / A of the inner face
+Reading = tuple[
+    float, Callable[[Pressures], float]
+]  # the largest stretch, and what is read of the pressures up to there
 
 
 def stretches(largest: float, count: int) -> tuple[float, ...]:
-    """From 1 to the largest, closer at both ends: where a polynomial through values is good in between."""
+    """Stretches from 1 to the largest, closer at both ends: where a polynomial through values is good in between."""
     along = (1 - np.cos(np.linspace(0, np.pi, count))) / 2
     return tuple((1 + (largest - 1) * along).tolist())
 
@@ -45,50 +47,30 @@ def sphere(element: str, n: int, degree: int) -> Cells:
     return shapes.sphere_octant(INNER, OUTER, n, 2 * n, ELEMENTS[element][0], degree)
 
 
-def slope(solved: Solved) -> Chebyshev:
-    """Of the energy over the frames [N mm]."""
-    end = solved.last.frame
-    frames, energies = zip(*((state.frame, state.scalars["energy"]) for state in solved.states), strict=True)
+def slope(solved: Run) -> Chebyshev:
+    """The slope of the energy over the frames [N mm]."""
+    end = solved.last.number
+    frames, energies = zip(*((state.number, state.scalars["energy"]) for state in solved.states), strict=True)
     return Chebyshev.fit(frames, energies, len(frames) - 1, domain=[frames[0], end]).deriv()
 
 
-def _blown(lab: Lab, n: int, element: str, material: Material, degree: int = 2, largest: float = 1.6) -> Pressures:
-    """The pressures of the sphere whose inner face is moved out up to the largest stretch: it encloses ``pi a^3 / 6``."""
+def blown(lab: Lab, n: int, reading: Reading, element: str, material: Material, degree: int = 2) -> float:
+    """A ``reading`` of the sphere whose inner face is moved out: it encloses ``pi a^3 / 6``."""
+    largest, read = reading
     grown = Prescribed("inner", "inner", (0, 1, 2), Radial(1.0, knots=((1.0, 0.0), (2.0, 1.0), (3.0, 2.0))))
     frames = stretches(largest, 8 if largest < 2 else 10)
-    body = Body(sphere(element, n, degree), material(), (*SYMMETRY, grown), frames)
+    body = Body(sphere(element, n, degree), material, (*SYMMETRY, grown), frames)
     curve = slope(lab.solve(body, element, first_step=0.2, residual=RESIDUAL))
-    return lambda stretch: float(curve(stretch) / (np.pi / 2 * INNER**3 * stretch**2))
+    return read(lambda stretch: float(curve(stretch) / (np.pi / 2 * INNER**3 * stretch**2)))
 
 
-def _pressure(lab: Lab, n: int, element: str, material: Material, degree: int = 2) -> float:
-    """In the sphere at STRETCH [MPa]."""
-    return _blown(lab, n, element, material, degree)(STRETCH)
-
-
-def _limit_stretch(lab: Lab, n: int, material: Material) -> float:
-    """Where the pressure in the sphere is largest."""
-    return _top(_blown(lab, n, "Q2/Q1", material, largest=BEYOND))
-
-
-def _limit_pressure(lab: Lab, n: int, material: Material, degree: int = 2) -> float:
-    """The largest pressure in the sphere [MPa]."""
-    pressures = _blown(lab, n, "Q2/Q1", material, degree, BEYOND)
-    return pressures(_top(pressures))
-
-
-def _fall(lab: Lab, n: int, material: Material) -> float:
-    """From the largest pressure in the sphere to that at BEYOND [MPa]."""
-    pressures = _blown(lab, n, "Q2/Q1", material, largest=BEYOND)
-    return pressures(_top(pressures)) - pressures(BEYOND)
-
-
-def _top(pressures: Pressures) -> float:
+def top(pressures: Pressures) -> float:
+    """The stretch at which the ``pressures`` have their largest, from STRETCH to BEYOND."""
     found = minimize_scalar(lambda stretch: -pressures(stretch), bounds=(STRETCH, BEYOND), options={"xatol": 1e-7})
     return float(found.x)
 
 
-def _pressed(lab: Lab, n: int, mu: float) -> float:
+def pressed(lab: Lab, n: int, mu: float) -> float:
     """The mean stretch of the sphere's inner face, over its nodes, where a fluid of the pressure PRESSED is in it."""
     mesh = sphere("P2/P1", n, 2)
     fluid = make("pressure", on="inner", pressure=f"{PRESSED} MPa", ramp=ramp())
@@ -98,204 +80,195 @@ def _pressed(lab: Lab, n: int, mu: float) -> float:
     return float(np.linalg.norm(state.points[inside], axis=1).mean() / INNER)
 
 
-def _tube(lab: Lab, n: int, element: str, ends: tuple[str, ...] = ("bottom", "top"), degree: int = 2) -> Solved:
+def tube(lab: Lab, n: int, element: str, ends: tuple[str, ...], degree: int) -> Run:
     """A quarter of the tube, whose inner face is moved out to STRETCH, and whose ``ends`` stay in their planes."""
     mesh = shapes.tube_quarter(INNER, OUTER, LENGTH, (2 * n, 2 * n, 1), ELEMENTS[element][0], degree)
-    fixed = [Prescribed(end, end, (2,), Rest()) for end in ends]
     grown = Prescribed("inner", "inner", (0, 1), Radial(1.0, (1.0, 1.0, 0.0), ((1.0, 0.0), (2.0, 1.0))))
-    body = Body(mesh, neo_hooke(MU, BULK), (*SYMMETRY[:2], *fixed, grown), stretches(STRETCH, 8))
+    fixed = (*SYMMETRY[:2], *clamped(*ends, components=(2,)), grown)
+    body = Body(mesh, neo_hooke(MU, BULK), fixed, stretches(STRETCH, 8))
     return lab.solve(body, element, first_step=0.2, residual=RESIDUAL)
 
 
-def _tube_pressure(lab: Lab, n: int, element: str, ends: tuple[str, ...] = ("bottom", "top")) -> float:
-    """At STRETCH [MPa]: the quarter encloses ``pi a^2 L / 4``."""
-    curve = slope(_tube(lab, n, element, ends))
-    return float(curve(STRETCH) / (np.pi / 2 * INNER**2 * STRETCH * LENGTH))
+def tube_pressure(lab: Lab, n: int, ends: tuple[str, ...]) -> float:
+    """The pressure in the tube at STRETCH [MPa]: the quarter encloses ``pi a^2 L / 4``."""
+    return float(slope(tube(lab, n, "Q2/Q1", ends, 2))(STRETCH) / (np.pi / 2 * INNER**2 * STRETCH * LENGTH))
 
 
-def _tube_force(lab: Lab, n: int, element: str, degree: int = 2) -> float:
-    """On an end of the whole tube at STRETCH [N]."""
-    return float(4 * _tube(lab, n, element, degree=degree).last.forces["top"][2])
+def tube_force(lab: Lab, n: int, degree: int) -> float:
+    """The force on an end of the whole tube at STRETCH [N]."""
+    return float(4 * tube(lab, n, "P2/P1", ("bottom", "top"), degree).last.forces["top"][2])
 
 
-def _true_pressure(law: Callable[[Any], Any]) -> float:
-    """In the sphere at STRETCH [MPa], of a law of ``validation/laws.py``."""
-    material = law(truths.find("laws"))
-    return float(truths.find("radial").sphere_pressure(material, BULK, (INNER, OUTER), STRETCH))
+laws, radial = find("laws"), find("radial")
+TRUE_SPHERE = find("rivlin").Sphere(MU, INNER, OUTER)
 
 
-def _true_pressed() -> float:
-    radial, law = truths.find("radial"), truths.find("laws").neo_hooke(MU)
-
-    def excess(stretch: float) -> float:
-        return float(radial.sphere_pressure(law, BULK, (INNER, OUTER), stretch) - PRESSED)
-
-    return float(brentq(excess, 1.1, 1.7, xtol=1e-10))
+def true_pressure(law: object, stretch: float = STRETCH) -> float:
+    """The pressure in the sphere [MPa], of a law of ``validation/laws.py``."""
+    return float(radial.sphere_pressure(law, BULK, (INNER, OUTER), stretch))
 
 
-def _true_sphere() -> Any:
-    return truths.find("rivlin").Sphere(MU, INNER, OUTER)
+def true_pressed() -> float:
+    """The stretch of the sphere under PRESSED."""
+    law = laws.neo_hooke(MU)
+    return float(brentq(lambda stretch: true_pressure(law, stretch) - PRESSED, 1.1, 1.7, xtol=1e-10))
 
 
-def _true_limit_stretch() -> float:
-    return float(_true_sphere().limit_point()[0])
+def true_fall() -> float:
+    """The difference of the largest pressure and that at BEYOND [MPa]."""
+    return float(TRUE_SPHERE.limit_point()[1] - TRUE_SPHERE.pressure(BEYOND))
 
 
-def _true_limit_pressure() -> float:
-    return float(_true_sphere().limit_point()[1])
+def true_tube(which: int) -> float:
+    """The pressure [MPa] (0) or the force along the axis [N] (1) of the tube at STRETCH."""
+    return float(radial.tube(laws.neo_hooke(MU), BULK, (INNER, OUTER), STRETCH)[which])
 
 
-def _true_fall() -> float:
-    return float(_true_limit_pressure() - _true_sphere().pressure(BEYOND))
-
-
-def _true_tube(which: int) -> float:
-    """At STRETCH, the pressure [MPa] (0) or the force along the axis [N] (1)."""
-    law = truths.find("laws").neo_hooke(MU)
-    return float(truths.find("radial").tube(law, BULK, (INNER, OUTER), STRETCH)[which])
-
-
-_NEO_HOOKE = partial(neo_hooke, MU, BULK)
-_MOONEY_RIVLIN = partial(mooney_rivlin, C1, C2, BULK)
-_NEARLY_INCOMPRESSIBLE = partial(neo_hooke, MU, NEARLY)
-_TRUE_PRESSURE = partial(_true_pressure, lambda laws: laws.neo_hooke(MU))
-_TRUE_TUBE_PRESSURE, _TRUE_TUBE_FORCE = partial(_true_tube, 0), partial(_true_tube, 1)
-_UP = partial(ladder, size=INNER / 2)
-_FINITE = partial(
+NEO_HOOKE, MOONEY_RIVLIN = neo_hooke(MU, BULK), mooney_rivlin(C1, C2, BULK)
+NEARLY_INCOMPRESSIBLE = neo_hooke(MU, NEARLY)
+STRAIGHT = "straight cells, whose surfaces have flat facets"
+RISING = "Mooney-Rivlin material of the same shear modulus, whose pressure goes on rising"
+FINITE = partial(
     Entry,
     group="inflation",
     relative=True,
     kind="closed form",
     source="Ogden 1984, ch. 5.3, with the finite bulk modulus; validation/radial.py",
 )
-_LIMIT = partial(
+# Pressure at STRETCH [MPa], the largest pressure [MPa] and its stretch, and the fall from there to BEYOND [MPa].
+AT_STRETCH: Reading = (1.6, lambda pressures: pressures(STRETCH))
+LARGEST: Reading = (BEYOND, lambda pressures: pressures(top(pressures)))
+WHERE_LARGEST: Reading = (BEYOND, top)
+FALL: Reading = (BEYOND, lambda pressures: pressures(top(pressures)) - pressures(BEYOND))
+CELLS = {"n": 2, "element": "Q2/Q1", "material": NEARLY_INCOMPRESSIBLE}
+LIMIT = partial(
     Entry,
     group="inflation",
+    measure=blown,
     relative=True,
     kind="closed form",
     source="Green and Zerna 1954, ch. 3; Ogden 1984, ch. 5.3.2; validation/rivlin.py Sphere",
 )
 
 ENTRIES: tuple[Entry, ...] = (
-    _FINITE(
+    FINITE(
         name="inflation_sphere_pressure_tetrahedra",
         title="A thick sphere blown up to 1.5 times its inner radius: its pressure, by curved tetrahedra (P2/P1)",
         unit="MPa",
-        truth=_TRUE_PRESSURE,
+        measure=blown,
+        given={"reading": AT_STRETCH, "element": "P2/P1", "material": NEO_HOOKE},
+        negative_control=STRAIGHT,
+        wrong={"degree": 1},
+        truth=lambda: true_pressure(laws.neo_hooke(MU)),
         within=2e-4,
         because="discretisation of order 4, 5e-5 with 6 cells through the wall; the polynomial of the energy adds 1e-6",
-        measure=partial(
-            _UP, value=partial(_pressure, element="P2/P1", material=_NEO_HOOKE), counts=(1, 2, 3), truth=_TRUE_PRESSURE
-        ),
-        negative_control="straight cells, whose surfaces have flat facets",
-        with_negative_control=partial(
-            once, value=partial(_pressure, element="P2/P1", material=_NEO_HOOKE, degree=1), count=3
-        ),
+        refinement=Refinement((1, 2, 3), INNER / 2, order=4),
         slow=True,
         slow_negative_control=True,
     ),
-    _FINITE(
+    FINITE(
         name="inflation_sphere_pressure_hexahedra",
         title="A thick sphere blown up to 1.5 times its inner radius: its pressure, by curved hexahedra (Q2/Q1)",
         unit="MPa",
-        truth=_TRUE_PRESSURE,
+        measure=blown,
+        given={"reading": AT_STRETCH, "element": "Q2/Q1", "material": NEO_HOOKE},
+        negative_control=STRAIGHT,
+        wrong={"degree": 1},
+        truth=lambda: true_pressure(laws.neo_hooke(MU)),
         within=4e-4,
         because="discretisation of order 4, 1.1e-4 with 4 cells through the wall; the polynomial of the energy adds 1e-6",
-        measure=partial(
-            _UP, value=partial(_pressure, element="Q2/Q1", material=_NEO_HOOKE), counts=(1, 2), truth=_TRUE_PRESSURE
-        ),
-        negative_control="straight cells, whose surfaces have flat facets",
-        with_negative_control=partial(
-            once, value=partial(_pressure, element="Q2/Q1", material=_NEO_HOOKE, degree=1), count=2
-        ),
+        refinement=Refinement((1, 2), INNER / 2, order=4),
         slow=True,
     ),
-    _FINITE(
+    FINITE(
         name="inflation_sphere_pressure_mooney_rivlin",
         title="A thick Mooney-Rivlin sphere blown up to 1.5 times its inner radius: its pressure",
         unit="MPa",
-        truth=partial(_true_pressure, lambda laws: laws.MooneyRivlin(C1, C2)),
+        measure=blown,
+        given={"reading": AT_STRETCH, "n": 2, "element": "Q2/Q1", "material": MOONEY_RIVLIN},
+        negative_control="neo-Hookean material of the same shear modulus",
+        wrong={"material": NEO_HOOKE},
+        truth=lambda: true_pressure(laws.MooneyRivlin(C1, C2)),
         within=4e-4,
         because="discretisation of order 4, 1e-4 with 4 cells through the wall (Q2/Q1)",
-        measure=partial(once, value=partial(_pressure, element="Q2/Q1", material=_MOONEY_RIVLIN), count=2),
-        negative_control="neo-Hookean material of the same shear modulus",
-        with_negative_control=partial(once, value=partial(_pressure, element="Q2/Q1", material=_NEO_HOOKE), count=2),
         slow=True,
         slow_negative_control=True,
     ),
-    _FINITE(
+    FINITE(
         name="inflation_sphere_stretch",
         title="A thick sphere under the pressure of a fluid that follows its face: the stretch of its inner radius",
         unit="1",
-        truth=_true_pressed,
+        measure=pressed,
+        given={"mu": MU},
+        negative_control="the shear modulus is 1 % too large",
+        wrong={"mu": 1.01 * MU},
+        truth=true_pressed,
         within=4e-4,
         because="discretisation of order 4, 8e-5 with 4 cells through the wall (P2/P1)",
-        measure=partial(_UP, value=partial(_pressed, mu=MU), counts=(1, 2), truth=_true_pressed),
-        negative_control="the shear modulus is 1 % too large",
-        with_negative_control=partial(once, value=partial(_pressed, mu=1.01 * MU), count=2),
+        refinement=Refinement((1, 2), INNER / 2, order=4),
     ),
-    _LIMIT(
+    LIMIT(
         name="inflation_limit_pressure",
         title="A thick sphere blown up without end: the largest pressure that it bears",
         unit="MPa",
-        truth=_true_limit_pressure,
+        given={**CELLS, "reading": LARGEST},
+        negative_control=STRAIGHT,
+        wrong={"degree": 1},
+        truth=lambda: TRUE_SPHERE.limit_point()[1],
         within=4e-4,
         because="discretisation of order 4, 1e-4 with 4 cells through the wall (Q2/Q1); the polynomial adds 1e-6",
-        measure=partial(once, value=partial(_limit_pressure, material=_NEARLY_INCOMPRESSIBLE), count=2),
-        negative_control="straight cells, whose surfaces have flat facets",
-        with_negative_control=partial(
-            once, value=partial(_limit_pressure, material=_NEARLY_INCOMPRESSIBLE, degree=1), count=2
-        ),
         slow_negative_control=True,
     ),
-    _LIMIT(
+    LIMIT(
         name="inflation_limit_stretch",
         title="A thick sphere blown up without end: the stretch of its inner radius where it bears the most pressure",
         unit="1",
-        truth=_true_limit_stretch,
+        given={**CELLS, "reading": WHERE_LARGEST},
+        negative_control=RISING,
+        wrong={"material": MOONEY_RIVLIN},
+        truth=lambda: TRUE_SPHERE.limit_point()[0],
         within=1e-4,
         because="discretisation of order 4, 2e-5 with 4 cells through the wall (Q2/Q1)",
-        measure=partial(once, value=partial(_limit_stretch, material=_NEARLY_INCOMPRESSIBLE), count=2),
-        negative_control="Mooney-Rivlin material of the same shear modulus, whose pressure goes on rising",
-        with_negative_control=partial(once, value=partial(_limit_stretch, material=_MOONEY_RIVLIN), count=2),
         slow=True,
         slow_negative_control=True,
     ),
-    _LIMIT(
+    LIMIT(
         name="inflation_fall_beyond_limit",
         title="A thick sphere blown up to 2.2 times its inner radius: how far its pressure has fallen from the largest",
         unit="MPa",
-        truth=_true_fall,
+        given={**CELLS, "reading": FALL},
+        negative_control=RISING,
+        wrong={"material": MOONEY_RIVLIN},
+        truth=true_fall,
         within=2e-3,
         because="4 % of a pressure that is found to 1e-4: of its error 2e-4 is left (Q2/Q1, 4 cells through the wall)",
-        measure=partial(once, value=partial(_fall, material=_NEARLY_INCOMPRESSIBLE), count=2),
-        negative_control="Mooney-Rivlin material of the same shear modulus, whose pressure goes on rising",
-        with_negative_control=partial(once, value=partial(_fall, material=_MOONEY_RIVLIN), count=2),
         slow=True,
     ),
-    _FINITE(
+    FINITE(
         name="inflation_tube_pressure",
         title="A thick tube of constant length blown up to 1.5 times its inner radius: its pressure",
         unit="MPa",
-        truth=_TRUE_TUBE_PRESSURE,
+        measure=tube_pressure,
+        given={"ends": ("bottom", "top")},
+        negative_control="one end of the tube is free to move along it",
+        wrong={"ends": ("bottom",)},
+        truth=lambda: true_tube(0),
         within=5e-5,
         because="discretisation of order 4, 1.1e-5 with 6 cells through the wall (Q2/Q1)",
-        measure=partial(
-            _UP, value=partial(_tube_pressure, element="Q2/Q1"), counts=(1, 2, 3), truth=_TRUE_TUBE_PRESSURE
-        ),
-        negative_control="one end of the tube is free to move along it",
-        with_negative_control=partial(once, value=partial(_tube_pressure, element="Q2/Q1", ends=("bottom",)), count=3),
+        refinement=Refinement((1, 2, 3), INNER / 2, order=4),
         slow=True,
     ),
-    _FINITE(
+    FINITE(
         name="inflation_tube_axial_force",
         title="A thick tube of constant length blown up to 1.5 times its inner radius: the force along its axis",
         unit="N",
-        truth=_TRUE_TUBE_FORCE,
+        measure=tube_force,
+        given={"degree": 2},
+        negative_control=STRAIGHT,
+        wrong={"degree": 1},
+        truth=lambda: true_tube(1),
         within=5e-5,
         because="discretisation of order 4, 1e-5 with 6 cells through the wall (P2/P1)",
-        measure=partial(_UP, value=partial(_tube_force, element="P2/P1"), counts=(1, 2, 3), truth=_TRUE_TUBE_FORCE),
-        negative_control="straight cells, whose surfaces have flat facets",
-        with_negative_control=partial(once, value=partial(_tube_force, element="P2/P1", degree=1), count=3),
+        refinement=Refinement((1, 2, 3), INNER / 2, order=4),
     ),
 )

@@ -1,22 +1,49 @@
-"""Parts of entries: effects as scene files write them, planes of symmetry, values on ladders of meshes."""
+"""Parts of entries: materials and clamps in few words, and what is read from the states of a body."""
 
-from collections.abc import Callable
+from collections.abc import Iterable
+from functools import partial
 
-from fem_reference.assessment import catalogue
-from fem_reference.assessment.catalogue import Finding, Lab
+import numpy as np
+
+from fem_reference.assessment.catalogue import Entry
 from fem_reference.effects import Effect, make
+from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.body import ELEMENTS, Prescribed
 from fem_reference.problems.paths import Rest
+from fem_reference.runs.store import Run
 
-Value = Callable[[Lab, int], float]  # of so many cells
-
-# Along the axes the planes through the origin are those of mirrors.
-SYMMETRY = tuple(Prescribed(face, face, (axis,), Rest()) for axis, face in enumerate(("x0", "y0", "z0")))
+SURFACE = ("x0", "x1", "y0", "y1", "z0", "z1")  # of a box
+NO_GRADIENT = ((0.0, 0.0, 0.0),) * 3
+# A property that is there (1) or not (0).
+YES = partial(
+    Entry,
+    unit="1",
+    truth=1.0,
+    within=0.1,
+    because="it is yes (1) or no (0), and nothing between",
+    kind="property",
+)
+# Loads that are gone at frame 2.
+UP_AND_GONE = [{"frame": 0.0, "amount": 0.0}, {"frame": 1.0, "amount": 1.0}, {"frame": 2.0, "amount": 0.0}]
 
 
 def ramp(full: float = 1.0) -> list[dict[str, float]]:
-    """From nothing at frame 0 to ``full`` at frame 1, as scene files write it."""
+    """A ramp from nothing at frame 0 to ``full`` at frame 1, as scene files write it."""
     return [{"frame": 0.0, "amount": 0.0}, {"frame": 1.0, "amount": full}]
+
+
+def clamped(*regions: str, components: tuple[int, ...] = (0, 1, 2)) -> tuple[Prescribed, ...]:
+    """Regions that stay where they are, along the axes ``components``."""
+    return tuple(Prescribed(region, region, components, Rest()) for region in regions)
+
+
+def sliding(*faces: str) -> tuple[Prescribed, ...]:
+    """Faces such as ``x0`` that stay in their planes, without friction."""
+    return tuple(Prescribed(face, face, ("xyz".index(face[0]),), Rest()) for face in faces)
+
+
+# Along the axes the planes through the origin are those of mirrors.
+SYMMETRY = sliding("x0", "y0", "z0")
 
 
 def resistance(element: str, bulk: float) -> Effect:
@@ -25,27 +52,33 @@ def resistance(element: str, bulk: float) -> Effect:
     return make(name, bulk=f"{bulk} MPa")
 
 
-def neo_hooke(mu: float, bulk: float) -> tuple[Effect, ...]:
-    """Material of the moduli ``mu`` and ``bulk`` [MPa], the latter in mixed form."""
-    return make("neo_hooke", mu=f"{mu} MPa"), make("incompressible", bulk=f"{bulk} MPa")
+def neo_hooke(mu: float, bulk: float, element: str = "P2/P1") -> tuple[Effect, ...]:
+    """Material of the moduli ``mu`` and ``bulk`` [MPa], for an ``element``."""
+    return make("neo_hooke", mu=f"{mu} MPa"), resistance(element, bulk)
 
 
 def mooney_rivlin(c1: float, c2: float, bulk: float) -> tuple[Effect, ...]:
     """Material of ``c1``, ``c2`` and the modulus ``bulk`` [MPa], the latter in mixed form."""
-    return make("mooney_rivlin", c1=f"{c1} MPa", c2=f"{c2} MPa"), make("incompressible", bulk=f"{bulk} MPa")
+    return make("mooney_rivlin", c1=f"{c1} MPa", c2=f"{c2} MPa"), resistance("P2/P1", bulk)
 
 
-def zero() -> float:
-    """The truth of what must vanish."""
-    return 0.0
+def frames(last: float, count: int) -> tuple[float, ...]:
+    """``count`` frames after 0, evenly to the ``last``."""
+    return tuple(np.linspace(0, last, count + 1).tolist())
 
 
-def once(lab: Lab, value: Value, count: int) -> Finding:
-    """The ``value`` with ``count`` cells."""
-    return Finding(value(lab, count))
+def farthest(points: Floats, others: Floats) -> float:
+    """The greatest distance [mm] of points (n, 3) from ``others`` (n, 3)."""
+    return float(np.linalg.norm(points - others, axis=1).max())
 
 
-def ladder(lab: Lab, value: Value, counts: tuple[int, ...], size: float, truth: Callable[[], float]) -> Finding:
-    """The ``value`` with the last of ``counts`` cells, of size ``size / count`` [mm], and its convergence."""
-    steps = tuple((size / count, value(lab, count)) for count in counts)
-    return Finding(steps[-1][1], catalogue.order(steps, truth()), steps)
+def nearest(points: Floats, place: Iterable[float]) -> int:
+    """The index of that of ``points`` (n, 3) which is nearest to a ``place`` (3,)."""
+    return int(np.argmin(np.linalg.norm(points - np.array(tuple(place)), axis=1)))
+
+
+def relaxation_rate(solved: Run, numbers: tuple[int, int], seconds: float) -> float:
+    """The rate [1/s] at which the top of a body, its greatest z, goes back to rest between two states, ``seconds`` apart."""
+    rest = solved.states[0].points[:, 2].max()
+    ends = [solved.states[number].points[:, 2].max() - rest for number in numbers]
+    return float(np.log(ends[0] / ends[1])) / seconds

@@ -7,13 +7,14 @@ import os
 import pkgutil
 import threading
 import time
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import replace
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
+from itertools import count
+from queue import SimpleQueue
 from types import ModuleType
 
 from fem_reference import verification
@@ -57,7 +58,7 @@ def choose(catalogue: dict[str, Entry], wanted: Iterable[str], place: str) -> tu
 
 
 def _known(catalogue: dict[str, Entry], text: str) -> str:
-    """What could have been meant by ``text``: the names closest to it, and every group."""
+    """The entries that could have been meant by ``text``: the names closest to it, and every group."""
     groups = dict.fromkeys(entry.group for entry in catalogue.values())
     near = get_close_matches(text, catalogue, n=5)
     such = f" (such as {', '.join(near)})" if near else ""
@@ -69,46 +70,40 @@ def run(
     make_lab: Callable[[], AbstractContextManager[Lab]],
     with_negative_control: frozenset[str] = frozenset(),
 ) -> tuple[Result, ...]:
-    """What came of the entries, in their order; those whose names are in ``with_negative_control`` are measured with their
+    """The results of the entries, in their order; those whose names are in ``with_negative_control`` are measured with their
     negative control.
 
     Two at a time where there are two cores, each thread with a lab of its own. However this ends, its labs are closed.
     """
-    waiting, found = deque(enumerate(wanted)), dict[int, Result]()
-    reporting, begin = threading.Lock(), time.perf_counter()
+    begin, reporting, done = time.perf_counter(), threading.Lock(), count(1)
+    free = SimpleQueue[Lab]()
 
-    def work(lab: Lab) -> None:
-        for place, entry in _taken(waiting):
-            last = _measured(entry, lab, with_negative_control=entry.name in with_negative_control)
-            with reporting:
-                found[place] = last
-                _log_progress(last, len(found), len(wanted), time.perf_counter() - begin)
+    def work(entry: Entry) -> Result:
+        lab = free.get()
+        last = _measured(entry, lab, with_negative_control=entry.name in with_negative_control)
+        free.put(lab)
+        with reporting:
+            _log_progress(last, next(done), len(wanted), time.perf_counter() - begin)
+        return last
 
-    count = min(2, len(os.sched_getaffinity(0)), len(wanted))
-    with ThreadPoolExecutor(max(count, 1)) as pool, ExitStack() as stack:
-        labs = [stack.enter_context(make_lab()) for _ in range(count)]
-        stack.callback(waiting.clear)  # so that no thread goes on to the next entry while the labs close
-        threads = [pool.submit(work, lab) for lab in labs]
-        for thread in wait(threads, return_when=FIRST_EXCEPTION).done:
-            thread.result()
-    return tuple(found[place] for place in range(len(wanted)))
-
-
-def _taken(waiting: deque[tuple[int, Entry]]) -> Iterator[tuple[int, Entry]]:
-    """Takes what is waiting, one after the other, until nothing is."""
-    while True:
-        try:
-            taken = waiting.popleft()
-        except IndexError:
-            return
-        yield taken
+    labs = min(2, len(os.sched_getaffinity(0)), len(wanted))
+    with ThreadPoolExecutor(max(labs, 1)) as pool, ExitStack() as stack:
+        for _ in range(labs):
+            free.put(stack.enter_context(make_lab()))
+        found = [pool.submit(work, entry) for entry in wanted]
+        stack.callback(
+            lambda: [one.cancel() for one in found]
+        )  # so that no thread goes on to the next while the labs close
+        for one in wait(found, return_when=FIRST_EXCEPTION).done:
+            one.result()
+    return tuple(one.result() for one in found)
 
 
 def _measured(entry: Entry, lab: Lab, *, with_negative_control: bool) -> Result:
-    """What came of an entry; where it raised, a finding or a truth that is not a number, and a note that says why."""
+    """The result of an entry; where it raised, a finding or a truth that is not a number, and a note that says why."""
     begin = time.perf_counter()
     try:
-        finding = (entry.with_negative_control if with_negative_control else entry.measure)(lab)
+        finding = entry.find(lab, with_negative_control=with_negative_control)
     except FAILURES as error:
         finding = Finding(math.nan, note=f"{type(error).__name__}: {error}")
     seconds = time.perf_counter() - begin

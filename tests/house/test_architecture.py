@@ -82,7 +82,7 @@ def own(tree: ast.AST) -> set[str]:
 
 def test_packages_import_in_one_order_and_heavy_ones_have_one_door() -> None:
     found = {path.name for path in PACKAGE.iterdir() if path.name != "__pycache__"}
-    assert found == {*ORDER, "__init__.py", "__main__.py", "py.typed"}
+    assert found == {*ORDER, "__init__.py", "__init__.pyi", "__main__.py", "py.typed"}
     wrong = []
     for name, tree, _ in sources():
         place = name.split("/")[0]

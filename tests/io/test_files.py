@@ -1,6 +1,5 @@
 """What goes out comes back the same, and a file that is not whole is never read nor left behind."""
 
-from contextlib import chdir
 from pathlib import Path
 
 import meshio
@@ -130,65 +129,6 @@ def test_a_damaged_index_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "run.pvd").write_text(text)
     with pytest.raises(InputError, match=r"run\.pvd: got .*, want a PVD index"):
         files.read_pvd(tmp_path / "run.pvd")
-
-
-def write_series(path: Path, data_format: str = "XML", **data: np.ndarray) -> None:
-    """Two steps at 0 and 0.5 s; each value of ``data`` is that of the second; meshio puts its .h5 beside the path."""
-    with chdir(path.parent), meshio.xdmf.TimeSeriesWriter(path, data_format=data_format) as series:
-        series.write_points_cells(BALL.points, [("triangle", BALL.triangles)])
-        for time in (0.0, 0.5):
-            series.write_data(time, point_data={name: 2 * time * values for name, values in data.items()})
-
-
-@pytest.mark.parametrize("name", ["displacement", "u"])
-def test_a_series_moves_by_its_displacement(tmp_path: Path, name: str) -> None:
-    write_series(tmp_path / "run.xdmf", **{name: MOVED - BALL.points, "velocity": BALL.points})
-    (start, first), (end, last) = files.read_xdmf(tmp_path / "run.xdmf", 10.0)
-    assert (start, end) == (0.0, 0.5)
-    # meshio writes 17 digits, so that only the sum is rounded: a unit in the last place of 300 mm is 6e-14.
-    assert np.allclose(first.points, 10 * BALL.points, rtol=0, atol=1e-13)
-    assert np.allclose(last.points, 10 * MOVED, rtol=0, atol=1e-13)
-    assert last.place == f"{tmp_path / 'run.xdmf'}: time 0.5"
-
-
-@pytest.mark.parametrize("relative", [False, True])
-def test_a_series_whose_numbers_are_in_hdf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, relative: bool) -> None:
-    """As meshio chooses by itself; the .h5 is beside the .xdmf, wherever we are."""
-    (tmp_path / "there").mkdir()
-    write_series(tmp_path / "there" / "run.xdmf", "HDF", displacement=MOVED - BALL.points)
-    assert (tmp_path / "there" / "run.h5").is_file()
-    monkeypatch.chdir(tmp_path)
-    (start, first), (end, last) = files.read_xdmf(Path("." if relative else tmp_path) / "there" / "run.xdmf", 10.0)
-    assert (start, end) == (0.0, 0.5)
-    assert np.array_equal(first.points, 10 * BALL.points)
-    assert np.array_equal(first.triangles, BALL.triangles)
-    assert np.allclose(last.points, 10 * MOVED, rtol=0, atol=1e-13)  # the sum is rounded, as above
-
-
-@pytest.mark.parametrize("share", [None, 0.0, 0.5])
-def test_a_series_without_its_hdf_is_refused(tmp_path: Path, share: float | None) -> None:
-    write_series(tmp_path / "run.xdmf", "HDF", displacement=MOVED - BALL.points)
-    store = tmp_path / "run.h5"
-    if share is None:
-        store.unlink()
-    else:
-        store.write_bytes(store.read_bytes()[: int(share * store.stat().st_size)])
-    with pytest.raises(InputError, match=r"run\.xdmf: got .*open file.*, want an XDMF time series"):
-        files.read_xdmf(tmp_path / "run.xdmf", 1.0)
-
-
-def test_a_series_without_displacement_is_refused(tmp_path: Path) -> None:
-    write_series(tmp_path / "run.xdmf", velocity=MOVED)
-    with pytest.raises(InputError, match=r"run\.xdmf: got point data velocity in a step, want an XDMF time series"):
-        files.read_xdmf(tmp_path / "run.xdmf", 1.0)
-
-
-def test_a_cut_series_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "run.xdmf"
-    write_series(path, displacement=MOVED)
-    path.write_bytes(path.read_bytes()[:-20])
-    with pytest.raises(InputError, match=r"run\.xdmf: got .*, want an XDMF time series"):
-        files.read_xdmf(path, 1.0)
 
 
 def test_rows_of_a_table(tmp_path: Path) -> None:

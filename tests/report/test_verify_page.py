@@ -28,7 +28,7 @@ def made(name="bar", value=2.01, *, with_negative_control=False, truth=2.0, grou
         "kind": "closed form",
         "negative_control": "mu twice",
     }
-    entry = Entry(name=name, group=group, measure=None, with_negative_control=None, **(printed | numbers | changes))
+    entry = Entry(name=name, group=group, measure=None, given={}, wrong={}, **(printed | numbers | changes))
     return result(entry, Finding(value, **given), 1.25, with_negative_control=with_negative_control)
 
 

@@ -54,14 +54,14 @@ def test_a_scene_of_surfaces_can_be_set_up_as_it_is(stl: Path, capsys) -> None:
 @pytest.mark.parametrize(("scale", "unit"), [(1.0, "mm"), (1e-3, "m")])
 def test_the_unit_is_guessed_where_only_one_makes_a_muscle_and_bones(scale: float, unit: str) -> None:
     muscle, *bones = (files.read_surface(HIP / f"{name}.ply", scale) for name in ("muscle", "pelvis", "femur"))
-    assert new_scene._unit(muscle, bones).name == unit
+    assert new_scene.guessed_unit(muscle, bones).name == unit
 
 
 def test_where_several_units_make_one_it_is_asked_for() -> None:
     muscle, *bones = (files.read_surface(HIP / f"{name}.ply", 0.2) for name in ("muscle", "pelvis", "femur"))
     want = r'--unit: got none, where "muscle.ply" is 41.*, a muscle in mm or cm; "pelvis.ply" is .*: several units are'
     with pytest.raises(InputError, match=want):
-        new_scene._unit(muscle, bones)
+        new_scene.guessed_unit(muscle, bones)
 
 
 def test_what_cannot_be_is_refused_and_nothing_is_written(stl: Path, capsys) -> None:

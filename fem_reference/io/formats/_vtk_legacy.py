@@ -6,31 +6,19 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.io.formats._vtk_cells import Cells, DataSet, checked
+from fem_reference.io.formats._vtk_cells import DataSet, PointLists, checked
 
 _HEAD = re.compile(rb"# vtk DataFile Version (\d+)\.(\d+)[^\n]*\n[^\n]*\n\s*(ASCII|BINARY)\s+DATASET\s+(\w+)\s*?\n")
 _KINDS = {b"POLYDATA": "PolyData", b"UNSTRUCTURED_GRID": "UnstructuredGrid"}
 _CELLS = {"LINES": "Lines", "POLYGONS": "Polys", "TRIANGLE_STRIPS": "Strips", "CELLS": "Cells", "VERTICES": "Verts"}
-_TYPES = {"unsigned_char": "u1", "char": "i1", "unsigned_short": "u2", "short": "i2", "unsigned_int": "u4", "int": "i4"}
-_TYPES |= {
-    "unsigned_long": "u8",
-    "long": "i8",
-    "vtktypeint64": "i8",
-    "vtktypeuint64": "u8",
-    "float": "f4",
-    "double": "f8",
-}
-_TYPES |= {"vtkidtype": "i4", "signed_char": "i1", "vtktypeint32": "i4", "vtktypeuint32": "u4"}
-# Of attributes: their components, and which word of their line says the type, or how many components.
-_COMPONENTS = {
-    "VECTORS": 3,
-    "NORMALS": 3,
-    "TENSORS": 9,
-    "TENSORS6": 6,
-    "GLOBAL_IDS": 1,
-    "PEDIGREE_IDS": 1,
-    "EDGE_FLAGS": 1,
-}
+_TYPES = {
+    "char": "i1", "signed_char": "i1", "short": "i2", "int": "i4", "long": "i8", "vtktypeint32": "i4", "vtktypeint64": "i8",
+    "unsigned_char": "u1", "unsigned_short": "u2", "unsigned_int": "u4", "unsigned_long": "u8", "vtktypeuint32": "u4",
+    "vtktypeuint64": "u8", "vtkidtype": "i4", "float": "f4", "double": "f8",
+}  # fmt: skip
+# Attributes with a fixed number of components; the third word of their line is the type.
+_COMPONENTS = {"VECTORS": 3, "NORMALS": 3, "TENSORS": 9, "TENSORS6": 6}
+_COMPONENTS |= dict.fromkeys(("GLOBAL_IDS", "PEDIGREE_IDS", "EDGE_FLAGS"), 1)
 
 
 def read(data: bytes) -> DataSet:
@@ -58,20 +46,19 @@ class _File:
         while (words := self._line()) is not None:
             self._section(words)
         cells = {name: self._cells(name) for name in set(_CELLS.values())}
-        if kind == "UnstructuredGrid" and len(self.types) != len(cells["Cells"].offsets) - 1:
-            raise ValueError(f"{len(self.types)} types of {len(cells['Cells'].offsets) - 1} cells")
+        if kind == "UnstructuredGrid" and len(self.types) != len(cells["Cells"].sizes):
+            raise ValueError(f"{len(self.types)} types of {len(cells['Cells'].sizes)} cells")
         return DataSet(kind, self.points, cells, self.types)
 
-    def _cells(self, name: str) -> Cells:
-        ends, corners = self.parts.get(name, ([], []))
-        return checked(ends, corners, len(self.points))
+    def _cells(self, name: str) -> PointLists:
+        return checked(*self.parts.get(name, ([], [])), len(self.points))
 
     def _section(self, words: list[str]) -> None:
         name = words[0].upper()
         if name == "POINTS":
             self.points = self._array(3 * _number(words[1]), words[2]).reshape(-1, 3)
         elif name in _CELLS:
-            self.parts[_CELLS[name]] = self._ends_and_corners(_number(words[1]), _number(words[2]))
+            self.parts[_CELLS[name]] = self._sizes_and_corners(_number(words[1]), _number(words[2]))
         elif name == "CELL_TYPES":
             self.types = np.asarray(self._array(_number(words[1]), "int"), np.int64)
         elif name in ("POINT_DATA", "CELL_DATA"):
@@ -83,43 +70,42 @@ class _File:
         else:
             self._attribute(name, words)
 
-    def _ends_and_corners(self, count: int, size: int) -> tuple[Any, Any]:
-        """Where cells end in their corners, and these; in old files each cell is preceded by how many it has."""
+    def _sizes_and_corners(self, count: int, size: int) -> tuple[Any, Any]:
+        """Sizes of cells and their corners; in old files each cell is preceded by its size."""
         if self.new:
-            arrays = {}
-            for name, length in (("OFFSETS", count), ("CONNECTIVITY", size)):
-                words = self._line() or [""]
-                if words[0].upper() != name:
-                    raise ValueError(f"no {name} of cells")
-                arrays[name] = self._array(length, words[1])
-            offsets = arrays["OFFSETS"]
+            offsets, corners = self._named("OFFSETS", count), self._named("CONNECTIVITY", size)
             if count and offsets[0] != 0:
                 raise ValueError("offsets that do not begin with 0")
-            return offsets[1:], arrays["CONNECTIVITY"]
+            return np.diff(np.asarray(offsets, np.int64)), corners
         values = self._array(size, "int").tolist()
-        ends, corners, at = [], list[int](), 0
-        for _ in range(count):
-            if at >= len(values) or not 0 <= values[at] < len(values) - at:
+        sizes, corners, at = list[int](), list[int](), 0
+        while at < len(values):
+            if not 0 <= values[at] < len(values) - at:
                 raise ValueError("cells that do not fit in their list")
+            sizes.append(values[at])
             corners += values[at + 1 : at + 1 + values[at]]
-            ends.append(len(corners))
             at += 1 + values[at]
-        if at != len(values):
-            raise ValueError(f"{len(values)} entries of cells, of which {at} are theirs")
-        return ends, corners
+        if len(sizes) != count:
+            raise ValueError(f"{len(sizes)} cells of {count}")
+        return sizes, corners
+
+    def _named(self, name: str, length: int) -> Any:
+        """The array on whose line is a ``name`` and then its type."""
+        words = self._line() or [""]
+        if words[0].upper() != name:
+            raise ValueError(f"no {name} of cells")
+        return self._array(length, words[1])
 
     def _attribute(self, name: str, words: list[str]) -> None:
+        of_bytes = "float" if self.text else "unsigned_char"
         if name == "SCALARS":
-            components = _number(words[3]) if len(words) > 3 else 1
             if re.match(rb"\s*LOOKUP_TABLE\s", self.data[self.at : self.at + 100], re.IGNORECASE):
                 self._line()
-            self._array(components * self.count, words[2])
+            self._array((_number(words[3]) if len(words) > 3 else 1) * self.count, words[2])
         elif name == "LOOKUP_TABLE":
-            self._array(4 * _number(words[2]), "float" if self.text else "unsigned_char")
-        elif name == "COLOR_SCALARS":
-            self._array(_number(words[2]) * self.count, "float" if self.text else "unsigned_char")
-        elif name == "TEXTURE_COORDINATES":
-            self._array(_number(words[2]) * self.count, words[3])
+            self._array(4 * _number(words[2]), of_bytes)
+        elif name in ("COLOR_SCALARS", "TEXTURE_COORDINATES"):
+            self._array(_number(words[2]) * self.count, words[3] if name[0] == "T" else of_bytes)
         elif name in _COMPONENTS:
             self._array(_COMPONENTS[name] * self.count, words[2])
         else:

@@ -14,8 +14,8 @@ from xml.etree.ElementTree import Element, fromstring
 
 import numpy as np
 
-from fem_reference.io.formats._vtk_cells import Cells, DataSet, checked, joined
-from fem_reference.io.references import check_no_entities
+from fem_reference.io.formats._vtk_cells import DataSet, checked, joined
+from fem_reference.io.texts import check_no_entities
 
 # The most bytes of an array that was compressed.
 _MOST = 2**28
@@ -54,21 +54,15 @@ def _piece(piece: Element, kind: str, read_array: Callable[[Element], Any]) -> D
     for name in _KINDS[kind]:
         arrays = {one.get("Name"): one for one in piece.findall(f"{name}/DataArray")}
         number = _count(piece, f"NumberOf{name}")
-        if number == 0:
-            cells[name] = checked([], [], count)
-            continue
-        cells[name] = _cells(read_array(arrays["offsets"]), read_array(arrays["connectivity"]), number, count)
-        if kind == "UnstructuredGrid":
+        ends, corners = (read_array(arrays[key]) if number else [] for key in ("offsets", "connectivity"))
+        if len(ends) != number:
+            raise ValueError(f"{len(ends)} offsets of {number} cells")
+        cells[name] = checked(np.diff(np.asarray(ends, np.int64), prepend=0), corners, count)
+        if kind == "UnstructuredGrid" and number:
             types = np.asarray(read_array(arrays["types"]), np.int64)
             if len(types) != number:
                 raise ValueError(f"{len(types)} types of {number} cells")
     return DataSet(kind, points, cells, types)
-
-
-def _cells(ends: Any, corners: Any, number: int, points: int) -> Cells:
-    if len(ends) != number:
-        raise ValueError(f"{len(ends)} offsets of {number} cells")
-    return checked(ends, corners, points)
 
 
 def _count(piece: Element, name: str) -> int:
@@ -84,8 +78,9 @@ class _Arrays:
     def __init__(self, root: Element, appended: bytes) -> None:
         self.order = ">" if root.get("byte_order") == "BigEndian" else "<"
         self.header = np.dtype(f"{self.order}u{8 if root.get('header_type') == 'UInt64' else 4}")
-        compressor = root.get("compressor")
-        self.unpacked = None if not compressor else _unpacking(compressor)
+        self.compressor = root.get("compressor")
+        if self.compressor and self.compressor not in _UNPACKING:
+            raise ValueError(f"arrays compressed by {self.compressor[:40]}, none of {', '.join(_UNPACKING)}")
         attributes, _, self.appended = appended.partition(b"_")
         self.encoded = b"base64" in attributes
 
@@ -108,10 +103,10 @@ class _Arrays:
         return np.frombuffer(self._bytes(data, encoded=encoded), dtype)
 
     def _bytes(self, data: memoryview, *, encoded: bool) -> bytes:
-        """What is stored at the beginning of ``data``, behind a header that says its length, or those of its compressed blocks."""
+        """Bytes stored at the beginning of ``data``, behind a header with their length, or with those of compressed blocks."""
         size = self.header.itemsize
         take = _decoded if encoded else _taken
-        if self.unpacked is None:
+        if not self.compressor:
             (count,) = np.frombuffer(take(data, size), self.header).tolist()
             return take(data, size + count)[size:]
         blocks, block, last = np.frombuffer(take(data, 3 * size), self.header).tolist()
@@ -121,11 +116,15 @@ class _Arrays:
         head = size * (3 + blocks)
         lengths = np.frombuffer(take(data, head), self.header)[3:].tolist()
         packed = take(data[4 * -(-head // 3) :] if encoded else data[head:], sum(lengths))
-        parts, at = [], 0
+        found, at = bytearray(), 0
         for i, length in enumerate(lengths):
-            parts.append(self.unpacked(packed[at : at + length], last if last and i == blocks - 1 else block))
+            wanted = last if last and i == blocks - 1 else block
+            part = _UNPACKING[self.compressor](packed[at : at + length], wanted + 1)  # never more than that
+            if len(part) != wanted:
+                raise ValueError(f"a block of {len(part)} bytes in place of {wanted}")
+            found += part
             at += length
-        return b"".join(parts)
+        return bytes(found)
 
 
 def _taken(data: memoryview, count: int) -> bytes:
@@ -140,20 +139,6 @@ def _decoded(data: memoryview, count: int) -> bytes:
     if len(found) < count:
         raise ValueError(f"{len(found)} bytes of {count}")
     return found[:count]
-
-
-def _unpacking(compressor: str) -> Callable[[bytes, int], bytes]:
-    """How blocks become bytes, never more than are said to be in them."""
-    if compressor not in _UNPACKING:
-        raise ValueError(f"arrays compressed by {compressor[:40]}, none of {', '.join(_UNPACKING)}")
-
-    def unpacked(packed: bytes, count: int) -> bytes:
-        found = _UNPACKING[compressor](packed, count + 1)
-        if len(found) != count:
-            raise ValueError(f"a block of {len(found)} bytes in place of {count}")
-        return found
-
-    return unpacked
 
 
 def _of_lz4(packed: bytes, most: int) -> bytes:

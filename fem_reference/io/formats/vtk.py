@@ -2,20 +2,37 @@
 
 import errno
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh
-from fem_reference.io.blocks import Block, Tree
+from fem_reference.foundations.mesh import Floats, Ints, Polylines, Surface, TetMesh
 from fem_reference.io.formats import Format, _vtk_legacy, _vtk_xml
 from fem_reference.io.formats._vtk_cells import DataSet
 from fem_reference.io.soup import Lines, Soup, check_lines, joined, only_triangles
 
 _TRIANGLE = 5  # of VTK's cell types
+_NO_ROOM = 20007  # what VTK calls a disk that is full; other errors of the system have the system's numbers
+_WRITERS = {".vtk": "PolyDataWriter", ".vtp": "XMLPolyDataWriter", ".vtu": "XMLUnstructuredGridWriter"}
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """``cells`` between ``points`` (n, 3) [mm]: triangles (m, 3), tetrahedra (m, 4) or lines; by name arrays ``of_points``
+    (n, ...), ``of_cells`` (m, ...), and ``numbers`` that are one for all of it.
+    """
+
+    points: Floats
+    cells: Ints | Polylines
+    of_points: dict[str, Floats] = field(default_factory=dict)
+    of_cells: dict[str, Floats] = field(default_factory=dict)
+    numbers: dict[str, float] = field(default_factory=dict)
+
+
+type Tree = Mapping[str, "Block | Tree"]
 
 
 def _read(path: Path) -> Soup:
@@ -28,16 +45,17 @@ def _read(path: Path) -> Soup:
     cells = data.cells.get("Cells" if data.kind == "UnstructuredGrid" else "Polys")
     if cells is None or len(cells.corners) == 0:
         return np.empty((0, 3)), np.empty((0, 3))
-    only_triangles(cells.sizes)
+    only_triangles({*cells.sizes.tolist()})
     return data.points, cells.corners.reshape(-1, 3)
 
 
 def _read_lines(path: Path) -> Lines:
     """Points (n, 3) of the file, and the points of each line; ValueError where one is not usable."""
     data = _data(path)
-    if data.kind != "PolyData" or "Lines" not in data.cells or len(data.cells["Lines"].corners) == 0:
+    found = data.cells.get("Lines")
+    if data.kind != "PolyData" or found is None or len(found.corners) == 0:
         raise ValueError("no lines")
-    cells = [cell.tolist() for cell in np.split(data.cells["Lines"].corners, data.cells["Lines"].offsets[1:-1])]
+    cells = [cell.tolist() for cell in np.split(found.corners, np.cumsum(found.sizes)[:-1])]
     points = np.asarray(data.points, np.float64)
     check_lines(points, cells)
     return points, joined(cells)
@@ -54,66 +72,39 @@ def _data(path: Path) -> DataSet:
     return _vtk_legacy.read(data) if path.suffix.lower() == ".vtk" else _vtk_xml.read(data)
 
 
-@contextmanager
-def _errors() -> Iterator[list[str]]:
-    """What VTK complains of meanwhile, known at the end of it, instead of on stderr; some errors it calls warnings."""
-    import pyvista
-
-    found: list[str] = []
-    with pyvista.vtk_verbosity("off"), pyvista.VtkErrorCatcher(send_to_logging=False) as caught:
-        yield found
-    found += [event.alert for event in caught.events if "error" in str(event).lower()]
-
-
 def _write(path: Path, surface: Surface, displacement: Floats) -> None:
     """The surface with point data ``displacement`` [mm], float64; as an unstructured grid in VTU."""
-    import pyvista
-
-    data = pyvista.PolyData.from_regular_faces(np.array(surface.points, np.float64), surface.triangles, deep=True)
+    data = _data_set(Block(surface.points, surface.triangles))
     _save(path, data.cast_to_unstructured_grid() if path.suffix.lower() == ".vtu" else data, displacement)
 
 
 def _write_lines(path: Path, lines: Polylines, displacement: Floats) -> None:
     """The lines with point data ``displacement`` [mm], float64."""
-    import pyvista
-
-    cells = pyvista.CellArray.from_arrays(lines.offsets, np.arange(len(lines.points)), deep=True)
-    _save(path, pyvista.PolyData(np.array(lines.points, np.float64), lines=cells), displacement)
+    _save(path, _data_set(Block(lines.points, lines)), displacement)
 
 
 def write_tets(path: Path, mesh: TetMesh, displacement: Floats) -> None:
     """VTU of the tets with point data ``displacement`` [mm], float64."""
-    import pyvista
-
-    data = pyvista.UnstructuredGrid({pyvista.CellType.TETRA: mesh.tets}, np.array(mesh.points, np.float64))
-    _save(path, data, displacement)
-
-
-_NO_ROOM = 20007  # what VTK calls a disk that is full; other errors of the system have the system's numbers
+    _save(path, _data_set(Block(mesh.points, mesh.tets)), displacement)
 
 
 def _save(path: Path, data: Any, displacement: Floats) -> None:
     """Write ``data`` with its ``displacement`` (n, 3) [mm]; OSError where that fails."""
+    data.point_data.set_vectors(displacement, "displacement")
+    _finish(_WRITERS[path.suffix.lower()], path, data)
+
+
+def _finish(kind: str, path: Path, data: Any) -> None:
+    """Write by a writer of pyvista of this ``kind``; OSError where that fails. VTK complains to nobody meanwhile."""
     import pyvista
 
-    data.point_data.set_vectors(displacement, "displacement")
-    kinds = {
-        ".vtk": pyvista.PolyDataWriter,
-        ".vtp": pyvista.XMLPolyDataWriter,
-        ".vtu": pyvista.XMLUnstructuredGridWriter,
-    }
-    with _errors():
-        writer = kinds[path.suffix.lower()](path, data)
+    with pyvista.vtk_verbosity("off"), pyvista.VtkErrorCatcher(send_to_logging=False):
+        writer = getattr(pyvista, kind)(path, data)
         if path.suffix.lower() == ".vtk":
             writer.writer.SetFileTypeToBinary()
         else:  # in the other modes a displacement that is not finite cannot be read again
             writer.writer.SetDataModeToAppended()
-        _finish(writer)
-
-
-def _finish(writer: Any) -> None:
-    """Write; OSError where that fails."""
-    writer.write()
+        writer.write()
     if code := writer.writer.GetErrorCode():
         number = errno.ENOSPC if code == _NO_ROOM else int(code)
         raise OSError(number, os.strerror(number) if number in errno.errorcode else f"error {code} of VTK")
@@ -121,12 +112,7 @@ def _finish(writer: Any) -> None:
 
 def write_blocks(path: Path, blocks: Tree) -> None:
     """VTM of ``blocks`` by name, with their own files in a folder beside it of the same name; OSError where that fails."""
-    import pyvista
-
-    with _errors():
-        writer = pyvista.XMLMultiBlockDataWriter(path, _collection(blocks))
-        writer.writer.SetDataModeToAppended()
-        _finish(writer)
+    _finish("XMLMultiBlockDataWriter", path, _collection(blocks))
 
 
 def _collection(blocks: Tree) -> Any:

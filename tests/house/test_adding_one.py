@@ -1,0 +1,143 @@
+"""One of each kind is added to a copy of the project, in one new file or folder: list, contract and verb find it."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from fem_reference.foundations.subprocesses import environment
+from fem_reference.solvers.fenicsx import processes
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not processes.installed(), reason="FEniCSx is not installed"),
+]
+PROJECT = Path(__file__).parents[2]
+FOLDERS = ("fem_reference", "cases", "meshes", "validation", "tests")
+
+
+class New(NamedTuple):
+    """A new thing: its file, or all files of its folder, by path in the project, and commands with what they must print.
+
+    A command is the words after ``python -m``; one that begins with ``!`` must fail.
+    """
+
+    files: dict[str, str | bytes]
+    seen: dict[str, str]
+
+
+def folder(source: str, target: str, changes: dict[str, str] | None = None) -> dict[str, str | bytes]:
+    """The files of a folder of the project for a new one, its texts changed."""
+    found: dict[str, str | bytes] = {}
+    for path in sorted((PROJECT / source).iterdir()):
+        if path.is_file():
+            content: str | bytes = path.read_bytes()
+            for old, new in (changes or {}).items():
+                content = path.read_text(encoding="utf-8").replace(old, new)
+            found[f"{target}/{path.name}"] = content
+    return found
+
+
+ENTRY = '''
+"""A cube in a fluid."""
+
+from fem_reference.assessment.catalogue import Entry, Lab
+from fem_reference.effects import make
+from fem_reference.problems import shapes
+from fem_reference.problems.body import Body
+from fem_reference.verification.parts import SYMMETRY, neo_hooke, ramp
+
+
+def volume(lab: Lab, pressure: float) -> float:
+    """V/V0 under a fluid on the top of a cube."""
+    mesh = shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
+    fluid = [make("pressure", on=face, pressure=f"{pressure} MPa", ramp=ramp()) for face in ("x1", "y1", "z1")]
+    body = Body(mesh, (*neo_hooke(0.01, 1.0), *fluid), SYMMETRY, (0.0, 1.0))
+    return lab.solve(body, "P2/P1", first_step=0.5, residual=1e-12).last.scalars["volume_ratio"]
+
+
+ENTRIES = (
+    Entry(
+        name="own_entry",
+        group="own",
+        title="A cube in a fluid: its volume",
+        unit="1",
+        measure=volume,
+        given={"pressure": 0.1},
+        negative_control="one percent more pressure",
+        wrong={"pressure": 0.101},
+        truth=1 - 0.1 / 1.0,
+        within=1e-9,
+        relative=False,
+        because="the element has the exact answer, p = K (1 - J)",
+        kind="closed form",
+        source="by hand",
+    ),
+)
+'''.lstrip()
+
+TRUTH = '''
+"""The area of a circle, derived from a polygon."""
+
+
+def circle(radius: float) -> float:
+    """Pi times the radius [mm] squared [mm2], by 22/7: 0.04 % too large."""
+    return 22 / 7 * radius**2
+'''.lstrip()
+
+KINDS = {
+    "verification entry": New(
+        {"fem_reference/verification/own_entry.py": ENTRY},
+        {
+            "fem_reference verify own --quiet": "verdict: pass, 1 of 1 pass",
+            "!fem_reference verify --negative-control own_entry --quiet": "fail (negative control)",
+            "pytest -q tests/contracts/test_every_entry.py -k own_entry": "3 passed",
+        },
+    ),
+    "mesh": New(
+        folder("meshes/box", "meshes/own_mesh"),
+        {"pytest -q tests/contracts/test_every_mesh.py -k own_mesh": "passed"},
+    ),
+    "case": New(
+        folder("cases/rod", "cases/own_case", {"rod": "own rod"}),
+        {
+            "fem_reference list": "own_case",
+            "fem_reference run own_case --solver listing --quiet": "pass: listing nodal_error",
+            "pytest -q tests/contracts/test_every_case.py -k own_case": "passed",
+        },
+    ),
+    "truth": New(
+        {"validation/own_truth.py": TRUTH},
+        {"pytest -q tests/verification/test_truths.py -k own_truth": "1 passed"},
+    ),
+}
+
+
+@pytest.fixture
+def copy(tmp_path: Path) -> Path:
+    """A copy of the project."""
+    for name in FOLDERS:
+        shutil.copytree(PROJECT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(PROJECT / "pyproject.toml", tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_one_new_file_or_folder_is_all_that_it_takes(kind: str, copy: Path) -> None:
+    new = KINDS[kind]
+    assert len(new.files) == 1 or len({Path(name).parent for name in new.files}) == 1
+    for name, content in new.files.items():
+        path = copy / name
+        assert not path.exists()
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(content.encode() if isinstance(content, str) else content)
+    here = environment(PYTHONPATH=str(copy))
+    for command, printed in new.seen.items():
+        words = [sys.executable, "-m", *command.removeprefix("!").split()]
+        done = subprocess.run(words, cwd=copy, env=here, capture_output=True, text=True, check=False)
+        output = done.stdout + done.stderr
+        assert (done.returncode != 0) == command.startswith("!"), output
+        assert printed in output, output
