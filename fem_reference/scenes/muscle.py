@@ -62,7 +62,7 @@ class Attachment(Record):
         return self
 
 
-class Polylines(Record):
+class PolylineFile(Record):
     """Fibres given as polylines in a file."""
 
     file: str
@@ -80,7 +80,7 @@ class Traced(Record):
 class Fibres(Record):
     """The fibres whose lengths are measured: exactly one of ``polylines`` and ``traced``."""
 
-    polylines: Polylines | None = None
+    polylines: PolylineFile | None = None
     traced: Traced | None = None
 
     @model_validator(mode="after")
