@@ -27,7 +27,7 @@ SOLVERS = {one.name: one for row in solver_kinds() for one in row.candidate}
 ITERATIONS, WARM_UP, REPEATS = 100, 2, 3
 
 
-def spent(solver: str, settings: Record, setup: muscles.Setup, iterations: int) -> float:
+def spent(solver: str, settings: Record, setup: Any, iterations: int) -> float:
     """Processor time [s] of so many iterations from the first frame; not a number where the solver failed."""
     first = setup.frames[0]
 
@@ -63,8 +63,9 @@ class Iteration:
             raise NotImplementedError(str(error)) from error
         self.solver = SOLVERS[solver].solver
         self.settings = self.bench.settings(SOLVERS[solver], solver)
-        self.made: Any = self.bench.given(solvers.find(self.solver, self.solver), self.settings)
-        spent(self.solver, self.settings, self.made, WARM_UP)
+        made: Any = self.bench.given(solvers.find(self.solver, self.solver), self.settings)
+        self.made = made
+        spent(self.solver, self.settings, made, WARM_UP)
 
     @over(case=CASES, solver=SOLVERS)
     def track_seconds(self, case: str, solver: str) -> float:  # noqa: ARG002

@@ -37,7 +37,7 @@ class Finding:
 
 
 @dataclass(frozen=True, eq=False)
-class Ladder:
+class Refinement:
     """Meshes, or steps in time, from coarse to fine.
 
     ``counts`` are of cells or steps, each of ``size / count`` [mm] or [s]. The error falls at ``order`` by theory, to within a
@@ -65,9 +65,9 @@ class Ladder:
 class Entry:
     """A problem whose answer is known.
 
-    ``measure`` finds the number that ``truth`` states, both in ``unit``: it is called with a lab, with the count of a ``ladder``
-    where there is one, and with what is ``given`` by name. The number must come within ``within`` (of the truth's size where
-    ``relative``, else in ``unit``); ``because`` gives the reason for this tolerance. ``source`` is where the truth is from,
+    ``measure`` finds the number that ``truth`` states, both in ``unit``: it is called with a lab, with each count of a
+    ``refinement`` where there is one, and with what is ``given`` by name. The number must come within ``within`` (in ``unit``, or
+    of the truth's size where ``relative``); ``because`` gives the reason for this tolerance. ``source`` is where the truth is from,
     ``kind`` what it is. ``negative_control`` names one thing wrong, by which ``wrong`` replaces a part of ``given``: it must fail.
     ``slow`` where a measurement takes above some 4 s, or is like another one, ``slow_negative_control`` where that does: tests
     leave it to the verb verify.
@@ -83,11 +83,11 @@ class Entry:
     wrong: Mapping[str, object]
     truth: float | Callable[[], float]
     within: float
-    relative: bool
     because: str
     kind: Kind
     source: str
-    ladder: Ladder | None = None
+    relative: bool = False
+    refinement: Refinement | None = None
     slow: bool = False
     slow_negative_control: bool = False
 
@@ -96,17 +96,17 @@ class Entry:
         return float(self.truth() if callable(self.truth) else self.truth)
 
     def find(self, lab: Lab, *, with_negative_control: bool = False) -> Finding:
-        """The finding; with the negative control on the finest of the ladder alone."""
+        """The finding; with the negative control on the finest of a refinement alone."""
         given = {**self.given, **(self.wrong if with_negative_control else {})}
-        if self.ladder is None:
+        if self.refinement is None:
             return _finding(self.measure(lab, **given))
-        needed = self.ladder.needed if with_negative_control else self.ladder.counts
-        steps = tuple((self.ladder.size / n, _finding(self.measure(lab, n, **given)).value) for n in needed)
-        value = self.ladder.value([found for _, found in steps])
+        needed = self.refinement.needed if with_negative_control else self.refinement.counts
+        steps = tuple((self.refinement.size / n, _finding(self.measure(lab, n, **given)).value) for n in needed)
+        value = self.refinement.value([found for _, found in steps])
         if with_negative_control:
             return Finding(value)
-        fall = None if self.ladder.order is None else order(steps, self.known())
-        return Finding(value, fall, steps, self.ladder.note)
+        fall = None if self.refinement.order is None else order(steps, self.known())
+        return Finding(value, fall, steps, self.refinement.note)
 
 
 def _finding(found: float | Finding) -> Finding:
@@ -156,3 +156,39 @@ def order(ladder: tuple[tuple[float, float], ...], truth: float) -> float | None
     if min(errors) == 0:
         return None
     return math.log(errors[0] / errors[1]) / math.log(coarse / fine)
+
+
+@dataclass(frozen=True, eq=False)
+class Verification:
+    """The ``results`` of entries in the order of the catalogue, the wall time in ``seconds``, and the ``versions`` of the packages
+    that they were made with.
+    """
+
+    results: tuple[Result, ...]
+    seconds: float
+    versions: dict[str, str]
+
+    @property
+    def failed(self) -> tuple[Result, ...]:
+        """The results that do not pass."""
+        return tuple(one for one in self.results if one.word != "pass")
+
+    @property
+    def word(self) -> str:
+        """Pass or fail."""
+        return "fail" if self.failed else "pass"
+
+    @property
+    def summary(self) -> str:
+        """The verdict in one line."""
+        passed, controls = len(self.results) - len(self.failed), sum(one.with_negative_control for one in self.results)
+        note = f", {controls} measured with their negative control" if controls else ""
+        return f"verdict: {self.word}, {passed} of {len(self.results)} pass{note}, {self.seconds:.0f} s"
+
+    @property
+    def groups(self) -> dict[str, list[Result]]:
+        """The results by group, in the order of the catalogue."""
+        found: dict[str, list[Result]] = {}
+        for one in self.results:
+            found.setdefault(one.entry.group, []).append(one)
+        return found

@@ -12,95 +12,37 @@ never branches on a parameter and computes with it by operators and ``state.func
 
 import importlib
 import pkgutil
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from pydantic import Field, field_validator
 
 from fem_reference.foundations import outside
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.functions import Functions, Numpy
 from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.limits import Limit
+from fem_reference.foundations.material_point import State as State
 from fem_reference.foundations.records import Record, parse
 from fem_reference.foundations.units import unit_of, written
 
 __path__ += outside.folders()
 
 
-@dataclass(frozen=True)
-class State:
-    """What an expression may depend on at a point; each entry a number, an array over points or a symbolic expression.
-
-    ``F``: the deformation gradient, ``F[i][k] = dx_i / dX_k``; ``displacement``: (3,) [mm]; ``pressure``: the mixed pressure
-    unknown [MPa], None where no effect brings it; ``fibre``: the unit vector (3,) along the fibres at rest, None where there is
-    none; ``amount``: how much of the effect acts (see :meth:`Effect.amount`); ``before``: the displacement (3,) [mm] that the load
-    step starts from, ``F_before`` its deformation gradient, ``predicted`` (3,) [mm] where velocities alone would lead it, and
-    ``rate`` [1/s] one over the time that it takes, 0 where no time passes.
+class Moduli(NamedTuple):
+    """Stiffness at rest [MPa]: ``shear`` (of what has fibres, across them), ``bulk``, and the stress by which that of ``fibres`` is
+    given; 0 of what has none.
     """
 
-    F: Sequence[Sequence[Any]]
-    displacement: Sequence[Any] = (0.0, 0.0, 0.0)
-    pressure: Any = None
-    fibre: Any = None
-    amount: Any = 1.0
-    before: Sequence[Any] = (0.0, 0.0, 0.0)
-    predicted: Sequence[Any] = (0.0, 0.0, 0.0)
-    F_before: Sequence[Sequence[Any]] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    rate: Any = 0.0
-    functions: Functions = field(default_factory=Numpy)
-
-    @property
-    def J(self) -> Any:
-        """Determinant of F."""
-        return sum(self.F[0][k] * entry for k, entry in enumerate(self.cofactors[0]))
-
-    @property
-    def cofactors(self) -> Sequence[Sequence[Any]]:
-        """``J F^-T`` (3, 3): takes an area vector at rest to where it is now (Nanson)."""
-        F = self.F
-        after = {0: (1, 2), 1: (2, 0), 2: (0, 1)}
-        return [
-            [F[i][k] * F[j][m] - F[i][m] * F[j][k] for k, m in (after[column] for column in range(3))]
-            for i, j in (after[row] for row in range(3))
-        ]
-
-    @property
-    def C(self) -> Sequence[Sequence[Any]]:
-        """``F^T F`` (3, 3)."""
-        F = self.F
-        return [[sum(F[i][k] * F[i][m] for i in range(3)) for m in range(3)] for k in range(3)]
-
-    @property
-    def I1(self) -> Any:
-        """Trace of C."""
-        return sum(self.F[i][k] ** 2 for i in range(3) for k in range(3))
-
-    @property
-    def I2(self) -> Any:
-        """``((tr C)^2 - tr C^2) / 2``, the sum of the squared cofactors."""
-        return sum(entry**2 for row in self.cofactors for entry in row)
-
-    def square_stretch(self, direction: Sequence[Any]) -> Any:
-        """``direction . C direction``: the squared stretch of a line along the unit vector ``direction`` (3,) at rest."""
-        return sum(sum(F * a for F, a in zip(row, direction, strict=True)) ** 2 for row in self.F)
-
-    @property
-    def fibre_stretch(self) -> Any:
-        """``J^(-1/3) |F fibre|``: how far the fibre is stretched, without its share in the change of volume."""
-        return self.J ** (-1 / 3) * self.functions.sqrt(self.square_stretch(self.fibre))
-
-    def between(self, low: Any, high: Any, x: Any) -> Any:
-        """``x``, or the bound that it lies beyond."""
-        above = self.functions.above
-        return above(x, high, high, above(x, low, x, low))
+    shear: float = 0.0
+    bulk: float = 0.0
+    fibres: float = 0.0
 
 
 class RampPoint(Record):
-    """How much of an effect acts at a frame number: up to a thousand times what its parameters say."""
+    """A share of an effect that acts at a frame number: up to a thousand times what its parameters say."""
 
     frame: float
     amount: float = Field(ge=0, le=1000)
@@ -114,28 +56,34 @@ class Effect(Record):
 
     ``unknowns``: names of the fields that it brings; ``needs``: what it asks of the rest state, ``"fibre"``, of the frames,
     ``"interval"``: the time from a frame number to the next, or of a step, ``"momentum"``: velocities and where these lead;
-    ``outer``: whether it acts from outside the body, so that its forces are not in balance by themselves.
+    ``outer``: True where it acts from outside the body, so that its forces are not in balance by themselves; ``example``: of its
+    parameters as scene files write them, beside those of its kind.
     """
 
     unknowns: ClassVar[tuple[str, ...]] = ()
     needs: ClassVar[tuple[str, ...]] = ()
     outer: ClassVar[bool] = False
+    example: ClassVar[dict[str, Any]] = {}
 
     def amount(self, frame: float) -> float:  # noqa: ARG002
-        """How much of it acts at a frame: all of it, unless it has a ramp."""
+        """The share of it that acts at a frame: all of it, unless it has a ramp."""
         return 1.0
 
     def limits(self) -> tuple[Limit, ...]:
         """The ranges that it is meant for; none unless its docstring gives one."""
         return ()
 
+    def moduli(self) -> Moduli:
+        """The stiffness that it gives the body at rest."""
+        return Moduli()
+
     def indicator(self, scene: Estimates) -> Indicator | None:  # noqa: ARG002
-        """Whether a scene needs it, by what is known of that before it is solved; None of what is part of the material: always."""
+        """The evidence that a scene needs it, known before it is solved; None of what is part of the material: always."""
         return None
 
     @property
     def title(self) -> str:
-        """What it is called beside the other effects of a scene."""
+        """Its name beside the other effects of a scene."""
         return type(self).__name__
 
     @property
@@ -147,6 +95,7 @@ class Effect(Record):
 class Ramped(Effect):
     """An effect with a ramp: ``ramp`` says how much of it acts, linearly between its knots, constant beyond them."""
 
+    example: ClassVar[dict[str, Any]] = {"ramp": [{"frame": 0, "amount": 0.0}, {"frame": 10, "amount": 1.0}]}
     ramp: tuple[RampPoint, ...] = Field(min_length=1)
 
     @field_validator("ramp")
@@ -157,7 +106,7 @@ class Ramped(Effect):
         return ramp
 
     def amount(self, frame: float) -> float:
-        """How much of it acts at a frame."""
+        """The share of it that acts at a frame."""
         frames, amounts = zip(*((knot.frame, knot.amount) for knot in self.ramp), strict=True)
         return float(np.interp(frame, frames, amounts))
 
@@ -176,11 +125,12 @@ class Load(Effect):
     """A load on a part of the surface; ``on`` names it."""
 
     outer: ClassVar[bool] = True
+    example: ClassVar[dict[str, Any]] = {"on": "top"}
     on: str
 
     @property
     def title(self) -> str:
-        """What it is called beside the other effects of a scene, other loads of its kind among them."""
+        """Its name beside the other effects of a scene, other loads of its kind among them."""
         return f"{type(self).__name__} on {self.on}"
 
     def traction(self, state: State, normal: Sequence[Any]) -> Sequence[Any]:
@@ -240,7 +190,7 @@ class FieldState:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a field effect acts: the ``position`` (x, y, z as far as there are), the ``functions`` that formulas may call, and
+    """A point that a field effect acts at: the ``position`` (x, y, z as far as there are), the ``functions`` of formulas, and
     ``upper``, the share of the element that lies above the mean y of the vertices.
     """
 
@@ -251,8 +201,10 @@ class Place:
 
 class FieldEffect(Record):
     """A frozen record of parameters with a term of ``-div(k grad psi) + v . grad psi + c psi - f = 0`` (report eq. 4.4, whose
-    A, B, C and D f are -k, v, c and f).
+    A, B, C and D f are -k, v, c and f). ``example``: of its parameters as scene files write them.
     """
+
+    example: ClassVar[dict[str, Any]] = {}
 
     def weak(self, psi: FieldState, test: FieldState, place: Place) -> Any:
         """The term times ``test``, integrated by parts where it has second derivatives; linear in ``test``, affine in ``psi``."""
@@ -273,6 +225,18 @@ def find(name: str) -> type[Record]:
     if name not in {module.name for module in pkgutil.iter_modules(__path__)}:
         raise KeyError(name)
     return _record(name)
+
+
+def example(name: str) -> dict[str, Any]:
+    """An example of the parameters of the effect ``name``, with those of all of its kind."""
+    stated = [vars(kind).get("example", {}) for kind in reversed(find(name).__mro__)]
+    return {key: value for one in stated for key, value in one.items()}
+
+
+def moduli(acting: Iterable[Record]) -> Moduli:
+    """The stiffness at rest of the effects ``acting`` together."""
+    found = [effect.moduli() for effect in acting if isinstance(effect, Effect)]
+    return Moduli(*map(sum, zip(*found, strict=True)))
 
 
 def _record(name: str) -> type[Record]:

@@ -15,10 +15,11 @@ class ActiveTension(Ramped, Energy):
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
+    example: ClassVar[dict[str, Any]] = {"tension": "60 kPa"}
     tension: PositivePressure
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """By how far fibres that pull straighten the muscle, or shorten it where they can."""
+        """The distance by which fibres that pull straighten the muscle, or shorten it where they can."""
         pull = scene.greatest(self) * self.tension
         return Indicator(
             "tension of the fibres over the shear modulus", pull / scene.shear, scene.straighten(pull), pull

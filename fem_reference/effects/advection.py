@@ -1,6 +1,6 @@
 """Advection of a scalar by a flow."""
 
-from typing import Any
+from typing import Any, ClassVar
 
 from fem_reference.effects import FieldEffect, FieldState, Place
 
@@ -11,6 +11,7 @@ class Advection(FieldEffect):
     ``velocity``: v, as many components as the domain has coordinates [length / time].
     """
 
+    example: ClassVar[dict[str, Any]] = {"velocity": [1.0, -3.0]}
     velocity: tuple[float, ...]
 
     def weak(self, psi: FieldState, test: FieldState, place: Place) -> Any:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable
+from typing import Any, ClassVar
 
 from pydantic import Field
 
@@ -17,6 +18,7 @@ class Contact(Interaction):
     this distance on a bone is felt. ``bones``: their names, by default all.
     """
 
+    example: ClassVar[dict[str, Any]] = {"stiffness": "500 kPa/mm", "smoothing": "0.3 mm", "bones": ["femur"]}
     stiffness: AreaStiffness
     smoothing: PositiveLength = 0.1
     bones: tuple[str, ...] | None = Field(default=None, min_length=1)
@@ -33,7 +35,7 @@ class Contact(Interaction):
         return Indicator(rule, gap, depth, self.stiffness * max(depth, self.smoothing - gap, 0.0))
 
     def is_by(self, bone: str) -> bool:
-        """Whether the bone of this name is in contact."""
+        """True where the bone of this name is in contact."""
         return self.bones is None or bone in self.bones
 
 

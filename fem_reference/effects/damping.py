@@ -19,11 +19,12 @@ class Damping(Energy):
     outer: ClassVar[bool] = True
     needs: ClassVar[tuple[str, ...]] = ("interval",)
     stored: ClassVar[bool] = False
+    example: ClassVar[dict[str, Any]] = {"coefficient": "2 Pa s/mm^2"}
 
     coefficient: VolumeDamping
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """By the sag of a beam under the drag, and the shift of a bar along it."""
+        """The sag of a beam under the drag, and the shift of a bar along it."""
         force, sideways = (self.coefficient * scene.in_time(speed) for speed in (scene.speed, scene.sideways))
         return Indicator(
             "drag over the length against the shear modulus",

@@ -1,6 +1,6 @@
 """Diffusion of a scalar down its gradient."""
 
-from typing import Any
+from typing import Any, ClassVar
 
 from pydantic import Field
 
@@ -13,6 +13,7 @@ class Diffusion(FieldEffect):
     ``coefficient``: k, above zero [length^2 / time in whatever units the scene is in].
     """
 
+    example: ClassVar[dict[str, Any]] = {"coefficient": 2.0}
     coefficient: float = Field(gt=0)
 
     def weak(self, psi: FieldState, test: FieldState, place: Place) -> Any:  # noqa: ARG002

@@ -21,15 +21,16 @@ class FibreActive(Ramped, Energy):
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
+    example: ClassVar[dict[str, Any]] = {"stress": "300 kPa", "optimal_stretch": 1.1}
     stress: PositivePressure
     optimal_stretch: float = Field(gt=0)
 
     def limits(self) -> tuple[Limit, ...]:
-        """Of the fibre stretch."""
+        """The range of the fibre stretch."""
         return (Limit("fibre stretch", 0.4 * self.optimal_stretch, 1.6 * self.optimal_stretch),)
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """By how far fibres that pull straighten the muscle, or shorten it where they can."""
+        """The distance by which fibres that pull straighten the muscle, or shorten it where they can."""
         pull = scene.greatest(self) * self.stress
         return Indicator(
             "tension of the fibres over the shear modulus", pull / scene.shear, scene.straighten(pull), pull

@@ -4,7 +4,7 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
-from fem_reference.effects import Energy, State, fibre_tension
+from fem_reference.effects import Energy, Moduli, State, fibre_tension
 from fem_reference.foundations.indicators import Estimates, Indicator
 from fem_reference.foundations.limits import Limit
 from fem_reference.foundations.units import PositivePressure
@@ -23,6 +23,13 @@ class FibrePassive(Energy):
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
+    example: ClassVar[dict[str, Any]] = {
+        "stress": "300 kPa",
+        "p1": 0.05,
+        "p2": 6.6,
+        "optimal_stretch": 1.1,
+        "linear_from": 1.4,
+    }
     stress: PositivePressure
     p1: float = Field(gt=0)
     p2: float = Field(gt=0)
@@ -30,11 +37,11 @@ class FibrePassive(Energy):
     linear_from: float = Field(gt=1)
 
     def limits(self) -> tuple[Limit, ...]:
-        """Of the fibre stretch."""
+        """The range of the fibre stretch."""
         return (Limit("fibre stretch", high=max(1.6, self.linear_from) * self.optimal_stretch),)
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """By how much they pull at the greatest stretch that is to be expected, against the matrix."""
+        """Their pull at the greatest stretch that is to be expected, against the matrix."""
         pull = fibre_tension(self, scene.stretch[1])
         return Indicator(
             "tension of the fibres over the shear modulus",
@@ -42,6 +49,10 @@ class FibrePassive(Energy):
             scene.shorten(pull, 0.1 * (scene.stretch[1] - 1)),
             pull,
         )
+
+    def moduli(self) -> Moduli:
+        """The stiffness that it gives the body at rest."""
+        return Moduli(fibres=self.stress)
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa], zero in slack fibres."""

@@ -24,13 +24,14 @@ class FibrePassiveFebio(Energy):
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
+    example: ClassVar[dict[str, Any]] = {"c3": "10 kPa", "c4": 12.0, "c5": "3 MPa", "linear_from": 1.3}
     c3: PositivePressure
     c4: float = Field(gt=0)
     c5: PositivePressure
     linear_from: float = Field(gt=1)
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """By how much they pull at the greatest stretch that is to be expected, against the matrix."""
+        """Their pull at the greatest stretch that is to be expected, against the matrix."""
         pull = fibre_tension(self, scene.stretch[1])
         return Indicator(
             "tension of the fibres over the shear modulus",

@@ -15,11 +15,12 @@ class Gravity(Ramped, Energy):
     """
 
     outer: ClassVar[bool] = True
+    example: ClassVar[dict[str, Any]] = {"density": "1060 kg/m3", "acceleration": "0, 0, -9.81 m/s^2"}
     density: Density
     acceleration: AccelerationVector
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """By the sag of a beam."""
+        """The sag of a beam."""
         force = scene.greatest(self) * self.density * math.hypot(*self.acceleration)
         return Indicator(
             "weight over the length against the shear modulus",

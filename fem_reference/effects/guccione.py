@@ -4,7 +4,7 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
-from fem_reference.effects import Energy, State
+from fem_reference.effects import Energy, Moduli, State
 from fem_reference.foundations.units import PositivePressure
 
 
@@ -18,10 +18,15 @@ class Guccione(Energy):
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
+    example: ClassVar[dict[str, Any]] = {"c": "2 kPa", "bf": 8.0, "bt": 2.0, "bfs": 4.0}
     c: PositivePressure
     bf: float = Field(gt=0)
     bt: float = Field(gt=0)
     bfs: float = Field(gt=0)
+
+    def moduli(self) -> Moduli:
+        """The stiffness that it gives the body at rest."""
+        return Moduli(shear=self.c * self.bt / 2)
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa]; ``|E fibre|^2`` and ``|E|^2`` give the sums over s and n."""

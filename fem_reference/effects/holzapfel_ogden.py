@@ -18,6 +18,7 @@ class HolzapfelOgden(Energy):
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
+    example: ClassVar[dict[str, Any]] = {"k1": "20 kPa", "k2": 1.5, "angle": "30 deg", "normal": [0.2, 0.5, 2.0]}
     k1: PositivePressure
     k2: float = Field(gt=0)
     angle: Angle

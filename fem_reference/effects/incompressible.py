@@ -2,7 +2,7 @@
 
 from typing import Any, ClassVar
 
-from fem_reference.effects import Energy, State
+from fem_reference.effects import Energy, Moduli, State
 from fem_reference.foundations.limits import Limit
 from fem_reference.foundations.units import PositivePressure
 
@@ -19,11 +19,16 @@ class Incompressible(Energy):
     """
 
     unknowns: ClassVar[tuple[str, ...]] = ("pressure",)
+    example: ClassVar[dict[str, Any]] = {"bulk": "10 MPa"}
     bulk: PositivePressure
 
     def limits(self) -> tuple[Limit, ...]:
-        """Of the volume."""
+        """The range of the volume."""
         return (Limit("V/V0", 0.5, 2.0),)
+
+    def moduli(self) -> Moduli:
+        """The stiffness that it gives the body at rest."""
+        return Moduli(bulk=self.bulk)
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa]."""

@@ -1,8 +1,8 @@
 """Near-incompressibility by a penalty on volume change, without an unknown of its own: it locks where the mixed form does not."""
 
-from typing import Any
+from typing import Any, ClassVar
 
-from fem_reference.effects import Energy, State
+from fem_reference.effects import Energy, Moduli, State
 from fem_reference.foundations.limits import Limit
 from fem_reference.foundations.units import PositivePressure
 
@@ -13,11 +13,16 @@ class IncompressiblePenalty(Energy):
     ``bulk``: bulk modulus K [MPa]. Meant for J from 1/2 to 2, as ``incompressible`` is, and for its reasons.
     """
 
+    example: ClassVar[dict[str, Any]] = {"bulk": "10 MPa"}
     bulk: PositivePressure
 
     def limits(self) -> tuple[Limit, ...]:
-        """Of the volume."""
+        """The range of the volume."""
         return (Limit("V/V0", 0.5, 2.0),)
+
+    def moduli(self) -> Moduli:
+        """The stiffness that it gives the body at rest."""
+        return Moduli(bulk=self.bulk)
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa]."""

@@ -26,6 +26,7 @@ class Inertia(Energy):
     outer: ClassVar[bool] = True
     needs: ClassVar[tuple[str, ...]] = ("interval", "momentum")
     stored: ClassVar[bool] = False
+    example: ClassVar[dict[str, Any]] = {"density": "1060 kg/m3", "spectral_radius": 0.8}
 
     density: Density
     spectral_radius: float = Field(default=0.9, ge=0, le=1)

@@ -1,10 +1,10 @@
 """Isotropic elastic matrix that resists shear and area change apart, without its resistance to volume change."""
 
-from typing import Any
+from typing import Any, ClassVar
 
 from pydantic import model_validator
 
-from fem_reference.effects import Energy, State
+from fem_reference.effects import Energy, Moduli, State
 from fem_reference.foundations.units import Pressure
 
 
@@ -14,6 +14,7 @@ class MooneyRivlin(Energy):
     ``c1``, ``c2`` [MPa]: the shear modulus at rest is ``2 (c1 + c2)``.
     """
 
+    example: ClassVar[dict[str, Any]] = {"c1": "10 kPa", "c2": "4 kPa"}
     c1: Pressure
     c2: Pressure
 
@@ -22,6 +23,10 @@ class MooneyRivlin(Energy):
         if self.c1 + self.c2 <= 0:
             raise ValueError("c1 + c2 above zero")
         return self
+
+    def moduli(self) -> Moduli:
+        """The stiffness that it gives the body at rest."""
+        return Moduli(shear=2 * (self.c1 + self.c2))
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa]."""

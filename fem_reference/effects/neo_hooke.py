@@ -1,8 +1,8 @@
 """Isotropic elastic matrix, without its resistance to volume change."""
 
-from typing import Any
+from typing import Any, ClassVar
 
-from fem_reference.effects import Energy, State
+from fem_reference.effects import Energy, Moduli, State
 from fem_reference.foundations.units import PositivePressure
 
 
@@ -12,7 +12,12 @@ class NeoHooke(Energy):
     ``mu``: shear modulus at rest [MPa].
     """
 
+    example: ClassVar[dict[str, Any]] = {"mu": "10 kPa"}
     mu: PositivePressure
+
+    def moduli(self) -> Moduli:
+        """The stiffness that it gives the body at rest."""
+        return Moduli(shear=self.mu)
 
     def energy(self, state: State) -> Any:
         """Energy per rest volume [MPa]."""

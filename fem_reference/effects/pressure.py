@@ -1,7 +1,7 @@
 """Fluid pressure on a part of the surface, perpendicular to it as it moves (a follower load)."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 from fem_reference.effects import Load, Ramped, State
 from fem_reference.foundations import units
@@ -18,10 +18,11 @@ class Pressure(Ramped, Load):
     0.15 mu / K (a / L)^3 of p / K more, as 0.9002 instead of 0.9 where a is L/2 and K is 10 mu.
     """
 
+    example: ClassVar[dict[str, Any]] = {"pressure": "8 kPa"}
     pressure: units.Pressure
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """By how far it presses the thickness together."""
+        """The distance by which it presses the thickness together."""
         load = scene.greatest(self) * abs(self.pressure)
         part = load / scene.shear
         return Indicator("pressure over the shear modulus", part, part * scene.thickness / 3, load)

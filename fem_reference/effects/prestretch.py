@@ -17,6 +17,7 @@ class Prestretch(Ramped, Prestrain):
     """
 
     needs: ClassVar[tuple[str, ...]] = ("fibre",)
+    example: ClassVar[dict[str, Any]] = {"stretch": 1.1}
     stretch: float = Field(gt=0)
 
     @model_validator(mode="after")

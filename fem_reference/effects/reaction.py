@@ -1,6 +1,6 @@
 """Decay or growth of a scalar in proportion to itself."""
 
-from typing import Any
+from typing import Any, ClassVar
 
 from fem_reference.effects import FieldEffect, FieldState, Place
 
@@ -11,6 +11,7 @@ class Reaction(FieldEffect):
     ``rate``: c [1 / time].
     """
 
+    example: ClassVar[dict[str, Any]] = {"rate": 0.5}
     rate: float
 
     def weak(self, psi: FieldState, test: FieldState, place: Place) -> Any:

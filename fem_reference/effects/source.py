@@ -1,6 +1,6 @@
 """A source of a scalar, everywhere or in the upper half."""
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from fem_reference.effects import FieldEffect, FieldState, Place
 from fem_reference.foundations.formula import Formula, evaluate
@@ -13,6 +13,7 @@ class Source(FieldEffect):
     mean y of the mesh's vertices, as in listing 4.5, line 17. An element that this line cuts has the share of f that lies above it.
     """
 
+    example: ClassVar[dict[str, Any]] = {"strength": "x*y", "where": "everywhere"}
     strength: Formula
     where: Literal["everywhere", "y above average"]
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 from fem_reference.effects import Load, Ramped, State
 from fem_reference.foundations.indicators import Estimates, Indicator
@@ -15,10 +15,11 @@ class Traction(Ramped, Load):
     ``on``: the part of the surface; ``force``: t, the force per area at rest (3,) [MPa].
     """
 
+    example: ClassVar[dict[str, Any]] = {"force": "0, 6.25, 1 kPa"}
     force: PressureVector
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """By how far it pulls the length."""
+        """The distance by which it pulls the length."""
         load = scene.greatest(self) * math.hypot(*self.force)
         part = load / scene.shear
         return Indicator("traction over the shear modulus", part, part * scene.length / 3, load)

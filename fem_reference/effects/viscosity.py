@@ -23,11 +23,12 @@ class Viscosity(Energy):
 
     needs: ClassVar[tuple[str, ...]] = ("interval",)
     stored: ClassVar[bool] = False
+    example: ClassVar[dict[str, Any]] = {"eta": "300 kPa s"}
 
     eta: Coefficient
 
     def indicator(self, scene: Estimates) -> Indicator:
-        """By how much of its travel a body lags behind in the time in which it relaxes."""
+        """The part of its travel by which a body lags behind in the time in which it relaxes."""
         rate = scene.in_time(scene.speed) / scene.length
         deborah = self.eta / scene.shear * rate
         return Indicator(

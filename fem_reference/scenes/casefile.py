@@ -8,14 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.effects import Effect, FieldEffect, Load, Ramped
+from fem_reference.effects import Effect, FieldEffect, Load, Ramped, moduli
 from fem_reference.effects import find as find_effect
 from fem_reference.effects import names as effect_names
 from fem_reference.effects.contact import Contact, among
 from fem_reference.effects.damping import Damping
-from fem_reference.effects.incompressible import Incompressible
-from fem_reference.effects.incompressible_penalty import IncompressiblePenalty
-from fem_reference.effects.neo_hooke import NeoHooke
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record, join, keys, parse
 from fem_reference.io import texts
@@ -90,7 +87,7 @@ def _change(table: dict[str, Any], key: str, value: Any, place: str, *, add: boo
 
 
 def _near(table: dict[str, Any], parts: list[str | int]) -> str:
-    """What there is where ``parts`` of a key lead nowhere, as the end of a sentence."""
+    """The keys that there are where ``parts`` of a key lead nowhere, as the end of a sentence."""
     inside: Any = table
     part: Any
     for i, part in enumerate(parts):
@@ -195,8 +192,9 @@ def effects(entries: Any, place: str, kind: type[Record] = Effect) -> Any:
     if not isinstance(entries, list | tuple):
         return entries
     found = tuple(_effect(entry, join(place, f"effect[{i}]"), kind) for i, entry in enumerate(entries))
-    _check_effects([entry["name"] for entry in entries], found, place)
-    _check_moduli(found, place)
+    names = [entry["name"] for entry in entries]
+    _check_effects(names, found, place)
+    _check_moduli(names, found, place)
     return found
 
 
@@ -211,13 +209,15 @@ def _check_effects(names: list[str], effects: tuple[Record, ...], place: str) ->
             raise InputError(join(place, f"effect[{i}].name"), again, "every effect once")
 
 
-def _check_moduli(effects: tuple[Record, ...], place: str) -> None:
+def _check_moduli(names: list[str], effects: tuple[Record, ...], place: str) -> None:
     """A bulk modulus below the shear modulus is of no tissue, and usually a slip of units."""
-    mu = max((effect.mu for effect in effects if isinstance(effect, NeoHooke)), default=0.0)
-    for i, effect in enumerate(effects):
-        if isinstance(effect, Incompressible | IncompressiblePenalty) and effect.bulk < mu:
-            want = f"at least the shear modulus of neo_hooke, {mu:g} MPa"
-            raise InputError(join(place, f"effect[{i}].bulk"), f"{effect.bulk:g} MPa", want)
+    known = [moduli([effect]) for effect in effects]
+    shear, stiff = sum(one.shear for one in known), [name for name, one in zip(names, known, strict=True) if one.shear]
+    for i, (effect, one) in enumerate(zip(effects, known, strict=True)):
+        if 0 < one.bulk < shear:
+            key = ".bulk" if "bulk" in type(effect).model_fields else ""
+            want = f"at least the shear modulus of {' and '.join(stiff)}, {shear:g} MPa"
+            raise InputError(join(place, f"effect[{i}]{key}"), f"{one.bulk:g} MPa", want)
 
 
 def _effect(table: Any, place: str, kind: type[Record]) -> Record:
@@ -258,7 +258,7 @@ def _check_forces(scene: MuscleCase) -> None:
 
 
 def _candidate_names(scene: Case) -> list[str]:
-    """What runs are called: the reference and each candidate, which have names of their own."""
+    """Names of runs: the reference and each candidate, which have names of their own."""
     names = ["reference", *(candidate.name for candidate in scene.candidate)]
     _check_once([*names, "candidates"], join(scene.place, "candidate"))
     return names

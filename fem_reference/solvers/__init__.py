@@ -25,12 +25,12 @@ def names(task: Task | None = None) -> list[str]:
 
 
 def _is_shared(module: str) -> bool:
-    """Whether a ``module`` of this folder is no solver but serves some."""
+    """True of a ``module`` of this folder that is no solver but serves some."""
     return module == "common" or module.endswith("_kernels")
 
 
 def offers(name: str) -> tuple[Solver[Any, Any], ...]:
-    """What the solver ``name`` offers, one entry a task; TypeError where its file does not say."""
+    """The offers of the solver ``name``, one entry a task; TypeError where its file does not say."""
     found = vars(importlib.import_module(f"{__name__}.{name}")).get("SOLVES")
     if not isinstance(found, tuple) or not found or not all(isinstance(offer, Solver) for offer in found):
         want = "a tuple of MuscleSolver, FieldSolver or BodySolver (solvers/common/protocol.py)"
@@ -64,7 +64,7 @@ def require(name: str, settings: Record, place: str, task: Task = "solve") -> No
 
 
 def takes_effects(name: str) -> bool:
-    """Whether the solver ``name`` simulates the effects of a scene."""
+    """True where the solver ``name`` simulates the effects of a scene."""
     return any(isinstance(offer, MuscleSolver) and offer.check_effects is not None for offer in offers(name))
 
 

@@ -1,4 +1,4 @@
-"""What the report's Octave listings compute (4.1 on an interval, 4.5 on triangles), whatever equation the scene states."""
+"""The report's Octave listings (4.1 on an interval, 4.5 on triangles) as they compute, whatever equation the scene states."""
 
 import time
 

@@ -1,7 +1,7 @@
 """Position based dynamics of the muscle surface: the report's Algorithm 1 (section 5.5.3).
 
 Frame number n is the state after iteration n. In an iteration the bones take their pose and stay; then every
-sub-iteration is a whole step of the algorithm. No force acts from outside, so the time step cancels: what is kept of a
+sub-iteration is a full step of the algorithm. No force acts from outside, so the time step cancels: what is kept of a
 velocity is the displacement of a vertex in one sub-iteration, ``dt v``, and no time step is asked for. The result depends on
 the order of the vertices, as it does in the report: constraints are projected one after the other. Collisions are found anew
 in every sweep, where line 13 finds them once.

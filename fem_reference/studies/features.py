@@ -2,11 +2,8 @@
 
 import numpy as np
 
+from fem_reference.effects import moduli
 from fem_reference.effects.contact import among
-from fem_reference.effects.fibre_passive import FibrePassive
-from fem_reference.effects.incompressible import Incompressible
-from fem_reference.effects.incompressible_penalty import IncompressiblePenalty
-from fem_reference.effects.neo_hooke import NeoHooke
 from fem_reference.foundations.mesh import diagonal
 from fem_reference.foundations.motion import apply
 from fem_reference.problems.setup import Setup
@@ -26,9 +23,7 @@ def features(scene: MuscleCase, setup: Setup) -> dict[str, float]:
         if len(entry.vertices)
     ]
     contact = among(scene.effects)
-    shear = sum(effect.mu for effect in scene.effects if isinstance(effect, NeoHooke))
-    bulk = sum(effect.bulk for effect in scene.effects if isinstance(effect, Incompressible | IncompressiblePenalty))
-    fibres = sum(effect.stress for effect in scene.effects if isinstance(effect, FibrePassive))
+    shear, bulk, fibres = moduli(scene.effects)
     pressing = 0 if contact is None else len(scene.bone if contact.bones is None else contact.bones)
     return {
         "size": diagonal(points),

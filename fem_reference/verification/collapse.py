@@ -85,7 +85,6 @@ ENTRIES = (
         wrong={"poisson": 0.32},  # with which the volume stays above a half
         truth=known_outside,
         within=0.1,
-        relative=False,
         because="it is a number of states, each of them homogeneous, so that every element has it",
         kind="closed form",
         source="validation/loads.py: one scalar equation for the volume, from the energy by hand (Holzapfel 2000, ch. 6.4)",

@@ -20,7 +20,6 @@ YES = partial(
     unit="1",
     truth=1.0,
     within=0.1,
-    relative=False,
     because="it is yes (1) or no (0), and nothing between",
     kind="property",
 )
@@ -29,7 +28,7 @@ UP_AND_GONE = [{"frame": 0.0, "amount": 0.0}, {"frame": 1.0, "amount": 1.0}, {"f
 
 
 def ramp(full: float = 1.0) -> list[dict[str, float]]:
-    """From nothing at frame 0 to ``full`` at frame 1, as scene files write it."""
+    """A ramp from nothing at frame 0 to ``full`` at frame 1, as scene files write it."""
     return [{"frame": 0.0, "amount": 0.0}, {"frame": 1.0, "amount": full}]
 
 

@@ -78,7 +78,6 @@ BLOCK = Entry(
     wrong={"further": 1.01},
     truth=0.0,
     within=1e-10,
-    relative=False,
     because=f"A turned body is a linear function of the body at rest: {LEFT}.",
     kind="property",
     source="Objectivity: a law sees C = F^T F only.",

@@ -119,7 +119,6 @@ ENTRIES = tuple(
         wrong={"mistake": mistake},
         truth=0.0,
         within=0.5,
-        relative=False,
         because="it counts the checks that are not met",
         kind="property",
         source="fem_reference/assessment/run_checks.py",

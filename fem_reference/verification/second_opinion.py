@@ -145,7 +145,6 @@ def opinion(name: str, title: str, body: Callable[[], Body], element: str, withi
         wrong={"error": 0.01},
         truth=0.0,
         within=within,
-        relative=False,
         because=because,
         kind="second solver",
         source="scikit-fem's elements; derivatives by jets, own assembly and Newton's method, scipy's sparse LU",

@@ -134,7 +134,6 @@ ENTRIES: tuple[Entry, ...] = (
         given={"element": "Q2/Q1", "bulk": 10.0},
         wrong={"bulk": 0.99 * 10.0},
         truth=lambda: loads.squeezed_volume(MU, 10.0, HEIGHT),
-        relative=False,
     ),
     *(
         SMOOTH(
@@ -147,7 +146,6 @@ ENTRIES: tuple[Entry, ...] = (
             negative_control="the plates stop a thousandth of their way before they are back",
             wrong={"back": 0.999},
             truth=0.0,
-            relative=False,
             because=f"{EXACT}; of an elastic body nothing remembers the squeeze",
             kind="property",
             source="a hyperelastic body that nothing loads or moves is at rest",

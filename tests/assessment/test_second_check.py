@@ -20,8 +20,7 @@ from fem_reference.foundations.mesh import Surface
 from fem_reference.foundations.motion import Rotation as Turn
 from fem_reference.foundations.motion import Translation
 from fem_reference.geometry.intersections import crossings, overlaps, self_crossings
-from fem_reference.geometry.penetrations import Body as Within
-from fem_reference.geometry.penetrations import depths
+from fem_reference.geometry.penetrations import ClosedSurface, depths
 from fem_reference.geometry.rigid_bodies import Box, Sphere
 from fem_reference.geometry.sectors import attached_shares
 from fem_reference.geometry.skins import attached_skin
@@ -50,7 +49,7 @@ def ball(radius: float, at=(0.0, 0.0, 0.0)) -> tuple[Surface, Sphere]:
 
 def deepest(body: Surface, radius: float, at) -> float:
     surface, form = ball(radius, at)
-    return depths(Within(body), surface, form, STILL).deepest()[0]
+    return depths(ClosedSurface(body), surface, form, STILL).deepest()[0]
 
 
 BLOCK = shapes.skin(shapes.box((2, 2, 3), (10, 10, 40)))
@@ -75,7 +74,7 @@ def test_a_thin_needle_between_the_vertices_of_a_coarse_block_is_found_all_along
     turned = needle.moved_to(needle.points[:, [2, 0, 1]] + [-5.0, 3.3, 17.7])
     low, high = turned.points.min(axis=0), turned.points.max(axis=0)
     form = Box(tuple((low + high) / 2), tuple(high - low), 0.0)
-    found, place = depths(Within(BLOCK), turned, form, STILL).deepest()
+    found, place = depths(ClosedSurface(BLOCK), turned, form, STILL).deepest()
     # The nearest side of the block: y = 0 from 3.3, or the way back along x.
     assert_allclose(found, 3.4, atol=0.2)
     assert place[0] > 3.0

@@ -15,41 +15,64 @@ from acting import (
     ENERGIES,
     EXPRESSED,
     FIBRE,
+    FIELD_PARAMETERS,
     KINDS,
-    OTHER,
     PARAMETERS,
-    POSITIVE,
     RAMP,
     RAMPED,
     TURN,
     deformations,
+    is_positive,
     make,
+    other,
     outcome,
     state,
     uniaxial,
 )
 
 from fem_reference import effects
-from fem_reference.effects import Energy, FieldEffect, FieldState, Load, Numpy, Place, Prestrain, State
+from fem_reference.effects import Energy, FieldEffect, FieldState, Load, Place, Prestrain, State
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.functions import Numpy
 from fem_reference.foundations.records import parse
 
-FIELD_PARAMETERS = {
-    "diffusion": {"coefficient": 2.0},
-    "advection": {"velocity": [1.0, -3.0]},
-    "reaction": {"rate": 0.5},
-    "source": {"strength": "x*y", "where": "everywhere"},
-}
-CHANGED = {"coefficient": 3.0, "velocity": [1.0, 2.0], "rate": 0.0, "strength": "x", "where": "y above average"}
 HERE = Place((0.3, 0.7), vars(np), 0.25)
 PSI, TEST = FieldState(1.1, (0.2, -0.4), 3.0), FieldState(0.6, (0.9, 0.5))
 
 
-def test_every_field_effect_is_under_test() -> None:
-    assert sorted(FIELD_PARAMETERS) == effects.names(FieldEffect)
-
-
 # The contract
+
+
+@pytest.mark.parametrize("name", [*PARAMETERS, *FIELD_PARAMETERS])
+def test_an_effect_states_an_example_of_all_that_it_needs(name: str) -> None:
+    stated, fields = effects.example(name), effects.find(name).model_fields
+    assert parse(effects.find(name), stated, name)
+    assert {key for key, field in fields.items() if field.is_required()} <= {*stated} <= {*fields}
+
+
+@pytest.mark.parametrize("name", ELASTIC)
+def test_an_effect_states_its_moduli_at_rest(name: str) -> None:
+    """By central differences of its energy: of a shear across the fibres, and of the volume."""
+    effect, step = make(name), 1e-4
+    stated = effect.moduli()
+
+    def energies(F: Callable[[float], np.ndarray], bulk: float = 0.0) -> list[float]:
+        """Beside that at rest; a pressure unknown is K (J - 1)."""
+        points = [(F(x), bulk * (np.linalg.det(F(x)) - 1)) for x in (-step, 0, step)]
+        found = [float(effect.energy(State(at, pressure=p, fibre=(0, 0, 1.0), amount=0.0))) for at, p in points]
+        return [found[0] - found[1], found[2] - found[1]]
+
+    sheared = energies(lambda x: np.eye(3) + x * np.outer([1, 0, 0], [0, 1, 0]))
+    slack = min(sheared) == 0  # fibres to one side
+    assert stated.shear == pytest.approx(0 if slack else sum(sheared) / step**2, rel=1e-4, abs=1e-6)
+    grown = energies(lambda x: (1 + x) ** (1 / 3) * np.eye(3), stated.bulk)
+    assert stated.bulk == pytest.approx(sum(grown) / step**2, rel=1e-3, abs=1e-5)
+    assert min(stated) >= 0
+
+
+def test_moduli_of_several_effects_add_up() -> None:
+    acting = [make("neo_hooke"), make("mooney_rivlin"), make("incompressible"), make("gravity")]
+    assert effects.moduli(acting) == pytest.approx((0.01 + 0.028, 10, 0))
 
 
 @pytest.mark.parametrize("name", ELASTIC)
@@ -82,7 +105,7 @@ def test_the_rest_state_has_no_stress(name: str) -> None:
 def test_every_parameter_is_felt_and_has_its_unit(name: str) -> None:
     effect, F = make(name), uniaxial(1.6) @ (np.eye(3) + 0.05 * deformations()[0])
     for key, _, unit in effect.parameters:
-        changed = make(name, **{key: OTHER.get(key, "7 MPa")})
+        changed = make(name, **{key: other(type(effect), key, PARAMETERS[name][key])})
         printed = [
             (np.array(outcome(one, state(F, fibre=ALONG))).tolist(), one.title, one.amount(5))
             for one in (effect, changed)
@@ -91,7 +114,7 @@ def test_every_parameter_is_felt_and_has_its_unit(name: str) -> None:
         if unit:
             with pytest.raises(InputError, match=rf'{name}\.{key}: got "1 s", want .*{KINDS[unit]}'):
                 make(name, **{key: "1 s"})
-        if key in POSITIVE:
+        if is_positive(type(effect), key):
             with pytest.raises(InputError, match="want more than zero"):
                 make(name, **{key: "-" + PARAMETERS[name][key]})
 
@@ -264,10 +287,10 @@ def test_weak_forms_are_linear_in_the_test_and_affine_in_the_field(name: str) ->
         value, laplacian = values
         return FieldState(value, gradient, laplacian)
 
-    other, nothing = FieldState(-0.7, (1.5, 0.3), -2.0), FieldState(0.0, (0.0, 0.0), 0.0)
+    second, nothing = FieldState(-0.7, (1.5, 0.3), -2.0), FieldState(0.0, (0.0, 0.0), 0.0)
     for share in (0.3, 2.0):
-        between = share * effect.weak(PSI, TEST, HERE) + (1 - share) * effect.weak(other, TEST, HERE)
-        assert effect.weak(mixed(PSI, other, share), TEST, HERE) == pytest.approx(between, rel=1e-12)
+        between = share * effect.weak(PSI, TEST, HERE) + (1 - share) * effect.weak(second, TEST, HERE)
+        assert effect.weak(mixed(PSI, second, share), TEST, HERE) == pytest.approx(between, rel=1e-12)
         assert effect.weak(PSI, mixed(TEST, nothing, share), HERE) == pytest.approx(
             share * effect.weak(PSI, TEST, HERE)
         )
@@ -276,7 +299,7 @@ def test_weak_forms_are_linear_in_the_test_and_affine_in_the_field(name: str) ->
 @pytest.mark.parametrize("name", FIELD_PARAMETERS)
 def test_every_field_parameter_is_felt_and_strict(name: str) -> None:
     for key in FIELD_PARAMETERS[name]:
-        changed = field(name, **{key: CHANGED[key]})
+        changed = field(name, **{key: other(effects.find(name), key, FIELD_PARAMETERS[name][key])})
         assert changed.weak(PSI, TEST, HERE) != field(name).weak(PSI, TEST, HERE)
         assert changed.strong(PSI, HERE) != field(name).strong(PSI, HERE)
         with pytest.raises(InputError, match=rf"{name}\.{key}: got True"):

@@ -31,9 +31,9 @@ def test_every_entry_states_what_a_reader_needs() -> None:
 def test_an_entry_finds_its_truth(entry: Entry, fem_lab) -> None:
     found = result(entry, entry.find(fem_lab), 0.0, with_negative_control=False)
     assert found.word == "pass", (found.finding, found.truth, found.within)
-    if entry.ladder is not None and entry.ladder.order is not None:
+    if entry.refinement is not None and entry.refinement.order is not None:
         # Less than in theory is room for meshes that are not fine enough yet.
-        assert found.finding.order is None or found.finding.order > entry.ladder.order - 0.5
+        assert found.finding.order is None or found.finding.order > entry.refinement.order - 0.5
 
 
 @pytest.mark.slow

@@ -33,3 +33,18 @@ def test_the_numbers_of_the_small_bar(tmp_path: Path) -> None:
         path.write_text(text + CONTACT + names)
         assert features(casefile.read_muscle(path.parent), rest)["contact"] == count
     assert found["contact"] == 0
+
+
+def test_every_law_counts_with_its_shear_modulus(tmp_path: Path) -> None:
+    """Of a Mooney-Rivlin matrix that is 2 (c1 + c2): as stiff as 10 kPa, it has the features of the neo-Hookean bar."""
+    path = small.write(tmp_path / "bar") / "case.toml"
+    scene = casefile.read_muscle(path.parent)
+    rest = muscle.setup(scene)
+    path.write_text(
+        path.read_text().replace(
+            'name = "neo_hooke"\nmu = "10 kPa"', 'name = "mooney_rivlin"\nc1 = "3 kPa"\nc2 = "2 kPa"'
+        )
+    )
+    other = casefile.read_muscle(path.parent)
+    assert type(other.effects[0]).__name__ == "MooneyRivlin"
+    assert features(other, rest) == pytest.approx(features(scene, rest), rel=1e-12)

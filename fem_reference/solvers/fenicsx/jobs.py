@@ -32,7 +32,7 @@ class Kept:
 
 
 def kept(cut_off: CutOff, body: Body) -> Kept:
-    """What can be gone on from; anything else that an earlier process left in the folder is removed."""
+    """The states to go on from; anything else that an earlier process left in the folder is removed."""
     whole = Kept(cut_off.folder.resolve(), fingerprint(body.mesh.points, body.mesh.cells))
     frames = tuple(number for number in cut_off.numbers if _is_of(whole, number))
     cut_off.folder.mkdir(exist_ok=True)

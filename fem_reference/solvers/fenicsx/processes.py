@@ -25,7 +25,7 @@ _SETTINGS = {
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
     "OMPI_MCA_rmaps_base_oversubscribe": "1",
 }
-_PATIENCE = 5.0  # [s] until a process that was asked to end is killed
+PATIENCE = 5.0  # [s] until a process that was asked to end is killed
 # Times a limit of processor time, and what starting takes, that the clock may show: longer than that a machine is too busy to say
 # anything.
 CLOCK, _START = 20, 3.0  # [s]
@@ -34,7 +34,7 @@ MARK = "@fem_reference "  # begins each line of the worker's output that is mean
 
 
 def installed() -> bool:
-    """Whether FEniCSx is."""
+    """True where FEniCSx is installed."""
     return any(importlib.util.find_spec(name) for name in ("dolfinx_solver", "dolfinx"))
 
 
@@ -61,14 +61,14 @@ class Process:
         self.errors.extend(line for line in self.process.stderr if line.strip())
 
     def events(self) -> Iterator[dict[str, Any]]:
-        """What it reports, until its output ends."""
+        """The events that it reports, until its output ends."""
         assert self.process.stdout is not None
         for line in self.process.stdout:
             if line.startswith(MARK):
                 yield json.loads(line.removeprefix(MARK))
 
     def ending(self, kept: str) -> Outcome:
-        """How it ended without a report; ``kept`` says what there is all the same."""
+        """The outcome where it ended without a report; ``kept`` says what there is all the same."""
         code = self.process.wait()
         self.listener.join(timeout=5)  # its last lines may still arrive
         if self.overran is not None:
@@ -126,7 +126,7 @@ class Process:
         """End it: ask again and again, as mpiexec ignores a signal that comes before its own processes; at last kill it."""
         asked = time.monotonic()
         while self.process.poll() is None:
-            patient = time.monotonic() - asked < _PATIENCE
+            patient = time.monotonic() - asked < PATIENCE
             self.process.send_signal(signal.SIGTERM if patient else signal.SIGKILL)
             with suppress(subprocess.TimeoutExpired):
                 self.process.wait(timeout=0.5)

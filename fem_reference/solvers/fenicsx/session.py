@@ -67,7 +67,7 @@ _WORKER = "fem_reference.solvers.fenicsx.worker"
 
 
 def _followed(process: Process, job: Path, sink: Callable[[dict[str, Any]], None], kept: str) -> Outcome:
-    """How ``process`` comes through the ``job``."""
+    """The outcome of the ``job`` in ``process``."""
     process.feed(str(job))
     count = 0
     for event in process.events():

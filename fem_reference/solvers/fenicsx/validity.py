@@ -70,7 +70,7 @@ class Ranges:
             self.frames.setdefault(one.law, set()).add(frame)
 
     def facts(self) -> list[Any]:
-        """What there is to know, in JSON's types."""
+        """The facts, in JSON's types."""
         return [[law, frame, how, sorted(self.frames[law])] for law, (frame, how) in self.first.items()]
 
     def know(self, facts: list[Any]) -> None:
@@ -99,7 +99,7 @@ class Validity:
                 np.arange(len(self.cells), dtype=np.int32),
             )
             self.values["fibre stretch"] = lambda: np.asarray(stretch.eval(self.mesh, mine))
-        self.volumes, self.centres = _volumes(self.mesh, len(self.cells), form.rule)
+        self.volumes, self.centres = volumes_and_centres(self.mesh, len(self.cells), form.rule)
 
     def volume_ratio(self) -> float:
         """The volume of the body over that at rest."""
@@ -118,7 +118,7 @@ class Validity:
         return Trouble("collapsed", why)
 
     def examine(self, frame: float) -> tuple[dict[str, float], list[Outside]]:
-        """Of the present state, that of a ``frame``: the extremes of the means and in how many cells a law is outside its range,
+        """The extremes of the means in the present state, that of a ``frame``, and in how many cells a law is outside its range,
         ``outside_law``; and each law outside it.
         """
         scalars: dict[str, float] = {}
@@ -145,7 +145,7 @@ class Validity:
         ]
 
     def _means(self, measure: str) -> Floats:
-        """By cell of this rank (n,)."""
+        """The means over the cells of this rank (n,)."""
         if len(self.cells) == 0:
             return np.zeros(0)
         return np.average(self.values[measure]().reshape(self.volumes.shape), axis=1, weights=self.volumes)
@@ -161,8 +161,8 @@ class Validity:
         return min(everywhere, key=lambda one: sign * one.value)
 
 
-def _volumes(msh: mesh.Mesh, count: int, rule: Rule) -> tuple[Floats, Floats]:
-    """Of the first ``count`` cells at rest: the volumes (n, q) [mm3] that the points of a ``rule`` stand for, and the centres
+def volumes_and_centres(msh: mesh.Mesh, count: int, rule: Rule) -> tuple[Floats, Floats]:
+    """The volumes (n, q) [mm3] that the points of a ``rule`` stand for in the first ``count`` cells at rest, and the centres
     (n, 3) [mm].
     """
     points, weights = rule

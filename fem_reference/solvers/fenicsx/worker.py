@@ -104,8 +104,8 @@ class Worker:
         return result
 
     def solve_exactly(self) -> bool:
-        """From now on solve linear systems exactly; whether that is another way than until now. What is left of an inexact solution
-        moves a body that is next to free far away.
+        """Solve linear systems exactly from now on; True where that is another way than until now. What is left of an inexact
+        solution moves a body that is next to free far away.
         """
         other = self.body.linear.solve_exactly()
         self.exact |= other
@@ -129,8 +129,8 @@ class Worker:
         )
 
     def negative_modes(self, frame: float) -> dict[str, float]:
-        """In how many directions the energy falls from the state of a frame that was reached, where that can be known; the time
-        for it is no part of solving.
+        """The number of directions in which the energy falls from the state of a frame that was reached, where it can be known;
+        the time for it is no part of solving.
         """
         begin = time.perf_counter()
         modes = self.body.examine(frame)
@@ -158,7 +158,7 @@ class Worker:
         return "limit point", f"{limit}; {self.sentence(reached)}"
 
     def sentence(self, reached: Step) -> str:
-        """Why a frame could not be reached, where, and what to try."""
+        """The reason why a frame could not be reached, where, and what to try."""
         other = "a larger bulk modulus" if self.collapse else "smaller cells"
         self.ranges.add(reached.at, self.body.validity.examine(reached.at)[1])
         return (
@@ -170,7 +170,7 @@ class Worker:
         )
 
     def deepest(self) -> str:
-        """Where contact is deepest, if there is any."""
+        """The place where contact is deepest, if there is any."""
         contact = self.body.contact
         return f", and contact is deepest, {contact.deepest()}" if contact else ""
 

@@ -24,7 +24,7 @@ log = logging.getLogger(__name__)
 
 _HALVINGS = 10
 _ROUNDING = 1e-14  # of what is prescribed, over the size of the body
-_GROWTH = 10.0  # of the out-of-balance forces, above which a Newton step is halved
+_GROWTH = 10.0  # of the residual, above which a Newton step is halved
 
 
 class ScikitBodySettings(Record):
@@ -32,7 +32,7 @@ class ScikitBodySettings(Record):
 
     ``element``: one of ``body.ELEMENTS``. ``first_step`` and ``smallest_step`` bound the load step, by default one to each
     frame: it grows by half after an easy step (at most 5 Newton iterations) and is halved when Newton needs more than
-    ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3] ends Newton's iteration: the norm of out-of-balance nodal forces
+    ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3] ends Newton's iteration: the norm of the nodal forces
     and of the volume equation. ``quadrature_degree``: of the polynomials that are integrated exactly on a straight cell, by
     default what the element needs.
     """
@@ -88,7 +88,7 @@ def solve_body(body: Body, settings: ScikitBodySettings) -> Run:
 
 @dataclass(frozen=True, eq=False)
 class _Tangent:
-    """The equations at ``unknowns`` (N,): the out-of-balance forces ``residual`` (N,) and their derivative ``matrix`` (N, N)."""
+    """The equations at ``unknowns`` (N,): their ``residual`` (N,) and its derivative ``matrix`` (N, N)."""
 
     unknowns: Floats
     residual: Floats

@@ -1,0 +1,75 @@
+"""The state at a point of a body, with the invariants that laws are written in."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from fem_reference.foundations.functions import Functions, Numpy
+
+
+@dataclass(frozen=True)
+class State:
+    """The state at a point that an expression depends on; each entry a number, an array over points or a symbolic expression.
+
+    ``F``: the deformation gradient, ``F[i][k] = dx_i / dX_k``; ``displacement``: (3,) [mm]; ``pressure``: the mixed pressure
+    unknown [MPa], None where no effect brings it; ``fibre``: the unit vector (3,) along the fibres at rest, None where there is
+    none; ``amount``: how much of the effect acts (see :meth:`Effect.amount`); ``before``: the displacement (3,) [mm] that the load
+    step starts from, ``F_before`` its deformation gradient, ``predicted`` (3,) [mm] where velocities alone would lead it, and
+    ``rate`` [1/s] one over the time that it takes, 0 where no time passes.
+    """
+
+    F: Sequence[Sequence[Any]]
+    displacement: Sequence[Any] = (0.0, 0.0, 0.0)
+    pressure: Any = None
+    fibre: Any = None
+    amount: Any = 1.0
+    before: Sequence[Any] = (0.0, 0.0, 0.0)
+    predicted: Sequence[Any] = (0.0, 0.0, 0.0)
+    F_before: Sequence[Sequence[Any]] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    rate: Any = 0.0
+    functions: Functions = field(default_factory=Numpy)
+
+    @property
+    def J(self) -> Any:
+        """Determinant of F."""
+        return sum(self.F[0][k] * entry for k, entry in enumerate(self.cofactors[0]))
+
+    @property
+    def cofactors(self) -> Sequence[Sequence[Any]]:
+        """``J F^-T`` (3, 3): takes an area vector at rest to where it is now (Nanson)."""
+        F = self.F
+        after = {0: (1, 2), 1: (2, 0), 2: (0, 1)}
+        return [
+            [F[i][k] * F[j][m] - F[i][m] * F[j][k] for k, m in (after[column] for column in range(3))]
+            for i, j in (after[row] for row in range(3))
+        ]
+
+    @property
+    def C(self) -> Sequence[Sequence[Any]]:
+        """``F^T F`` (3, 3)."""
+        F = self.F
+        return [[sum(F[i][k] * F[i][m] for i in range(3)) for m in range(3)] for k in range(3)]
+
+    @property
+    def I1(self) -> Any:
+        """Trace of C."""
+        return sum(self.F[i][k] ** 2 for i in range(3) for k in range(3))
+
+    @property
+    def I2(self) -> Any:
+        """``((tr C)^2 - tr C^2) / 2``, the sum of the squared cofactors."""
+        return sum(entry**2 for row in self.cofactors for entry in row)
+
+    def square_stretch(self, direction: Sequence[Any]) -> Any:
+        """``direction . C direction``: the squared stretch of a line along the unit vector ``direction`` (3,) at rest."""
+        return sum(sum(F * a for F, a in zip(row, direction, strict=True)) ** 2 for row in self.F)
+
+    @property
+    def fibre_stretch(self) -> Any:
+        """``J^(-1/3) |F fibre|``: how far the fibre is stretched, without its share in the change of volume."""
+        return self.J ** (-1 / 3) * self.functions.sqrt(self.square_stretch(self.fibre))
+
+    def between(self, low: Any, high: Any, x: Any) -> Any:
+        """``x``, or the bound that it lies beyond."""
+        above = self.functions.above
+        return above(x, high, high, above(x, low, x, low))
