@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, diags_array
-from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface, enclosed_volume, triangle_areas
+from fem_reference.foundations.mesh import Floats, Ints, Surface, connected_parts, enclosed_volume, triangle_areas
 from fem_reference.geometry.coarsening import flip_edges, free_part
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.parts import Parts, between, relaxed, widened
@@ -120,9 +119,8 @@ def _islands(fine: Surface, shares: Floats) -> Ints:
     attached[fine.triangles[shares > 1 / 2]] = True
     ends = fine.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     ends = ends[attached[ends].all(axis=1)]
-    links = coo_array((np.ones(len(ends), bool), tuple(ends.T)), shape=(len(attached), len(attached)))
-    part = connected_components(links, directed=False)[1][fine.triangles]
-    return np.where(shares > 1 / 2, part, -1)
+    part = connected_parts(ends[:, 0], ends[:, 1], len(attached))
+    return np.where(shares > 1 / 2, part[fine.triangles], -1)
 
 
 def _best(parts: Parts, fine: Surface, shares: Floats, label: int, area: float) -> Parts:
