@@ -45,8 +45,8 @@ from fem_reference.problems.body import Body
 from fem_reference.problems.contact import check_exempt, check_outside, check_thickness
 from fem_reference.problems.muscle_body import body_of
 from fem_reference.problems.problem import AtRest
-from fem_reference.problems.setup import AttachedVertices, RigidBody, Setup
-from fem_reference.scenes.bones import Bone
+from fem_reference.problems.setup import AttachedVertices, Bone, Setup
+from fem_reference.scenes.bones import CaseBone
 from fem_reference.scenes.muscle import MuscleCase
 
 
@@ -56,7 +56,7 @@ def kept_meshes() -> Path | None:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem(Setup):
+class MuscleProblem(Setup):
     """A setup filled with tetrahedra (``mesh.facets`` by attachment), with its effects and fibres; ``fibre``, the direction of the
     fibres at any point, where an effect needs it; ``skin``, the contact surface, where there is contact; ``attached_skins``, by
     attachment by springs, what these pull at; ``mesh_facts`` are what the mesh is like, ``seconds`` how long it took
@@ -79,7 +79,7 @@ class Problem(Setup):
         return None if self.fibre is None else self.fibre(np.arange(len(middles)), middles)
 
     @property
-    def muscle(self) -> "Problem":
+    def muscle(self) -> "MuscleProblem":
         """Itself."""
         return self
 
@@ -114,7 +114,7 @@ def setup(scene: MuscleCase) -> Setup:
     return Setup(surface, bones, _attached(scene, surface, bones), scene.frames.numbers, scene.frames.interval)
 
 
-def build(scene: MuscleCase, rest: Setup) -> Problem:
+def build(scene: MuscleCase, rest: Setup) -> MuscleProblem:
     """The whole problem of a scene: its setup ``rest``, filled with tetrahedra and fibres."""
     begin = time.perf_counter()
     contact = among(scene.effects)
@@ -129,7 +129,7 @@ def build(scene: MuscleCase, rest: Setup) -> Problem:
             raise InputError(place, "an area smaller than the tetrahedra resolve", "a smaller muscle.tet_size")
     fibres, fibre = fibre_field.of(scene, rest.surface, partial(_filled, scene, rest))
     apart, asked = spacing(rest.surface), (*scene.effects, *(one.effect for one in scene.decisions))
-    return Problem(
+    return MuscleProblem(
         rest.surface,
         rest.bones,
         rest.attached,
@@ -182,20 +182,20 @@ def _filled(scene: MuscleCase, rest: Setup, size: float) -> TetMesh:
     return replace(mesh, facets={name: facets_under(mesh, rest.surface, attached) for name, attached in shares.items()})
 
 
-def _body(scene: MuscleCase, i: int, muscle: Surface) -> RigidBody:
+def _body(scene: MuscleCase, i: int, muscle: Surface) -> Bone:
     bone, form = scene.bone[i], solid(scene.bone[i])
     motion = bone.motion.poses() if bone.motion else None
     if form is not None:
         surface = tessellated(form, muscle.points, join(scene.place, f"bone[{i}]"))
-        return RigidBody(bone.name, surface, motion, solid=form)
-    assert bone.surface is not None  # a Bone record has a closed form or a surface with its unit
+        return Bone(bone.name, surface, motion, solid=form)
+    assert bone.surface is not None  # a CaseBone record has a closed form or a surface with its unit
     assert bone.unit is not None
     surface = files.read_surface(scene.file(bone.surface, f"bone[{i}].surface"), bone.unit)
     check_finite(surface)
-    return RigidBody(bone.name, surface, motion, bone.distance_error, bone.distance_rounding)
+    return Bone(bone.name, surface, motion, bone.distance_error, bone.distance_rounding)
 
 
-def _attached(scene: MuscleCase, surface: Surface, bones: tuple[RigidBody, ...]) -> tuple[AttachedVertices, ...]:
+def _attached(scene: MuscleCase, surface: Surface, bones: tuple[Bone, ...]) -> tuple[AttachedVertices, ...]:
     by_name = {bone.name: bone for bone in bones}
     taken = np.zeros(len(surface.points), bool)
     attached = []
@@ -213,7 +213,7 @@ def _attached(scene: MuscleCase, surface: Surface, bones: tuple[RigidBody, ...])
     return tuple(attached)
 
 
-def solid(bone: Bone) -> Obstacle | None:
+def solid(bone: CaseBone) -> Obstacle | None:
     """The body of closed form that a ``bone`` of a scene is; None where it is a surface in a file."""
     given = ((name, getattr(bone, name)) for name in CLOSED_FORMS)
     return next((CLOSED_FORMS[name](**form.model_dump()) for name, form in given if form is not None), None)

@@ -21,7 +21,7 @@ from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.mesh import Floats, Polylines
 from fem_reference.foundations.motion import Rotation
 from fem_reference.metrics import MeasurementContext
-from fem_reference.problems.setup import RigidBody
+from fem_reference.problems.setup import Bone
 from fem_reference.runs.store import Run
 
 FIBRES, POINTS = 30, 12  # the most that are drawn: fibres, and points of each
@@ -138,7 +138,7 @@ class Fields:
         }
 
 
-def joints(bones: tuple[RigidBody, ...], numbers: tuple[int, ...]) -> list[dict[str, Any]]:
+def joints(bones: tuple[Bone, ...], numbers: tuple[int, ...]) -> list[dict[str, Any]]:
     """How far each bone that moves has moved: the angle [degrees] or the distance [mm]."""
     found = []
     for bone in bones:

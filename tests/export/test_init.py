@@ -23,7 +23,7 @@ from fem_reference.foundations.records import parse
 from fem_reference.io import files
 from fem_reference.problems import muscle
 from fem_reference.problems.body import ByCell
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.runs.cost import seconds_per_frame
 from fem_reference.runs.store import Outcome, Run
 from fem_reference.scenes import casefile
@@ -42,7 +42,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> MuscleCase:
 
 
 @pytest.fixture(scope="module")
-def built(scene: MuscleCase) -> Problem:
+def built(scene: MuscleCase) -> MuscleProblem:
     """The small scene, with a direction of fibres in each tet, no two the same."""
     bar = muscle.build(scene, muscle.setup(scene))
     along = np.random.default_rng(6).normal(size=(len(bar.mesh.tets), 3))
@@ -50,7 +50,7 @@ def built(scene: MuscleCase) -> Problem:
 
 
 @pytest.fixture(scope="module")
-def exported(scene: MuscleCase, built: Problem, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def exported(scene: MuscleCase, built: MuscleProblem, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("export") / "bar"
     export.export(scene, lambda: built, folder, "open")
     return folder
@@ -61,7 +61,7 @@ def rows(path: Path) -> list[list[str]]:
         return list(csv.reader(table))[1:]
 
 
-def test_surfaces_and_fibres_come_back_to_the_bit(exported: Path, built: Problem) -> None:
+def test_surfaces_and_fibres_come_back_to_the_bit(exported: Path, built: MuscleProblem) -> None:
     surfaces = [built.surface, *(bone.surface for bone in built.bones)]
     for name, surface in zip(("muscle.ply", "bones/0.ply", "bones/1.ply"), surfaces, strict=True):
         for points, triangles in (
@@ -76,14 +76,14 @@ def test_surfaces_and_fibres_come_back_to_the_bit(exported: Path, built: Problem
 
 
 @pytest.mark.parametrize("name", ["tets.vtu", "tets.msh"])
-def test_tets_and_fibre_directions_come_back_to_the_bit(exported: Path, built: Problem, name: str) -> None:
+def test_tets_and_fibre_directions_come_back_to_the_bit(exported: Path, built: MuscleProblem, name: str) -> None:
     mesh = meshio.gmsh.read(exported / name) if name.endswith("msh") else meshio.read(exported / name)
     assert np.array_equal(mesh.points, built.mesh.points)
     assert np.array_equal(mesh.cells_dict["tetra"], built.mesh.tets)
     assert np.array_equal(mesh.cell_data["fibre"][0], built.directions)
 
 
-def test_poses_of_every_bone_and_frame(exported: Path, built: Problem) -> None:
+def test_poses_of_every_bone_and_frame(exported: Path, built: MuscleProblem) -> None:
     found = {
         (bone, int(frame)): np.reshape(row, (4, 4)).astype(float) for bone, frame, *row in rows(exported / "poses.csv")
     }
@@ -93,7 +93,7 @@ def test_poses_of_every_bone_and_frame(exported: Path, built: Problem) -> None:
             assert np.array_equal(found[bone.name, frame], bone.pose(frame))
 
 
-def test_what_is_attached(exported: Path, built: Problem) -> None:
+def test_what_is_attached(exported: Path, built: MuscleProblem) -> None:
     for attached in built.attached:
         vertices = [
             int(row[2])
@@ -109,7 +109,7 @@ def test_what_is_attached(exported: Path, built: Problem) -> None:
         assert np.array_equal(np.array(facets, int), built.mesh.facets[attached.attachment])
 
 
-def test_the_surface_lies_where_its_shares_of_the_tets_say(exported: Path, built: Problem) -> None:
+def test_the_surface_lies_where_its_shares_of_the_tets_say(exported: Path, built: MuscleProblem) -> None:
     """1e-9 mm is rounding at 40 mm in flat tets, whose shares are large."""
     table = np.array(rows(exported / "surface_in_tets.csv"), float)
     corners = built.mesh.points[built.mesh.tets[table[:, 1].astype(int)]]
@@ -117,7 +117,7 @@ def test_the_surface_lies_where_its_shares_of_the_tets_say(exported: Path, built
     assert np.allclose(np.einsum("vi,vik->vk", table[:, 2:], corners), built.surface.points, rtol=0, atol=1e-9)
 
 
-def test_the_scene_says_units_and_values(exported: Path, built: Problem) -> None:
+def test_the_scene_says_units_and_values(exported: Path, built: MuscleProblem) -> None:
     facts = json.loads((exported / "scene.json").read_text())
     assert facts["frames"] == [0, 5, 10, 15, 20]
     assert [effect["name"] for effect in facts["effects"]] == ["neo_hooke", "incompressible"]
@@ -129,7 +129,7 @@ def test_the_scene_says_units_and_values(exported: Path, built: Problem) -> None
     assert facts["mesh"]["tets"] == len(built.mesh.tets)
 
 
-def test_springs_are_stated_in_the_unit_that_they_have(scene: MuscleCase, built: Problem) -> None:
+def test_springs_are_stated_in_the_unit_that_they_have(scene: MuscleCase, built: MuscleProblem) -> None:
     soft = casefile.read_muscle(scene.folder, changes={"attachment[0].stiffness": "250 kPa/mm"})
     facts = open_formats.facts(soft, replace(built, attached=muscle.setup(soft).attached))
     assert facts["attachments"] == [
@@ -138,14 +138,14 @@ def test_springs_are_stated_in_the_unit_that_they_have(scene: MuscleCase, built:
     ]
 
 
-def test_bones_that_contact_names_are_obstacles(scene: MuscleCase, built: Problem) -> None:
+def test_bones_that_contact_names_are_obstacles(scene: MuscleCase, built: MuscleProblem) -> None:
     contact = parse(acting.effects.find("contact"), acting.PARAMETERS["contact"] | {"bones": ["lid"]}, "test")
     facts = open_formats.facts(scene, replace(built, effects=(*built.effects, contact)))
     assert [bone["obstacle"] for bone in facts["bones"]] == [False, True]
 
 
 @pytest.mark.parametrize("name", sorted(acting.PARAMETERS))
-def test_every_effect_can_be_stated(scene: MuscleCase, built: Problem, name: str) -> None:
+def test_every_effect_can_be_stated(scene: MuscleCase, built: MuscleProblem, name: str) -> None:
     effect = parse(acting.effects.find(name), acting.PARAMETERS[name], "test")
     (printed,) = open_formats.facts(scene, replace(built, effects=(effect,)))["effects"]
     assert printed["name"] == name
@@ -158,7 +158,7 @@ def code(text: str) -> str:
     return block
 
 
-def test_the_reading_example_runs(exported: Path, built: Problem) -> None:
+def test_the_reading_example_runs(exported: Path, built: MuscleProblem) -> None:
     """With numpy and meshio, from a process that cannot see this project; numpy prints 8 digits."""
     text = (exported / "README.md").read_text()
     words = [sys.executable, "-I", "-W", "error", "-c", code(text)]
@@ -203,7 +203,9 @@ def test_a_folder_that_cannot_be_written_shows_before_the_problem_is_built(scene
         export.export(scene, lambda: pytest.fail("built"), tmp_path / "file" / "scene", "open")
 
 
-def test_an_export_that_fails_leaves_nothing(scene: MuscleCase, built: Problem, tmp_path: Path, monkeypatch) -> None:
+def test_an_export_that_fails_leaves_nothing(
+    scene: MuscleCase, built: MuscleProblem, tmp_path: Path, monkeypatch
+) -> None:
     def fails(*_: object) -> None:
         raise OSError("no space left")
 
@@ -226,7 +228,7 @@ def foreign(exported: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_foreign_solver_is_judged(
-    scene: MuscleCase, built: Problem, foreign: Path, tmp_path: Path, monkeypatch
+    scene: MuscleCase, built: MuscleProblem, foreign: Path, tmp_path: Path, monkeypatch
 ) -> None:
     """Against a reference that slides by 1 mm a frame number. Bodies turned as a whole keep volume and fibre lengths."""
     slid = np.multiply.outer(np.array(built.frames, float), [0, 0, 1.0])

@@ -21,7 +21,7 @@ from fem_reference.foundations.motion import Translation
 from fem_reference.geometry.rigid_bodies import HalfSpace
 from fem_reference.geometry.tessellation import tessellated
 from fem_reference.metrics import Measure, MeasurementContext
-from fem_reference.problems.setup import RigidBody, Setup
+from fem_reference.problems.setup import Bone, Setup
 from fem_reference.report import gallery, page
 from fem_reference.report import sections as folder_of_sections
 from fem_reference.report.at_frames import label
@@ -146,7 +146,7 @@ def small_comparison(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Compari
         "reference", "fenicsx", moved, scalars={"min_det_F_points": 1 - steps[:, 0, 0] / 8}, origin=origin
     )
     quick, torn = a_run("quick", "pbd", moved + steps * [0, 0, 1.0]), a_run("torn", "recorded", torn, "diverged")
-    plate = RigidBody("plate", Surface(rest.points - [0, 0, 25], rest.triangles), scene.bone[0].motion.poses())
+    plate = Bone("plate", Surface(rest.points - [0, 0, 25], rest.triangles), scene.bone[0].motion.poses())
     return Comparison(
         scene=scene,
         setup=Setup(rest, (plate,), (), NUMBERS, None),
@@ -316,7 +316,7 @@ def test_cameras_look_at_the_widest_side_away_from_the_bones(comparison, up):
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     body = comparison.setup.surface
     bone = Surface((body.points + np.array([0, 12, -25 * up])) @ turn.T, body.triangles)
-    views = gallery.directions(body.moved_to(body.points @ turn.T), (RigidBody("plate", bone, None),))
+    views = gallery.directions(body.moved_to(body.points @ turn.T), (Bone("plate", bone, None),))
     # The body is symmetric, so only rounding is between its axes and the computed ones.
     np.testing.assert_allclose(views @ turn, [[0, 0, up], [0, -1, 0]], atol=1e-9)
 
@@ -324,7 +324,7 @@ def test_cameras_look_at_the_widest_side_away_from_the_bones(comparison, up):
 def test_cameras_look_along_the_coordinates_where_two_axes_are_as_long(comparison):
     body = comparison.setup.surface
     points = body.points / [30, 20, 10] * [20, 8, 20] + np.random.default_rng(4).normal(size=body.points.shape) * 1e-12
-    plate = RigidBody("plate", body.moved_to(body.points - [300, 200, 100]), None)
+    plate = Bone("plate", body.moved_to(body.points - [300, 200, 100]), None)
     np.testing.assert_allclose(gallery.directions(body.moved_to(points), (plate,)), [[0, 1, 0], [1, 0, 0]], atol=0.01)
 
 
@@ -332,9 +332,7 @@ def test_cameras_do_not_look_through_plates(comparison):
     # Half axes 30, 20, 10 again, now between plates across z: seen along y and x. With one plate alone, from its other side.
     body = comparison.setup.surface
     floor, lid = (HalfSpace((0, 0, -10 * up), (0, 0, up)) for up in (1, -1))
-    bones = tuple(
-        RigidBody("plate", tessellated(solid, body.points, "plate"), None, solid=solid) for solid in (floor, lid)
-    )
+    bones = tuple(Bone("plate", tessellated(solid, body.points, "plate"), None, solid=solid) for solid in (floor, lid))
     np.testing.assert_allclose(np.abs(gallery.directions(body, bones)), [[0, 1, 0], [1, 0, 0]], atol=1e-9)
     np.testing.assert_allclose(gallery.directions(body, bones[:1])[0], [0, 0, 1], atol=1e-9)
     np.testing.assert_allclose(gallery.directions(body, bones[1:])[0], [0, 0, -1], atol=1e-9)

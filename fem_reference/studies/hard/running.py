@@ -19,7 +19,7 @@ from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.embedding import Locator
 from fem_reference.problems import of_case
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.of_case import CaseProblem
 from fem_reference.problems.problem import NO_SURFACE
 from fem_reference.runs.key import made_with
@@ -190,13 +190,13 @@ def _solved(posed: Posed, choice: SolverChoice) -> Cell:
     return replace(found, scene=_scene(found, followed))
 
 
-def _muscle_problem(hard: Hard) -> Problem:
+def _muscle_problem(hard: Hard) -> MuscleProblem:
     built = Posed(hard).problem.muscle
     assert built is not None  # as that of the case is
     return built
 
 
-def _muscle(built: Problem, choice: SolverChoice) -> tuple[Outcome, Followed]:
+def _muscle(built: MuscleProblem, choice: SolverChoice) -> tuple[Outcome, Followed]:
     offer = solvers.find(choice.solver, choice.solver)
     if offer.moves not in ("surface", "tetrahedra"):
         raise InputError(
@@ -215,7 +215,7 @@ def _muscle(built: Problem, choice: SolverChoice) -> tuple[Outcome, Followed]:
     return outcome, _followed(built, frames)
 
 
-def _followed(built: Problem, frames: list[Frame]) -> Followed:
+def _followed(built: MuscleProblem, frames: list[Frame]) -> Followed:
     tets = [frame.points for frame in frames if len(frame.points)]
     whole = len(tets) == len(frames)
     return Followed(
@@ -246,7 +246,7 @@ def _all(frames: list[Frame], scalar: str) -> Floats | None:
     return np.array(found) if len(found) == len(frames) else None
 
 
-def _second(built: Problem, choice: SolverChoice) -> tuple[Outcome, Followed]:
+def _second(built: MuscleProblem, choice: SolverChoice) -> tuple[Outcome, Followed]:
     """By a solver of bodies of any shape; the surface goes along with the tetrahedra."""
     if len(built.mesh.tets) > _MOST_FOR_SECOND:
         want = f"at most {_MOST_FOR_SECOND}: it is written in Python, to be right and not fast"
