@@ -24,8 +24,8 @@ def scene_of(options: argparse.Namespace) -> Case:
     return of_case.chosen(casefile.read(options.case, with_negative_control=options.negative_control, changes=changes))
 
 
-def with_limits(scene: Case, limits: list[str]) -> Case:
-    """The scene, expecting of every candidate too that statistics deviate no more than ``limits``, METRIC.STATISTIC=VALUE each."""
+def with_limits(case: Case, limits: list[str]) -> Case:
+    """The case, expecting of every candidate too that statistics deviate no more than ``limits``, METRIC.STATISTIC=VALUE each."""
     asked = []
     for text in limits:
         name, equals, value = text.partition("=")
@@ -34,18 +34,18 @@ def with_limits(scene: Case, limits: list[str]) -> Case:
             raise InputError("--limit", f'"{text}"', "METRIC.STATISTIC=VALUE, such as surface_deviation.max='5 mm'")
         within = value.strip()
         unit = within.lstrip("+-.0123456789eE ")
-        limit = _limit(name.strip(), within, bool(unit), scene)
+        limit = _limit(name.strip(), within, bool(unit), case)
         table = {"of": "candidates", "metric": metric, "statistic": statistic, "truth": f"0 {unit}" if unit else 0.0}
         table |= {"within": limit, "kind": "property", "because": "asked for by --limit"}
         asked.append(parse(Expectation, table, "--limit"))
-    return scene.model_copy(update={"expect": (*scene.expect, *asked)})
+    return case.model_copy(update={"expect": (*case.expect, *asked)})
 
 
-def _limit(name: str, within: str, has_unit: bool, scene: Case) -> str | float:
-    """What a statistic is to be ``within``, a number where it has no unit; InputError unless cases like ``scene`` have one of this
+def _limit(name: str, within: str, has_unit: bool, case: Case) -> str | float:
+    """What a statistic is to be ``within``, a number where it has no unit; InputError unless cases like ``case`` have one of this
     ``name`` and it can be that.
     """
-    known = metrics.units(against=scene.standards("candidates"))
+    known = metrics.units(against=case.standards("candidates"))
     if name not in known:
         near = get_close_matches(name, known, n=5) or sorted(known)
         raise InputError("--limit", f'"{name}"', f"a statistic such as {', '.join(near)}")
@@ -57,24 +57,24 @@ def _limit(name: str, within: str, has_unit: bool, scene: Case) -> str | float:
     return limit
 
 
-def own_candidates(scene: Case) -> list[tuple[Candidate, str]]:
-    """The candidates of the scene, each with its place."""
-    return [(candidate, f"candidate[{i}]") for i, candidate in enumerate(scene.candidate)]
+def own_candidates(case: Case) -> list[tuple[Candidate, str]]:
+    """The candidates of the case, each with its place."""
+    return [(candidate, f"candidate[{i}]") for i, candidate in enumerate(case.candidate)]
 
 
-def choose(scene: Case, text: str, unit: str | None) -> tuple[Candidate, str]:
-    """The candidate of the scene with this name, else the recorded frames in this folder, else the solver of this name with the
+def choose(case: Case, text: str, unit: str | None) -> tuple[Candidate, str]:
+    """The candidate of the case with this name, else the recorded frames in this folder, else the solver of this name with the
     settings of the page table-5-1; and the place that chooses it.
     """
-    names = [candidate.name for candidate in scene.candidate]
+    names = [candidate.name for candidate in case.candidate]
     if text in names:
         if Path(text).is_dir():
             raise InputError(
                 "--candidate", f'"{text}", a candidate of the case and a folder', f"another name, or ./{text}"
             )
-        return scene.candidate[names.index(text)], f"candidate[{names.index(text)}]"
-    if text in solvers.names(scene.task) and not Path(text).exists():
-        found = solver_table.choice(scene, text)[1]
+        return case.candidate[names.index(text)], f"candidate[{names.index(text)}]"
+    if text in solvers.names(case.task) and not Path(text).exists():
+        found = solver_table.choice(case, text)[1]
         return Candidate(name=text, solver=text, **found.settings), "--candidate"
     if not text or not Path(text).exists():
         raise InputError("--candidate", f'"{text}"', f"a folder of frames, a solver, or one of {', '.join(names)}")
@@ -90,10 +90,10 @@ def check_names(names: list[str]) -> None:
             raise InputError("--candidate", f'"{name}" twice', "folders and candidates of different names")
 
 
-def refuse_error_bar(scene: Case, options: argparse.Namespace) -> None:
+def refuse_error_bar(case: Case, options: argparse.Namespace) -> None:
     """InputError where error bars are wanted of what has none."""
     if options.error_bar:
-        casefile.muscle(scene, "--error-bar")
+        casefile.muscle(case, "--error-bar")
 
 
 def checked_bench[C: Case](scene: C, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> Bench[C]:

@@ -40,13 +40,13 @@ LONGEST_STEP = 2.0  # [frame numbers], that of the runs whose results FEBIO.md c
 TOLERANCES = {"dtol": 1e-4, "etol": 1e-5}
 
 
-def check(scene: MuscleCase) -> None:
-    """InputError where a scene has an effect that FEBio has not, or not in the same form."""
-    for i, effect in enumerate(scene.effects):
+def check(case: MuscleCase) -> None:
+    """InputError where a case has an effect that FEBio has not, or not in the same form."""
+    for i, effect in enumerate(case.effects):
         if not isinstance(effect, SAME):
             same = ", ".join(kind.__module__.rpartition(".")[2] for kind in SAME)
             raise InputError(
-                join(scene.place, f"effect[{i}]"),
+                join(case.place, f"effect[{i}]"),
                 f'"{effect_name(effect)}"',
                 f"what FEBio has in the same form: {same}",
             )
@@ -54,8 +54,8 @@ def check(scene: MuscleCase) -> None:
         ((NeoHooke, MooneyRivlin), "no matrix: neither neo_hooke nor mooney_rivlin"),
         ((Incompressible, IncompressiblePenalty), "neither incompressible nor incompressible_penalty"),
     ):
-        if not any(isinstance(effect, kinds) for effect in scene.effects):
-            raise InputError(join(scene.place, "effect"), got, "one of them, which FEBio's uncoupled materials need")
+        if not any(isinstance(effect, kinds) for effect in case.effects):
+            raise InputError(join(case.place, "effect"), got, "one of them, which FEBio's uncoupled materials need")
 
 
 def write(problem: MuscleProblem, folder: Path) -> None:

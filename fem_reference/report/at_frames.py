@@ -21,9 +21,9 @@ class Column:
     at: Callable[[int], float]
 
 
-def columns(scene: Case, setup: Any) -> list[Column]:
+def columns(case: Case, setup: Any) -> list[Column]:
     """Time [s], where the case has any, and how far each bone that moves is turned [°] or shifted [mm]."""
-    interval = getattr(getattr(scene, "frames", None), "interval", None)
+    interval = getattr(getattr(case, "frames", None), "interval", None)
     found = [] if interval is None else [Column("time", "s", lambda frame: frame * float(interval))]
     for bone in getattr(setup, "bones", ()):
         motion = bone.motion
@@ -34,10 +34,10 @@ def columns(scene: Case, setup: Any) -> list[Column]:
     return found
 
 
-def label(scene: Case, setup: Any, frame: int) -> str:
+def label(case: Case, setup: Any, frame: int) -> str:
     """A frame in words: its number, and in brackets what is known of it."""
     known = [
-        f"{one.name} {number(one.at(frame))}{'' if one.unit == '°' else ' '}{one.unit}" for one in columns(scene, setup)
+        f"{one.name} {number(one.at(frame))}{'' if one.unit == '°' else ' '}{one.unit}" for one in columns(case, setup)
     ]
     return f"frame {frame}" + (f" ({', '.join(known)})" if known else "")
 

@@ -62,11 +62,11 @@ def stand(scenes: Iterable[MuscleCase], store: Path, foreign: dict[str, list[Can
     return Table(rows, tuple(scenarios), tuple(results), missing, versions(), machines)
 
 
-def chosen(scene: MuscleCase, row: SolverKind) -> list[tuple[Candidate, str]]:
-    """The solvers measured for a kind on a scene, and the place that says so."""
+def chosen(case: MuscleCase, row: SolverKind) -> list[tuple[Candidate, str]]:
+    """The solvers measured for a kind on a case, and the place that says so."""
     own = [
         (candidate, f"candidate[{i}]")
-        for i, candidate in enumerate(scene.candidate)
+        for i, candidate in enumerate(case.candidate)
         if any(fnmatch(candidate.name, pattern) for pattern in row.of_case)
     ]
     return own + [(candidate, f"{row.name} of Table 5.1") for candidate in row.candidate]
@@ -92,12 +92,12 @@ def _on(
     return Scenario(scene.name, scene.title, triangles, context.travel, reference.outcome), found
 
 
-def _result(scene: MuscleCase, kind: str, run: Run, measures: tuple[Measure, ...]) -> SolverResult:
+def _result(case: MuscleCase, kind: str, run: Run, measures: tuple[Measure, ...]) -> SolverResult:
     return SolverResult(
         kind,
         run.name,
         run.solver,
-        scene.name,
+        case.name,
         run.outcome,
         _seconds_per_frame(run),
         measures,
