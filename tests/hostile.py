@@ -214,7 +214,7 @@ def read_words(folder: Path) -> None:
     except (ValueError, RecursionError):
         words = [text]
     for word in words:
-        for kind in units._EXAMPLE:
+        for kind in units.KINDS:
             _valued(units.quantity, word, kind)
         _valued(units.three, word, "a length")
         _valued(units.length_unit, word)

@@ -116,7 +116,7 @@ def _step(problem: MuscleProblem) -> float:
 
 
 def _domains(root: Element, problem: MuscleProblem) -> None:
-    """How FEBio computes the muscle's elements; bones, and what springs hang from, are rigid."""
+    """The formulation of the muscle's elements; bones, and the areas that springs hang from, are rigid."""
     domains = SubElement(root, "MeshDomains")
     mixed = any(isinstance(effect, Incompressible) for effect in problem.effects)
     kind = "three-field-solid" if mixed else "elastic-solid"

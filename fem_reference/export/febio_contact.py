@@ -33,7 +33,7 @@ PENALTY = {"laugon": 0, "two_pass": 0, "auto_penalty": 0, "symmetric_stiffness":
 
 
 def has_contact(problem: MuscleProblem) -> bool:
-    """Whether the file has a section ``Contact``, whose tangent is not symmetric."""
+    """True where the file has a section ``Contact``, whose tangent is not symmetric."""
     return bool(obstacles(problem) or by_springs(problem))
 
 

@@ -28,12 +28,12 @@ def vector(values: Iterable[float]) -> str:
 
 
 def bone_id(bone: Bone) -> str:
-    """What a bone is called in the file: its material, its elements."""
+    """The name of a bone in the file: of its material, of its elements."""
     return f"bone_{bone.name}"
 
 
 def springs_id(attached: AttachedVertices) -> str:
-    """What the springs of an attachment are called in the file: their shells on the bone, their surfaces."""
+    """The name of the springs of an attachment in the file: of their shells on the bone, of their surfaces."""
     return f"springs_{attached.attachment}"
 
 

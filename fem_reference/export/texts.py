@@ -17,7 +17,7 @@ The reference was solved without `reference.store_state = true`: the arrays that
 
 
 def readme(case: MuscleCase, *, febio: bool) -> str:
-    """How to read the files of an export; with FEBio's among them or without."""
+    """Instructions for the files of an export; with FEBio's among them or without."""
     more = _FEBIO_FILES if febio else ""
     return _filled("README.md", title=case.title, name=case.name, version=__version__, more=more)
 
@@ -32,7 +32,7 @@ def febio_readme(case: MuscleCase, notes: Sequence[str]) -> str:
 
 
 def paraview_readme(case: MuscleCase, unit: str, *, states: bool) -> str:
-    """What is in a collection for ParaView, whose times are in ``unit``; with ``states`` of the reference or without."""
+    """The content of a collection for ParaView, whose times are in ``unit``; with ``states`` of the reference or without."""
     lacking = "" if states else _NO_STATES
     return _filled("PARAVIEW.md", title=case.title, name=case.name, version=__version__, unit=unit, lacking=lacking)
 

@@ -1,4 +1,4 @@
-"""Triangle surfaces and tetrahedral meshes: the records, what makes a surface usable, and how good tetrahedra are.
+"""Triangle surfaces, tetrahedral meshes and polylines: records, measures, and checks that a surface is usable.
 
 Vocabulary of shapes: points ``(n, 3)`` [mm], triangles ``(m, 3)`` and tets ``(k, 4)`` of point indices.
 """
@@ -185,8 +185,7 @@ def check_closed(surface: Surface) -> Surface:
     lost = len(points) - len(np.unique(triangles))
     if lost:
         raise InputError(surface.place, f"{lost} points that no triangle uses", "every point on the surface")
-    _check_fans(surface)
-    _check_one_part(surface)
+    _check_parts(surface)
     volume = enclosed_volume(points, triangles)
     if volume == 0:
         raise InputError(surface.place, "an enclosed volume of zero", "a body")
@@ -206,8 +205,10 @@ def _parts(first: Ints, second: Ints, count: int) -> Ints:
     return np.asarray(connected_components(links, directed=False)[1], np.int64)
 
 
-def _check_fans(surface: Surface) -> None:
-    """InputError where the triangles around a vertex of a closed oriented surface are more than one fan."""
+def _check_parts(surface: Surface) -> None:
+    """InputError where the triangles around a vertex of a closed oriented surface are more than one fan, or where its triangles,
+    connected by edges, are more than one part.
+    """
     one, other = _twins(surface.triangles)
     after_one, after_other = (side - side % 3 + (side + 1) % 3 for side in (one, other))
     corners = surface.triangles.ravel()
@@ -218,11 +219,6 @@ def _check_fans(surface: Surface) -> None:
         first = f"vertex {wrong[0]} at {place_of(surface.points[wrong[0]])}"
         got = f"{len(wrong)} vertices where parts touch, the first {first}"
         raise InputError(surface.place, got, "a manifold surface")
-
-
-def _check_one_part(surface: Surface) -> None:
-    """InputError where a closed surface is more than one part, connected by edges."""
-    one, other = _twins(surface.triangles)
     part = _parts(one // 3, other // 3, len(surface.triangles))
     areas = np.bincount(part, weights=triangle_areas(surface.points, surface.triangles))
     if len(areas) > 1:

@@ -30,29 +30,16 @@ class Shared(NamedTuple):
 
 
 def shared(surface: Surface, counts: NDArray[np.bool_], distance: Distance, body: Floats) -> Shared:
-    """The part of the inside of a surface that is in a rigid body.
+    """The part of the inside of a closed ``surface`` of m triangles that is in a rigid body.
 
     Space is cut into cubes, those that may contain a part of it into smaller ones, and 4000 to 8000 random points are drawn in
-    these, the same every time. On average the count is exact. Its standard deviation is at most half of what one point stands
-    for, times the root of the number of points in cubes on the border of the overlap.
+    these, the same every time. On average the count is exact. Its standard deviation is at most half of what one point stands for,
+    times the root of the number of points in cubes on the border of the overlap.
 
-    Parameters
-    ----------
-    surface
-        Closed, of m triangles.
-    counts
-        Triangles (m,) that count: so does a point whose nearest triangle is one of these.
-    distance
-        Of points (n, 3) [mm] to the rigid body, (n,) [mm], negative inside.
-    body
-        Points (k, 3) [mm] on all sides of the rigid body: where all are inside, it is swallowed.
-
-    Returns
-    -------
-    Shared
-        Nothing where no triangle that counts comes into the body, nor that into the surface as far as its middle; all of a body
-        that is swallowed, whatever counts; a volume of NaN where the surface has blown up beyond a cubic metre.
-
+    A point counts where its nearest triangle is one of those that ``counts`` (m,) names. The rigid body is known by its
+    ``distance`` (n,) [mm] of points (n, 3) to it, negative inside, and by points ``body`` (k, 3) [mm] on all its sides: where all
+    are inside the surface, it is swallowed, and counts as a whole. Nothing is shared where no triangle that counts comes into the
+    body, nor that into the surface as far as its middle. The volume is NaN where the surface has blown up beyond a cubic metre.
     """
     extent = np.ptp(surface.points, axis=0)
     within = _within(surface, body)
