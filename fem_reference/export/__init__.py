@@ -9,7 +9,7 @@ from fem_reference.export import febio, febio_differences, open_formats, texts
 from fem_reference.export.folders import check, new_folder
 from fem_reference.foundations.errors import InputError
 from fem_reference.io import files
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.scenes.muscle import MuscleCase
 
 log = logging.getLogger(__name__)
