@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, boundary, enclosed_volume
 from fem_reference.geometry.distance import distances
-from fem_reference.problems.muscle import Problem
-from fem_reference.problems.setup import AttachedVertices, RigidBody
+from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.setup import AttachedVertices, Bone
 
 # Corners between which the last six nodes of a tet10 are; the first three pairs are those of a tri6 too.
 EDGES = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
@@ -39,7 +39,7 @@ def vector(values: Iterable[float]) -> str:
     return ",".join(repr(float(value)) for value in values)
 
 
-def bone_id(bone: RigidBody) -> str:
+def bone_id(bone: Bone) -> str:
     """The name of a bone in the file: of its material, of its elements."""
     return f"bone_{bone.name}"
 
@@ -49,12 +49,12 @@ def springs_id(attached: AttachedVertices) -> str:
     return f"springs_{attached.attachment}"
 
 
-def by_springs(problem: Problem) -> list[AttachedVertices]:
+def by_springs(problem: MuscleProblem) -> list[AttachedVertices]:
     """The attachments by springs."""
     return [attached for attached in problem.attached if attached.stiffness is not None]
 
 
-def exactly(problem: Problem) -> list[AttachedVertices]:
+def exactly(problem: MuscleProblem) -> list[AttachedVertices]:
     """The attachments whose nodes move with their bone."""
     return [attached for attached in problem.attached if attached.stiffness is None]
 
@@ -67,7 +67,7 @@ def quadratic(mesh: TetMesh) -> tuple[Floats, Ints]:
     return np.vstack([mesh.points, mesh.points[edges].mean(axis=1)]), np.hstack([mesh.tets, middles])
 
 
-def obstacles(problem: Problem) -> list[RigidBody]:
+def obstacles(problem: MuscleProblem) -> list[Bone]:
     """The bones in contact with the muscle."""
     contact = problem.contact
     return [bone for bone in problem.bones if contact is not None and contact.is_by(bone.name)]
@@ -85,7 +85,7 @@ def among(facets: Ints, others: Ints) -> NDArray[np.bool_]:
     return np.array([tuple(facet) in known for facet in np.sort(facets, axis=1).tolist()], bool)
 
 
-def free_facets(problem: Problem) -> Ints:
+def free_facets(problem: MuscleProblem) -> Ints:
     """The facets (m, 3) of the tets that are in contact: those not attached in whose middle contact is felt; InputError where there
     are none.
     """
@@ -104,7 +104,7 @@ def free_facets(problem: Problem) -> Ints:
 class Mesh:
     """Nodes, elements, node sets and surfaces; node numbers of FEBio begin at 1, with those of the muscle."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: MuscleProblem) -> None:
         self.problem = problem
         self.points, self.tets = quadratic(problem.mesh)
         ends = np.sort(problem.mesh.tets[:, EDGES].reshape(-1, 2), axis=1)
