@@ -25,7 +25,7 @@ from fem_reference.studies.execution import Bench
 STORE = Path("reports/runs")
 
 
-def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Case:
+def load_case(case: str | Path, changes: Mapping[str, object] | None = None) -> Case:
     """Read a case.
 
     Parameters
