@@ -44,7 +44,7 @@ README = (
 )
 
 
-class Stored(Record):
+class StoredStatistic(Record):
     """One statistic: ``values`` per frame, the ``tolerance`` of a change of each, and the greatest magnitude allowed, ``within``,
     all in ``unit``.
     """
@@ -56,8 +56,8 @@ class Stored(Record):
 
 
 class Positions(Record):
-    """Where the sampled ``vertices`` (s,) of ``CurrentMeasures.points`` are in each frame, ``values`` (f, s, 3) [mm], and how far
-    [mm] from there they may be, ``tolerance``.
+    """Positions of the sampled ``vertices`` (s,) of ``CurrentMeasures.points`` in each frame, ``values`` (f, s, 3) [mm], and the
+    ``tolerance`` [mm] of their distance from there.
     """
 
     tolerance: float = Field(ge=0)
@@ -75,7 +75,7 @@ class Baseline(Record):
     fem_reference: str
     format: Literal[1]
     frames: tuple[int, ...]
-    measures: dict[str, Stored]
+    measures: dict[str, StoredStatistic]
     positions: Positions
     readme: str
     reference: str
@@ -175,7 +175,7 @@ def _made(current: CurrentMeasures, before: Baseline | None) -> Baseline:
     )
 
 
-def _stored(one: Measure, bars: Floats, before: Stored | None) -> Stored:
+def _stored(one: Measure, bars: Floats, before: StoredStatistic | None) -> StoredStatistic:
     """A statistic with the limits that it had ``before``, else those that its error bars make."""
     limits = Limits.of(one, bars)
     if before is not None:
@@ -183,11 +183,11 @@ def _stored(one: Measure, bars: Floats, before: Stored | None) -> Stored:
     values = tuple(
         round(value, PLACES[one.unit]) + 0.0 if math.isfinite(value) else None for value in one.values.tolist()
     )
-    return Stored(tolerance=limits.tolerance, unit=one.unit, values=values, within=limits.within)
+    return StoredStatistic(tolerance=limits.tolerance, unit=one.unit, values=values, within=limits.within)
 
 
 class Limits(NamedTuple):
-    """How far a statistic may be from what it was (``tolerance``) and from the reference (``within``, None if not known)."""
+    """The ``tolerance`` of a statistic about what it was, and the distance from the reference, ``within``, None if not known."""
 
     tolerance: float
     within: float | None

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from fem_reference import metrics, solvers
-from fem_reference.assessment import judge, solver_table
+from fem_reference.assessment import judge
 from fem_reference.cli._printing import out
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import parse
@@ -75,7 +75,7 @@ def choose(scene: Case, text: str, unit: str | None) -> tuple[Candidate, str]:
             )
         return scene.candidate[names.index(text)], f"candidate[{names.index(text)}]"
     if text in solvers.names(scene.task) and not Path(text).exists():
-        found = solver_table.choice(scene, text)[1]
+        found = solvers.choice(scene, text)[1]
         return Candidate(name=text, solver=text, **found.settings), "--candidate"
     if not text or not Path(text).exists():
         raise InputError("--candidate", f'"{text}"', f"a folder of frames, a solver, or one of {', '.join(names)}")

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from fnmatch import fnmatch
 from pathlib import Path
 
+from fem_reference import solvers
 from fem_reference.assessment.solver_table import Scenario, SolverKind, SolverResult, Table, solver_kinds
 from fem_reference.foundations.errors import InputError
 from fem_reference.metrics import Measure, MeasurementContext, in_tables, measure
@@ -69,7 +70,7 @@ def chosen(scene: MuscleCase, row: SolverKind) -> list[tuple[Candidate, str]]:
         for i, candidate in enumerate(scene.candidate)
         if any(fnmatch(candidate.name, pattern) for pattern in row.of_case)
     ]
-    return own + [(candidate, f"{row.name} of Table 5.1") for candidate in row.candidate]
+    return own + [(candidate, f"{row.name} of Table 5.1") for candidate in solvers.in_table(row.name)]
 
 
 def _on(
