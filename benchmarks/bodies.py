@@ -13,8 +13,9 @@ from fem_reference.geometry import tessellation
 from fem_reference.geometry.rigid_bodies import Sphere
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, ByCell, Cells, Prescribed
-from fem_reference.problems.muscle import AttachedVertices, Problem, RigidBody, Setup
+from fem_reference.problems.muscle import Problem
 from fem_reference.problems.paths import Rest, Turn
+from fem_reference.problems.setup import AttachedVertices, RigidBody, Setup
 
 # The fusiform body: its length and its radius in the middle [mm], and by what share it is thinner at its ends.
 LENGTH, RADIUS, THINNER = 60.0, 10.0, 0.6

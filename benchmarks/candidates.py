@@ -16,7 +16,7 @@ from fem_reference import solvers
 from fem_reference.assessment.solver_table import report_speeds
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record
-from fem_reference.problems import muscle  # not its Setup: asv takes a name like that for one of its own
+from fem_reference.problems import setup as muscles  # not its Setup: asv takes a name like that for one of its own
 from fem_reference.runs.store import Frame
 from fem_reference.scenes import casefile
 from fem_reference.studies.execution import Bench
@@ -27,7 +27,7 @@ SOLVERS = {one.name: one for one in solvers.in_table()}
 ITERATIONS, WARM_UP, REPEATS = 100, 2, 3
 
 
-def spent(solver: str, settings: Record, setup: muscle.Setup, iterations: int) -> float:
+def spent(solver: str, settings: Record, setup: Any, iterations: int) -> float:
     """Processor time [s] of so many iterations from the first frame; not a number where the solver failed."""
     first = setup.frames[0]
 
@@ -40,7 +40,7 @@ def spent(solver: str, settings: Record, setup: muscle.Setup, iterations: int) -
     return time.process_time() - begin if ended.status == "converged" else nan
 
 
-def per_iteration(solver: str, settings: Record, setup: muscle.Setup, counts: tuple[int, int], repeats: int) -> float:
+def per_iteration(solver: str, settings: Record, setup: muscles.Setup, counts: tuple[int, int], repeats: int) -> float:
     """Processor time [s] for an iteration by which a run of more of the ``counts`` of iterations takes longer, each in the fastest
     of its repeats; not a number where the solver failed, or took too little to be speed.
     """
@@ -63,8 +63,9 @@ class Iteration:
             raise NotImplementedError(str(error)) from error
         self.solver = SOLVERS[solver].solver
         self.settings = self.bench.settings(SOLVERS[solver], solver)
-        self.made: Any = self.bench.made_for(self.solver, self.settings)
-        spent(self.solver, self.settings, self.made, WARM_UP)
+        made: Any = self.bench.given(solvers.find(self.solver, self.solver), self.settings)
+        self.made = made
+        spent(self.solver, self.settings, made, WARM_UP)
 
     @over(case=CASES, solver=SOLVERS)
     def track_seconds(self, case: str, solver: str) -> float:  # noqa: ARG002

@@ -17,7 +17,7 @@ from benchmarks.power_law import PowerLaw, fit
 from benchmarks.reference import solve_fusiform
 from fem_reference import solvers
 from fem_reference.foundations.usage import forget_peak_memory, peak_memory
-from fem_reference.problems import muscle
+from fem_reference.problems import setup as problem_setup
 from fem_reference.solvers import fenicsx
 
 # Subdivisions of the icosahedron of an ellipsoid; rings and slices of spindles of tetrahedra, and of those of the reference.
@@ -50,10 +50,12 @@ def of_candidate(name: str, most: int | None = None) -> list[Point]:
     """A candidate in an iteration [s], and its memory [MB], with the first ``most`` sizes, by default all."""
     chosen = SOLVERS[name]
     settings, tets = solvers.settings(chosen, name), chosen.solver == "mass_spring"
-    made: list[muscle.Setup] = [spindle(*size) for size in SPINDLES] if tets else [ellipsoid(k) for k in SUBDIVISIONS]
+    made: list[problem_setup.Setup] = (
+        [spindle(*size) for size in SPINDLES] if tets else [ellipsoid(k) for k in SUBDIVISIONS]
+    )
     points = []
     for setup in made[:most]:
-        size = len(setup.mesh.tets if isinstance(setup, muscle.Problem) else setup.surface.triangles)
+        size = len(setup.rest.mesh.tets if setup.rest.mesh else setup.surface.triangles)
         spent(chosen.solver, settings, setup, 1)  # what is compiled is loaded
         _give_back()
         forget_peak_memory()

@@ -86,7 +86,7 @@ def solve_muscle(case: str, last: int | None, ranks: int | None) -> Costs:
     reached = list[Frame]()
     solve = solvers.find(bench.scene.reference.solver, bench.scene.place).solve
     outcome = solve(replace(problem, frames=frames), settings, reached.append)
-    rest, tets = problem.mesh.points, reached[-1].tets if reached else None
+    rest, tets = problem.mesh.points, reached[-1].points if reached else None
     return costs(outcome, rest - rest if tets is None else tets - rest)
 
 

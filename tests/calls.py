@@ -18,7 +18,7 @@ from fem_reference.foundations.mesh import Polylines
 from fem_reference.problems.body import ByCell
 from fem_reference.problems.paths import Affine, Along, Rest, Turn
 from fem_reference.report import gallery
-from fem_reference.runs.solved import Solved
+from fem_reference.runs.store import Run
 
 NAN, INF = math.nan, math.inf
 STILL = ((0.0, 0.0, 0.0),) * 3
@@ -225,7 +225,7 @@ def solving(draw: Any) -> Callable[[], Any]:
     return lambda: denied(body, fr.solve_body(body, progress=progress, **settings))
 
 
-def denied(body: fr.Body, solved: Solved) -> None:
+def denied(body: fr.Body, solved: Run) -> None:
     """AssertionError where what is said to be converged is not: it is finite, of the frames that were wanted, in their order, and
     where it is prescribed.
     """

@@ -11,7 +11,8 @@ import shapes
 from fem_reference.foundations.motion import Rotation, Translation
 from fem_reference.foundations.records import parse
 from fem_reference.problems.body import ByCell
-from fem_reference.problems.muscle import Problem, RigidBody
+from fem_reference.problems.muscle import Problem
+from fem_reference.problems.setup import RigidBody
 
 FRAMES = (10, 15, 20, 25)
 TURNS = Rotation((1, 2, 2), (3.0, -4.0, 5.0), (10.0, 18.0, 40.0), (0.0, -0.7, 0.4))

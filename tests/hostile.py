@@ -25,10 +25,12 @@ from fem_reference.foundations.mesh import Polylines, check_closed, check_finite
 from fem_reference.foundations.records import parse
 from fem_reference.io import files
 from fem_reference.problems import attachments, muscle, scalar
-from fem_reference.problems.muscle import Setup
+from fem_reference.problems.problem import AtRest
+from fem_reference.problems.setup import Setup
 from fem_reference.runs import results, states, store
 from fem_reference.runs.states import NodalState
-from fem_reference.runs.store import Frame, Outcome, Run, Writer
+from fem_reference.runs.store import Frame, Outcome, Run
+from fem_reference.runs.writer import Writer
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import HOME
 from fem_reference.scenes.muscle import MuscleCase, Outline
@@ -351,7 +353,7 @@ def _make_run(folder: Path) -> None:
         "origin": {"case": "none", "versions": {"numpy": "2"}},
         "frames": NUMBERS,
     }
-    writer = Writer(folder / "run", identity, BALL, FIBRE, shapes.box((1, 1, 1), (5, 5, 5)))
+    writer = Writer(folder / "run", identity, AtRest(BALL, FIBRE, shapes.box((1, 1, 1), (5, 5, 5))))
     for number in NUMBERS:
         tets = writer.mesh.points + number  # type: ignore[union-attr]
         state = NodalState(np.zeros((6, 10, 3)) + number, np.zeros((6, 4)), np.zeros((0, 0, 3)))

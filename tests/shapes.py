@@ -6,7 +6,8 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh, boundary
 from fem_reference.foundations.motion import Rotation
-from fem_reference.problems.muscle import AttachedVertices, Problem, RigidBody
+from fem_reference.problems.muscle import Problem
+from fem_reference.problems.setup import AttachedVertices, RigidBody
 
 
 def box(cells: tuple[int, int, int], size: tuple[float, float, float]) -> TetMesh:

@@ -6,10 +6,10 @@ from types import ModuleType
 import pytest
 
 from fem_reference.assessment import second_check
-from fem_reference.solvers.common.protocol import MuscleSolver, SolveMuscle
+from fem_reference.solvers.common.protocol import MuscleSolver, Solve
 
 
-def solve_by(monkeypatch: pytest.MonkeyPatch, module: ModuleType, solve: SolveMuscle) -> None:
+def solve_by(monkeypatch: pytest.MonkeyPatch, module: ModuleType, solve: Solve) -> None:
     """Let the solver in ``module`` solve muscles by ``solve``, whatever is installed."""
     changes = {"solve": solve, "require": lambda _: None, "go_on": None}
     offers = (replace(one, **changes) if isinstance(one, MuscleSolver) else one for one in module.SOLVES)

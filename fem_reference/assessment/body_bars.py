@@ -7,7 +7,7 @@ import numpy as np
 
 from fem_reference.assessment.error_bars import SAFETY
 from fem_reference.foundations.mesh import Floats, Ints
-from fem_reference.runs.solved import Reached
+from fem_reference.runs.store import Frame
 
 # The error over what half the size of cells changes of it, where it is of first order: the least order there is away from rims of
 # what is prescribed, where displacement goes with the root of the distance, whatever the element (docs/error_bars.md).
@@ -31,7 +31,7 @@ class BodyBars:
     sharper: str
 
 
-def body_bars(states: tuple[Reached, ...], finer: tuple[Reached, ...], shared: Ints, sharper: str) -> BodyBars:
+def body_bars(states: tuple[Frame, ...], finer: tuple[Frame, ...], shared: Ints, sharper: str) -> BodyBars:
     """The bars of the ``states`` of a body.
 
     Parameters
@@ -46,8 +46,8 @@ def body_bars(states: tuple[Reached, ...], finer: tuple[Reached, ...], shared: I
         What it had otherwise, in words.
 
     """
-    there = {state.frame: state for state in finer}
-    pairs = [(state, _beside(state, there.get(state.frame), shared)) for state in states]
+    there = {state.number: state for state in finer}
+    pairs = [(state, _beside(state, there.get(state.number), shared)) for state in states]
     left = SAFETY * LEFT
 
     def vectors(kind: str) -> dict[str, Floats]:
@@ -61,11 +61,11 @@ def body_bars(states: tuple[Reached, ...], finer: tuple[Reached, ...], shared: I
     moved = np.array([np.linalg.norm(one.points - states[0].points) for one in states])
     wrong = np.sqrt(np.sum(np.where(shared < 0, 0.0, points) ** 2, axis=1))
     share = np.divide(wrong, moved, out=np.where(wrong > 0, np.inf, wrong), where=moved > 0)
-    frames = tuple(state.frame for state in states)
+    frames = tuple(state.number for state in states)
     return BodyBars(frames, points, vectors("forces"), vectors("moments"), energy, share, sharper)
 
 
-def _beside(state: Reached, other: Reached | None, shared: Ints) -> Reached:
+def _beside(state: Frame, other: Frame | None, shared: Ints) -> Frame:
     """The ``other`` state at the points of ``state``, NaN where it has none or was not reached."""
     if other is None:
         blank: dict[str, Any] = {

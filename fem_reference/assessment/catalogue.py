@@ -7,7 +7,7 @@ from typing import Literal, Protocol
 
 from fem_reference.assessment.judge import judge
 from fem_reference.problems.body import Body
-from fem_reference.runs.solved import Solved
+from fem_reference.runs.store import Run
 
 Kind = Literal["closed form", "published", "second solver", "property"]
 
@@ -15,12 +15,12 @@ Kind = Literal["closed form", "published", "second solver", "property"]
 class Lab(Protocol):
     """The solvers that measure entries."""
 
-    def solve(self, body: Body, element: str, **settings: float) -> Solved:
+    def solve(self, body: Body, element: str, **settings: float) -> Run:
         """The states of ``body`` by the reference, FEniCSx, with an element of ``body.ELEMENTS``; settings as in
         ``BodySettings`` (first_step, smallest_step, newton_iterations, residual [N, mm3]).
         """
 
-    def second(self, body: Body, element: str, **settings: float) -> Solved:
+    def second(self, body: Body, element: str, **settings: float) -> Run:
         """The same by the second opinion, scikit-fem."""
 
 
@@ -37,7 +37,7 @@ class Finding:
 
 
 @dataclass(frozen=True, eq=False)
-class Ladder:
+class Refinement:
     """Meshes, or steps in time, from coarse to fine.
 
     ``counts`` are of cells or steps, each of ``size / count`` [mm] or [s]. The error falls at ``order`` by theory, to within a
@@ -65,9 +65,9 @@ class Ladder:
 class Entry:
     """A problem whose answer is known.
 
-    ``measure`` finds the number that ``truth`` states, both in ``unit``: it is called with a lab, with the count of a ``ladder``
-    where there is one, and with what is ``given`` by name. The number must come within ``within`` (of the truth's size where
-    ``relative``, else in ``unit``); ``because`` gives the reason for this tolerance. ``source`` is where the truth is from,
+    ``measure`` finds the number that ``truth`` states, both in ``unit``: it is called with a lab, with each count of a
+    ``refinement`` where there is one, and with what is ``given`` by name. The number must come within ``within`` (in ``unit``, or
+    of the truth's size where ``relative``); ``because`` gives the reason for this tolerance. ``source`` is where the truth is from,
     ``kind`` what it is. ``negative_control`` names one thing wrong, by which ``wrong`` replaces a part of ``given``: it must fail.
     ``slow`` where a measurement takes above some 4 s, or is like another one, ``slow_negative_control`` where that does: tests
     leave it to the verb verify.
@@ -83,11 +83,11 @@ class Entry:
     wrong: Mapping[str, object]
     truth: float | Callable[[], float]
     within: float
-    relative: bool
     because: str
     kind: Kind
     source: str
-    ladder: Ladder | None = None
+    relative: bool = False
+    refinement: Refinement | None = None
     slow: bool = False
     slow_negative_control: bool = False
 
@@ -96,17 +96,17 @@ class Entry:
         return float(self.truth() if callable(self.truth) else self.truth)
 
     def find(self, lab: Lab, *, with_negative_control: bool = False) -> Finding:
-        """The finding; with the negative control on the finest of the ladder alone."""
+        """The finding; with the negative control on the finest of a refinement alone."""
         given = {**self.given, **(self.wrong if with_negative_control else {})}
-        if self.ladder is None:
+        if self.refinement is None:
             return _finding(self.measure(lab, **given))
-        needed = self.ladder.needed if with_negative_control else self.ladder.counts
-        steps = tuple((self.ladder.size / n, _finding(self.measure(lab, n, **given)).value) for n in needed)
-        value = self.ladder.value([found for _, found in steps])
+        needed = self.refinement.needed if with_negative_control else self.refinement.counts
+        steps = tuple((self.refinement.size / n, _finding(self.measure(lab, n, **given)).value) for n in needed)
+        value = self.refinement.value([found for _, found in steps])
         if with_negative_control:
             return Finding(value)
-        fall = None if self.ladder.order is None else order(steps, self.known())
-        return Finding(value, fall, steps, self.ladder.note)
+        fall = None if self.refinement.order is None else order(steps, self.known())
+        return Finding(value, fall, steps, self.refinement.note)
 
 
 def _finding(found: float | Finding) -> Finding:

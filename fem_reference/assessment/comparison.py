@@ -1,7 +1,7 @@
 """A reference and its candidates, measured and judged: what reports are written from."""
 
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from fem_reference.assessment.doubts import doubts
 from fem_reference.assessment.error_bars import ErrorBars, Of
@@ -10,8 +10,19 @@ from fem_reference.assessment.ranking import Ranking, rankings
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.markup import table
 from fem_reference.foundations.records import join
-from fem_reference.metrics import Context, Measure, at_rest, context_of, described, find, measure, names
+from fem_reference.metrics import (
+    Context,
+    Measure,
+    MeasurementContext,
+    at_rest,
+    context_of,
+    described,
+    find,
+    measure,
+    names,
+)
 from fem_reference.metrics.fibre_length import extension_error
+from fem_reference.problems.of_case import CaseSetup
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case, Expectation
 
@@ -41,7 +52,7 @@ class Comparison:
     """
 
     scene: Case
-    setup: Any
+    setup: CaseSetup
     reference: Run
     candidates: tuple[Run, ...]
     context: Context
@@ -106,7 +117,7 @@ class Comparison:
 
 
 def compare(
-    scene: Case, setup: Any, reference: Run, candidates: tuple[Run, ...], error_bars: ErrorBars | None = None
+    scene: Case, setup: CaseSetup, reference: Run, candidates: tuple[Run, ...], error_bars: ErrorBars | None = None
 ) -> Comparison:
     """Measure and judge runs of a scene.
 
@@ -141,7 +152,7 @@ def compare(
         verdicts = tuple(
             replace(one, word="fail" if one.expectation.of == "reference" else "inconclusive") for one in verdicts
         )
-    error = extension_error(reference, context) if "lines" in reference.carries else None
+    error = extension_error(reference, context) if isinstance(context, MeasurementContext) else None
     return Comparison(scene, setup, reference, candidates, context, deviations, changes, error, verdicts, error_bars)
 
 
@@ -153,7 +164,7 @@ class Alone(NamedTuple):
     word: Word
 
 
-def alone(scene: Case, setup: Any, run: Run) -> Alone:
+def alone(scene: Case, setup: CaseSetup, run: Run) -> Alone:
     """The measures and verdicts of a ``run`` without a reference: of a muscle none, whose measures all take their context from
     one.
     """

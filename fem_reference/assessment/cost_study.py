@@ -94,7 +94,7 @@ def load(path: Path) -> CaseStudy:
 def load_all(path: Path) -> list[CaseStudy]:
     """The study of a case, or those of several, from a file; InputError as of :func:`load`."""
     found = texts.read_json(path, _WANT)
-    if isinstance(found, list):
+    if isinstance(found, list) and found:
         return [_read(one, f"{path}: [{i}]") for i, one in enumerate(found)]
     return [_read(found, f"{path}")]
 

@@ -12,7 +12,7 @@ from fem_reference.foundations.mesh import Floats, Surface, TetMesh, diagonal, e
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.signed_distance import signed_distances
 from fem_reference.geometry.windings import outer_windings
-from fem_reference.problems.muscle import RigidBody
+from fem_reference.problems.setup import RigidBody
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ from fem_reference.foundations.mesh import Floats, Polylines, Surface
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.signed_distance import signed_distances
 from fem_reference.metrics import MeasurementContext
-from fem_reference.problems.muscle import DISTANCE_MARGIN, RigidBody
+from fem_reference.problems.setup import DISTANCE_MARGIN, RigidBody
 from fem_reference.runs.store import Run
 
 

@@ -9,7 +9,7 @@ from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.metrics import Measure, MeasurementContext
-from fem_reference.problems.muscle import Setup
+from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Run
 from fem_reference.scenes.muscle import MuscleCase
 

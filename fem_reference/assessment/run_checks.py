@@ -17,14 +17,13 @@ from fem_reference.foundations.mesh import Floats, Surface, boundary, diagonal, 
 from fem_reference.foundations.motion import Rotation, apply
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.intersections import overlaps, self_crossings
-from fem_reference.geometry.penetrations import Body as Within
-from fem_reference.geometry.penetrations import Depths, depths
+from fem_reference.geometry.penetrations import ClosedSurface, Depths, depths
 from fem_reference.geometry.signed_distance import Grid
 from fem_reference.geometry.skins import spacing
 from fem_reference.problems.body import Body
 from fem_reference.problems.checks import SAME
-from fem_reference.problems.muscle import AttachedVertices, Problem, RigidBody
-from fem_reference.runs.solved import Solved
+from fem_reference.problems.muscle import Problem
+from fem_reference.problems.setup import AttachedVertices, RigidBody
 from fem_reference.runs.store import Run
 
 # What is in place to this share of the size of a body is in place: rounding of what is stored is a thousandth of it.
@@ -79,28 +78,28 @@ RunChecks = tuple[RunCheck, ...]
 Nodes = Callable[[int], Floats | None]
 
 
-def of_body(body: Body, solved: Solved) -> RunChecks:
+def of_body(body: Body, solved: Run) -> RunChecks:
     """All states there and finite, and what is prescribed exactly met at its nodes."""
-    numbers, points = tuple(state.frame for state in solved.states), [state.points for state in solved.states]
+    numbers, points = tuple(state.number for state in solved.states), [state.points for state in solved.states]
     found = (_complete(body.frames, numbers), _finite(numbers, points))
     if not all(one.met for one in found):
         return found
     return (*found, *_worst(_prescribed(body, solved)))
 
 
-def _prescribed(body: Body, solved: Solved) -> Iterator[RunCheck]:
+def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
     begun = body.start is not None  # its first state is where it is put
     for state in solved.states[1:] if begun else solved.states:
         for entry in body.prescribed:
             if entry.stiffness is None and isinstance(entry.on, str):
                 nodes = np.unique(body.mesh.facets[entry.on])
                 rest, along = body.mesh.points[nodes], list(entry.components)
-                wanted = entry.displacements(rest, state.frame)
+                wanted = entry.displacements(rest, state.number)
                 off = np.abs((state.points[nodes] - rest - wanted)[:, along]).max(axis=1)
                 allowed = SAME * (
                     body.size + float(np.abs(wanted).max())
                 )  # by which regions may contradict where they meet
-                yield _at(f"prescribed at {entry.name}", off, np.full(len(off), allowed), state.frame, rest)
+                yield _at(f"prescribed at {entry.name}", off, np.full(len(off), allowed), state.number, rest)
 
 
 def of_muscle(problem: Problem, run: Run, nodes: Nodes = lambda _: None) -> RunChecks:
@@ -227,23 +226,25 @@ def _depths(problem: Problem, run: Run, nodes: Nodes) -> Iterator[RunCheck]:
     """Depths of each bone in contact and the muscle in each other. Where its surface, whose triangles may be large, is deeper
     than is allowed, that of its tetrahedra is checked too: the muscle is crossed where both are.
     """
-    contact, rest = problem.contact, Within(run.surface)
+    contact, rest = problem.contact, ClosedSurface(run.surface)
     skin = cache(lambda: Surface(problem.mesh.points, boundary(problem.mesh.tets)[0]))
-    inside = cache(lambda: Within(skin()))
+    inside = cache(lambda: ClosedSurface(skin()))
     pressures = np.nan_to_num(run.scalars.get("contact_pressure", np.zeros(len(run.numbers))))
     for i, number in _states(run, bones := [one for one in problem.bones if contact and contact.is_by(one.name)]):
-        muscle = Within(run.surface.moved_to(run.positions[i]))
+        muscle = ClosedSurface(run.surface.moved_to(run.positions[i]))
         for bone in bones:
             check_of = partial(
                 _deep, bone, number, _give(problem, bone, float(pressures[i])), pressed=bool(pressures[i] > 0)
             )
             check = check_of(muscle, rest)
             if not check.met and (now := nodes(number)) is not None:
-                check = min(check, check_of(Within(skin().moved_to(now)), inside()), key=lambda one: one.share)
+                check = min(check, check_of(ClosedSurface(skin().moved_to(now)), inside()), key=lambda one: one.share)
             yield check
 
 
-def _deep(bone: RigidBody, number: int, give: float, muscle: Within, rest: Within, *, pressed: bool) -> RunCheck:
+def _deep(
+    bone: RigidBody, number: int, give: float, muscle: ClosedSurface, rest: ClosedSurface, *, pressed: bool
+) -> RunCheck:
     """Depth of a bone and the muscle in each other; beyond rest, where that is more than contact gives way. Never to the middle
     of a bone.
     """
@@ -257,7 +258,7 @@ def _deep(bone: RigidBody, number: int, give: float, muscle: Within, rest: Withi
 
 
 @lru_cache(maxsize=8)
-def _at_rest(muscle: Within, bone: RigidBody) -> Depths:
+def _at_rest(muscle: ClosedSurface, bone: RigidBody) -> Depths:
     return depths(muscle, bone.surface, bone.shape, np.eye(4))
 
 

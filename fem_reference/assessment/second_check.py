@@ -9,8 +9,6 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from fem_reference.assessment import run_checks
 from fem_reference.assessment.run_checks import RunCheck, RunChecks, of_body, of_muscle
 from fem_reference.foundations.records import Record
@@ -18,8 +16,7 @@ from fem_reference.problems.body import Body
 from fem_reference.problems.muscle import Problem
 from fem_reference.runs.contents import amend
 from fem_reference.runs.cut_off import places
-from fem_reference.runs.solved import Solved
-from fem_reference.runs.store import Frame, Outcome, Run
+from fem_reference.runs.store import Frame, Outcome, Run, collected
 
 log = logging.getLogger(__name__)
 
@@ -58,12 +55,8 @@ def confirmed_frames(problem: Problem, frames: Sequence[Frame], outcome: Outcome
     """The ``outcome`` of ``frames`` of a muscle that are not stored, denied where the check denies that they converged."""
     if outcome.status != "converged":
         return outcome
-    names = set.intersection(*(set(frame.scalars) for frame in frames))
-    scalars = {name: np.array([frame.scalars[name] for frame in frames]) for name in names}
-    numbers, positions = tuple(frame.number for frame in frames), np.array([frame.surface for frame in frames])
-    run = Run("", "", outcome, numbers, problem.surface, positions, scalars=scalars)
-    run = replace(run, origin={"settings": settings.model_dump(mode="json")})
-    tets = {frame.number: frame.tets for frame in frames}
+    run = replace(collected(frames, outcome, problem.rest), origin={"settings": settings.model_dump(mode="json")})
+    tets = {frame.number: frame.points for frame in frames if len(frame.points)}
     return confirmed(outcome, of_muscle(problem, run, tets.get))
 
 
@@ -83,7 +76,7 @@ def _known(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def confirmed_body(body: Body, solved: Solved) -> Solved:
+def confirmed_body(body: Body, solved: Run) -> Run:
     """A solution of a ``body``, denied where the check denies that it converged."""
     if solved.outcome.status != "converged":
         return solved

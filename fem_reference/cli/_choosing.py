@@ -3,7 +3,6 @@
 import argparse
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
 
 from fem_reference import metrics, solvers
 from fem_reference.assessment import judge
@@ -97,9 +96,9 @@ def refuse_error_bar(scene: Case, options: argparse.Namespace) -> None:
         casefile.muscle(scene, "--error-bar")
 
 
-def checked_bench(scene: Case, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> Bench[Any]:
+def checked_bench[C: Case](scene: C, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> Bench[C]:
     """The bench of a scene whose expectations, reference and ``chosen`` candidates can all be read."""
     judge.check(scene)
-    bench: Bench[Any] = Bench(scene, out(options) / "runs", options.ranks)
+    bench = Bench(scene, out(options) / "runs", options.ranks)
     bench.check(chosen)
     return bench

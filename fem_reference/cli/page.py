@@ -3,7 +3,6 @@
 import argparse
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from fem_reference import report
 from fem_reference.assessment.claims import Cover
@@ -18,7 +17,7 @@ from fem_reference.report.claims_page import facts as claims_facts
 from fem_reference.report.overview import comparison_text, ranking_text
 from fem_reference.report.ranking_page import facts as ranking_facts
 from fem_reference.scenes import casefile
-from fem_reference.scenes.case import Candidate
+from fem_reference.scenes.case import Candidate, Case
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx, recorded
 from fem_reference.studies import judging, table_5_1, true_errors
@@ -75,7 +74,7 @@ def _examples(options: argparse.Namespace) -> int:
     return VERDICT_FAIL if any(result.word == "fail" for result in results) else DONE
 
 
-def _compared(bench: Bench[Any]) -> Comparison:
+def _compared(bench: Bench[Case]) -> Comparison:
     """The reference of a case and all its candidates."""
     case = bench.scene
     reference = bench.obtain("reference", case.reference, "reference")

@@ -28,7 +28,8 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.motion import Rotation
 from fem_reference.foundations.records import join
 from fem_reference.io import files
-from fem_reference.problems.muscle import Problem, RigidBody
+from fem_reference.problems.muscle import Problem
+from fem_reference.problems.setup import RigidBody
 from fem_reference.scenes.muscle import MuscleCase
 
 # What FEBio has in the same form.

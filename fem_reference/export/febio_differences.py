@@ -8,7 +8,8 @@ from scipy.linalg import eigh
 from fem_reference.export.febio_contact import overlaps, search_radius
 from fem_reference.export.febio_mesh import by_springs
 from fem_reference.foundations.mesh import Floats, corner_areas
-from fem_reference.problems.muscle import AttachedVertices, Problem
+from fem_reference.problems.muscle import Problem
+from fem_reference.problems.setup import AttachedVertices
 
 # What FEBio 4.11 gave with springs over facets, for the reference's own, at 1 rad on gluteus_medius and gluteus_maximus.
 MEASURED = (

@@ -15,7 +15,8 @@ from fem_reference.effects.neo_hooke import NeoHooke
 from fem_reference.export.febio_mesh import bone_id, leaf, vector
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.motion import Rotation
-from fem_reference.problems.muscle import Problem, RigidBody
+from fem_reference.problems.muscle import Problem
+from fem_reference.problems.setup import RigidBody
 
 VOLUME_LAW = 2  # FEBio's pressure_model whose energy is K/2 (J - 1)^2
 

@@ -9,7 +9,8 @@ import numpy as np
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, boundary, enclosed_volume
 from fem_reference.geometry.distance import distances
-from fem_reference.problems.muscle import AttachedVertices, Problem, RigidBody
+from fem_reference.problems.muscle import Problem
+from fem_reference.problems.setup import AttachedVertices, RigidBody
 
 # Corners between which the last six nodes of a tet10 are; the first three pairs are those of a tri6 too.
 EDGES = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])

@@ -139,7 +139,7 @@ class _Frames:
         whole = {"stretch_of_fibre": lines.lengths(points) / lines.lengths()}
         blocks["fibres"] = Block(lines.points, lines, _moved(lines.points, points) | stretch, whole)
         if run is self.reference and self.results is not None and run.numbers[i] in self.results.frames:
-            blocks["interior"] = _interior(self.results, run.numbers[i])
+            blocks["interior"] = interior(self.results, run.numbers[i])
         return blocks
 
     def _at_surface(self, run: Run, i: int) -> dict[str, Any]:
@@ -153,7 +153,7 @@ class _Frames:
         return self.results.evaluate_in(tets, self.within[1], frame, names)
 
 
-def _interior(made: Results, frame: float) -> Block:
+def interior(made: Results, frame: float) -> Block:
     """The tetrahedra of a reference; what jumps between them as it is in the middle of each, det F also at its least corner."""
     mesh, count = made.mesh, len(made.mesh.tets)
     names = [name for name in made.names(made.states[frame]) if name in _EVALUATED]

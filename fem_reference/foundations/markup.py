@@ -22,3 +22,18 @@ def table(title: str, heads: Sequence[str], rows: Iterable[Sequence[object]]) ->
     head = "".join(f"<th>{escape(name)}</th>" for name in heads)
     body = "".join(f"<tr>{''.join(f'<td>{escape(str(cell))}</td>' for cell in row)}</tr>" for row in rows)
     return f"<b>{escape(title)}</b><table><tr>{head}</tr>{body}</table>"
+
+
+def exact(value: object) -> str:
+    """A fact about where something comes from, with all the digits it has.
+
+    >>> exact(0.123456), exact(True), exact("0.11.0"), exact(None), exact((0.0, -9810.0))
+    ('0.123456', 'yes', '0.11.0', 'not set', '(0, -9810)')
+    """
+    if value is None:
+        return "not set"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, tuple):
+        return f"({', '.join(exact(entry) for entry in value)})"
+    return f"{value:.12g}" if isinstance(value, float) else str(value)

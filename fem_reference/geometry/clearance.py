@@ -1,4 +1,4 @@
-"""How far one can go from a point, whatever the direction, before a tricubic spline on a grid falls to a level."""
+"""The length that one can go from a point, whatever the direction, before a tricubic spline on a grid falls to a level."""
 
 from dataclasses import dataclass
 

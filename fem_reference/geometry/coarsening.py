@@ -1,6 +1,4 @@
-"""A coarser surface of well-shaped triangles that lies on a fine one."""
-
-from dataclasses import dataclass
+"""A coarser surface of well-shaped triangles that lies on a fine one, or the same surface of more."""
 
 import igl
 import numpy as np
@@ -8,6 +6,7 @@ from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints, Surface, enclosed_volume, normals, triangle_areas, unit_normals
 from fem_reference.geometry.distance import distances
+from fem_reference.geometry.edges import Edges
 
 # Chosen on four hip muscles and a box. More rounds gain nothing.
 _ROUNDS = 6
@@ -31,6 +30,18 @@ def coarsen(surface: Surface, count: int) -> Surface:
         triangles = flip_edges(points, triangles)
         points = distances(slide(points, triangles), surface).closest
     points = inflate(points, triangles, enclosed_volume(surface.points, surface.triangles))
+    return Surface(points, triangles, surface.place)
+
+
+def resampled(surface: Surface, power: int) -> Surface:
+    """``surface`` with ``4**power`` times as many triangles: each cut into four where ``power`` is above 0, so often, which moves
+    nothing and leaves its vertices the first; else coarsened.
+    """
+    if power < 0:
+        return coarsen(surface, max(4, round(len(surface.triangles) * 4**power)))
+    points, triangles = np.array(surface.points), np.array(surface.triangles)
+    if power:
+        points, triangles = igl.upsample(points, triangles, power)
     return Surface(points, triangles, surface.place)
 
 
@@ -63,22 +74,9 @@ def slide(points: Floats, triangles: Ints) -> Floats:
 
 
 def free_part(points: Floats, triangles: Ints, chosen: Ints, steps: Floats) -> Floats:
-    """The part of displacements of points on a surface that does not leave it.
-
-    Parameters
-    ----------
-    points, triangles
-        The surface, (n, 3) [mm] and (m, 3).
-    chosen
-        Indices (k,) of the points that are displaced.
-    steps
-        Their displacements (k, 3) [mm].
-
-    Returns
-    -------
-    array (k, 3)
-        In a smooth place the part in the tangent plane, at a sharp edge that along the edge, at a corner 0.
-
+    """The part (k, 3) of displacements of points on a surface that does not leave it: in a smooth place the part in the tangent
+    plane, at a sharp edge that along the edge, at a corner 0. The surface has ``points`` (n, 3) [mm] and ``triangles`` (m, 3); of
+    its points those ``chosen`` (k,) are displaced, by ``steps`` (k, 3) [mm].
     """
     shares, directions = np.linalg.eigh(_normal_tensors(points, triangles))
     free = shares < _FREE * shares.sum(axis=1, keepdims=True)
@@ -99,15 +97,8 @@ def _normal_tensors(points: Floats, triangles: Ints) -> Floats:
 
 
 def inflate(points: Floats, triangles: Ints, volume: float) -> Floats:
-    """Points of a surface shifted by one distance along their normals, until they enclose a volume.
-
-    Parameters
-    ----------
-    points, triangles
-        The surface, (n, 3) [mm] and (m, 3), closed and outward.
-    volume
-        To be enclosed [mm3].
-
+    """The ``points`` (n, 3) [mm] of a closed outward surface of ``triangles`` (m, 3), shifted by one distance along their normals
+    until they enclose a ``volume`` [mm3].
     """
     for _ in range(3):
         across = _around(normals(points[triangles]), triangles, len(points))
@@ -118,20 +109,8 @@ def inflate(points: Floats, triangles: Ints, volume: float) -> Floats:
 
 
 def flip_edges(points: Floats, triangles: Ints, labels: Ints | None = None) -> Ints:
-    """Flip edges of a closed surface towards Delaunay, until none is left to flip (at most 20 passes).
-
-    Parameters
-    ----------
-    points, triangles
-        The surface, (n, 3) [mm] and (m, 3).
-    labels
-        Of triangles (m,), or None. Edges between different ones stay, so that the labels are valid for what is returned.
-
-    Returns
-    -------
-    array (m, 3)
-        Triangles between the same points.
-
+    """The triangles (m, 3) of a closed surface after its edges are flipped towards Delaunay, until none is left to flip (at most 20
+    passes). Edges between triangles of different ``labels`` (m,) stay, so that the labels are valid for what is returned.
     """
     for _ in range(20):
         flipped = _flip_once(points, triangles, labels)
@@ -141,38 +120,18 @@ def flip_edges(points: Floats, triangles: Ints, labels: Ints | None = None) -> I
     return triangles
 
 
-@dataclass(frozen=True, eq=False)
-class _Hinges:
-    """Each edge from ``a`` to ``b`` with the triangles ``left`` (a, b, c) and ``right`` (b, a, d) of it; all (e,)."""
-
-    a: Ints
-    b: Ints
-    c: Ints
-    d: Ints
-    left: Ints
-    right: Ints
-
-    @classmethod
-    def of(cls, triangles: Ints) -> "_Hinges":
-        sides = triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2)
-        order = np.lexsort(np.sort(sides, axis=1).T)
-        one, other = order[::2], order[1::2]
-        a, b = sides[one].T
-        return cls(a, b, triangles.ravel()[one], triangles.ravel()[other], one // 3, other // 3)
-
-
 def _flip_once(points: Floats, triangles: Ints, labels: Ints | None) -> Ints:
     """Edges worth a flip flipped, the best first, each triangle at most once; the same array where none is."""
-    hinge = _Hinges.of(triangles)
-    gain = _flip_gain(points, hinge)
+    edges = Edges.of(Surface(points, triangles))
+    gain = _flip_gain(points, edges)
     if labels is not None:
-        gain = np.where(labels[hinge.left] == labels[hinge.right], gain, 0.0)
-    there = set(zip(np.minimum(hinge.a, hinge.b).tolist(), np.maximum(hinge.a, hinge.b).tolist(), strict=True))
+        gain = np.where(labels[edges.beside[:, 0]] == labels[edges.beside[:, 1]], gain, 0.0)
+    there = set(map(tuple, np.sort(edges.ends, axis=1).tolist()))
     touched, flipped = np.zeros(len(triangles), bool), triangles.copy()
     order = np.argsort(-gain, kind="stable")
     for i in order[: np.count_nonzero(gain > 0)]:
-        pair = [hinge.left[i], hinge.right[i]]
-        a, b, c, d = (int(corner[i]) for corner in (hinge.a, hinge.b, hinge.c, hinge.d))
+        pair = edges.beside[i]
+        (a, b), (c, d) = edges.ends[i].tolist(), edges.opposite[i].tolist()
         edge = (min(c, d), max(c, d))
         if touched[pair].any() or edge in there:
             continue
@@ -182,12 +141,12 @@ def _flip_once(points: Floats, triangles: Ints, labels: Ints | None) -> Ints:
     return flipped if touched.any() else triangles
 
 
-def _flip_gain(points: Floats, hinge: _Hinges) -> Floats:
-    """By how much the angles opposite to each edge exceed a straight one [rad], (e,).
+def _flip_gain(points: Floats, edges: Edges) -> Floats:
+    """The excess (e,) [rad] of the angles opposite to each edge over a straight one.
 
     0 where a flip is not worth it, or the two triangles are not nearly in one plane before and after.
     """
-    a, b, c, d = (points[corner] for corner in (hinge.a, hinge.b, hinge.c, hinge.d))
+    a, b, c, d = (points[corner] for corner in (*edges.ends.T, *edges.opposite.T))
     excess = _angle(a - c, b - c) + _angle(a - d, b - d) - np.pi
     before = _cosine(np.cross(b - a, c - a), np.cross(a - b, d - b))
     after = _cosine(np.cross(a - c, d - c), np.cross(b - d, c - d))

@@ -9,11 +9,12 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, triangle_areas
 
 @dataclass(frozen=True, eq=False)
 class Edges:
-    """``ends`` (e, 2) of each edge, in the direction of its left triangle seen from outside; ``opposite`` (e, 2), the third
-    corner of its left and of its right triangle; ``areas`` (e,) [mm2], a third of its two triangles at rest.
+    """The edges of a closed surface: ``ends`` (e, 2), in the direction of the left triangle seen from outside; ``beside`` (e, 2),
+    the left and the right triangle; ``opposite`` (e, 2), their third corners; ``areas`` (e,) [mm2], a third of both at rest.
     """
 
     ends: Ints
+    beside: Ints
     opposite: Ints
     areas: Floats
 
@@ -22,10 +23,10 @@ class Edges:
         """The edges of a closed, consistently oriented surface at rest; their areas sum to its own."""
         triangles = surface.triangles
         ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
-        left, right = np.lexsort(np.sort(ends, axis=1).T).reshape(-1, 2).T
+        sides = np.lexsort(np.sort(ends, axis=1).T).reshape(-1, 2)
         third = np.roll(triangles, -2, axis=1).ravel()
         areas = triangle_areas(surface.points, triangles) / 3
-        return cls(ends[left], np.stack([third[left], third[right]], axis=1), areas[left // 3] + areas[right // 3])
+        return cls(ends[sides[:, 0]], sides // 3, third[sides], areas[sides // 3].sum(axis=1))
 
     def lengths(self, points: Floats) -> Floats:
         """Length of each edge (e,) [mm] with the surface's vertices at ``points`` (n, 3) [mm]."""

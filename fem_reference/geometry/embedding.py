@@ -73,7 +73,7 @@ class Locator:
 
 
 def embed(mesh: TetMesh, points: Floats) -> Embedding:
-    """Where ``points`` (n, 3) [mm] lie in ``mesh``."""
+    """The places of ``points`` (n, 3) [mm] in ``mesh``."""
     return Locator(mesh).embed(points)
 
 

@@ -131,17 +131,8 @@ class Exemption:
 
 
 def free_skin(exempt: Exemption, mesh: TetMesh, apart: float) -> Skin:
-    """The material points of a surface where contact is felt.
-
-    Parameters
-    ----------
-    exempt
-        What is exempt of the surface.
-    mesh
-        The tetrahedra that carry the points.
-    apart
-        The distance of points [mm], on average and at most.
-
+    """The material points of a surface where contact is felt, beside what is ``exempt`` of it: at most ``apart`` [mm] from each
+    other on average, carried by the tetrahedra of a ``mesh``.
     """
     surface = exempt.surface
     pieces = cut(surface, np.arange(len(surface.triangles)), apart)

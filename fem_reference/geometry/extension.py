@@ -42,7 +42,7 @@ class Extension:
         return cls(points, rest.points, weights)
 
     def apply(self, positions: Floats) -> Floats:
-        """Where the points are (m, 3) [mm] when the surface's points are at ``positions`` (n, 3) [mm]."""
+        """The places of the points (m, 3) [mm] when the surface's points are at ``positions`` (n, 3) [mm]."""
         return np.asarray(self.points + self.weights @ (positions - self.rest))
 
 

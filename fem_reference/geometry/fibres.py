@@ -15,6 +15,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, TetMesh, tet_volumes
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.embedding import Locator
+from fem_reference.geometry.nested import EDGES
 
 _POINTS = 40  # of each line
 _NEAR = 1e-3  # the field this close to 0 or 1 counts as having arrived
@@ -40,7 +41,7 @@ class FibreField:
     end: Ints
 
     def __getstate__(self) -> dict[str, object]:
-        """What is made from the rest when it is needed is not passed to other processes."""
+        """The fields that are not made from others: the rest is not passed to other processes."""
         return {name: value for name, value in vars(self).items() if name not in ("locator", "size")}
 
     def __call__(self, cells: Ints, points: Floats) -> Floats:  # noqa: ARG002
@@ -60,9 +61,8 @@ class FibreField:
     @cached_property
     def size(self) -> float:
         """The mean length of the edges of the mesh [mm]."""
-        mesh = self.mesh
-        edges = mesh.points[mesh.tets[:, [0, 0, 0, 1, 1, 2]]] - mesh.points[mesh.tets[:, [1, 2, 3, 2, 3, 3]]]
-        return float(np.linalg.norm(edges, axis=2).mean())
+        first, second = np.moveaxis(self.mesh.points[self.mesh.tets[:, EDGES]], 2, 0)
+        return float(np.linalg.norm(first - second, axis=2).mean())
 
     def directions(self, points: Floats) -> Floats:
         """Unit vectors (m, 3) of steepest ascent at ``points`` (m, 3)."""
@@ -70,23 +70,15 @@ class FibreField:
         return np.asarray(found / np.maximum(np.linalg.norm(found, axis=1), np.finfo(float).tiny)[:, None])
 
     def between_attachments(self, points: Floats) -> Bools:
-        """Which of ``points`` (m, 3) are in the mesh and at no attachment, (m,)."""
+        """Mask (m,) of the ``points`` (m, 3) that are in the mesh and at no attachment."""
         embedding = self.locator.embed(points)
         values = embedding.interpolate(self.mesh, self.values)
         return np.asarray((embedding.outside == 0) & (values > _NEAR) & (values < 1 - _NEAR))
 
 
 def fibre_field(mesh: TetMesh, start: str, end: str) -> FibreField:
-    """A Laplace field from one attachment to another, by linear elements.
-
-    Parameters
-    ----------
-    mesh
-        Tetrahedra of the muscle.
-    start, end
-        Keys of ``mesh.facets``: the field is 0 on ``start``, 1 on ``end``, without flux elsewhere; 1/2 where they touch, as they
-        may on a coarse mesh.
-
+    """A Laplace field in the tetrahedra of a muscle, by linear elements: 0 on the facets ``start`` of the ``mesh``, 1 on ``end``,
+    without flux elsewhere; 1/2 where they touch, as they may on a coarse mesh.
     """
     zeros, ones = np.unique(mesh.facets[start]), np.unique(mesh.facets[end])
     values = np.zeros(len(mesh.points))
@@ -124,7 +116,7 @@ class NearestLine:
     lines: Polylines
 
     def __getstate__(self) -> dict[str, object]:
-        """As ``FibreField`` has it."""
+        """The fields that are not made from others."""
         return {"lines": self.lines}
 
     def __call__(self, cells: Ints, points: Floats) -> Floats:  # noqa: ARG002
@@ -164,7 +156,7 @@ def _seeds(field: FibreField) -> Floats:
     Where the section cuts a tet, the middle of the cut and the points halfway from there to its corners.
     """
     mesh = field.mesh
-    ends = mesh.tets[:, [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]]
+    ends = mesh.tets[:, EDGES]
     low, high = (field.values[ends[:, :, side]] - _HALFWAY for side in range(2))
     cut = (low < 0) != (high < 0)
     some = cut.any(axis=1)

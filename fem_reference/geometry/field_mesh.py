@@ -36,13 +36,13 @@ class FieldMesh:
         return np.asarray(unique[sides == 1])
 
     def edge_numbers(self, pairs: Ints) -> Ints:
-        """Which of ``edges`` each of ``pairs`` (k, 2) of vertices is, (k,); all must be edges."""
+        """The number (k,) among ``edges`` of each of ``pairs`` (k, 2) of vertices; all must be edges."""
         key = np.array([len(self.points), 1])
         return np.asarray(np.searchsorted(self.edges @ key, np.sort(pairs, axis=1) @ key))
 
     @property
     def nodes(self) -> dict[int, Floats]:
-        """Where the nodes of Lagrange elements of order 1 and 2 are: the vertices, then the middles of the edges."""
+        """The places of the nodes of Lagrange elements of order 1 and 2: the vertices, then the middles of the edges."""
         middles = self.points[self.edges].mean(axis=1)
         return {1: self.points, 2: np.concatenate([self.points, middles])}
 
@@ -105,28 +105,12 @@ def share_above(mesh: FieldMesh, level: float) -> Floats:
 
 
 def stabilisation(mesh: FieldMesh, diffusion: float, velocity: Floats, order: int) -> tuple[float, Floats]:
-    """The mesh Peclet number and the parameter of streamline upwinding, ``tau = h / 2|v| (coth Pe - 1 / Pe)``.
+    """The greatest Peclet number of all cells and, of each (m,), the parameter ``tau = h / 2|v| (coth Pe - 1 / Pe)`` of upwinding.
 
-    ``Pe = |v| h / 2k``, with v the part of the velocity along the cell and h the distance of nodes along it,
-    ``2|v| / sum |v . grad lambda|`` over the order of the elements (Brooks and Hughes 1982, doi 10.1016/0045-7825(82)90071-8;
-    h after Tezduyar 1986). On an interval it makes linear elements exact at their nodes for constant coefficients.
-
-    Parameters
-    ----------
-    mesh
-        Of m cells in d dimensions.
-    diffusion
-        The diffusivity k.
-    velocity
-        Of the flow, (d,).
-    order
-        Of the elements.
-
-    Returns
-    -------
-    peclet, tau
-        The greatest number of all cells, and the parameter of each (m,).
-
+    ``Pe = |v| h / 2k``, with ``diffusion`` k, v the part of the ``velocity`` (d,) along the cell and h the distance of nodes along
+    it, ``2|v| / sum |v . grad lambda|`` over the ``order`` of the elements (Brooks and Hughes 1982, doi
+    10.1016/0045-7825(82)90071-8; h after Tezduyar 1986). On an interval it makes linear elements exact at their nodes for constant
+    coefficients.
     """
     slopes = barycentric_gradients(mesh)
     rates = np.abs(slopes @ velocity).sum(axis=1) * order / 2  # |v| / h

@@ -66,11 +66,11 @@ def _reach(triangles: Floats, walls: Floats) -> Floats:
 
 
 def _pierces(surface: Surface, edges: Ints, triangles: Ints) -> NDArray[np.bool_]:
-    """Whether each of ``edges`` (p, 2) passes through the triangle beside it in ``triangles`` (p, 3), (p,)."""
+    """Mask (p,) of the ``edges`` (p, 2) that pass through the triangle beside them in ``triangles`` (p, 3)."""
     apart = (edges[:, :, None] != triangles[:, None, :]).all(axis=(1, 2))
     begin, end = (surface.points[edges[apart, side]] for side in range(2))
     a, b, c = (surface.points[triangles[apart, corner]] for corner in range(3))
-    normal = np.cross(b - a, c - a)
+    normal = normals(surface.points[triangles[apart]])
     crosses = _dot(normal, begin - a) * _dot(normal, end - a) < 0
     direction = end - begin
     turns = np.stack([_dot(direction, np.cross(p - begin, q - begin)) for p, q in ((a, b), (b, c), (c, a))])

@@ -10,20 +10,31 @@ import numpy as np
 
 log = logging.getLogger(__name__)
 
+Arrays = dict[str, Any]
 
-def read[T](path: Path, made: Callable[[dict[str, Any]], T]) -> T | None:
-    """What ``made`` makes of the arrays of a file, None where there is none that can be read whole."""
+
+def kept[T](path: Path, make: Callable[[], T], to_arrays: Callable[[T], Arrays], of_arrays: Callable[[Arrays], T]) -> T:
+    """The value that ``of_arrays`` finds in the file at ``path``; where there is none, that of ``make``, kept as ``to_arrays``."""
+    found = _read(path, of_arrays)
+    if found is None:
+        found = make()
+        _write(path, to_arrays(found))
+    return found
+
+
+def _read[T](path: Path, of_arrays: Callable[[Arrays], T]) -> T | None:
+    """The value in a file, None where there is none that can be read whole."""
     if not path.is_file():
         return None
     try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as kept:
-            return made(dict(kept))
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+            return of_arrays(dict(arrays))
     except Exception as error:  # zipfile and numpy raise whatever occurs to them over a damaged file
         log.warning("%s: damaged, made anew: %s", path, error)
         return None
 
 
-def write(path: Path, arrays: dict[str, Any]) -> None:
+def _write(path: Path, arrays: Arrays) -> None:
     """Keep arrays, also where several processes do so; where they cannot be written a warning says so."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

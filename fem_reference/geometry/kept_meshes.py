@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Surface, TetMesh, fingerprint
-from fem_reference.geometry import kept_arrays
+from fem_reference.geometry.kept_arrays import kept
 
 Mesher = Callable[[Surface, float, Mapping[str, Floats]], TetMesh]
 _MADE_WITH = ("gmsh", "pytetwild", "libigl", "numpy", "scipy")
@@ -17,31 +17,22 @@ _FACETS = "facets "
 
 
 def cached(mesher: Mesher, surface: Surface, size: float, shares: Mapping[str, Floats], folder: Path | None) -> TetMesh:
-    """What ``mesher`` makes of a surface, stored under a hash of all that it depends on, this folder and its packages among it.
+    """The tetrahedra that ``mesher`` makes of a surface, ``size`` [mm] and ``shares``, which are those of
+    :func:`fem_reference.geometry.tetrahedra.tetrahedralise`.
 
-    Parameters
-    ----------
-    mesher, surface, size, shares
-        As of :func:`fem_reference.geometry.tetrahedra.tetrahedralise`.
-    folder
-        Where meshes are stored; a damaged file is made anew. None: nowhere.
-
+    They are kept in ``folder``, where that is not None, under a hash of all that they depend on: this package and those that it
+    stands on are part of that.
     """
     if folder is None:
         return mesher(surface, size, shares)
-    names = np.frombuffer("\0".join([*shares, _code()]).encode(), np.uint8)
+    names = np.frombuffer("\0".join([*shares, code()]).encode(), np.uint8)
     key = fingerprint(surface.points, surface.triangles, *shares.values(), np.array([size]), names)
-    path = folder / f"tetrahedra_{key[:32]}.npz"
-    mesh = kept_arrays.read(path, _mesh)
-    if mesh is None:
-        mesh = mesher(surface, size, shares)
-        kept_arrays.write(path, _arrays(mesh))
-    return mesh
+    return kept(folder / f"tetrahedra_{key[:32]}.npz", lambda: mesher(surface, size, shares), _arrays, _mesh)
 
 
 @cache
-def _code() -> str:
-    """All of the source here, and the versions of the packages that meshes are made with."""
+def code() -> str:
+    """A hash of all of the source here, and the versions of the packages that meshes are made with."""
     folder = Path(__file__).parent
     sources = [np.frombuffer(path.read_bytes(), np.uint8) for path in sorted(folder.glob("*.py"))]
     versions = dict[str, str]()
@@ -53,9 +44,9 @@ def _code() -> str:
     return f"{fingerprint(*sources)} {versions}"
 
 
-def _mesh(kept: dict[str, Any]) -> TetMesh:
-    facets = {name.removeprefix(_FACETS): array for name, array in kept.items() if name.startswith(_FACETS)}
-    return TetMesh(kept["points"], kept["tets"], facets, str(kept["maker"]))
+def _mesh(arrays: dict[str, Any]) -> TetMesh:
+    facets = {name.removeprefix(_FACETS): array for name, array in arrays.items() if name.startswith(_FACETS)}
+    return TetMesh(arrays["points"], arrays["tets"], facets, str(arrays["maker"]))
 
 
 def _arrays(mesh: TetMesh) -> dict[str, Any]:

@@ -13,17 +13,9 @@ POINTS = 5  # of the rules along each direction: exact up to degree 9
 
 
 def l2_distance(mesh: FieldMesh, values: Floats, exact: Callable[[Floats], Floats]) -> float:
-    """The L2 norm over ``mesh`` of a Lagrange function minus an ``exact`` one.
-
-    Parameters
-    ----------
-    mesh
-        Intervals or triangles, in the plane or in space.
-    values
-        (N,) at the nodes: the vertices, then for order 2 the middles of ``mesh.edges``.
-    exact
-        Its values (q,) at points (q, d).
-
+    """The L2 norm over a ``mesh`` of intervals or triangles, in the plane or in space, of a Lagrange function minus an ``exact``
+    one, which gives values (q,) at points (q, d). The function has ``values`` (N,) at the nodes: the vertices, then for order 2 the
+    middles of ``mesh.edges``.
     """
     order = 1 if len(values) == len(mesh.points) else 2
     barycentric, weights = rule(mesh.cells.shape[1])

@@ -57,16 +57,9 @@ class _Cut:
 def refined(mesh: TetMesh, surface: Surface | None, rims: tuple[str, ...] = ()) -> TetMesh:
     """Tetrahedra each cut into eight, and the facets of regions into four.
 
-    Parameters
-    ----------
-    mesh
-        The tetrahedra.
-    surface
-        What all boundary points then move onto, and from there along their normals, so that as much is enclosed, as far as
-        tetrahedra stay sound; None: they stay.
-    rims
-        Regions of ``mesh.facets``: edges that begin at their rims are cut at a quarter, all others in the middle.
-
+    Edges that begin at the rims of the regions ``rims`` of ``mesh.facets`` are cut at a quarter, all others in the middle. All
+    boundary points then move onto ``surface``, and from there along their normals so that as much is enclosed, as far as
+    tetrahedra stay sound; where it is None they stay.
     """
     cut = _cut(mesh, _on_rims(mesh, rims))
     points = np.concatenate([mesh.points, cut.points])
@@ -88,7 +81,7 @@ def _cut(mesh: TetMesh, on_rim: Bools) -> _Cut:
 
 
 def _on_rims(mesh: TetMesh, rims: tuple[str, ...]) -> Bools:
-    """Which points (n,) are on the rim of one of these regions: on an edge between a facet of it and one that is not."""
+    """Mask (n,) of the points on the rim of one of these regions: on an edge between a facet of it and one that is not."""
     found = np.zeros(len(mesh.points), bool)
     for name in rims:
         faces = mesh.facets[name]

@@ -85,7 +85,7 @@ def _within(surface: Surface, body: Floats) -> NDArray[np.bool_]:
 
 
 def _touches(surface: Surface, counts: NDArray[np.bool_], distance: Distance) -> bool:
-    """Whether a triangle that counts comes into the body: looked for at its vertices, and near the body at ever smaller parts."""
+    """True where a triangle that counts comes into the body: looked for at its vertices, near the body at ever smaller parts."""
     triangles = surface.triangles[counts]
     corners, away = surface.points[triangles], distance(surface.points)[triangles]
     for _ in range(_PARTINGS):
@@ -109,7 +109,7 @@ class _Sides:
             self.trees.append((tree, triangles))
 
     def may_count(self, centres: Floats, reach: float) -> NDArray[np.bool_]:
-        """Which of the balls of radius ``reach`` about ``centres`` (n, 3) may contain something that counts, (n,)."""
+        """Mask (n,) of the balls of radius ``reach`` about ``centres`` (n, 3) that may contain something that counts."""
         counting, other = self._distances(centres)
         found = counting - other <= 2 * reach
         deep = found & (np.minimum(counting, other) > reach)
@@ -117,7 +117,7 @@ class _Sides:
         return np.asarray(found)
 
     def count(self, points: Floats) -> NDArray[np.bool_]:
-        """Which of ``points`` (n, 3) are inside and nearest to a triangle that counts, (n,)."""
+        """Mask (n,) of the ``points`` (n, 3) that are inside and nearest to a triangle that counts."""
         found = _inside(self.surface, points)
         counting, other = self._distances(points[found])
         found[found] = counting <= other
@@ -154,5 +154,5 @@ def _cut(centres: Floats, edge: float, parts: int) -> tuple[Floats, float]:
 
 
 def _reach(edge: float) -> float:
-    """From the centre of a cube to its corners [mm]."""
+    """The distance [mm] from the centre of a cube to its corners."""
     return float(np.sqrt(3) / 2 * edge)

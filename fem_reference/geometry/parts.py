@@ -36,26 +36,12 @@ class Parts:
         return Surface(self.points, self.triangles)
 
     def area(self, label: int) -> float:
-        """Of the triangles with this label [mm2]."""
+        """The area [mm2] of the triangles with this label."""
         return float(triangle_areas(self.points, self.triangles[self.labels == label]).sum())
 
 
 def between(triangles: Ints, labels: Ints, count: int) -> Bools:
-    """The points of a surface at which triangles of different labels meet.
-
-    Parameters
-    ----------
-    triangles, labels
-        (m, 3) and (m,).
-    count
-        Of the points, n.
-
-    Returns
-    -------
-    array (n,)
-        Of bool.
-
-    """
+    """Mask (n,) of the ``count`` points of a surface at which ``triangles`` (m, 3) of different ``labels`` (m,) meet."""
     low, high = np.full(count, np.iinfo(np.int64).max), np.full(count, -1)
     np.minimum.at(low, triangles.ravel(), np.repeat(labels, 3))
     np.maximum.at(high, triangles.ravel(), np.repeat(labels, 3))
@@ -63,17 +49,8 @@ def between(triangles: Ints, labels: Ints, count: int) -> Bools:
 
 
 def relaxed(parts: Parts, fine: Surface, size: float) -> Parts:
-    """Parts with well-shaped triangles: short edges at rims collapsed, edges flipped, points slid, those of a rim along it only.
-
-    Parameters
-    ----------
-    parts
-        Labelled triangles.
-    fine
-        The surface that the points stay on.
-    size
-        The edge length wanted [mm].
-
+    """The parts with well-shaped triangles of about ``size`` [mm], on the ``fine`` surface: short edges at rims collapsed, edges
+    flipped, points slid, those of a rim along it only.
     """
     for _ in range(_ROUNDS):
         parts = collapsed(parts, _SHORT * size)
@@ -140,7 +117,7 @@ def collapsed(parts: Parts, short: float) -> Parts:
 
 
 def _straight(points: Floats, neighbours: list[int], goes: int, stays: int) -> bool:
-    """Whether ``goes`` has two ``neighbours`` on a rim, one of which ``stays``, and the rim hardly turns there."""
+    """True where ``goes`` has two ``neighbours`` on a rim, one of which ``stays``, and the rim hardly turns there."""
     if len(neighbours) != 2 or stays not in neighbours:
         return False
     before, after = points[goes] - points[neighbours[0]], points[neighbours[1]] - points[goes]
@@ -157,8 +134,8 @@ def _around_points(triangles: Ints, count: int) -> list[list[int]]:
 
 
 def _may_collapse(parts: Parts, around: list[list[int]], goes: int, stays: int) -> bool:
-    """Whether ``goes`` may move onto ``stays``: the surface stays manifold, its sharp edges stay, no triangle turns or gets flatter
-    than the flattest was.
+    """True where ``goes`` may move onto ``stays``: the surface stays manifold, its sharp edges stay, no triangle turns or gets
+    flatter than the flattest was.
     """
     points, triangles = parts.points, parts.triangles
     here, there = set(triangles[around[goes]].ravel().tolist()), set(triangles[around[stays]].ravel().tolist())
@@ -188,26 +165,9 @@ def _flatness(points: Floats, triangles: Ints) -> Floats:
 
 
 def widened(parts: Parts, areas: list[float], volume: float, most: float) -> Floats:
-    """Parts of given areas that enclose a given volume: a polygon in a circle is too small.
-
-    The rim of each part moves outwards by one distance, and all points along their normals.
-
-    Parameters
-    ----------
-    parts
-        Labelled triangles between n points.
-    areas
-        Of the parts from label 1 on [mm2].
-    volume
-        To be enclosed [mm3].
-    most
-        How far rims move in a round at most [mm].
-
-    Returns
-    -------
-    array (n, 3)
-        The points [mm].
-
+    """The points (n, 3) [mm] of parts that have given ``areas`` [mm2], from label 1 on, and enclose a ``volume`` [mm3]: a polygon
+    in a circle is too small. In each round the rim of each part moves outwards by one distance, at most by ``most`` [mm], and all
+    points along their normals.
     """
     for _ in range(_ROUNDS):
         points = np.array(parts.points)

@@ -6,6 +6,7 @@ import numpy as np
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Surface
 from fem_reference.geometry.distance import distances
+from fem_reference.geometry.pieces import edge_lengths
 
 # The most triangles that a patch is laid on a bone in: those of some metres.
 _MOST_TRIANGLES = 2**20
@@ -30,9 +31,9 @@ def draped(patches: Surface, bone_surface: Surface) -> Surface:
     return Surface(distances(points, bone_surface).closest, triangles, patches.place)
 
 
+@np.errstate(over="ignore")  # squares of a point that is that far away: it is infinitely far
 def _longest_side(points: Floats, triangles: Ints) -> float:
-    with np.errstate(over="ignore"):  # squares of what is that far away: it is infinitely far
-        return float(np.linalg.norm(points[triangles] - points[np.roll(triangles, 1, axis=1)], axis=2).max())
+    return float(edge_lengths(points[triangles]).max())
 
 
 def fan(points: Floats) -> Surface:

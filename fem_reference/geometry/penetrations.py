@@ -18,8 +18,8 @@ _GRID = np.array([(i, j, 4 - i - j) for i in range(5) for j in range(5 - i)]) / 
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
-    """A closed ``surface`` that knows what is in it."""
+class ClosedSurface:
+    """A closed ``surface`` that knows the depths of points in it."""
 
     surface: Surface
 
@@ -57,7 +57,7 @@ class Depths:
         return float(beyond[worst]), self.places[worst]
 
 
-def depths(body: Body, bone: Surface, shape: Obstacle, pose: Floats) -> Depths:
+def depths(body: ClosedSurface, bone: Surface, shape: Obstacle, pose: Floats) -> Depths:
     """Penetration of a ``body`` and a ``bone`` at a ``pose`` (4, 4), whose ``shape`` knows the distance to it.
 
     Depth in the bone is as exact as its distance field, depth in the body exact.

@@ -36,11 +36,11 @@ class Obstacle(Protocol):
 
     @property
     def half_thickness(self) -> float:
-        """How deep [mm] its deepest place is."""
+        """The depth [mm] of its deepest place."""
         ...
 
     def clearance(self, within: float) -> Callable[[Floats], Floats]:
-        """What bounds from below how far (n,) [mm] each of points (n, 3) is from where the distance is at most ``within`` [mm]."""
+        """A lower bound (n,) [mm] of the way from points (n, 3) to where the distance is at most ``within`` [mm]."""
         ...
 
     def sample(self, points: Floats) -> Sampled:
@@ -49,12 +49,12 @@ class Obstacle(Protocol):
 
 
 class Exact:
-    """What bodies of closed form have in common: their distance is one, everywhere."""
+    """Base of bodies of closed form: their distance is exact, everywhere."""
 
     steepest: ClassVar[float] = 1.0
 
     def clearance(self: Obstacle, within: float) -> Callable[[Floats], Floats]:
-        """By how much they are farther away than ``within`` [mm]."""
+        """The distance of points less ``within`` [mm]."""
         return lambda points: self.sample(points).distance - within
 
 

@@ -194,8 +194,8 @@ class _Edges:
 
 @dataclass(frozen=True, eq=False)
 class _Crossings:
-    """Where edges first and last cross a level: at ``fractions`` (e, 2) of their length, NaN where they do not; ``signs`` (n,) of
-    the points, and whether the middles of triangles are ``within`` (m,).
+    """The places at which edges first and last cross a level: at ``fractions`` (e, 2) of their length, NaN where they do not;
+    ``signs`` (n,) of the points, and whether the middles of triangles are ``within`` (m,).
     """
 
     ends: Ints

@@ -29,7 +29,7 @@ def sectors(surface: Surface) -> Ints:
 
 
 def attached_shares(surface: Surface, vertices: Ints) -> Floats:
-    """Whether each corner (m, 3) of the triangles of ``surface`` is attached by attached ``vertices`` (k,): 1 or 0.
+    """The share, 1 or 0, to which each corner (m, 3) of the triangles of ``surface`` is attached by attached ``vertices`` (k,).
 
     A vertex on a sharp edge attaches only the sides of the edge on which it attaches a whole triangle, if there is one: the end
     of a muscle, and not a strip of the belly around it that has no width of its own.
@@ -52,22 +52,8 @@ def attached_area(surface: Surface, shares: Floats) -> float:
 
 
 def shares_at(points: Floats, surface: Surface, shares: Floats) -> Floats:
-    """Attached shares at the points of a surface that are nearest to given ones.
-
-    Parameters
-    ----------
-    points
-        (n, 3) [mm].
-    surface
-        Of m triangles.
-    shares
-        Of the corners of its triangles, (m, 3).
-
-    Returns
-    -------
-    array (n,)
-        From 0 to 1.
-
+    """The attached shares (n,), from 0 to 1, at the points of a ``surface`` that are nearest to ``points`` (n, 3) [mm], by the
+    ``shares`` (m, 3) of the corners of its triangles.
     """
     nearest = distances(points, surface)
     return np.asarray(np.sum(shares[nearest.triangle] * nearest.barycentric, axis=1))

@@ -5,7 +5,7 @@ Between the nodes stand tricubic B-splines, so that gradient and curvature are c
 
 import logging
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -23,9 +23,9 @@ from fem_reference.foundations.mesh import (
     read_only,
     triangle_areas,
 )
-from fem_reference.geometry import kept_arrays
 from fem_reference.geometry.clearance import Clearance, of_spline
 from fem_reference.geometry.distance import distances
+from fem_reference.geometry.kept_arrays import kept
 from fem_reference.geometry.rigid_bodies import Sampled, Vector
 
 # The distance [mm] to what lies outside a grid: far away from everything, and yet a number to calculate with.
@@ -76,14 +76,14 @@ class Grid:
 
     @cached_property
     def half_thickness(self) -> float:
-        """How deep [mm] its deepest place is at most: a spline is nowhere below its coefficients; infinite where nodes are too far
-        apart to know it.
+        """A bound of the depth [mm] of its deepest place: a spline is nowhere below its coefficients; infinite where nodes are too
+        far apart to know it.
         """
         deepest = float(-self.coefficients.min())
         return deepest if deepest > self.spacing else np.inf
 
     def clearance(self, within: float) -> Clearance:
-        """How far points are at least from where the distance is at most ``within`` [mm]."""
+        """A lower bound of the way from points to where the distance is at most ``within`` [mm]."""
         return of_spline(self.coefficients, np.asarray(self.origin), self.spacing, within)
 
     def sample(self, points: Floats) -> Sampled:
@@ -124,25 +124,11 @@ def _weights(within: Floats) -> Floats:
 
 
 def build(surface: Surface, spacing: float, margin: float, rounding: float = 0.0) -> Grid:
-    """Sample the signed distance to a closed surface on a grid.
+    """The signed distance to a closed ``surface``, sampled on a grid with nodes ``spacing`` [mm] apart, and meant within ``margin``
+    [mm] of it. Single triangles may have any orientation; InputError where the surface bounds no body, as ``check_closed`` says.
 
-    Parameters
-    ----------
-    surface
-        Closed; single triangles may have any orientation.
-    spacing
-        Of the nodes [mm].
-    margin
-        Around the surface in which the distance is wanted [mm].
-    rounding
-        The standard deviation s of the Gaussian mean that is taken of it [mm], as flat triangles are no smooth body to slide along;
-        where the surface has a mean curvature of 1/r, that moves it inward by s^2/r. It counts as error.
-
-    Raises
-    ------
-    InputError
-        Where the surface bounds no body, as ``check_closed`` says.
-
+    ``rounding`` is the standard deviation s [mm] of the Gaussian mean that is taken of the distance, as flat triangles are no
+    smooth body to slide along; where the surface has a mean curvature of 1/r, that moves it inward by s^2/r. It counts as error.
     """
     surface = _oriented(surface)
     low, shape = _extent(surface, spacing, margin)
@@ -155,18 +141,11 @@ def build(surface: Surface, spacing: float, margin: float, rounding: float = 0.0
 
 
 def resolve(surface: Surface, error: float, margin: float) -> Grid:
-    """As :func:`build`, with the spacing halved until the grid is as exact as wanted, or ``MOST_NODES`` forbids more.
+    """The grid of :func:`build` whose spacing is halved until its ``mean_error`` is at most ``error`` [mm], or ``MOST_NODES``
+    forbids more; its own says what it reached.
 
     The largest error is no such measure: on sharp edges and thin rims, which a grid rounds, it falls only in proportion to the
     spacing, and in a slit narrower than a cell not at all.
-
-    Parameters
-    ----------
-    surface, margin
-        As of :func:`build`.
-    error
-        The ``mean_error`` [mm] that is wanted of the grid; its own says what it reached.
-
     """
     spacing = float(np.ptp(surface.points, axis=0).max()) / _FIRST_CELLS
     grid = build(surface, spacing, margin)
@@ -180,33 +159,26 @@ def resolve(surface: Surface, error: float, margin: float) -> Grid:
 
 
 def cached(surface: Surface, error: float, margin: float, rounding: float, folder: Path) -> Grid:
-    """As :func:`build` with the spacing of :func:`resolve`, stored under a hash of all that it depends on, this file among it.
-
-    Parameters
-    ----------
-    surface, margin, rounding
-        As of :func:`build`.
-    error
-        As of :func:`resolve`.
-    folder
-        Where grids are stored; a damaged file is made anew.
-
+    """The grid of :func:`build` with the spacing of :func:`resolve`, kept in ``folder`` under a hash of all that it depends on,
+    this file among it.
     """
     code = np.frombuffer(Path(__file__).read_bytes(), np.uint8)
     name = fingerprint(surface.points, surface.triangles, np.array([error, margin, rounding]), code)
-    path = folder / f"distance_{name[:32]}.npz"
-    grid = kept_arrays.read(path, _grid)
-    if grid is None:
+
+    def make() -> Grid:
         grid = resolve(surface, error, margin)
-        if rounding > 0:
-            grid = build(surface, grid.spacing, margin, rounding)
-        kept_arrays.write(path, {entry.name: getattr(grid, entry.name) for entry in fields(grid)})
-    return grid
+        return build(surface, grid.spacing, margin, rounding) if rounding > 0 else grid
+
+    return kept(folder / f"distance_{name[:32]}.npz", make, _arrays, _grid)
 
 
-def _grid(kept: dict[str, Any]) -> Grid:
-    numbers = (float(kept[name]) for name in ("spacing", "margin", "error", "mean_error"))
-    return Grid(kept["coefficients"], tuple(kept["origin"].tolist()), *numbers)
+def _arrays(grid: Grid) -> dict[str, Any]:
+    return vars(grid)
+
+
+def _grid(arrays: dict[str, Any]) -> Grid:
+    numbers = (float(arrays[name]) for name in ("spacing", "margin", "error", "mean_error"))
+    return Grid(arrays["coefficients"], tuple(arrays["origin"].tolist()), *numbers)
 
 
 def _oriented(surface: Surface) -> Surface:

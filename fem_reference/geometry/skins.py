@@ -25,24 +25,14 @@ class Skin:
 
 
 def spacing(surface: Surface) -> float:
-    """How far apart [mm] points on a ``surface`` are at most, on average: the same whatever it is filled with."""
+    """The distance [mm] of points on a ``surface``, on average and at most: the same whatever it is filled with."""
     return diagonal(surface.points) / _ACROSS
 
 
 def attached_skin(surface: Surface, shares: Floats, mesh: TetMesh, apart: float) -> Skin:
-    """The material points of the attached part of a surface.
-
-    Parameters
-    ----------
-    surface
-        Of m triangles.
-    shares
-        Attached shares (m, 3) of their corners, linear between them: the areas of the points are those attached.
-    mesh
-        The tetrahedra that carry the points.
-    apart
-        The distance of points [mm], on average and at most.
-
+    """The material points of the attached part of a ``surface`` of m triangles, on average at most ``apart`` [mm] from each other,
+    carried by the tetrahedra of a ``mesh``. The areas of points are those attached by the ``shares`` (m, 3) of corners, linear
+    between them.
     """
     pieces, corners = Pieces.whole(np.flatnonzero(shares.any(axis=1))), surface.points[surface.triangles]
     while len(pieces.parents) and edge_lengths(pieces.of(corners)).mean() > apart:

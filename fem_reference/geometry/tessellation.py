@@ -16,20 +16,10 @@ _REACH, _THICKNESS = 1.5, 0.1
 
 
 def tessellated(solid: Obstacle, beside: Floats, place: str, turn: int = TURN) -> Surface:
-    """The closed outward surface of a body of closed form.
+    """The closed outward surface of a body of closed form, in ``turn`` sides to a full turn; errors in it name ``place``.
 
-    Parameters
-    ----------
-    solid
-        The body.
-    beside
-        Points (n, 3) [mm] that a half-space reaches past: having no end, it is a slab, of whose vertices only those in the plane
-        lie on the body.
-    place
-        What errors in the surface name.
-    turn
-        Sides to a full turn.
-
+    A half-space reaches past the points ``beside`` (n, 3) [mm]: having no end, it is a slab, of whose vertices only those in the
+    plane lie on the body.
     """
     match solid:
         case HalfSpace():

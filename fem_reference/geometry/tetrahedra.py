@@ -122,12 +122,12 @@ def _mesh(surface: Surface, size: float, shares: Mapping[str, Floats]) -> TetMes
     else:
         try:
             log.info("%s: gmsh fills %d triangles", surface.place, len(coarse.triangles))
-            mesh = _checked(_run("gmsh", coarse, size), coarse)
+            mesh = checked(run("gmsh", coarse, size), coarse)
             return replace(mesh, facets=_labelled(mesh, coarse, labels, list(shares)))
         except InputError as error:
             reason = str(error)
     log.warning("%s: fTetWild meshes it, differently each time, for gmsh cannot: %s", surface.place, reason)
-    return _checked(_run("tetwild", surface, size), surface)
+    return checked(run("tetwild", surface, size), surface)
 
 
 def _labelled(mesh: TetMesh, coarse: Surface, labels: Ints, names: list[str]) -> dict[str, Ints]:
@@ -173,8 +173,8 @@ def _near(coarse: Surface, surface: Surface, size: float) -> Surface:
     return coarse
 
 
-def _run(mesher: str, surface: Surface, size: float) -> TetMesh:
-    """What ``mesher`` makes of ``surface`` in its own process; InputError where it fails, crashes or takes too long."""
+def run(mesher: str, surface: Surface, size: float) -> TetMesh:
+    """The tetrahedra that ``mesher`` makes of ``surface`` in its own process; InputError where it crashes or takes too long."""
     with scratch.folder() as folder:
         job, result = folder / "job.npz", folder / "result.npz"
         np.savez(job, mesher=mesher, points=surface.points, triangles=surface.triangles, size=size)
@@ -195,18 +195,19 @@ def _run(mesher: str, surface: Surface, size: float) -> TetMesh:
         if no_room := next((words for words in map(os.strerror, NO_ROOM) if words in done.stderr), None):
             raise OSError(f"{folder}: cannot be written: {no_room}; tetrahedra of {surface.place} need room there")
         if done.returncode != 0 or not result.exists():
-            raise InputError(surface.place, f"a surface that {mesher} refuses ({_last_words(done)})", "a clean surface")
+            raise InputError(surface.place, f"a surface that {mesher} refuses ({last_words(done)})", "a clean surface")
         with np.load(result, allow_pickle=False) as arrays:
             return TetMesh(arrays["points"], arrays["tets"], maker=_MAKERS[mesher])
 
 
-def _last_words(done: subprocess.CompletedProcess[str]) -> str:
+def last_words(done: subprocess.CompletedProcess[str]) -> str:
+    """The reason why a process failed: the signal that ended it, or the last line that it wrote."""
     if done.returncode < 0:
         return f"it crashed with signal {-done.returncode}"
     return (done.stderr.strip().splitlines() or ["without a word"])[-1]
 
 
-def _checked(mesh: TetMesh, surface: Surface) -> TetMesh:
+def checked(mesh: TetMesh, surface: Surface) -> TetMesh:
     """The largest connected part of ``mesh``, its tets of positive volume, without unused points.
 
     InputError where nothing is left, a tet is flat, or the tets do not fill about the volume in ``surface``. Their boundary

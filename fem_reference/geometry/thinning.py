@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface, triangle_areas
+from fem_reference.foundations.mesh import Floats, Ints, Surface, normals, triangle_areas
 
 # Directions along which planes leave a vertex free have less than this share of the greatest eigenvalue of their quadric.
 _FREE = 1e-2
@@ -43,13 +43,13 @@ def _representatives(surface: Surface, cells: Ints, side: float) -> Floats:
     count = int(cells.max()) + 1
     sizes = np.bincount(cells, minlength=count)
     means = np.stack([np.bincount(cells, values, count) / sizes for values in surface.points.T], axis=1)
-    a, b, c = (surface.points[corner] for corner in surface.triangles.T)
-    normals = np.cross(b - a, c - a)
+    corners = surface.points[surface.triangles]
+    across = normals(corners)
     squares, pulls = np.zeros((count, 3, 3)), np.zeros((count, 3))
     for corner in cells[surface.triangles].T:
-        off = np.einsum("ij,ij->i", normals, a - means[corner])
-        np.add.at(squares, corner, normals[:, :, None] * normals[:, None, :])
-        np.add.at(pulls, corner, normals * off[:, None])
+        off = np.einsum("ij,ij->i", across, corners[:, 0] - means[corner])
+        np.add.at(squares, corner, across[:, :, None] * across[:, None, :])
+        np.add.at(pulls, corner, across * off[:, None])
     steps = np.einsum("nij,nj->ni", np.linalg.pinv(squares, rcond=_FREE, hermitian=True), pulls)
     lengths = np.linalg.norm(steps, axis=1, keepdims=True)
     return np.asarray(means + steps * np.minimum(1, side / np.maximum(lengths, side)))

@@ -3,7 +3,7 @@
 import igl
 import numpy as np
 
-from fem_reference.foundations.mesh import Floats, Surface, diagonal
+from fem_reference.foundations.mesh import Floats, Surface, diagonal, normals
 
 # How far outside a triangle is looked, as a share of the surface's diagonal.
 _STEP = 1e-5
@@ -11,18 +11,19 @@ _STEP = 1e-5
 
 @np.errstate(over="ignore", invalid="ignore")
 def outer_windings(surface: Surface) -> Floats:
-    """How often the surface winds round a place just outside each triangle (m,): 0 on the skin of a sound body, above 0 inside
-    another part of the body, below 0 where the triangle faces a part that is inside out; NaN where a triangle has no normal.
+    """The number of times (m,) that the surface winds round a place just outside each triangle: 0 on the skin of a sound body,
+    above 0 inside another part of the body, below 0 where the triangle faces a part that is inside out; NaN where a triangle has no
+    normal.
 
     "Just outside" is 1e-5 of the surface's diagonal away; thinner folds are not distinguished. Winding numbers by Barill et al.
     2018, doi 10.1145/3197517.3201337, a few thousandths from the whole numbers they are rounded to.
     """
     points, triangles = surface.points - surface.points.mean(axis=0), surface.triangles
-    a, b, c = (points[triangles[:, corner]] for corner in range(3))
-    normals = np.cross(b - a, c - a)
-    sizes = np.linalg.norm(normals, axis=1)
+    corners = points[triangles]
+    across = normals(corners)
+    sizes = np.linalg.norm(across, axis=1)
     step = _STEP * diagonal(points)
     if not (np.isfinite(step) and np.isfinite(sizes).all()):
         return np.full(len(triangles), np.nan)
-    outside = (a + b + c) / 3 + step * normals / np.where(sizes > 0, sizes, 1)[:, None]
+    outside = corners.sum(axis=1) / 3 + step * across / np.where(sizes > 0, sizes, 1)[:, None]
     return np.where(sizes > 0, np.round(igl.fast_winding_number(points, triangles, outside)), np.nan)

@@ -1,7 +1,7 @@
-"""The shortest paths between two points around a sphere or a cylinder: straight, along the obstacle, straight.
+"""The shortest paths between two points around a wrapping surface, a sphere or a cylinder: straight, along it, straight.
 
 Where a path touches, it goes along a geodesic: a great circle of the sphere, a helix of the cylinder. Seen along the axis
-about which it turns, both are an arc of a circle between two tangents, so one closed form serves both (the obstacles of
+about which it turns, both are an arc of a circle between two tangents, so one closed form serves both (the "obstacles" of
 Garner and Pandy 2000, Comput. Methods Biomech. Biomed. Eng. 3(1), DOI 10.1080/10255840008915251; report 5.3).
 """
 
@@ -17,9 +17,9 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class Paths:
-    """Of n paths, ``parts`` (n, 3) [mm]: lengths before, along and behind the obstacle, only the first where it is straight.
+    """Paths, n of them: ``parts`` (n, 3) [mm], their lengths before, along and behind the surface, all before it where straight.
 
-    ``starts``, ``ends``, and ``touches``, where each meets the obstacle and where it leaves it: (n, 3) [mm]. Along it a path
+    ``starts``, ``ends``, and ``touches``, where each meets the surface and where it leaves it: (n, 3) [mm]. Along it a path
     turns by ``turns`` (n,) [rad] about the unit ``axes`` (n, 3) through ``middles`` (n, 3) and climbs along them evenly.
     """
 
@@ -44,24 +44,26 @@ class Paths:
         straight = _between(self.starts[which], self.touches[0][which], _clipped(path, before))
         last = _between(self.touches[1][which], self.ends[which], _clipped(path - before - along, behind))
         beyond, wraps = path > before + along, (along > 0) & (path > before)
-        return np.where(beyond[:, None], last, np.where(wraps[:, None], self._on_obstacle(which, on), straight))
+        return np.where(beyond[:, None], last, np.where(wraps[:, None], self._on_surface(which, on), straight))
 
-    def _on_obstacle(self, which: Ints, share: Floats) -> Floats:
-        """The points (m, 3) after ``share`` (m,) of the path along the obstacle."""
-        first, last, axes = self.touches[0][which], self.touches[1][which], self.axes[which]
-        arm, angle = first - self.middles[which], (share * self.turns[which])[:, None]
-        height = np.sum(arm * axes, axis=1)[:, None] * axes
-        climb = (share * np.sum((last - first) * axes, axis=1))[:, None] * axes
-        across = arm - height
-        turned = np.cos(angle) * across + np.sin(angle) * np.cross(axes, across)
-        return np.asarray(self.middles[which] + height + climb + turned)
+    def _on_surface(self, which: Ints, share: Floats) -> Floats:
+        """The points (m, 3) after ``share`` (m,) of the path along the surface."""
+        first, last, axes, middles = (
+            self.touches[0][which],
+            self.touches[1][which],
+            self.axes[which],
+            self.middles[which],
+        )
+        height, climb = _along(first - middles, axes), share[:, None] * _along(last - first, axes)
+        turned = _turned(first - middles - height, axes, share * self.turns[which])
+        return np.asarray(middles + height + climb + turned)
 
 
-class Obstacle(Protocol):
-    """What paths go around."""
+class WrappingSurface(Protocol):
+    """A surface that paths go around."""
 
     def depths(self, points: Floats) -> Floats:
-        """How deep inside the obstacle ``points`` (n, 3) [mm] are, (n,) [mm]; below 0 outside."""
+        """Depths (n,) [mm] of ``points`` (n, 3) [mm] inside the surface; below 0 outside."""
         ...
 
     def around(self, starts: Floats, ends: Floats) -> Paths:
@@ -70,7 +72,7 @@ class Obstacle(Protocol):
 
 
 @dataclass(frozen=True)
-class Sphere:
+class WrappingSphere:
     """A ball of ``radius`` about ``centre`` [mm]."""
 
     centre: Vector
@@ -83,11 +85,13 @@ class Sphere:
     def around(self, starts: Floats, ends: Floats) -> Paths:
         """Along the great circle through both points; where they are opposite each other, one of them."""
         normals = np.cross(starts - self.centre, ends - self.centre)
-        return _around(starts, ends, np.asarray(self.centre), _units(normals, starts - self.centre), self.radius)
+        return _around(
+            starts, ends, np.asarray(self.centre), _perpendicular(normals, starts - self.centre), self.radius
+        )
 
 
 @dataclass(frozen=True)
-class Cylinder:
+class WrappingCylinder:
     """All within ``radius`` [mm] of the endless line through ``point`` [mm] along ``axis``, of any length."""
 
     point: Vector
@@ -132,8 +136,8 @@ def _around(starts: Floats, ends: Floats, middle: Floats, axes: Floats, radius: 
     flat = np.stack([np.sqrt(near**2 - radius**2), radius * turns, np.sqrt(far**2 - radius**2)], axis=1)
     climbs = np.sum((ends - starts) * axes, axis=1)
     rises = climbs[:, None] * flat / np.where(wraps, flat.sum(axis=1), 1.0)[:, None]
-    on = middle + radius * _turned(one, axes, first) + _along(starts - middle, axes) + rises[:, :1] * axes
-    off = middle + radius * _turned(other, axes, -last) + _along(ends - middle, axes) - rises[:, 2:] * axes
+    on = middle + radius * _turned(_units(one), axes, first) + _along(starts - middle, axes) + rises[:, :1] * axes
+    off = middle + radius * _turned(_units(other), axes, -last) + _along(ends - middle, axes) - rises[:, 2:] * axes
     plain, picked = straight(starts, ends), wraps[:, None]
     return Paths(
         parts=np.where(picked, np.hypot(flat, rises), plain.parts),
@@ -147,9 +151,12 @@ def _around(starts: Floats, ends: Floats, middle: Floats, axes: Floats, radius: 
 
 
 def _turned(arms: Floats, axes: Floats, angles: Floats) -> Floats:
-    """Unit vectors along ``arms`` (n, 3), which are perpendicular to ``axes``, turned about them by ``angles`` (n,)."""
-    units = arms / np.linalg.norm(arms, axis=1)[:, None]
-    return np.asarray(np.cos(angles)[:, None] * units + np.sin(angles)[:, None] * np.cross(axes, units))
+    """The ``arms`` (n, 3), which are perpendicular to the unit ``axes``, turned about them by ``angles`` (n,)."""
+    return np.asarray(np.cos(angles)[:, None] * arms + np.sin(angles)[:, None] * np.cross(axes, arms))
+
+
+def _units(vectors: Floats) -> Floats:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1)[:, None])
 
 
 def _along(vectors: Floats, axes: Floats) -> Floats:
@@ -162,13 +169,12 @@ def _across(vectors: Floats, axes: Floats) -> Floats:
     return np.asarray(vectors - _along(vectors, axes))
 
 
-def _units(normals: Floats, arms: Floats) -> Floats:
+def _perpendicular(normals: Floats, arms: Floats) -> Floats:
     """``normals`` (n, 3) of length 1; where one is round-off, any direction perpendicular to its arm."""
     sizes = np.linalg.norm(normals, axis=1)[:, None]
     squares = np.sum(arms**2, axis=1)[:, None]
     spare = np.cross(arms, np.eye(3)[np.argmin(np.abs(arms), axis=1)])
-    chosen = np.where(sizes > 1e-9 * squares, normals, spare)
-    return np.asarray(chosen / np.linalg.norm(chosen, axis=1)[:, None])
+    return _units(np.where(sizes > 1e-9 * squares, normals, spare))
 
 
 def _clipped(path: Floats, length: Floats) -> Floats:

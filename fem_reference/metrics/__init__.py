@@ -9,8 +9,8 @@ import importlib
 import pkgutil
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache, singledispatch
-from typing import Any, Literal, Protocol, cast
+from functools import cache
+from typing import Any, Literal, Protocol, cast, overload
 
 import numpy as np
 
@@ -18,8 +18,8 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, vertex_areas
 from fem_reference.geometry.exemption import Exemption
 from fem_reference.geometry.extension import Extension
-from fem_reference.problems.muscle import RigidBody, Setup
-from fem_reference.problems.scalar import FieldProblem
+from fem_reference.problems.of_case import CaseSetup
+from fem_reference.problems.setup import RigidBody, Setup
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Part, Standard
 
@@ -152,16 +152,16 @@ class FieldContext:
 Context = MeasurementContext | FieldContext
 
 
-@singledispatch
-def context_of(setup: object, reference: Run) -> Any:
+@overload
+def context_of(setup: Setup, reference: Run) -> MeasurementContext: ...
+@overload
+def context_of(setup: CaseSetup, reference: Run) -> Context: ...
+def context_of(setup: CaseSetup, reference: Run) -> Context:
     """The :data:`Context` of the runs of a case from its ``setup`` and its ``reference``; InputError where that does not have what
     others are measured against.
     """
-    raise TypeError(f"{type(setup).__name__} of {reference.name}: got no setup of a case")
-
-
-@context_of.register
-def _(setup: Setup, reference: Run) -> MeasurementContext:
+    if "field" in reference.carries:
+        return FieldContext(setup.exact)
     if not reference.has_surface:
         raise InputError(f"{reference.name}: surface", "a run of lines alone", "a reference that moves the surface")
     if reference.fibres is None:
@@ -169,11 +169,6 @@ def _(setup: Setup, reference: Run) -> MeasurementContext:
             f"{reference.name}: fibres", "a run without an interior", "a reference that carries the fibres"
         )
     return MeasurementContext.of(reference, reference.fibres, setup.bones, setup.exempt)
-
-
-@context_of.register
-def _(setup: FieldProblem, reference: Run) -> FieldContext:  # noqa: ARG001
-    return FieldContext(setup.exact)
 
 
 class Metric(Protocol):

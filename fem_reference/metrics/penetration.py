@@ -16,7 +16,7 @@ from fem_reference.geometry.exemption import Exemption
 from fem_reference.geometry.overlap import shared
 from fem_reference.geometry.pieces import edge_lengths
 from fem_reference.metrics import Measure, MeasurementContext, Statistic
-from fem_reference.problems.muscle import RigidBody
+from fem_reference.problems.setup import RigidBody
 from fem_reference.runs.store import Run
 
 STATISTICS = {

@@ -6,7 +6,7 @@ It knows no solver.
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from fem_reference.foundations.mesh import Floats, Ints, diagonal
 from fem_reference.geometry.fibres import Directions
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems.contact import Contact, Obstruction
+from fem_reference.problems.problem import NOTHING, AtRest, Task
 from fem_reference.problems.resolved_paths import Moving, moving_ramp, posed, some, stops, turning
 
 Kind = Literal["tetrahedron", "hexahedron"]
@@ -201,6 +202,9 @@ class Body:
     obstructions: tuple[Obstruction, ...] = ()
     interval: float | None = None
     start: Callable[[Floats], Floats] | None = None
+
+    task: ClassVar[Task] = "solve_body"
+    rest: ClassVar[AtRest] = NOTHING
 
     @property
     def first(self) -> float:

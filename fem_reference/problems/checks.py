@@ -45,6 +45,7 @@ def check(body: Body, element: str) -> None:
     _check_regions(body.mesh, tuple(used))
     _check_needs(body)
     check_agreement(body)
+    _check_start(body)
 
 
 def check_box(counts: Any, size: Any, kind: Any, degree: Any) -> None:
@@ -242,7 +243,7 @@ def check_agreement(body: Body) -> None:
                 raise InputError(f'prescribed "{one.name}" and "{other.name}"', got, "the same at what they share")
 
 
-def check_start(body: Body) -> None:
+def _check_start(body: Body) -> None:
     """InputError where something is prescribed elsewhere than at rest at the first frame, at which a body is at rest."""
     for entry in body.prescribed if body.start is None else ():
         off = np.abs(entry.displacements(body.points_on(entry.on), body.frames[0])).max(initial=0.0)

@@ -1,6 +1,7 @@
 """What is known of a muscle scene before it is solved, and the effects that it needs by that."""
 
 import logging
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,7 +32,7 @@ from fem_reference.problems.guess import (
     thickness_of,
     turn,
 )
-from fem_reference.problems.muscle import RigidBody, Setup
+from fem_reference.problems.setup import RigidBody, Setup
 from fem_reference.scenes.muscle import MuscleCase
 
 log = logging.getLogger(__name__)
@@ -65,7 +66,7 @@ class Decision:
     indicator: Indicator | None
     bound: float
     stress_bound: float
-    turned_out: int | None = None
+    turned_out: float | None = None
     listed: bool = False
 
     def __str__(self) -> str:
@@ -109,7 +110,7 @@ def decision(effect: Effect, found: Indicator | None, known: Estimates) -> Decis
     return Decision(effect, not within, found, known.tolerance, known.stress_tolerance)
 
 
-def solved(known: Estimates, rest: Setup, bones: tuple[RigidBody, ...], number: int, at: Floats) -> Estimates:
+def solved(known: Estimates, rest: Setup, bones: tuple[RigidBody, ...], number: float, at: Floats) -> Estimates:
     """What was ``known`` before, with where the surface is ``at`` (n, 3) in a frame that was solved, beside those ``bones``."""
     chosen, felt = _chosen(rest), rest.exempt.places(_PLACES)
     points, moved = rest.surface.points[chosen], at[chosen]
@@ -232,7 +233,7 @@ def _combined(edges: Floats, parts: Floats) -> Floats:
     return np.asarray(np.einsum("tij,tj->ti", edges, parts))
 
 
-def _near(bone: RigidBody, points: Floats, moved: dict[int, Floats], doubt: float) -> Near:
+def _near(bone: RigidBody, points: Floats, moved: Mapping[int, Floats] | Mapping[float, Floats], doubt: float) -> Near:
     """The gap to a ``bone`` of ``points`` (n, 3) that are ``moved``, wrong by ``doubt`` of their path past it at most."""
     low, high = bone.surface.points.min(axis=0), bone.surface.points.max(axis=0)
     local = np.stack([apply(np.linalg.inv(bone.pose(frame)), at) for frame, at in moved.items()])

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from fem_reference.foundations.mesh import Floats, diagonal, enclosed_volume, vertex_areas
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.signed_distance import signed_distances
-from fem_reference.problems.muscle import RigidBody, Setup
+from fem_reference.problems.setup import RigidBody, Setup
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +95,18 @@ def spans(rest: Setup, numbers: tuple[int, ...]) -> Floats:
         return np.zeros(0)
     ends = [centres(rest, number) for number in numbers]
     return np.array([float(np.linalg.norm(middles[0] - middles[-1])) for middles in ends])
+
+
+def described_motion(rest: Setup) -> str:
+    """What the motion of the bones does to the muscle, in a sentence; nothing where it is not attached twice."""
+    lengths = spans(rest, rest.frames)
+    if not len(lengths):
+        return ""
+    most = int(np.abs(lengths - lengths[0]).argmax())
+    how = "longer" if lengths[most] > lengths[0] else "shorter"
+    change = f"{100 * abs(lengths[most] / lengths[0] - 1):.0f} % {how}, in frame {rest.frames[most]}"
+    names = f"{rest.attached[0].attachment} to {rest.attached[-1].attachment}"
+    return f"from {names} it is {lengths[0]:.4g} mm at rest, and at most {change}"
 
 
 def axis_of(rest: Setup) -> Floats:

@@ -1,15 +1,12 @@
-"""Muscle scenes as arrays for solvers: bodies, attachments, effects, fibres, frames. It knows no solver."""
+"""Muscles filled with tetrahedra and fibres, with the effects that act."""
 
-import logging
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
 import platformdirs
-from numpy.typing import NDArray
 
 from fem_reference.effects import Effect
 from fem_reference.effects.contact import Contact as ContactEffect
@@ -17,7 +14,6 @@ from fem_reference.effects.contact import among
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import (
     Floats,
-    Ints,
     Polylines,
     Surface,
     TetMesh,
@@ -28,115 +24,35 @@ from fem_reference.foundations.mesh import (
     tet_volumes,
     triangle_areas,
 )
-from fem_reference.foundations.motion import RigidMotion
 from fem_reference.foundations.records import join
 from fem_reference.geometry import block
 from fem_reference.geometry.distance import distances
-from fem_reference.geometry.exemption import Exemption, free_skin
+from fem_reference.geometry.exemption import free_skin
 from fem_reference.geometry.fibres import Directions
 from fem_reference.geometry.intersections import self_intersections
 from fem_reference.geometry.kept_meshes import cached as cached_mesh
 from fem_reference.geometry.nested import refined
 from fem_reference.geometry.rigid_bodies import CLOSED_FORMS, Obstacle
 from fem_reference.geometry.sectors import attached_area, attached_shares
-from fem_reference.geometry.signed_distance import Grid, cached
+from fem_reference.geometry.signed_distance import Grid
 from fem_reference.geometry.skins import Skin, attached_skin, spacing
 from fem_reference.geometry.tessellation import tessellated
 from fem_reference.geometry.tetrahedra import tetrahedralise
 from fem_reference.io import files
 from fem_reference.problems import fibre_field
 from fem_reference.problems.attachments import facets_under, pick
+from fem_reference.problems.body import Body
 from fem_reference.problems.contact import check_exempt, check_outside, check_thickness
+from fem_reference.problems.muscle_body import body_of
+from fem_reference.problems.problem import AtRest
+from fem_reference.problems.setup import AttachedVertices, RigidBody, Setup
 from fem_reference.scenes.bones import Bone
 from fem_reference.scenes.muscle import MuscleCase
-
-log = logging.getLogger(__name__)
-
-# Up to here [mm] from a bone the distance to it is meant.
-DISTANCE_MARGIN = 12.0
-
-
-def kept_distances() -> Path:
-    """The folder where grids of distances are kept; it may be deleted."""
-    return platformdirs.user_cache_path("fem_reference") / "distances"
 
 
 def kept_meshes() -> Path | None:
     """The folder where tetrahedra are kept; it may be deleted. None: they are made each time."""
     return platformdirs.user_cache_path("fem_reference") / "meshes"
-
-
-@dataclass(frozen=True, eq=False)
-class RigidBody:
-    """A rigid bone: its ``surface`` at rest, its ``motion``, None where it rests, and how its distance shall be known, as
-    ``scene.Bone`` has it [mm]; or the ``solid`` of closed form whose vertices the surface has.
-    """
-
-    name: str
-    surface: Surface
-    motion: RigidMotion | None
-    distance_error: float = 0.05
-    distance_rounding: float = 1.0
-    solid: Obstacle | None = None
-
-    @cached_property
-    def shape(self) -> Obstacle:
-        """The signed distance to the surface, in the frame of rest; InputError where the surface of a file is not closed."""
-        named = replace(self.surface, place=f'bone "{self.name}": {self.surface.place}')
-        return self.solid or cached(
-            named, self.distance_error, DISTANCE_MARGIN, self.distance_rounding, kept_distances()
-        )
-
-    def pose(self, frame: float) -> Floats:
-        """The matrix (4, 4) that takes rest positions to positions at ``frame``."""
-        return np.eye(4) if self.motion is None else self.motion.pose(frame)
-
-
-@dataclass(frozen=True, eq=False)
-class AttachedVertices:
-    """An attachment: the ``vertices`` (k,) of the muscle surface attached to ``bone``, by springs of ``stiffness`` [MPa/mm] or
-    (None) exactly.
-    """
-
-    attachment: str
-    bone: RigidBody
-    vertices: Ints
-    stiffness: float | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Setup:
-    """What a surface solver needs: the muscle ``surface`` at rest, the bones, the attached vertices, and the frames wanted;
-    ``interval`` [s] from a frame number to the next where the scene says it; ``start``, where the body is at the first frame, by
-    its rest positions (n, 3), where that is not at rest.
-    """
-
-    surface: Surface
-    bones: tuple[RigidBody, ...]
-    attached: tuple[AttachedVertices, ...]
-    frames: tuple[int, ...]
-    interval: float | None
-    start: Callable[[Floats], Floats] | None = field(default=None, kw_only=True)
-
-    def begin(self, rest: Floats) -> Floats:
-        """Where points that are at ``rest`` (n, 3) [mm] are at the first frame; an array of the caller's own."""
-        return np.array(rest) if self.start is None else np.array(self.start(rest))
-
-    @cached_property
-    def attached_vertices(self) -> Ints:
-        """The vertices (k,) of the surface that are attached to bones, attachment by attachment."""
-        return np.concatenate([np.zeros(0, np.int64), *(entry.vertices for entry in self.attached)])
-
-    @cached_property
-    def exempt(self) -> Exemption:
-        """The part of the surface that is exempt from contact with bones."""
-        attached = ((one.bone.name, attached_shares(self.surface, one.vertices)) for one in self.attached)
-        return Exemption.of(self.surface, attached)
-
-    @cached_property
-    def free(self) -> NDArray[np.bool_]:
-        """Mask (n,) of the vertices of the surface that may be in contact with bones."""
-        return ~self.exempt.vertices
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,9 +79,30 @@ class Problem(Setup):
         return None if self.fibre is None else self.fibre(np.arange(len(middles)), middles)
 
     @property
+    def muscle(self) -> "Problem":
+        """Itself."""
+        return self
+
+    @property
+    def rest(self) -> AtRest:
+        """All that frames of it move."""
+        return AtRest(self.surface, self.fibres, self.mesh, self.directions)
+
+    @cached_property
+    def body(self) -> Body:
+        """The finite elements that it is solved with; InputError as :func:`body_of` says."""
+        return body_of(self, self.mesh, self.effects, self.fibre, self.skin, self.attached_skins)
+
+    @property
     def contact(self) -> ContactEffect | None:
         """The effect of contact, None where there is none."""
         return among(self.effects)
+
+    def write_meshes(self, folder: Path) -> None:
+        """Write surface, fibres and tetrahedra into ``folder``, for ParaView."""
+        files.write_surface(folder / "surface.vtp", self.surface, self.surface.points)
+        files.write_polylines(folder / "fibres.vtp", self.fibres, self.fibres.points)
+        files.write_tets(folder / "tets.vtu", self.mesh, self.mesh.points)
 
 
 def setup(scene: MuscleCase) -> Setup:
@@ -181,14 +118,7 @@ def build(scene: MuscleCase, rest: Setup) -> Problem:
     """The whole problem of a scene: its setup ``rest``, filled with tetrahedra and fibres."""
     begin = time.perf_counter()
     contact = among(scene.effects)
-    distances_known = {} if contact is None else _distance_facts(rest)
-    if contact is not None:
-        pressing = {
-            join(scene.place, f"bone[{i}]"): bone for i, bone in enumerate(rest.bones) if contact.is_by(bone.name)
-        }
-        check_outside({place: bone.surface for place, bone in pressing.items()}, rest.surface)
-        check_thickness({place: bone.shape for place, bone in pressing.items()}, spacing(rest.surface))
-        check_exempt(rest.exempt, join(scene.place, "attachment"))
+    distances_known = {} if contact is None else _distances(scene, rest, contact)
     mesh = _filled(scene, rest, scene.muscle.tet_size)
     exact = tuple(attached.attachment for attached in rest.attached if attached.stiffness is None)
     for _ in range(scene.muscle.refinements):
@@ -222,8 +152,14 @@ def build(scene: MuscleCase, rest: Setup) -> Problem:
     )
 
 
-def _distance_facts(rest: Setup) -> dict[str, float | str]:
-    """The distance grid of each bone of a file: its spacing, root mean square and greatest error [mm]."""
+def _distances(case: MuscleCase, rest: Setup, contact: ContactEffect) -> dict[str, float | str]:
+    """The distance grid of each bone of a file: its spacing, root mean square and greatest error [mm]; InputError where contact
+    cannot be felt by the bones and the surface that there are.
+    """
+    pressing = {join(case.place, f"bone[{i}]"): bone for i, bone in enumerate(rest.bones) if contact.is_by(bone.name)}
+    check_outside({place: bone.surface for place, bone in pressing.items()}, rest.surface)
+    check_thickness({place: bone.shape for place, bone in pressing.items()}, spacing(rest.surface))
+    check_exempt(rest.exempt, join(case.place, "attachment"))
     grids = {bone.name: bone.shape for bone in rest.bones}
     return {
         f"{name}_distance_{key}_mm": getattr(grid, key)
@@ -277,6 +213,12 @@ def _attached(scene: MuscleCase, surface: Surface, bones: tuple[RigidBody, ...])
     return tuple(attached)
 
 
+def solid(bone: Bone) -> Obstacle | None:
+    """The body of closed form that a ``bone`` of a scene is; None where it is a surface in a file."""
+    given = ((name, getattr(bone, name)) for name in CLOSED_FORMS)
+    return next((CLOSED_FORMS[name](**form.model_dump()) for name, form in given if form is not None), None)
+
+
 def _mesh_facts(rest: Setup, mesh: TetMesh, far: float) -> dict[str, float | str]:
     """Who made the mesh, its size and quality, and for each attachment the area attached on the surface and on the tets and how
     many of its vertices are more than ``far`` [mm] from the facets attached: islands that tets do not resolve.
@@ -299,9 +241,3 @@ def _mesh_facts(rest: Setup, mesh: TetMesh, far: float) -> dict[str, float | str
         facts[f"{name}_area_on_tets_mm2"] = float(triangle_areas(mesh.points, facets).sum())
         facts[f"{name}_vertices_beside_facets"] = float((off > far).sum())
     return facts
-
-
-def solid(bone: Bone) -> Obstacle | None:
-    """The body of closed form that a ``bone`` of a scene is; None where it is a surface in a file."""
-    given = ((name, getattr(bone, name)) for name in CLOSED_FORMS)
-    return next((CLOSED_FORMS[name](**form.model_dump()) for name, form in given if form is not None), None)

@@ -1,66 +1,76 @@
 """The muscle of a problem as a body that finite elements deform: attached to bones, and in contact with them."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from fem_reference.effects import Interaction
+from fem_reference.effects import Effect, Interaction
 from fem_reference.effects.contact import Contact as ContactEffect
+from fem_reference.effects.contact import among
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, TetMesh, boundary, place_of, tet_volumes
+from fem_reference.geometry.fibres import Directions
+from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import Body, Cells, Prescribed
 from fem_reference.problems.checks import check_agreement
 from fem_reference.problems.contact import Contact, Obstruction
-from fem_reference.problems.muscle import Problem, RigidBody
 from fem_reference.problems.paths import Follows, From
+from fem_reference.problems.setup import RigidBody, Setup
 
 # Frame numbers before the first one over which an overlap at rest is removed.
-RELAXING = 10.0
+RELAXING = 10
 # Where a bone is overlapped at rest down to this share of its half thickness, no direction leads out.
 _MIDDLE = 0.95
 # Cells that are so many times longer than thick: stiffnesses are as the square of that, and 16 digits do not hold both.
 _THINNEST = 1e6
 
 
-def as_body(problem: Problem) -> Body:
-    """The muscle as a body: its bones prescribe where exactly attached facets are, or pull by springs;
-    the rest of its skin is ``"free"``. InputError where two of them prescribe different things, or one moves as nothing can follow.
+def body_of(
+    setup: Setup,
+    mesh: TetMesh,
+    effects: tuple[Effect, ...],
+    fibre: Directions | None,
+    skin: Skin | None,
+    attached_skins: Mapping[str, Skin],
+) -> Body:
+    """The muscle of a ``setup`` as a body of ``mesh``: its bones prescribe where exactly attached facets are, or pull by springs at
+    ``attached_skins``; the rest of its surface is ``"free"``, of which ``skin`` feels contact. InputError where two of them
+    prescribe different things, or one moves as nothing can follow.
     """
-    mesh = problem.mesh
     _check_thickness(mesh)
-    attached = np.concatenate([np.zeros((0, 3), int), *(mesh.facets[entry.attachment] for entry in problem.attached)])
-    skin, _ = boundary(mesh.tets)
+    attached = np.concatenate([np.zeros((0, 3), int), *(mesh.facets[entry.attachment] for entry in setup.attached)])
+    outer, _ = boundary(mesh.tets)
     taken = {tuple(facet) for facet in np.sort(attached, axis=1).tolist()}
-    free = skin[[tuple(facet) not in taken for facet in np.sort(skin, axis=1).tolist()]]
+    free = outer[[tuple(facet) not in taken for facet in np.sort(outer, axis=1).tolist()]]
     cells = Cells(mesh.points, mesh.tets, "tetrahedron", 1, {**mesh.facets, "free": free})
-    first = problem.frames[0]
+    first = setup.frames[0]
     prescribed = tuple(
         Prescribed(
             entry.attachment,
-            problem.attached_skins.get(entry.attachment, entry.attachment),
+            attached_skins.get(entry.attachment, entry.attachment),
             (0, 1, 2),
             Follows(From(first, entry.bone.pose)),
             entry.stiffness,
         )
-        for entry in problem.attached
+        for entry in setup.attached
     )
-    acting = tuple(effect for effect in problem.effects if not isinstance(effect, Interaction))
-    body = Body(
-        cells, acting, prescribed, problem.frames, problem.fibre, interval=problem.interval, start=problem.start
-    )
-    body = body if problem.contact is None else _among_bones(body, problem, problem.contact)
+    acting, contact = tuple(effect for effect in effects if not isinstance(effect, Interaction)), among(effects)
+    body = Body(cells, acting, prescribed, setup.frames, fibre, interval=setup.interval, start=setup.start)
+    if contact is not None:
+        assert skin is not None  # built with the effect
+        body = _among_bones(body, setup.bones, skin, contact)
     check_agreement(body)
     return body
 
 
-def _among_bones(body: Body, problem: Problem, effect: ContactEffect) -> Body:
+def _among_bones(body: Body, bones: tuple[RigidBody, ...], skin: Skin, effect: ContactEffect) -> Body:
     """The body with the bones in contact with it; where they overlap it at rest, it is relaxed before the first frame."""
-    assert problem.skin is not None  # built with the effect
-    bones = [bone for bone in problem.bones if effect.is_by(bone.name)]
-    first, points = body.frames[0], problem.skin.points
+    bones = tuple(bone for bone in bones if effect.is_by(bone.name))
+    first, points = body.frames[0], skin.points
     nearest = min((_nearest(bone, points) for bone in bones), default=np.inf)
     before = first - RELAXING if nearest < effect.smoothing else None
-    law = Contact(problem.skin, effect.stiffness, effect.smoothing, None if before is None else (before, first))
+    law = Contact(skin, effect.stiffness, effect.smoothing, None if before is None else (before, first))
     frames = body.frames if before is None else (before, *body.frames)
     obstructions = tuple(Obstruction(bone.name, bone.shape, From(first, bone.pose)) for bone in bones)
     return replace(body, frames=frames, contact=law, obstructions=obstructions)

@@ -2,10 +2,19 @@
 
 import logging
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol, overload
 
-from fem_reference.problems import muscle, scalar
+from fem_reference.foundations.errors import InputError
+from fem_reference.geometry.exemption import Exemption
+from fem_reference.problems import contents, muscle, scalar
+from fem_reference.problems.body import Body
 from fem_reference.problems.estimates import Decision, decisions, estimates
+from fem_reference.problems.guess import described_motion
+from fem_reference.problems.muscle import Problem
+from fem_reference.problems.problem import Meshed
+from fem_reference.problems.problem import Problem as AnyProblem
+from fem_reference.problems.scalar import FieldProblem
+from fem_reference.problems.setup import RigidBody, Setup
 from fem_reference.problems.watch import Watch
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
@@ -14,16 +23,70 @@ from fem_reference.scenes.scalar import ScalarCase
 log = logging.getLogger(__name__)
 
 
-def explained(case: Case, rest: Callable[[], Any] | None = None) -> tuple[Decision, ...]:
+class CaseSetup(AnyProblem, Protocol):
+    """What is known of a case before it is meshed, and all that judging its runs needs: the ``Setup`` of a muscle, or the whole
+    ``FieldProblem``.
+    """
+
+    @property
+    def exact(self) -> str | None:
+        """The formula of the solution, where it is known."""
+
+    @property
+    def bones(self) -> tuple[RigidBody, ...]:
+        """The bones, of which a scalar field has none."""
+
+    @property
+    def exempt(self) -> Exemption | None:
+        """The part of the surface that is exempt from contact with bones, where there is a surface."""
+
+    @property
+    def body(self) -> Body | None:
+        """The finite elements that a muscle is solved with, once it is filled with them."""
+
+    @property
+    def field(self) -> FieldProblem | None:
+        """The scalar field, None of a muscle."""
+
+
+class CaseProblem(CaseSetup, Meshed, Protocol):
+    """What a solver of a case is given: the ``Problem`` of a muscle, or the ``FieldProblem``."""
+
+    @property
+    def muscle(self) -> Problem | None:
+        """The muscle, None of a scalar field."""
+
+
+def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[Decision, ...]:
     """Of each effect of a case whether that needs it, and why, by its setup that ``rest`` gives, by default a new one; nothing of
     a scalar field, which needs all.
     """
     if not isinstance(case, MuscleCase):
         return ()
-    return decisions(case, muscle.setup(case) if rest is None else rest())
+    known = muscle.setup(case) if rest is None else rest()
+    assert isinstance(known, Setup)  # of a muscle
+    return decisions(case, known)
 
 
-def chosen[C: Case](case: C, rest: Callable[[], Any] | None = None) -> C:
+def facts(case: Case, setup: CaseSetup) -> dict[str, Any]:
+    """Everything that a person asks of what a case is made of, as words and numbers by name."""
+    if isinstance(case, MuscleCase) and isinstance(setup, Setup):
+        return contents.of_muscle(setup, case)
+    assert isinstance(setup, FieldProblem)  # there are no others
+    return contents.of_field(setup, case)
+
+
+def known(case: Case, setup: CaseSetup) -> dict[str, Any]:
+    """What the motion of its bones does to a muscle, and why it needs its effects, in words; nothing of a scalar field."""
+    if not isinstance(case, MuscleCase) or not isinstance(setup, Setup):
+        return {}
+    found = case.decisions or explained(case)
+    effects = {one.effect.title: str(one).partition(": ")[2] for one in found}
+    motion = described_motion(setup)
+    return ({"motion": motion} if motion else {}) | {"effects": effects}
+
+
+def chosen[C: Case](case: C, rest: Callable[[], CaseSetup] | None = None) -> C:
     """The case with the effects that it needs, where it leaves that to be found out (as ``explained``); with ``decisions`` that
     say why.
     """
@@ -36,12 +99,13 @@ def chosen[C: Case](case: C, rest: Callable[[], Any] | None = None) -> C:
     return case.model_copy(update={"choice": "listed", "effect": kept, "decisions": found})
 
 
-def watch(case: Case, rest: Any, built: Callable[[], Any]) -> Watch | None:
+def watch(case: Case, rest: CaseSetup, built: Callable[[], CaseProblem]) -> Watch | None:
     """The watch for effects that the case left out, in frames that were solved; None where it left out none. ``rest`` is
     its setup, ``built`` gives its problem.
     """
     if not isinstance(case, MuscleCase) or all(one.needed for one in case.decisions):
         return None
+    assert isinstance(rest, Setup)  # of a muscle
     return Watch(case, rest, estimates(case, rest), built)
 
 
@@ -55,22 +119,33 @@ def with_effects[C: Case](case: C, found: tuple[Decision, ...]) -> C:
     return case.model_copy(update={"effect": kept, "decisions": made})
 
 
-def setup(case: Case) -> Any:
-    """What is known of a case before it is meshed, and all that judging its runs needs: a muscle's ``Setup``, or the whole
-    ``FieldProblem``. InputError names what is not usable.
-    """
+def scalar_case(case: Case, place: str | None = None) -> ScalarCase:
+    """The ``case`` itself, where it is one of a scalar field; else InputError at ``place``, by default the file of the case."""
+    if not isinstance(case, ScalarCase):
+        raise InputError(place or case.place, f'"{case.name}", the case of a muscle', "a scalar case")
+    return case
+
+
+@overload
+def setup(case: MuscleCase) -> Setup: ...
+@overload
+def setup(case: ScalarCase) -> FieldProblem: ...
+@overload
+def setup(case: Case) -> CaseSetup: ...
+def setup(case: Case) -> CaseSetup:
+    """The set-up of a case. InputError names what is not usable."""
     if isinstance(case, MuscleCase):
         return muscle.setup(case)
     assert isinstance(case, ScalarCase)  # there are no others
     return scalar.build(case)
 
 
-def problem(case: Case, rest: Any) -> Any:
-    """What a solver of the case needs, made of its setup ``rest``: a muscle's ``Problem``, filled with tetrahedra, or the
-    ``FieldProblem``.
-    """
+def problem(case: Case, rest: CaseSetup) -> CaseProblem:
+    """The problem of a case, made of its set-up ``rest``: a muscle is filled with tetrahedra."""
     if not isinstance(case, MuscleCase):
+        assert isinstance(rest, FieldProblem)
         return rest
+    assert isinstance(rest, Setup)
     size = case.muscle.tet_size / 2**case.muscle.refinements
     log.info("%s: filling the muscle with tetrahedra of %g mm", case.name, size)
     built = muscle.build(case, rest)

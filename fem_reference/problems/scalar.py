@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import Delaunay, QhullError
 
 from fem_reference.effects import FieldEffect
 from fem_reference.effects.advection import Advection
@@ -19,7 +19,9 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.records import join
 from fem_reference.geometry.field_mesh import FieldMesh, check, refined, share_above, stabilisation
 from fem_reference.io import files
-from fem_reference.scenes.scalar import Boundary, Interval, MeshFiles, ScalarCase
+from fem_reference.problems import domain
+from fem_reference.problems.problem import NOTHING, AtRest, Task
+from fem_reference.scenes.scalar import Boundary, ScalarCase
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +51,24 @@ class FieldProblem:
     peclet: float
     exact: str | None = None
 
+    task: ClassVar[Task] = "solve_field"
+    frames: ClassVar[tuple[int]] = (0,)  # a steady field has one
+    rest: ClassVar[AtRest] = NOTHING
+    body: ClassVar[None] = None
+    muscle: ClassVar[None] = None
+    bones: ClassVar[tuple[()]] = ()
+    exempt: ClassVar[None] = None
+
+    @property
+    def field(self) -> "FieldProblem":
+        """Itself."""
+        return self
+
+    def write_meshes(self, folder: Path) -> None:
+        """Write the mesh, with the values that are fixed, into ``folder``, for ParaView."""
+        shown = {"fixed": self.fixed[: len(self.mesh.points)]}
+        files.write_field(folder / "mesh.vtu", self.mesh.points, self.mesh.cells, shown)
+
     @property
     def form(self) -> str:
         """The weak form: galerkin, or supg where it is stabilised."""
@@ -72,7 +92,7 @@ class FieldProblem:
 
 def build(scene: ScalarCase, refinements: int = 0) -> FieldProblem:
     """The problem of a scene, its mesh refined so many times; InputError names what is not usable."""
-    mesh = check(_mesh(scene))
+    mesh = check(domain.mesh_of(scene))
     _check_effects(scene, mesh)
     average = float(mesh.points[:, 1].mean()) if mesh.points.shape[1] > 1 else 0.0
     given = _given(scene, mesh)
@@ -97,68 +117,6 @@ def build(scene: ScalarCase, refinements: int = 0) -> FieldProblem:
         peclet,
         scene.exact,
     )
-
-
-def _mesh(scene: ScalarCase) -> FieldMesh:
-    domain = scene.domain
-    if domain.mesh is not None:
-        return _mesh_files(scene, domain.mesh)
-    if domain.surface is not None:
-        surface = files.read_surface(scene.file(domain.surface.file, "domain.surface.file"), domain.surface.scale)
-        return FieldMesh(surface.points, surface.triangles, surface.place)
-    nodes = _nodes(domain.interval) if domain.interval is not None else np.array(domain.nodes)
-    vertices = np.arange(len(nodes))
-    return FieldMesh(nodes[:, None], np.column_stack([vertices[:-1], vertices[1:]]), join(scene.place, "domain"))
-
-
-def _nodes(interval: Interval) -> Floats:
-    if interval.seed is None:
-        return np.linspace(interval.start, interval.end, interval.count)
-    inside = np.random.default_rng(interval.seed).uniform(interval.start, interval.end, interval.count - 2)
-    return np.array([interval.start, *np.sort(inside), interval.end])
-
-
-def _mesh_files(scene: ScalarCase, given: MeshFiles) -> FieldMesh:
-    path = scene.file(given.points, "domain.mesh.points")
-    points = _numbers(path)
-    if points.shape[1] not in (2, 3):
-        raise InputError(path, f"rows of {points.shape[1]} numbers", "2 or 3 coordinates a vertex")
-    if given.triangles == "delaunay":
-        if points.shape[1] == 3:
-            raise InputError(join(scene.place, "domain.mesh.triangles"), '"delaunay" of points in space', "a file")
-        try:
-            return FieldMesh(points, Delaunay(points).simplices, str(path))
-        except QhullError as error:
-            raise InputError(
-                path, "points that cannot be triangulated", "points in the plane, not on a line"
-            ) from error
-    path = scene.file(given.triangles, "domain.mesh.triangles")
-    triangles = _whole_numbers(path, _numbers(path))
-    if triangles.shape[1] != 3:
-        raise InputError(path, f"rows of {triangles.shape[1]} numbers", "3 vertices a triangle")
-    return FieldMesh(points, triangles - 1, str(path))
-
-
-def _numbers(path: Path) -> Floats:
-    """The comma separated numbers of a file as a table."""
-    rows = files.read_rows(path)
-    for i, row in enumerate(rows):
-        if len(row) != len(rows[0]):
-            raise InputError(path, f"{len(row)} numbers in row {i + 1}", f"{len(rows[0])} as in row 1")
-    try:
-        table = np.array([[float(cell) for cell in row] for row in rows])
-    except ValueError as error:
-        raise InputError(path, str(error), "numbers") from error
-    if table.ndim != 2 or not np.isfinite(table).all():
-        raise InputError(path, "an empty table or a number that is not finite", "rows of finite numbers")
-    return table
-
-
-def _whole_numbers(path: Path, values: Floats) -> Ints:
-    wrong = (values != np.round(values)) | (np.abs(values) > np.iinfo(np.int32).max)
-    if wrong.any():
-        raise InputError(str(path), f"the vertex {values[wrong][0]:g}", "vertices, numbered from 1")
-    return np.asarray(values.astype(np.int64))
 
 
 def _check_effects(scene: ScalarCase, mesh: FieldMesh) -> None:
@@ -209,10 +167,10 @@ def _given(scene: ScalarCase, mesh: FieldMesh) -> Floats:
     for i, entry in enumerate(scene.boundary):
         if entry.bounds is not None:
             path = scene.file(entry.bounds, f"boundary[{i}].bounds")
-            table = _numbers(path)
+            table = domain.numbers(path)
             if len(table) != 2:
                 raise InputError(path, f"{len(table)} rows", "2: vertices, and values")
-            vertices = _whole_numbers(path, table[0]) - 1
+            vertices = domain.whole_numbers(path, table[0]) - 1
             if vertices.min() < 0 or vertices.max() >= len(values):
                 raise InputError(path, f"vertices {vertices.min() + 1} to {vertices.max() + 1}", f"1 to {len(values)}")
             if len(np.unique(vertices)) < len(vertices):

@@ -12,7 +12,8 @@ from fem_reference.foundations.indicators import Estimates
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.estimates import ROUNDING, STRESS_TOLERANCE, Decision, decision, solved
 from fem_reference.problems.guess import axis_of, rms
-from fem_reference.problems.muscle import Problem, Setup
+from fem_reference.problems.problem import Problem
+from fem_reference.problems.setup import Setup
 from fem_reference.problems.stresses import StressSamples, StressSizes
 from fem_reference.scenes.muscle import MuscleCase
 
@@ -37,20 +38,21 @@ class Watch:
         self.case, self.rest, self.known, self.built = case, rest, known, built
         self.left = tuple(one.effect for one in case.decisions if not one.needed)
         self.bones = rest.bones if among(self.left) else ()
-        self.frames: dict[int, WatchedFrame] = {}
+        self.frames: dict[float, WatchedFrame] = {}
 
     @cached_property
     def sampled(self) -> StressSamples:
         """The tetrahedra."""
-        built = self.built()
-        return StressSamples(built.mesh, built.directions)
+        rest = self.built().rest
+        assert rest.mesh is not None  # of a muscle that is filled
+        return StressSamples(rest.mesh, rest.directions)
 
     @property
     def names(self) -> list[str]:
         """The effects that are watched for, with their parameters."""
         return [repr(one) for one in self.left]
 
-    def see(self, number: int, surface: Floats, tets: Floats | None) -> tuple[Decision, ...]:
+    def see(self, number: float, surface: Floats, tets: Floats | None) -> tuple[Decision, ...]:
         """The effects that matter in a frame, by its ``surface`` (n, 3) and the points ``tets`` (k, 3), where it has tetrahedra."""
         acting, others = ([(one, one.amount(number)) for one in some] for some in (self.case.effects, self.left))
         self.frames[number] = WatchedFrame(surface, None if tets is None else self.sampled.sizes(tets, acting, others))
@@ -66,7 +68,7 @@ class Watch:
     def _most(self) -> float:
         return float(np.max([one.stresses.acts if one.stresses else 0.0 for one in self.frames.values()]))
 
-    def _found(self, number: int, stress_tolerance: float) -> tuple[Decision, ...]:
+    def _found(self, number: float, stress_tolerance: float) -> tuple[Decision, ...]:
         watched = self.frames[number]
         now = self._moving(solved(self.known, self.rest, self.bones, number, watched.surface), number)
         now = replace(
@@ -87,7 +89,7 @@ class Watch:
             found = replace(found, stress=float(np.max([guessed, stresses.added[i]])))  # NaN where either is
         return decision(effect, found, now)
 
-    def _moving(self, now: Estimates, number: int) -> Estimates:
+    def _moving(self, now: Estimates, number: float) -> Estimates:
         """The estimates ``now``, with the speed of the surface up to a frame; loads that come by ramps move it, too."""
         before = [earlier for earlier in sorted(self.frames) if earlier < number][-2:]
         if not before:

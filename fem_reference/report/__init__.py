@@ -17,7 +17,7 @@ from fem_reference.assessment.solver_table import Table
 from fem_reference.assessment.stress import Stress
 from fem_reference.assessment.versions import Versions
 from fem_reference.io import files
-from fem_reference.problems.muscle import Setup
+from fem_reference.problems.setup import Setup
 from fem_reference.report import (
     against_page,
     claims_page,

@@ -13,7 +13,7 @@ from fem_reference.assessment.baseline import SAMPLED
 from fem_reference.assessment.versions import ORDER, Change, Versions
 from fem_reference.foundations.errors import MissingSoftware
 from fem_reference.foundations.mesh import Floats
-from fem_reference.problems.muscle import Setup
+from fem_reference.problems.setup import Setup
 from fem_reference.report import gallery
 from fem_reference.report.at_frames import label
 from fem_reference.report.curves import BAND, PALETTE, Curve, drawn

@@ -16,7 +16,7 @@ from fem_reference.foundations.errors import MissingSoftware
 from fem_reference.foundations.mesh import Floats, Surface
 from fem_reference.foundations.subprocesses import command, environment
 from fem_reference.metrics import find
-from fem_reference.problems.muscle import RigidBody, Setup
+from fem_reference.problems.setup import RigidBody, Setup
 from fem_reference.report import pictures
 from fem_reference.runs.store import Run
 

@@ -2,40 +2,31 @@
 
 import math
 from collections.abc import Iterable
-from functools import singledispatch
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from fem_reference.assessment import second_check
 from fem_reference.assessment.comparison import Alone, Comparison
 from fem_reference.assessment.error_bars import ErrorBar
 from fem_reference.assessment.judge import Verdict
 from fem_reference.assessment.solver_table import Table
-from fem_reference.effects import Effect
-from fem_reference.foundations.mesh import Surface, enclosed_volume
-from fem_reference.foundations.motion import RigidMotion, Translation
-from fem_reference.geometry.sectors import attached_area, attached_shares
 from fem_reference.metrics import Measure, described, find
-from fem_reference.problems.muscle import AttachedVertices, RigidBody, Setup
-from fem_reference.problems.scalar import FieldProblem
-from fem_reference.report.words import exact
+from fem_reference.problems import of_case
+from fem_reference.problems.of_case import CaseSetup
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case, Expectation
-from fem_reference.scenes.muscle import MuscleCase
 
 # The statistics that are printed of a comparison; the page, JSON and CSV have them all.
 PRINTED = tuple(key for key in described("table") if not key[1].endswith("_percent"))
 
 
-def case_facts(case: Case, setup: Any) -> dict[str, Any]:
+def case_facts(case: Case, setup: CaseSetup) -> dict[str, Any]:
     """Everything that a person asks of a case before solving it, as words and numbers by name."""
     return {
         "case": case.name,
         "title": case.title,
         "proves": case.proves,
-        **_made_of(setup, case),
+        **of_case.facts(case, setup),
         "reference": " ".join([case.reference.solver, *(f"{k}={v}" for k, v in case.reference.settings.items())]),
         "candidates": {candidate.name: candidate.solver for candidate in case.candidate},
         "expects": [f"{_what(e)}: {e.truth} within {e.within} ({e.kind})" for e in case.expect],
@@ -46,82 +37,6 @@ def _what(expected: Expectation) -> str:
     if expected.statistic is None:
         return f"{expected.of} {expected.metric}"
     return f"{expected.of} {expected.metric} {expected.statistic} at frame {expected.frame}"
-
-
-@singledispatch
-def _made_of(setup: object, case: Case) -> dict[str, Any]:
-    """What is in a case, from its ``setup``."""
-    raise TypeError(f"{type(setup).__name__} is no setup of {case.name}")
-
-
-@_made_of.register
-def _(setup: Setup, case: MuscleCase) -> dict[str, Any]:
-    surface = setup.surface
-    return {
-        "muscle": {
-            "triangles": len(surface.triangles),
-            "volume_mm3": enclosed_volume(surface.points, surface.triangles),
-            "tet_size_mm": case.muscle.tet_size,
-            "refinements": case.muscle.refinements,
-            "mesher": case.muscle.mesher,
-        },
-        "bones": {bone.name: f"{_shape(bone)}, {_motion(bone.motion)}" for bone in setup.bones},
-        "attachments": {
-            one.attachment: f"{len(one.vertices)} vertices, {_area(surface, one):.0f} mm2, attached to {one.bone.name} "
-            + ("exactly" if one.stiffness is None else f"by springs of {one.stiffness:g} MPa/mm")
-            for one in setup.attached
-        },
-        "effects": {effect.title: _parameters(effect) for effect in case.effects},
-        **({"effects_chosen": [str(one) for one in case.decisions]} if case.decisions else {}),
-        "frames": f"{case.frames.first} to {case.frames.last}, every {case.frames.every}",
-    }
-
-
-@_made_of.register
-def _(setup: FieldProblem, case: Case) -> dict[str, Any]:
-    mesh, fixed = setup.mesh, int(np.isfinite(setup.fixed).sum())
-    return {
-        "domain": f"{len(mesh.cells)} cells, {len(mesh.points)} vertices, size {mesh.sizes.sum():.6g}",
-        "element": f"P{setup.order}, {len(setup.fixed)} nodes, {fixed} fixed",
-        "form": f"{setup.form}, mesh Peclet number up to {setup.peclet:.3g}",
-        "effects": {
-            title: {name: str(value) for name, value in effect.model_dump().items()}
-            for title, effect in case.acting.items()
-        },
-    }
-
-
-def _area(surface: Surface, attached: AttachedVertices) -> float:
-    return attached_area(surface, attached_shares(surface, attached.vertices))
-
-
-def _parameters(effect: Effect) -> dict[str, str]:
-    return {name: f"{exact(value)} {unit}".rstrip() for name, value, unit in effect.parameters}
-
-
-def _shape(bone: RigidBody) -> str:
-    """How fine the surface of a bone is, or what its closed form is."""
-    if bone.solid is None:
-        return f"{len(bone.surface.triangles)} triangles"
-    kind = "".join(f" {letter.lower()}" if letter.isupper() else letter for letter in type(bone.solid).__name__)
-    values = ", ".join(f"{name} {_number_or_three(value)}" for name, value in vars(bone.solid).items())
-    return f"{kind.strip()} of {values}, mm"
-
-
-def _number_or_three(value: Any) -> str:
-    return f"({', '.join(f'{entry:g}' for entry in value)})" if isinstance(value, tuple) else f"{value:g}"
-
-
-def _motion(motion: RigidMotion | None) -> str:
-    if motion is None:
-        return "rests"
-    if isinstance(motion, Translation):
-        stops = zip(motion.frames, motion.distances, strict=True)
-        keys = ", ".join(f"{distance:g} at {frame:g}" for frame, distance in stops)
-        return f"slides along {_number_or_three(motion.direction)}, mm at frame: {keys}"
-    x, y, z = motion.centre
-    keys = ", ".join(f"{angle:g} at {frame:g}" for frame, angle in zip(motion.frames, motion.angles, strict=True))
-    return f"turns about ({x:g}, {y:g}, {z:g}) mm along {motion.axis}, rad at frame: {keys}"
 
 
 def comparison_text(result: Comparison, page: Path | None = None) -> str:

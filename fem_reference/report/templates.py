@@ -5,7 +5,8 @@ from pathlib import Path
 
 import jinja2
 
-from fem_reference.report.words import duration, exact, number, words
+from fem_reference.foundations.markup import exact
+from fem_reference.report.words import duration, number, words
 
 
 def template(name: str) -> jinja2.Template:

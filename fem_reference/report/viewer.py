@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.thinning import thin
-from fem_reference.problems.muscle import RigidBody
+from fem_reference.problems.setup import RigidBody
 from fem_reference.report import gallery, pictures
 from fem_reference.report.viewer_fields import Fields, joints
 from fem_reference.runs.store import Run

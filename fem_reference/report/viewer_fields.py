@@ -21,7 +21,7 @@ from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.mesh import Floats, Polylines
 from fem_reference.foundations.motion import Rotation
 from fem_reference.metrics import MeasurementContext
-from fem_reference.problems.muscle import RigidBody
+from fem_reference.problems.setup import RigidBody
 from fem_reference.runs.store import Run
 
 FIBRES, POINTS = 30, 12  # the most that are drawn: fibres, and points of each

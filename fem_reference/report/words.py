@@ -50,21 +50,6 @@ def ratio(one: float | None, other: float | None) -> float | None:
     return one / other if one and other else None
 
 
-def exact(value: object) -> str:
-    """A fact about where something comes from, with all the digits it has.
-
-    >>> exact(0.123456), exact(True), exact("0.11.0"), exact(None), exact((0.0, -9810.0))
-    ('0.123456', 'yes', '0.11.0', 'not set', '(0, -9810)')
-    """
-    if value is None:
-        return "not set"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, tuple):
-        return f"({', '.join(exact(entry) for entry in value)})"
-    return f"{value:.12g}" if isinstance(value, float) else str(value)
-
-
 def words(name: str) -> str:
     """A name from code as words.
 

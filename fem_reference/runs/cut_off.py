@@ -50,14 +50,14 @@ def stored(folder: Path, identity: dict[str, Any]) -> dict[str, Any] | None:
     return None
 
 
-def truncate(state: dict[str, Any], number: int) -> None:
+def truncate(state: dict[str, Any], number: float) -> None:
     """Take the frames from ``number`` on, which are solved again, out of a ``state`` as run.json has it."""
     kept = sum(stored < number for stored in state["numbers"])
     state["numbers"], state["residuals"] = state["numbers"][:kept], state.get("residuals", [])[:kept]
     state["scalars"] = {name: values[:kept] for name, values in state["scalars"].items()} if kept else {}
 
 
-def places(folder: Path, number: int) -> tuple[Floats, Floats | None]:
+def places(folder: Path, number: float) -> tuple[Floats, Floats | None]:
     """Positions [mm] of the surface (n, 3) and of the points of the tets (k, 3), if there are any, in a stored frame of the run in
     ``folder``.
     """

@@ -20,10 +20,12 @@ VALUES = "psi"  # what the field itself is called
 class NodalField:
     """Arrays by name at the nodes of ``mesh``: ``psi`` (N,), at the vertices, then for elements of order 2 at the middles of
     ``mesh.edges``; and where a solver computes a vector that psi is the norm of, its ``components`` (n, d) at the vertices.
+    ``form``: the weak form that was solved. After a failure psi is not-a-number.
     """
 
     mesh: FieldMesh
     arrays: dict[str, Floats]
+    form: str
 
 
 def write(path: Path, field: NodalField) -> None:

@@ -66,7 +66,7 @@ def write_rest(folder: Path, mesh: TetMesh, fibre: Floats | None) -> None:
     write_arrays(folder / FOLDER / "rest.npz", {"points": mesh.points, "tets": mesh.tets, "fibre": directions})
 
 
-def write(folder: Path, frame: int, state: NodalState) -> None:
+def write(folder: Path, frame: float, state: NodalState) -> None:
     """Write the ``state`` at a ``frame`` number of the run in ``folder``."""
     write_arrays(_place(folder, frame), state.arrays)
 
@@ -118,8 +118,8 @@ class Stored(Mapping[float, NodalState]):
         return len(self.frames)
 
 
-def _place(folder: Path, frame: int) -> Path:
-    return folder / FOLDER / f"frame_{frame:04d}.npz"
+def _place(folder: Path, frame: float) -> Path:
+    return folder / FOLDER / f"frame_{frame:04.0f}.npz"
 
 
 def write_arrays(path: Path, arrays: dict[str, Any]) -> None:

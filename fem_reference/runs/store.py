@@ -1,4 +1,4 @@
-"""Run and the run store: what a solver produced, one folder a run, written as it goes.
+"""Runs: what a solver produced of a problem, in memory and on disk.
 
     <store>/<solver>-<key>/run.json        status, cost, origin, numbers per frame
                           /surface.pvd     the user's surface over the frames, for ParaView; surface/frame_0010.vtp
@@ -13,12 +13,7 @@ A file appears whole or not at all; ``run.json`` after the frame files that it n
 it is not read as a result, and goes on where its solver can, as one that crashed.
 """
 
-import json
-import logging
-import math
-import shutil
-import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -27,38 +22,59 @@ import numpy as np
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.markup import fact_table
-from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh, check_corners
-from fem_reference.foundations.records import parse
+from fem_reference.foundations.mesh import Floats, Polylines, Surface, check_corners
+from fem_reference.foundations.records import Record, parse
 from fem_reference.geometry.field_mesh import FieldMesh
 from fem_reference.io import files, texts
-from fem_reference.runs import cut_off, fields, states
-from fem_reference.runs.contents import FORMAT, Contents, Status
-from fem_reference.runs.cut_off import CutOff
+from fem_reference.problems.body import Body
+from fem_reference.problems.problem import NO_SURFACE, NOTHING, AtRest
+from fem_reference.problems.scalar import FieldProblem
+from fem_reference.runs import fields
+from fem_reference.runs.contents import Contents, Status
 from fem_reference.runs.fields import NodalField
+from fem_reference.runs.states import NodalState
 from fem_reference.scenes.case import Part
-
-log = logging.getLogger(__name__)
-
-# Between the first and the last frame, progress is reported no more often than this [s].
-QUIET = 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """One requested frame: positions [mm] of the surface (n, 3), None of a solver that moves none, and where the solver has them
-    of the fibre points (m, 3) and tet points (k, 3); ``scalars`` by name; ``note`` is what progress says of it; ``state`` the
-    unknowns of the tets, where they were asked for; ``field``, of a scalar problem; ``residuals`` of Newton's last load step.
+    """One requested frame, by its ``number``: what of it a solver has.
+
+    ``surface`` (n, 3), ``fibres`` (m, 3) and ``points`` (k, 3) [mm]: positions of the vertices of the surface, of the points of the
+    fibres and, (0, 3) without cells, of the nodes of the mesh. ``forces`` (3,) [N] by name of what is prescribed: those of the
+    constraint along the prescribed components, and their ``moments`` (3,) [N mm] about the origin (at nodes of several regions that
+    prescribe the same component, the force counts in each); and what obstacles exert. ``state``: the unknowns of the cells, where
+    they were asked for. ``field``: of a scalar problem. ``residuals``: the norms [N, mm3] before and after each of Newton's
+    iterations in the last load step to it. ``note``: what progress says of the frame.
+
+    ``scalars`` of a body: min_det_F_quadrature, min_det_F_vertices, volume_ratio, energy [N mm] of what acts inside,
+    newton_iterations, cut_backs. Of the reference besides, where all energy is stored, energy_gap since the frame before
+    (``solvers/fenicsx/path``; of muscles by Simpson's rule where the trapezoid leaves much); where the tangent is symmetric,
+    negative_modes and, of those, material_modes (``solvers/fenicsx/stability``); of the means over cells min_cell_volume_ratio and
+    max_cell_volume_ratio; where a law has a limit on it, min_cell_fibre_stretch and max_cell_fibre_stretch; outside_law, the
+    number of cells in which a law is outside its range; with contact the greatest contact_depth [mm] and contact_pressure [MPa]
+    and the contact_area at rest [mm2].
     """
 
-    number: int
+    number: float
     surface: Floats | None = None
     fibres: Floats | None = None
-    tets: Floats | None = None
+    points: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     scalars: dict[str, float] = field(default_factory=dict)
     note: str = ""
-    state: states.NodalState | None = None
+    state: NodalState | None = None
+    forces: dict[str, Floats] = field(default_factory=dict)
+    moments: dict[str, Floats] = field(default_factory=dict)
     field: NodalField | None = None
     residuals: tuple[float, ...] = ()
+
+    @classmethod
+    def of_field(cls, problem: FieldProblem, values: Floats, form: str, components: Floats | None = None) -> "Frame":
+        """The one frame of a scalar field: its ``values`` (N,), solved in a weak ``form``, and its ``components``, if it has
+        any, as :class:`NodalField` has them.
+        """
+        more = {} if components is None else {"components": components}
+        return cls(problem.frames[0], field=NodalField(problem.mesh, {fields.VALUES: values} | more, form))
 
 
 Sink = Callable[[Frame], None]
@@ -73,18 +89,16 @@ class Outcome:
     cost: dict[str, float] = field(default_factory=dict)
 
 
-# The surface of a run that moves none.
-NO_SURFACE = Surface(np.zeros((0, 3)), np.zeros((0, 3), np.int64))
-
-
 @dataclass(frozen=True, eq=False)
 class Run:
-    """Frames that somebody's solver produced for a case.
+    """Frames that somebody's solver produced of a problem: the muscle or the scalar field of a case, or a body.
 
     ``numbers`` (f,), ``positions`` (f, n, 3) [mm] of the vertices of ``surface`` (its rest state), ``fibre_positions``
     (f, m, 3) [mm] of the points of ``fibres`` or None for a surface-only solver, ``scalars`` by name (f,). A solver of lines
     alone moves no surface: ``has_surface`` is False, and every entry of ``positions`` NaN. A scalar run has a ``mesh`` in their
-    place, and ``fields`` by name (f, ...) at its nodes, as :class:`NodalField` has them. ``residuals`` by frame.
+    place, and ``fields`` by name (f, ...) at its nodes, as :class:`NodalField` has them. ``states``: the frames in full, of a run
+    that is not stored, all that there is of one of a body. ``body`` and ``settings``: what was solved how, where error bars of a
+    body may be asked for. ``residuals`` by frame.
     """
 
     name: str
@@ -101,14 +115,26 @@ class Run:
     has_surface: bool = True
     mesh: FieldMesh | None = None
     fields: dict[str, Floats] = field(default_factory=dict)
+    states: tuple[Frame, ...] = ()
+    body: Body | None = None
+    settings: Record | None = None
     residuals: tuple[tuple[float, ...], ...] = ()
+
+    @property
+    def last(self) -> Frame:
+        """The last frame of a run in memory; ArithmeticError with the reason where not all were reached."""
+        if self.outcome.status != "converged":
+            raise ArithmeticError(f"{self.outcome.status}: {self.outcome.message}")
+        return self.states[-1]
 
     @property
     def carries(self) -> frozenset[Part]:
         """What can be measured of it."""
         if self.mesh is not None:
             return frozenset({"field"})
-        return frozenset({"surface", "lines"}) if self.has_surface else frozenset({"lines"})
+        if self.has_surface:
+            return frozenset({"surface", "lines"})
+        return frozenset() if self.fibres is None else frozenset({"lines"})
 
     @property
     def points(self) -> Floats:
@@ -140,112 +166,36 @@ class Run:
         return fact_table(f"run {self.name}", facts)
 
 
-class Writer:
-    """Writes one run into ``folder``, which it empties first but for a run that was cut off and can go on; ``add`` each frame, then
-    ``close``. A frame that is stored already takes the place of the stored one and of all after it.
-    """
+def collected(frames: Iterable[Frame], outcome: Outcome, rest: AtRest = NOTHING) -> Run:
+    """The run in memory of ``frames``, with arrays of what all of them have; ``rest``: the shapes that they move."""
+    states = tuple(frames)
 
-    def __init__(
-        self,
-        folder: Path,
-        identity: dict[str, Any],
-        surface: Surface = NO_SURFACE,
-        fibres: Polylines | None = None,
-        mesh: TetMesh | None = None,
-        directions: Floats | None = None,
-    ) -> None:
-        """``identity``: ``name``, ``solver``, ``origin`` and ``frames`` (the numbers wanted), as they go into run.json;
-        ``directions`` (k, 3): the unit vector along the fibres in each tet of ``mesh``, which states are stored with.
-        """
-        self.folder, self.surface, self.fibres, self.mesh, self.directions = folder, surface, fibres, mesh, directions
-        self.state: dict[str, Any] = {"format": FORMAT, **identity, "status": "running", "message": "", "numbers": []}
-        self.state |= {"scalars": {}, "residuals": [], "cost": {}, "parts": []}
-        self.begin, self.reported = time.perf_counter(), 0.0
-        if (stored := cut_off.stored(folder, identity)) is not None:
-            self.state = stored | {"name": identity["name"], "origin": identity["origin"]}
-            return
-        shutil.rmtree(folder) if folder.exists() else None
-        files.make_folder(folder)
-        self._write_state()
+    def stacked(name: str) -> Floats | None:
+        found = [getattr(state, name) for state in states]
+        return np.stack(found) if found and all(one is not None for one in found) else None
 
-    @property
-    def cut_off(self) -> CutOff:
-        """What is stored so far, for a solver that can go on."""
-        return CutOff(self.folder / cut_off.FOLDER, self.frames)
-
-    @property
-    def frames(self) -> tuple[int, ...]:
-        """The numbers of those stored so far."""
-        return tuple(self.state["numbers"])
-
-    def add(self, frame: Frame) -> None:
-        """Store a frame: its files first, then the index files and run.json."""
-        cut_off.truncate(self.state, frame.number)
-        parts: dict[str, Callable[[Path], None]] = {}
-        if (surface := frame.surface) is not None:
-            parts["surface"] = lambda path: files.write_surface(path, self.surface, surface)
-        elif frame.field is None and not self.frames:
-            self._write_rest()
-        if self.fibres is not None and (fibres := frame.fibres) is not None:
-            lines = self.fibres
-            parts["fibres"] = lambda path: files.write_polylines(path, lines, fibres)
-        if self.mesh is not None and (tets := frame.tets) is not None:
-            mesh = self.mesh
-            parts["tets"] = lambda path: files.write_tets(path, mesh, tets)
-        stored = ["state"] if self._write_unknowns(frame) else []
-        if (solved := frame.field) is not None:
-            parts[fields.FOLDER] = lambda path: fields.write(path, solved)
-        self.state["numbers"].append(frame.number)
-        self.state["residuals"].append(frame.residuals)
-        self.state["parts"] = sorted([*parts, *stored])
-        for part, write in parts.items():
-            suffix = ".vtu" if part in ("tets", fields.FOLDER) else ".vtp"
-            (self.folder / part).mkdir(exist_ok=True)
-            write(self.folder / part / f"frame_{frame.number:04d}{suffix}")
-            names = [(number, f"{part}/frame_{number:04d}{suffix}") for number in self.state["numbers"]]
-            files.write_pvd(self.folder / f"{part}.pvd", names)
-        for name, value in (dict.fromkeys(self.state["scalars"], math.nan) | frame.scalars).items():
-            unknown: list[float | None] = [None] * (len(self.state["numbers"]) - 1)  # of effects that were added since
-            self.state["scalars"].setdefault(name, unknown).append(value if math.isfinite(value) else None)
-        self._write_state()
-        self._log_progress(frame)
-
-    def close(self, outcome: Outcome, **origin: Any) -> None:
-        """Store how it ended, and what more is known of its ``origin`` now."""
-        self.state["origin"] |= origin
-        cost = {"seconds": time.perf_counter() - self.begin} | outcome.cost
-        self.state |= {"status": outcome.status, "message": outcome.message, "cost": cost}
-        self._write_state()
-        if outcome.status not in (*cut_off.ENDED_EARLY, "stopped"):
-            cut_off.clear(self.folder)
-
-    def _write_unknowns(self, frame: Frame) -> bool:
-        """The unknowns of the tets, if the frame has them."""
-        if self.mesh is None or frame.state is None:
-            return False
-        if not self.frames:
-            states.write_rest(self.folder, self.mesh, self.directions)
-        states.write(self.folder, frame.number, frame.state)
-        return True
-
-    def _write_rest(self) -> None:
-        """The rest state, which the first frame of a solver without a surface is not."""
-        (self.folder / "rest").mkdir(exist_ok=True)
-        files.write_surface(self.folder / "rest" / "surface.vtp", self.surface, self.surface.points)
-        if self.fibres is not None:
-            files.write_polylines(self.folder / "rest" / "fibres.vtp", self.fibres, self.fibres.points)
-
-    def _write_state(self) -> None:
-        files.write_text(self.folder / "run.json", json.dumps(self.state, indent=1, allow_nan=False))
-
-    def _log_progress(self, frame: Frame) -> None:
-        done, wanted = len(self.state["numbers"]), len(self.state["frames"])
-        passed = time.perf_counter() - self.begin
-        left = f", about {passed / (done - 1) * (wanted - done):.0f} s left" if 1 < done < wanted else ""
-        if 1 < done < wanted and passed - self.reported < QUIET:
-            return
-        self.reported, name, note = passed, self.state["name"], f", {frame.note}" if frame.note else ""
-        log.info("%s: frame %d (%d of %d)%s, %.0f s%s", name, frame.number, done, wanted, note, passed, left)
+    positions, of_case = (
+        stacked("surface"),
+        all(state.surface is not None or state.field is not None for state in states),
+    )
+    has_surface = positions is not None
+    names = set.intersection(*(set(state.scalars) for state in states)) if states else set()
+    nodal = [state.field for state in states if state.field is not None]
+    return Run(
+        "",
+        "",
+        outcome,
+        tuple(int(state.number) for state in states) if of_case else (),
+        rest.surface,
+        np.zeros((len(states), 0, 3)) if positions is None else positions,
+        rest.fibres,
+        stacked("fibres"),
+        {name: np.array([state.scalars[name] for state in states]) for name in names},
+        has_surface=has_surface,
+        mesh=nodal[0].mesh if nodal else None,
+        fields={name: np.stack([one.arrays[name] for one in nodal]) for name in nodal[0].arrays} if nodal else {},
+        states=states,
+    )
 
 
 def load(folder: Path) -> Run:

@@ -11,8 +11,9 @@ from typing import Any, Literal, overload
 from fem_reference.effects import Effect
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record, join, parse
+from fem_reference.problems.problem import Task
 from fem_reference.scenes.case import Candidate, Case, SolverChoice
-from fem_reference.solvers.common.protocol import BodySolver, FieldSolver, MuscleSolver, Solver, Task, trades
+from fem_reference.solvers.common.protocol import BodySolver, FieldSolver, MuscleSolver, Solver, trades
 
 __all__ = ["check", "choice", "find", "in_table", "names", "offers", "require", "settings", "takes_effects", "trades"]
 
@@ -24,12 +25,12 @@ def names(task: Task | None = None) -> list[str]:
 
 
 def _is_shared(module: str) -> bool:
-    """Whether a ``module`` of this folder is no solver but serves some."""
+    """True of a ``module`` of this folder that is no solver but serves some."""
     return module == "common" or module.endswith("_kernels")
 
 
-def offers(name: str) -> tuple[Solver[Any], ...]:
-    """What the solver ``name`` offers, one entry a task; TypeError where its file does not say."""
+def offers(name: str) -> tuple[Solver[Any, Any], ...]:
+    """The offers of the solver ``name``, one entry a task; TypeError where its file does not say."""
     found = vars(importlib.import_module(f"{__name__}.{name}")).get("SOLVES")
     if not isinstance(found, tuple) or not found or not all(isinstance(offer, Solver) for offer in found):
         want = "a tuple of MuscleSolver, FieldSolver or BodySolver (solvers/common/protocol.py)"
@@ -44,15 +45,15 @@ def find(name: str, place: str, task: Literal["solve_field"]) -> FieldSolver[Any
 @overload
 def find(name: str, place: str, task: Literal["solve_body"]) -> BodySolver[Any]: ...
 @overload
-def find(name: str, place: str, task: Task) -> Solver[Any]: ...
-def find(name: str, place: str, task: Task = "solve") -> Solver[Any]:
+def find(name: str, place: str, task: Task) -> Solver[Any, Any]: ...
+def find(name: str, place: str, task: Task = "solve") -> Solver[Any, Any]:
     """The solver ``name`` for a ``task``; InputError at ``place`` where there is none."""
     if name not in names():
         raise InputError(join(place, "solver"), f'"{name}"', f"one of {', '.join(names(task))}")
     for offer in offers(name):
         if offer.task == task:
             return offer
-    kinds: dict[Task, type[Solver[Any]]] = {kind.task: kind for kind in (MuscleSolver, FieldSolver, BodySolver)}
+    kinds: dict[Task, type[Solver[Any, Any]]] = {kind.task: kind for kind in (MuscleSolver, FieldSolver, BodySolver)}
     got = f'"{name}", which does not solve {kinds[task].solves}'
     raise InputError(join(place, "solver"), got, f"one of {', '.join(names(task))}")
 
@@ -84,7 +85,7 @@ def require(name: str, settings: Record, place: str, task: Task = "solve") -> No
 
 
 def takes_effects(name: str) -> bool:
-    """Whether the solver ``name`` simulates the effects of a scene."""
+    """True where the solver ``name`` simulates the effects of a scene."""
     return any(isinstance(offer, MuscleSolver) and offer.check_effects is not None for offer in offers(name))
 
 

@@ -21,7 +21,7 @@ from scipy.sparse.linalg import splu
 from fem_reference.foundations.mesh import Floats, Ints, Surface, enclosed_volume
 from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import PositiveLength
-from fem_reference.problems.muscle import Setup
+from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers import arap_kernels
 from fem_reference.solvers.common.frame_loop import carry, follow, refused, timed

@@ -17,7 +17,7 @@ from pydantic import Field, model_validator
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import PositiveLength
-from fem_reference.problems.muscle import Setup
+from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Outcome, Sink
 from fem_reference.solvers.arap import Alternation, GlobalStep, Relaxed, Symmetric, VertexCells, alternate, farthest
 from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade

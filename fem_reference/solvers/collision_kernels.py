@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.signed_distance import FAR, Grid
-from fem_reference.problems.muscle import RigidBody
+from fem_reference.problems.setup import RigidBody
 from fem_reference.solvers.compiled_kernels import compiled
 from fem_reference.solvers.pbd_kernels import Vector
 

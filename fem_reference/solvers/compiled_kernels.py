@@ -25,7 +25,7 @@ def compiled[F: Callable[..., Any]](function: F) -> F:
 
 @cache
 def can_keep(folder: Path) -> bool:
-    """Whether files can be written in a folder, which is made; a user without a home has none."""
+    """True where files can be written in a folder, which is made; a user without a home has none."""
     if not folder.is_absolute():
         return False
     try:

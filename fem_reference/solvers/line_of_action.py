@@ -16,8 +16,9 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Polylines
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record, join
-from fem_reference.geometry.wrapping import Cylinder, Obstacle, Paths, Sphere, straight
-from fem_reference.problems.muscle import Problem, RigidBody
+from fem_reference.geometry.wrapping import Paths, WrappingCylinder, WrappingSphere, WrappingSurface, straight
+from fem_reference.problems.muscle import Problem
+from fem_reference.problems.setup import RigidBody
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.scenes import bones
 from fem_reference.solvers.common.frame_loop import each
@@ -48,7 +49,7 @@ class CylinderOn(bones.Rod):
 
 
 class LineSettings(Record):
-    """What lines go through and around; without any key they are straight.
+    """Points and obstacles that lines go through and around; without any key they are straight.
 
     ``via``: points in the order in which a fibre passes them. ``sphere`` or ``cylinder``: an obstacle that every part of a
     line goes around, from one fixed point to the next, where the straight path would cross it.
@@ -83,7 +84,7 @@ class Lines:
     share: Floats
 
     def at(self, number: int) -> Floats:
-        """Where the fixed points (k, p + 1, 3) [mm] are at frame ``number``."""
+        """The fixed points (k, p + 1, 3) [mm] at frame ``number``."""
         moved = np.array(self.fixed)
         for i in np.unique(self.on):
             moved[self.on == i] = apply(self.bones[i].pose(number), self.fixed[self.on == i])
@@ -94,7 +95,7 @@ class Lines:
 class Wrap:
     """An ``obstacle``, given at rest, on a ``bone``; ``name`` is what messages call it."""
 
-    obstacle: Obstacle
+    obstacle: WrappingSurface
     bone: RigidBody
     name: str
 
@@ -120,7 +121,7 @@ class Shortest:
             self.found = _frame(self.lines, self.wrap, fixed, number, self.problem.fibres)
 
     def trouble(self) -> Trouble | None:
-        """Whether a fixed point is inside the obstacle."""
+        """The trouble with a fixed point inside the obstacle; None without."""
         return self.inside
 
     def frame(self, _: int) -> Frame:
@@ -174,7 +175,7 @@ def _paths(wrap: Wrap | None, fixed: Floats, number: int) -> tuple[Paths, Floats
 
 
 def _inside(wrap: Wrap, fixed: Floats, number: int) -> str:
-    """Which line has the fixed point deepest inside the obstacle; empty where none is inside."""
+    """The line that has the fixed point deepest inside the obstacle; empty where none is inside."""
     resting = apply(np.linalg.inv(wrap.bone.pose(number)), fixed.reshape(-1, 3))
     depths = wrap.obstacle.depths(resting).reshape(len(fixed), -1).max(axis=1)
     line = int(np.argmax(depths))
@@ -185,11 +186,11 @@ def _wrap(problem: Problem, settings: LineSettings, place: str) -> Wrap | None:
     """The obstacle of the settings, None without one."""
     if (ball := settings.sphere) is not None:
         bone = problem.bones[_index(problem.bones, ball.bone, join(place, "sphere.bone"))]
-        return Wrap(Sphere(ball.centre, ball.radius), bone, "sphere")
+        return Wrap(WrappingSphere(ball.centre, ball.radius), bone, "sphere")
     if (roll := settings.cylinder) is not None:
         x, y, z = (float(entry) for entry in np.subtract(roll.end, roll.start))
         bone = problem.bones[_index(problem.bones, roll.bone, join(place, "cylinder.bone"))]
-        return Wrap(Cylinder(roll.start, (x, y, z), roll.radius), bone, "cylinder")
+        return Wrap(WrappingCylinder(roll.start, (x, y, z), roll.radius), bone, "cylinder")
     return None
 
 

@@ -1,4 +1,4 @@
-"""What the report's Octave listings compute (4.1 on an interval, 4.5 on triangles), whatever equation the scene states."""
+"""The report's Octave listings (4.1 on an interval, 4.5 on triangles) as they compute, whatever equation the scene states."""
 
 import time
 
@@ -8,8 +8,7 @@ from pydantic import Field
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record, join
 from fem_reference.problems.scalar import FieldProblem, at
-from fem_reference.runs.scalar import Solution
-from fem_reference.runs.store import Outcome
+from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers import listing_kernels
 from fem_reference.solvers.common.protocol import FieldSolver
 
@@ -20,7 +19,7 @@ class ListingSettings(Record):
     peclet: float | None = Field(default=None, gt=0)
 
 
-def solve_field(problem: FieldProblem, settings: ListingSettings) -> Solution:
+def solve(problem: FieldProblem, settings: ListingSettings, sink: Sink) -> Outcome:
     """The listing for the problem's domain, from its mesh and what is fixed; its effects and slopes are the listing's own.
 
     What listing 4.5 draws is minus the norm of its vector unknown; that is the field here, and the vector its components.
@@ -41,7 +40,8 @@ def solve_field(problem: FieldProblem, settings: ListingSettings) -> Solution:
         "seconds_solve": time.perf_counter() - begin,
         "unknowns": float(len(mesh.points) if components is None else components.size),
     }
-    return Solution(values, Outcome("converged", "as listed", cost), components, form="as listed")
+    sink(Frame.of_field(problem, values, "as listed", components))
+    return Outcome("converged", "as listed", cost)
 
 
 def check(settings: ListingSettings, problem: FieldProblem, place: str) -> None:
@@ -63,4 +63,4 @@ def _check_ends(problem: FieldProblem, place: str) -> None:
         raise InputError(join(place, "boundary"), "other conditions", want)
 
 
-SOLVES = (FieldSolver(settings=ListingSettings, solve_field=solve_field, check_problem=check, example={}),)
+SOLVES = (FieldSolver(settings=ListingSettings, solve=solve, check_problem=check, example={}),)

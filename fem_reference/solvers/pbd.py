@@ -1,7 +1,7 @@
 """Position based dynamics of the muscle surface: the report's Algorithm 1 (section 5.5.3).
 
 Frame number n is the state after iteration n. In an iteration the bones take their pose and stay; then every
-sub-iteration is a whole step of the algorithm. No force acts from outside, so the time step cancels: what is kept of a
+sub-iteration is a full step of the algorithm. No force acts from outside, so the time step cancels: what is kept of a
 velocity is the displacement of a vertex in one sub-iteration, ``dt v``, and no time step is asked for. The result depends on
 the order of the vertices, as it does in the report: constraints are projected one after the other. Collisions are found anew
 in every sweep, where line 13 finds them once.
@@ -10,7 +10,7 @@ in every sweep, where line 13 finds them once.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Annotated, cast
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -18,7 +18,7 @@ from pydantic import Field
 from fem_reference.foundations.mesh import Floats, Ints, Polylines, diagonal
 from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import Length
-from fem_reference.problems.muscle import Problem, Setup
+from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Outcome, Sink
 from fem_reference.solvers.collision_kernels import CollidingBone, move_out
 from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow, timed
@@ -159,7 +159,8 @@ def constraints_of(setup: Setup, settings: PbdSettings) -> PbdConstraints:
     found = PbdConstraints.at_rest(surface.points, surface.triangles, setup.attached_vertices)
     if settings.anisotropy is None:
         return found
-    fibres = cast(Problem, setup).fibres  # as the solver asks for them
+    fibres = setup.rest.fibres
+    assert fibres is not None  # as the solver asks for them
     return replace(found, share=1 - settings.anisotropy * along_fibres(surface.points, found.edges, fibres))
 
 

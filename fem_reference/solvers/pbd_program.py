@@ -35,7 +35,7 @@ the direction they have (there: it is taken from points read beside their own).
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Annotated, cast
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +44,7 @@ from pydantic import Field
 from fem_reference.foundations.mesh import Floats, Ints, Surface
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record
-from fem_reference.problems.muscle import Problem, RigidBody, Setup
+from fem_reference.problems.setup import RigidBody, Setup
 from fem_reference.runs.store import Outcome, Sink
 from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow, timed
 from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
@@ -167,7 +167,8 @@ def constraints_of(setup: Setup, settings: ProgramSettings) -> PbdConstraints:
     edges, (hinges, angles) = half_edges_of(triangles), hinges_of(points, triangles)
     share = np.ones(len(edges))
     if settings.anisotropy is not None:
-        fibres = cast(Problem, setup).fibres  # as the solver asks for them
+        fibres = setup.rest.fibres
+        assert fibres is not None  # as the solver asks for them
         share = (1 - along_fibres(points, edges, fibres)) ** settings.anisotropy
     return PbdConstraints(
         inverse_masses=np.ones(len(points)),

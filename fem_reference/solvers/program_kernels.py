@@ -1,4 +1,4 @@
-"""What the report's own program does, compiled, in the order in which it adds up: folds are opened only, bones are voxels.
+"""The report's own program, compiled, in the order in which it adds up: folds are opened only, bones are voxels.
 
 All of it was read in the program's source. Next to chaos the last digit counts: each sum here has the order that gcc 12 gives
 it with the flags in the program's CMakeLists.txt (-Ofast, which leaves the order to the compiler; no vectors wider than SSE2),
@@ -165,7 +165,7 @@ def _unit_normal(a: Vector, b: Vector) -> Vector:
 
 @compiled
 def _is_inside(inside: Bools, place: Vector) -> bool:
-    """Whether a ``place``, in voxels, lies in one that is inside."""
+    """True where a ``place``, in voxels, lies in one that is inside."""
     x, y, z = place
     count = len(inside)
     return 0 <= x < count and 0 <= y < count and 0 <= z < count and inside[int(x), int(y), int(z)]
@@ -173,7 +173,7 @@ def _is_inside(inside: Bools, place: Vector) -> bool:
 
 @compiled
 def _marks(a: Vector, b: Vector, c: Vector, normal: Vector, corner: Vector) -> bool:
-    """Whether the triangle a, b, c, in voxels, marks the voxel whose lower corner is ``corner``.
+    """True where the triangle a, b, c, in voxels, marks the voxel whose lower corner is ``corner``.
 
     It does where its plane is near, and beyond none of its edges by more than a diagonal. The planes at the edges are taken
     with its ``normal`` in mm, though voxels are no cubes.
@@ -205,7 +205,7 @@ def mark(border: Bools, points: Floats, places: Floats, triangles: Ints) -> None
 
 @compiled
 def flood(border: Bools) -> Bools:
-    """Which voxels (k, k, k) a flood from the corner (0, 0, 0) gets to, from face to face and not into the ``border``.
+    """The voxels (k, k, k) that a flood from the corner (0, 0, 0) gets to, from face to face and not into the ``border``.
 
     It never goes back to an index of 0.
     """
@@ -229,7 +229,7 @@ def flood(border: Bools) -> Bools:
 
 @compiled
 def are_inside(inside: Bools, places: Floats) -> Bools:
-    """Which of ``places`` (n, 3), in voxels, lie in one that is inside."""
+    """True (n,) of those ``places`` (n, 3), in voxels, that lie in one that is inside."""
     found = np.empty(len(places), np.bool_)
     for i in range(len(places)):
         found[i] = _is_inside(inside, at(places, i))
@@ -238,7 +238,7 @@ def are_inside(inside: Bools, places: Floats) -> Bools:
 
 @compiled
 def march_out(inside: Bools, goals: Floats, displacements: Floats) -> tuple[Floats, Bools]:
-    """Where those come to be that are inside at ``goals`` (n, 3), and who has come back too far (n,); all in voxels.
+    """The places (n, 3) that those reach which are inside at ``goals`` (n, 3), and who has come back too far (n,); all in voxels.
 
     They go straight back along their ``displacements`` (n, 3), by steps of 1, until they are outside; too far is farther than
     their length.

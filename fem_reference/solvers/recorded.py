@@ -17,7 +17,7 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, check_finite, 
 from fem_reference.foundations.records import FileName, Name, Record, parse
 from fem_reference.foundations.units import LengthUnit, length_unit
 from fem_reference.io import files, texts
-from fem_reference.problems.muscle import Setup
+from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.scenes.case import Candidate
 from fem_reference.solvers.common.protocol import MuscleSolver
@@ -42,7 +42,7 @@ ABOUT = "candidate.toml"
 
 
 class RecordedSettings(Record):
-    """Where the sequence is, and its unit of length.
+    """The place of the sequence, and its unit of length.
 
     ``folder``: a folder with one mesh file a frame, numbered by the last digits of their names; a .pvd or .xdmf file or
     a folder with one; or the folder of a stored run.
@@ -53,8 +53,8 @@ class RecordedSettings(Record):
 
 
 class About(Record):
-    """What ``candidate.toml`` says: who computed the sequence, its unit of length, and the time [s] that solving one frame took on
-    so many threads.
+    """The contents of ``candidate.toml``: who computed the sequence, its unit of length, and the time [s] that solving one frame
+    took on so many threads.
     """
 
     name: FileName | None = None
@@ -71,7 +71,9 @@ class About(Record):
 
 
 def about(path: Path) -> About:
-    """What is said of the sequence at ``path``, a folder or an index file; nothing where there is no ``candidate.toml``."""
+    """The ``candidate.toml`` of the sequence at ``path``, a folder or an index file; nothing where there is no
+    ``candidate.toml``.
+    """
     file = _about_file(path)
     if not os.path.lexists(file):
         return About()
@@ -102,7 +104,7 @@ def _about_file(path: Path) -> Path:
 
 
 def origin(settings: RecordedSettings) -> dict[str, Any]:
-    """Where a run comes from, as its candidate says."""
+    """The origin of a run, as its candidate says."""
     said = about(Path(settings.folder)).model_dump(exclude_none=True, include={"name", "version"})
     return {"candidate": said} if said else {}
 
@@ -136,7 +138,7 @@ def solve(setup: Setup, settings: RecordedSettings, sink: Sink) -> Outcome:
 
 
 def _checked_about(settings: RecordedSettings) -> About:
-    """What is said of the sequence; InputError where its unit is another than that of ``settings``."""
+    """The ``candidate.toml`` of the sequence; InputError where its unit is another than that of ``settings``."""
     said = about(Path(settings.folder))
     if said.unit is not None and length_unit(said.unit) != settings.unit:
         place = f"{_about_file(Path(settings.folder))}: unit"
@@ -170,7 +172,7 @@ def _visible(folder: Path) -> list[Path]:
 
 
 def _sequence(source: Path, unit: float, interval: float | None) -> dict[int, Path | Surface]:
-    """By frame number: the surface, or the file that it is in."""
+    """The surfaces by frame number, or the files that they are in."""
     if source.suffix.lower() == ".xdmf":
         steps = files.read_xdmf(source, unit)
         return _by_number(source, ((_number(time, interval), step.place, step) for time, step in steps))
@@ -230,7 +232,7 @@ def _positions(surface: Surface, rest: Surface) -> Floats:
 
 
 def _strangers(triangles: Ints, rest: Ints) -> NDArray[np.bool_]:
-    """Which of the ``triangles`` (m, 3) are there more often than among ``rest`` (m, 3), whichever corner is first."""
+    """True of those ``triangles`` (m, 3) that are there more often than among ``rest`` (m, 3), whichever corner is first."""
     both = np.concatenate([_turned(triangles), _turned(rest)])
     which = np.unique(both, axis=0, return_inverse=True)[1].ravel()
     here, there = which[: len(triangles)], which[len(triangles) :]

@@ -32,7 +32,7 @@ from fem_reference.foundations.units import (
     Stiffness,
     Time,
 )
-from fem_reference.problems.muscle import Setup
+from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Outcome, Sink
 from fem_reference.solvers.collision_kernels import CollidingBone
 from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow, other_clock, timed

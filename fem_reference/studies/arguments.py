@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -14,20 +13,30 @@ from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case
 
 
-def check_case(case: Any) -> None:
-    """InputError unless it is a case."""
+def check_case(case: object) -> Case:
+    """The case; InputError unless it is one."""
     if not isinstance(case, Case):
         raise InputError("case", said(case), "a Case, such as load_case returns")
+    return case
 
 
-def check_changes(changes: Any) -> None:
+def is_of_body(reference: object, of: object) -> bool:
+    """True of a run of a body; InputError where that is another than the one it is said to be ``of``."""
+    if not isinstance(reference, Run) or reference.body is None:
+        return False
+    if reference.body is not of:
+        raise InputError("reference", "a solution of another body", "what solve_body returned for this one")
+    return True
+
+
+def check_changes(changes: object) -> None:
     """InputError unless it is keys and values, or None."""
-    known = changes is None or isinstance(changes, Mapping)
-    if not known or not all(isinstance(key, str) for key in changes or ()):
+    keys = () if changes is None else tuple(changes) if isinstance(changes, Mapping) else (None,)
+    if not all(isinstance(key, str) for key in keys):
         raise InputError("changes", said(changes), 'values by key, such as {"frames.last": 10}')
 
 
-def check_solver(solver: Any, settings: Mapping[str, Any]) -> None:
+def check_solver(solver: object, settings: Mapping[str, object]) -> None:
     """InputError unless ``solver`` is a name, and there where there are ``settings`` of it."""
     if solver is not None and not isinstance(solver, str):
         raise InputError("solver", said(solver), "the name of a solver, or None")
@@ -36,13 +45,13 @@ def check_solver(solver: Any, settings: Mapping[str, Any]) -> None:
         raise InputError(f"settings {', '.join(settings)}", "no solver", want)
 
 
-def check_progress(progress: Any) -> None:
+def check_progress(progress: object) -> None:
     """InputError unless it can be called, or is None."""
     if progress is not None and not callable(progress):
         raise InputError("progress", said(progress), "a function of a line, such as print, or None")
 
 
-def free_folder(given: Any, place: str) -> Path:
+def free_folder(given: object, place: str) -> Path:
     """The path of a folder that is there or can be made."""
     folder = path(given, place)
     above = next(one for one in (folder, *folder.absolute().parents) if one.exists())
@@ -51,13 +60,13 @@ def free_folder(given: Any, place: str) -> Path:
     return folder
 
 
-def check_comparison(comparison: Any) -> None:
+def check_comparison(comparison: object) -> None:
     """InputError unless it is a comparison."""
     if not isinstance(comparison, Comparison):
         raise InputError("comparison", said(comparison), "a Comparison, such as compare returns")
 
 
-def check_error_bars(bars: Any, case: Case) -> None:
+def check_error_bars(bars: object, case: Case) -> None:
     """InputError unless they are error bars of a reference of the ``case``, or None."""
     if bars is not None and not isinstance(bars, ErrorBars):
         raise InputError("error_bars", said(bars), "ErrorBars, such as error_bars returns, or None")
@@ -67,7 +76,7 @@ def check_error_bars(bars: Any, case: Case) -> None:
         )
 
 
-def check_run(run: Any, case: Case, place: str) -> None:
+def check_run(run: object, case: Case, place: str) -> None:
     """InputError unless it is a run of the ``case``, as far as it says of which."""
     if not isinstance(run, Run):
         raise InputError(place, said(run), "a Run, such as solve and read_run return")
@@ -90,7 +99,7 @@ def _as_solved(run: Run, case: Case) -> Case:
     )
 
 
-def check_runs(reference: Run, candidates: Any, case: Case) -> None:
+def check_runs(reference: Run, candidates: object, case: Case) -> None:
     """InputError where runs cannot be compared: they are of another case, two of one name, or have other vertices."""
     check_run(reference, case, "reference")
     if not isinstance(candidates, Sequence) or isinstance(candidates, str | bytes):

@@ -6,11 +6,10 @@ from typing import Any
 import numpy as np
 
 from fem_reference.assessment.body_bars import BodyBars, body_bars
-from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Ints
 from fem_reference.problems.body import Body
 from fem_reference.problems.finer import finer
-from fem_reference.runs.solved import Solved
+from fem_reference.runs.store import Run
 from fem_reference.solvers import fenicsx
 
 log = logging.getLogger(__name__)
@@ -19,15 +18,14 @@ log = logging.getLogger(__name__)
 _QUADRATIC = {"P1": "P2", "P1/P1": "P2/P1", "Q1": "Q2", "Q1/P0": "Q2/Q1"}
 
 
-def obtain(body: Body, solved: Solved) -> BodyBars | None:
-    """The error bars of what :func:`solve_body` made of ``body``; None where that did not converge."""
-    if solved.body is not body:
-        raise InputError("reference", "a solution of another body", "what solve_body returned for this one")
+def obtain(solved: Run) -> BodyBars | None:
+    """The error bars of what :func:`solve_body` made of a body; None where that did not converge."""
     if solved.outcome.status != "converged":
         log.info("error bars: none, of a body that did not converge")
         return None
-    settings = solved.settings
+    settings, body = solved.settings, solved.body
     assert isinstance(settings, fenicsx.BodySettings)  # what solved the body
+    assert body is not None
     other, shared, changes, sharper = _sharper(body, settings)
     log.info("error bars: solving with %s", sharper)
     found = fenicsx.solve_body(other, settings.model_copy(update=changes))

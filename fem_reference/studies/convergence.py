@@ -3,17 +3,18 @@
 import logging
 import math
 from collections.abc import Callable, Iterator
-from functools import partial, singledispatch
+from functools import partial
 
 import numpy as np
 
 from fem_reference import solvers
 from fem_reference.assessment.comparison import Convergence
+from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import join
 from fem_reference.geometry.lagrange import l2_distance
-from fem_reference.problems import scalar
+from fem_reference.problems import of_case, scalar
+from fem_reference.problems.of_case import CaseSetup
 from fem_reference.problems.scalar import FieldProblem
-from fem_reference.runs.scalar import Solution
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.scalar import Element, ScalarCase
 
@@ -24,17 +25,11 @@ _MOST_CELLS = 100_000
 _EXACT = 1e-9  # errors below this share of the solution are rounding on fine meshes, and have no order
 
 
-@singledispatch
-def ladders(problem: object, case: Case) -> tuple[Convergence, ...]:  # noqa: ARG001
+def ladders(problem: CaseSetup, case: Case) -> tuple[Convergence, ...]:
     """The convergence of the reference solver of a ``case`` with elements of order 1 and 2, as far as its ``problem`` can be
     refined here; nothing of a muscle, whose error bars say more.
     """
-    return ()
-
-
-@ladders.register
-def _(problem: FieldProblem, case: ScalarCase) -> tuple[Convergence, ...]:
-    return tuple(_ladders(problem, case))
+    return () if problem.field is None else tuple(_ladders(problem.field, of_case.scalar_case(case)))
 
 
 def _ladders(coarse: FieldProblem, scene: ScalarCase) -> Iterator[Convergence]:
@@ -46,10 +41,10 @@ def _ladders(coarse: FieldProblem, scene: ScalarCase) -> Iterator[Convergence]:
     settings = solvers.settings(scene.reference, join(scene.place, "reference"), "solve_field")
     solver = solvers.find(scene.reference.solver, scene.place, "solve_field")
 
-    def solved(order: int, level: int) -> tuple[FieldProblem, Solution]:
+    def solved(order: int, level: int) -> tuple[FieldProblem, Floats]:
         element = Element(order=order, form=scene.element.form)  # type: ignore[arg-type]
         built = scalar.build(scene.model_copy(update={"element": element}), level)
-        return built, solver.solve_field(built, settings)
+        return built, solver.run(built, settings).values[0]
 
     error, against = _error(scene, lambda: solved(2, levels)[1])
     for order in (1, 2):
@@ -57,24 +52,24 @@ def _ladders(coarse: FieldProblem, scene: ScalarCase) -> Iterator[Convergence]:
         finest = levels if order == 1 or scene.exact is not None else levels - 1
         steps = [solved(order, level) for level in range(finest + 1)]
         errors = tuple(error(*step) for step in steps)
-        scale = float(np.abs(steps[-1][1].values).max())
+        scale = float(np.abs(steps[-1][1]).max())
         exact = len(errors) < 2 or not errors[-1] > _EXACT * scale
         measured = math.nan if exact else math.log2(errors[-2] / errors[-1])
         log.info("%s: elements of order %d measured on %d meshes", scene.name, order, len(steps))
         yield Convergence(f"P{order}", tuple(len(built.mesh.cells) for built, _ in steps), errors, measured, against)
 
 
-def _error(scene: ScalarCase, finest: Callable[[], Solution]) -> tuple[Callable[[FieldProblem, Solution], float], str]:
+def _error(scene: ScalarCase, finest: Callable[[], Floats]) -> tuple[Callable[[FieldProblem, Floats], float], str]:
     """How far a solution is from the truth, and what that is."""
     if scene.exact is not None:
         exact = partial(scalar.at, scene.exact)
-        return (lambda built, solution: l2_distance(built.mesh, solution.values, exact)), "the exact solution (L2)"
+        return (lambda built, values: l2_distance(built.mesh, values, exact)), "the exact solution (L2)"
     # The vertices of a mesh come first in every finer one. All of them count: where the coarsest mesh is irregular its
     # own vertices alone converge with h^2 log h, and not with h^2.
-    truth = finest().values
+    truth = finest()
 
-    def rms(built: FieldProblem, solution: Solution) -> float:
+    def rms(built: FieldProblem, values: Floats) -> float:
         count = len(built.mesh.points)
-        return float(np.sqrt(np.mean((solution.values[:count] - truth[:count]) ** 2)))
+        return float(np.sqrt(np.mean((values[:count] - truth[:count]) ** 2)))
 
     return rms, "the finest solution with P2 (rms at the vertices)"

@@ -6,13 +6,10 @@ import os
 import platform
 import time
 from collections.abc import Callable, Sequence
-from contextlib import suppress
-from dataclasses import replace
-from functools import cache, singledispatch
+from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
-from typing import Any
-
-import numpy as np
+from typing import Any, cast, overload
 
 from fem_reference import solvers
 from fem_reference.assessment import second_check
@@ -20,28 +17,79 @@ from fem_reference.foundations.records import Record, join
 from fem_reference.foundations.usage import forget_peak_memory, peak_memory
 from fem_reference.foundations.version import __version__
 from fem_reference.problems import of_case
-from fem_reference.problems.muscle import Problem, Setup
-from fem_reference.problems.scalar import FieldProblem
+from fem_reference.problems.estimates import Decision
+from fem_reference.problems.muscle import Problem
+from fem_reference.problems.of_case import CaseProblem, CaseSetup
+from fem_reference.problems.setup import Setup
+from fem_reference.problems.watch import Watch
 from fem_reference.runs import cut_off, states, store
-from fem_reference.runs.fields import VALUES, NodalField
 from fem_reference.runs.key import code_hash, key, versions
-from fem_reference.runs.store import Frame, Outcome, Run
+from fem_reference.runs.store import Frame, Outcome, Run, collected
+from fem_reference.runs.writer import Writer
+from fem_reference.scenes import casefile
 from fem_reference.scenes.case import MACHINE_ONLY, Case, SolverChoice
+from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import recorded
-from fem_reference.solvers.common.protocol import MuscleSolver
+from fem_reference.solvers.common.protocol import Solver
 from fem_reference.studies import expected_cost, run_folders, watched
 
 log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A run that is wanted: the ``name`` that pages give it, who solves it with which ``settings``, and where it is stored."""
+
+    name: str
+    choice: SolverChoice
+    place: str
+    offer: Solver[Any, Any]
+    settings: Record
+    folder: Path
 
 
 class Bench[C: Case]:
     """A case with what is made from it once and only when needed: its setup, its problem, and where its runs are stored."""
 
     def __init__(self, scene: C, store: Path, ranks: int | None = None) -> None:
-        self.setup: Callable[[], Any] = cache(lambda: of_case.setup(scene))
-        self.scene, self.store, self.ranks = of_case.chosen(scene, self.setup), store, ranks
-        self.problem: Callable[[], Any] = cache(lambda: of_case.problem(self.scene, self.setup()))
-        self.watch: Callable[[], Any] = cache(lambda: of_case.watch(self.scene, self.setup(), self.problem))
+        self._setup: Callable[[], CaseSetup] = cache(lambda: of_case.setup(scene))
+        self._scene, self.store, self.ranks = of_case.chosen(scene, self._setup), store, ranks
+        self._begin()
+
+    def _begin(self) -> None:
+        """Make anew what depends on the effects that act."""
+        self._problem: Callable[[], CaseProblem] = cache(lambda: of_case.problem(self.scene, self._setup()))
+        self._watch: Callable[[], Watch | None] = cache(lambda: of_case.watch(self.scene, self._setup(), self._problem))
+
+    @property
+    def scene(self) -> C:
+        """The case, with the effects that it needs."""
+        return self._scene
+
+    @overload
+    def setup(self: "Bench[MuscleCase]") -> Setup: ...
+    @overload
+    def setup(self) -> CaseSetup: ...
+    def setup(self) -> CaseSetup:
+        """What is known of the case before it is meshed."""
+        return self._setup()
+
+    @overload
+    def problem(self: "Bench[MuscleCase]") -> Problem: ...
+    @overload
+    def problem(self) -> CaseProblem: ...
+    def problem(self) -> CaseProblem:
+        """The problem of the case, meshed."""
+        return self._problem()
+
+    def watch(self) -> Watch | None:
+        """The watch for effects that the case left out; None where it left out none."""
+        return self._watch()
+
+    def of_muscle(self) -> "Bench[MuscleCase]":
+        """The bench itself, where its case is one of a muscle; else InputError."""
+        casefile.muscle(self.scene)
+        return cast("Bench[MuscleCase]", self)
 
     def settings(self, choice: SolverChoice, place: str) -> Record:
         """The settings of ``choice``, checked; a folder that the scene names is found as its files are, and only there."""
@@ -68,100 +116,104 @@ class Bench[C: Case]:
         for one, place, own in settings:
             offer = solvers.find(one.solver, place, self.scene.task)
             if offer.check_problem:
-                offer.check_problem(own, self.made_for(one.solver, own), join(self.scene.place, place))
+                offer.check_problem(own, self.given(offer, own), join(self.scene.place, place))
 
     def obtain(self, name: str, choice: SolverChoice, place: str) -> Run:
         """The run of a solver of our own, by the name that pages give it; ``place`` is where the scene chooses it."""
-        if choice.solver == "recorded":  # files may change behind a name; they are read anew each time
-            return self.read(name, choice, place)
-        settings, folder = self.settings(choice, place), self.folder(choice, place)
-        ended = self._ended(choice.solver)
-        if (stored := _stored(folder, name, ended, settings)) is not None:
-            return self._with_all_that_matters(self._checked(stored), choice, place)
-        solvers.require(choice.solver, settings, place, self.scene.task)
-        if choice == self.scene.reference:
-            self.check()
-        built = self.made_for(choice.solver, settings)  # what is wrong with the input shows before anything is written
-        takes = expected_cost.seconds(choice.solver, built, settings)
-        long = "" if takes is None else f", about {takes:.2g} s of processor time"
-        log.info("%s: no stored run of it in %s; solving%s", name, folder.parent.resolve(), long)
-        with run_folders.locked(folder), run_folders.bars_kept(folder):
-            run = _stored(folder, name, ended, settings) or self._solve(name, choice.solver, settings, folder)
-            run = self._checked(run)
-        return self._with_all_that_matters(run, choice, place)
-
-    def _ended(self, solver: str) -> tuple[str, ...]:
-        """Statuses of stored runs that are taken again."""
-        return ("converged", "denied", *(("stopped",) if self._watches(solver) else ()))
+        run = self._run(name, choice, place, self._made)
+        assert run is not None  # what is not stored is made
+        return run
 
     def known(self, name: str, choice: SolverChoice, place: str) -> Run | None:
         """The stored run that ``obtain`` takes up, None where it would solve one."""
-        shelf = _Shelf(self.scene, self.store, self.ranks)
-        shelf.setup = self.setup
-        with suppress(_UnsolvedError):
-            return shelf.obtain(name, choice, place)
-        return None
+        other = Bench(self.scene, self.store, self.ranks)
+        other._setup = self._setup
+        return other._run(name, choice, place, lambda _: None)
+
+    def _run(self, name: str, choice: SolverChoice, place: str, make: Callable[[Wanted], Run | None]) -> Run | None:
+        """The stored run, or what ``make`` makes; with all effects that turn out to matter in it."""
+        if choice.solver == "recorded":  # files may change behind a name; they are read anew each time
+            return self.read(name, choice, place)
+        while True:
+            run = self._stored(wanted := self._wanted(name, choice, place)) or make(wanted)
+            found = () if run is None else self._turned_out(run)
+            if run is None or not found:
+                return run
+            self._scene = of_case.with_effects(self.scene, found)
+            self._begin()
+            assert run.folder is not None  # from the store
+            folder = self.folder(choice, place)
+            with run_folders.locked(folder):  # goes on from what is kept of a run that was stopped for it
+                cut_off.pass_on(run.folder, folder)
+
+    def _wanted(self, name: str, choice: SolverChoice, place: str) -> Wanted:
+        settings, offer = self.settings(choice, place), solvers.find(choice.solver, place, self.scene.task)
+        return Wanted(name, choice, place, offer, settings, self.folder(choice, place))
+
+    def _stored(self, wanted: Wanted) -> Run | None:
+        run = _stored(wanted, self._ended(wanted.choice.solver))
+        return None if run is None else self._checked(run)
+
+    def _made(self, wanted: Wanted) -> Run:
+        """The run, solved now, by one process at a time; what is wrong with the input shows before anything is written."""
+        solver = wanted.choice.solver
+        wanted.offer.require(wanted.settings)
+        if wanted.choice == self.scene.reference:
+            self.check()
+        given = self.given(wanted.offer, wanted.settings)
+        long = ""
+        if solver == "fenicsx" and given.body is not None:
+            element = str(wanted.settings.model_dump()["element"])
+            long = f", about {expected_cost.seconds(given.body, element):.2g} s of processor time"
+        log.info("%s: no stored run of it in %s; solving%s", wanted.name, wanted.folder.parent.resolve(), long)
+        with run_folders.locked(wanted.folder), run_folders.bars_kept(wanted.folder):
+            return self._stored(wanted) or self._checked(self._solved(wanted, given))
+
+    def _ended(self, solver: str) -> tuple[str, ...]:
+        """Statuses of stored runs that are taken again."""
+        return ("converged", "denied", *(("stopped",) if self._watched(solver) else ()))
 
     def _checked(self, run: Run) -> Run:
         """The ``run``; that of a muscle by a solver of effects with the second check of it, which is stored with it."""
         asked = self.scene.task == "solve" and solvers.takes_effects(run.solver)
         if not asked or run.outcome.status not in ("converged", "denied"):
             return run
-        return second_check.confirmed_run(self.problem, run)
+        return second_check.confirmed_run(self.of_muscle().problem, run)
 
-    def _watches(self, solver: str) -> bool:
-        """Whether the case left effects out that may turn out to matter."""
-        return solvers.takes_effects(solver) and self.watch() is not None
+    def _watched(self, solver: str) -> Watch | None:
+        """The watch for effects that the case left out and that may turn out to matter."""
+        return self._watch() if solvers.takes_effects(solver) else None
 
-    def _with_all_that_matters(self, run: Run, choice: SolverChoice, place: str) -> Run:
-        """The ``run``; where an effect that the case left out turns out to matter in it, one with that effect, which goes on from
-        what is kept of a run that was stopped for it.
-        """
-        if not self._watches(choice.solver) or run.origin.get("watched") == self.watch().names:
-            return run
-        found = watched.again(self.watch(), run)
-        if not found:
-            return run
-        self.scene = of_case.with_effects(self.scene, found)
-        self.problem.cache_clear()  # type: ignore[attr-defined]
-        self.watch.cache_clear()  # type: ignore[attr-defined]
-        assert run.folder is not None  # from the store
-        folder = self.folder(choice, place)
-        with run_folders.locked(folder):
-            cut_off.pass_on(run.folder, folder)
-        return self.obtain(run.name, choice, place)
+    def _turned_out(self, run: Run) -> tuple[Decision, ...]:
+        """The effects that the case left out and that turn out to matter in a stored ``run``."""
+        watch = self._watched(run.solver)
+        return () if watch is None or run.origin.get("watched") == watch.names else watched.again(watch, run)
+
+    def _solved(self, wanted: Wanted, given: CaseSetup) -> Run:
+        """The run of the problem that its solver is ``given``, written into its folder as it goes."""
+        origin = self.origin(wanted.choice.solver, wanted.settings)
+        if wanted.offer.fills(wanted.settings):
+            origin["mesh"] = self._problem().mesh_facts
+        identity = {"name": wanted.name, "solver": wanted.choice.solver, "origin": origin, "frames": self.scene.numbers}
+        _write(Writer(wanted.folder, identity, given.rest), wanted, given, self._watched(wanted.choice.solver))
+        return store.load(wanted.folder)
+
+    def given(self, offer: Solver[Any, Any], settings: Record) -> CaseSetup:
+        """What a solver is given: the problem, or the setup of a muscle that it does not need filled."""
+        return self._problem() if offer.fills(settings) else self._setup()
+
+    def read(self, name: str, choice: SolverChoice, place: str) -> Run:
+        """The run that somebody recorded, checked against the setup of the scene; it is read each time and not stored."""
+        wanted, frames = self.settings(choice, place), list[Frame]()
+        assert isinstance(wanted, recorded.RecordedSettings)
+        outcome = solvers.find(choice.solver, place, self.scene.task).solve(self._setup(), wanted, frames.append)
+        origin = self.origin(choice.solver, wanted) | recorded.origin(wanted)
+        run = collected(frames, outcome, self._setup().rest)
+        return replace(run, name=name, solver=choice.solver, origin=origin, states=())
 
     def folder(self, choice: SolverChoice, place: str) -> Path:
         """Where the run of a solver of our own is stored, once there is one."""
         return self.store / f"{choice.solver}-{self.key(choice.solver, self.settings(choice, place))}"
-
-    def _solve(self, name: str, solver: str, settings: Record, folder: Path) -> Run:
-        origin, numbers = self.origin(solver, settings), self.scene.numbers
-        identity = {"name": name, "solver": solver, "origin": origin, "frames": numbers}
-        _solved(
-            self.made_for(solver, settings),
-            solvers.find(solver, self.scene.place, self.scene.task),
-            settings,
-            folder,
-            identity,
-            self.watch() if self._watches(solver) else None,
-        )
-        return store.load(folder)
-
-    def made_for(self, solver: str, settings: Record) -> Any:
-        """What the solver needs: the problem, or the setup of a muscle that it does not need filled."""
-        offer = solvers.find(solver, self.scene.place, self.scene.task)
-        return self.setup() if isinstance(offer, MuscleSolver) and not offer.fills(settings) else self.problem()
-
-    def read(self, name: str, choice: SolverChoice, place: str) -> Run:
-        """The run that somebody recorded, checked against the setup of the scene; it is read each time and not stored."""
-        settings, frames, rest = self.settings(choice, place), list[Frame](), self.setup()
-        assert isinstance(settings, recorded.RecordedSettings)
-        outcome = recorded.solve(rest, settings, frames.append)
-        positions = np.stack([frame.surface for frame in frames if frame.surface is not None])
-        numbers = tuple(frame.number for frame in frames)
-        origin = self.origin(choice.solver, settings) | recorded.origin(settings)
-        return Run(name, choice.solver, outcome, numbers, rest.surface, positions, origin=origin)
 
     def key(self, solver: str, settings: Record) -> str:
         """The key of a run: a hash over all that determines it."""
@@ -185,41 +237,10 @@ class Bench[C: Case]:
         }
 
 
-class _UnsolvedError(Exception):
-    """A run is not there yet."""
-
-
-class _Shelf(Bench[Any]):
-    """A bench that takes up what is stored, and solves nothing."""
-
-    def made_for(self, solver: str, settings: Record) -> Any:
-        """Nothing: what would be solved is not there."""
-        raise _UnsolvedError(f"{solver}-{self.key(solver, settings)}")
-
-
-@singledispatch
-def _solved(built: object, solver: Any, settings: Record, folder: Path, identity: dict[str, Any], watch: Any) -> None:  # noqa: ARG001
-    """Solve what was ``built`` of a case, and write the run into ``folder`` as it goes; ``watch`` sees each frame of a muscle, and
-    may stop it.
+def _write(writer: Writer, wanted: Wanted, given: CaseSetup, watch: Watch | None) -> None:
+    """Solve, with each frame written as it is reached, and what all took; ``watch`` sees each frame, and may stop the run. Of a run
+    that failed before its first frame, that is the state at rest.
     """
-    raise TypeError(f"{type(built).__name__} is no problem of a case")
-
-
-@_solved.register
-def _(built: Problem, solver: Any, settings: Record, folder: Path, identity: dict[str, Any], watch: Any) -> None:
-    identity["origin"]["mesh"] = built.mesh_facts
-    writer = store.Writer(folder, identity, built.surface, built.fibres, built.mesh, built.directions)
-    _write(writer, built, solver, settings, Frame(built.frames[0], built.surface.points, built.fibres.points), watch)
-
-
-@_solved.register
-def _(built: Setup, solver: Any, settings: Record, folder: Path, identity: dict[str, Any], watch: Any) -> None:
-    writer = store.Writer(folder, identity, built.surface)
-    _write(writer, built, solver, settings, Frame(built.frames[0], built.surface.points), watch)
-
-
-def _write(writer: store.Writer, built: Setup, solver: Any, settings: Record, rest: Frame, watch: Any) -> None:
-    """The run of a muscle, with what it cost; of one that failed before its first frame that frame, which is ``rest``."""
 
     def add(frame: Frame) -> None:
         writer.add(frame)
@@ -229,10 +250,10 @@ def _write(writer: store.Writer, built: Setup, solver: Any, settings: Record, re
     if watch is not None:
         watched.begin(watch, writer)
     forget_peak_memory()
-    began = time.process_time()
-    go_on = solver.go_on
+    began, solve, go_on = time.process_time(), wanted.offer.solve, wanted.offer.go_on
     try:
-        outcome = go_on(built, settings, add, writer.cut_off) if go_on else solver.solve(built, settings, add)
+        sofar = (given, wanted.settings, add)
+        outcome = go_on(*sofar, writer.cut_off) if go_on else solve(*sofar)
         if watch is not None and outcome.status == "converged":
             watched.end(watch)
     except watched.StoppedError as why:
@@ -243,7 +264,8 @@ def _write(writer: store.Writer, built: Setup, solver: Any, settings: Record, re
     used = {"seconds_processor": processor, "peak_memory_mb": peak_memory()}
     outcome = replace(outcome, cost=used | outcome.cost)  # a solver with processes of its own says what those used
     if not writer.frames:
-        writer.add(rest)
+        rest = given.rest
+        writer.add(Frame(given.frames[0], rest.surface.points, rest.fibres.points if rest.fibres else None))
     names = {"watched": watch.names} if watch is not None and outcome.status == "converged" else {}
     writer.close(outcome, **_contact(writer.state), **names)
 
@@ -257,21 +279,11 @@ def _contact(state: dict[str, Any]) -> dict[str, str]:
     return {"contact": f"pressed first at frame {pressed[0]}" if pressed else "nothing was pressed at any frame"}
 
 
-@_solved.register
-def _(built: FieldProblem, solver: Any, settings: Record, folder: Path, identity: dict[str, Any], watch: Any) -> None:  # noqa: ARG001
-    identity["origin"]["mesh"] = built.mesh_facts
-    writer = store.Writer(folder, identity)
-    solution = solver.solve_field(built, settings)
-    components = {} if solution.components is None else {"components": solution.components}
-    (number,) = identity["frames"]
-    writer.add(Frame(number, field=NodalField(built.mesh, {VALUES: solution.values} | components)))
-    writer.close(solution.outcome, form=solution.form or built.form)
-
-
-def _stored(folder: Path, name: str, ended: tuple[str, ...], settings: Record) -> Run | None:
-    """The run in ``folder`` that ``ended`` so, under the name that it has here; None where there is none, other packages made
-    it, or it lacks states that the ``settings`` ask for.
+def _stored(wanted: Wanted, ended: tuple[str, ...]) -> Run | None:
+    """The stored run that ``ended`` so, under the name that it has here; None where there is none, other packages made it, or it
+    lacks states that the settings ask for.
     """
+    folder, name = wanted.folder, wanted.name
     run = store.finished(folder, ended)
     if run is None:
         return None
@@ -280,7 +292,7 @@ def _stored(folder: Path, name: str, ended: tuple[str, ...], settings: Record) -
     if other:
         log.info("%s: solved before, but with another %s; solving again", name, other[0])
         return None
-    if getattr(settings, "store_state", None) and not states.are_kept(folder, run.numbers):
+    if getattr(wanted.settings, "store_state", None) and not states.are_kept(folder, run.numbers):
         log.info("%s: solved before without its states; solving again", name)
         return None
     log.info("%s: solved before, taken from %s", name, folder)

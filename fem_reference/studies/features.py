@@ -6,7 +6,7 @@ from fem_reference.effects import moduli
 from fem_reference.effects.contact import among
 from fem_reference.foundations.mesh import diagonal
 from fem_reference.foundations.motion import apply
-from fem_reference.problems.muscle import Setup
+from fem_reference.problems.setup import Setup
 from fem_reference.scenes.muscle import MuscleCase
 
 

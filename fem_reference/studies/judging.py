@@ -2,19 +2,19 @@
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Any
 
 from fem_reference.assessment import comparison
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.runs.complete import complete
 from fem_reference.runs.store import Run
+from fem_reference.scenes.case import Case
 from fem_reference.studies import convergence
 from fem_reference.studies.execution import Bench
 
 
 def compare(
-    bench: Bench[Any], reference: Run, candidates: Iterable[Run], error_bars: ErrorBars | None = None
+    bench: Bench[Case], reference: Run, candidates: Iterable[Run], error_bars: ErrorBars | None = None
 ) -> Comparison:
     """Measure and judge the runs of the case of a ``bench``, over all its frames, and how its reference converges."""
     case, setup = bench.scene, bench.setup()

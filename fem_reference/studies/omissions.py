@@ -151,7 +151,7 @@ def _warm_up(scene: MuscleCase, store: Path) -> None:
             with suppress(InputError, MissingSoftware):  # of which its run says more
                 settings = bench.settings(trial.choice, trial.name)
                 offer.require(settings)
-                built = bench.made_for(trial.choice.solver, settings)
+                built: Any = bench.given(offer, settings)
                 offer.solve(replace(built, frames=built.frames[:2]), settings, lambda _: None)
 
 

@@ -19,6 +19,7 @@ from fem_reference.geometry.sectors import attached_area, attached_shares
 from fem_reference.metrics import context_of
 from fem_reference.runs.complete import complete
 from fem_reference.runs.store import Run
+from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import fenicsx
 from fem_reference.studies.execution import Bench
@@ -64,7 +65,7 @@ def half_steps(scene: MuscleCase, settings: Any) -> Vary:
     return partial(with_reference, first_step=settings.first_step / 2, largest_step=largest)
 
 
-def obtain(bench: Bench[MuscleCase], reference: Run, *, model: bool = True) -> ErrorBars | None:
+def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> ErrorBars | None:
     """The error bars of the ``reference`` of a bench: from runs in the store where they are, else solved now; stored beside it.
     With ``model``, also what exact attachments would change. None for a run that did not converge, and for one without an interior.
     """
@@ -72,20 +73,20 @@ def obtain(bench: Bench[MuscleCase], reference: Run, *, model: bool = True) -> E
         log.info("error bar: none, of a reference that did not converge or has no interior")
         return None
     with fenicsx.shared():
-        pair = _pair(bench, reference, model)
+        pair = _pair(bench.of_muscle(), reference, model)
     log.info("error bar: measuring the runs against each other")
-    bars = error_bars.error_bars(pair, context_of(bench.setup(), reference))
+    bars = error_bars.error_bars(pair, context_of(bench.of_muscle().setup(), reference))
     if reference.folder is not None:
         error_bars.save(bars, reference.folder, _of(reference))
     return bars
 
 
-def bars(bench: Bench[MuscleCase], reference: Run, *, model: bool = True) -> ErrorBars | None:
+def bars(bench: Bench[Case], reference: Run, *, model: bool = True) -> ErrorBars | None:
     """The error bars that are stored beside a reference, else those that :func:`obtain` makes."""
     return stored(reference) or obtain(bench, reference, model=model)
 
 
-def offered(bench: Bench[MuscleCase], reference: Run) -> ErrorBars | None:
+def offered(bench: Bench[Case], reference: Run) -> ErrorBars | None:
     """The error bars where nobody asked for them: those that are stored, or new ones where they cost less than a fifth of the
     reference; else None, as of what did not converge or has no interior.
     """
@@ -94,8 +95,9 @@ def offered(bench: Bench[MuscleCase], reference: Run) -> ErrorBars | None:
         return found
     if reference.outcome.status != "converged" or reference.fibres is None:
         return None
-    _, (fine, coarse) = coarser(bench.scene)
-    count = 1 + len(needed(bench, reference))
+    own = bench.of_muscle()
+    _, (fine, coarse) = coarser(own.scene)
+    count = 1 + len(needed(own, reference))
     if count * (fine / coarse) ** 3 > CHEAP:
         return None
     log.info("error bar: made without being asked for, as it takes less than a fifth of the time")

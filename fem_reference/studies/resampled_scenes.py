@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Surface
+from fem_reference.geometry.coarsening import resampled
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.extension import Extension
-from fem_reference.geometry.resampling import resampled
 from fem_reference.io import files
-from fem_reference.problems.muscle import Setup
+from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Run
 from fem_reference.scenes.muscle import Attachment, MuscleCase, VertexList
 

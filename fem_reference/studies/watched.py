@@ -4,15 +4,16 @@ from collections.abc import Sequence
 
 from fem_reference.problems.estimates import Decision
 from fem_reference.problems.watch import Watch
-from fem_reference.runs import cut_off, store
+from fem_reference.runs import cut_off
 from fem_reference.runs.store import Frame, Run
+from fem_reference.runs.writer import Writer
 
 
 class StoppedError(Exception):
     """A run that goes on with other effects, and why."""
 
 
-def begin(watch: Watch, writer: store.Writer) -> None:
+def begin(watch: Watch, writer: Writer) -> None:
     """Begin to watch a run, of which a process before this one may have stored frames."""
     watch.frames.clear()
     for number in writer.frames:
@@ -22,7 +23,7 @@ def begin(watch: Watch, writer: store.Writer) -> None:
 def see(watch: Watch, frame: Frame) -> None:
     """StoppedError where an effect matters in a ``frame`` that was solved."""
     if frame.surface is not None:
-        _stop(watch.see(frame.number, frame.surface, frame.tets))
+        _stop(watch.see(frame.number, frame.surface, frame.points if len(frame.points) else None))
 
 
 def end(watch: Watch) -> None:

@@ -1,7 +1,6 @@
 """The steps from a case to a page, one call each: what the package offers to Python."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, overload
 
@@ -11,14 +10,11 @@ from fem_reference.assessment.body_bars import BodyBars
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.export import paraview
-from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.given import path
 from fem_reference.foundations.progress import Progress, reported
 from fem_reference.foundations.records import parse
 from fem_reference.problems import of_case
 from fem_reference.problems.body import Body
-from fem_reference.problems.checks import check, check_start
-from fem_reference.runs.solved import Solved
 from fem_reference.runs.store import Run
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Case, SolverChoice
@@ -128,12 +124,12 @@ def error_bars(
 
 @overload
 def error_bars(
-    case: Body, reference: Solved, *, store: str | Path = STORE, progress: Progress | None = None
+    case: Body, reference: Run, *, store: str | Path = STORE, progress: Progress | None = None
 ) -> BodyBars | None: ...
 
 
 def error_bars(
-    case: Case | Body, reference: Run | Solved, *, store: str | Path = STORE, progress: Progress | None = None
+    case: Case | Body, reference: Run, *, store: str | Path = STORE, progress: Progress | None = None
 ) -> ErrorBars | BodyBars | None:
     """Estimate how far each statistic of a reference may be from the truth, from runs on larger tetrahedra and with finer contact;
     or how far a body may be from it on cells of its shape, from a solution on smaller cells or with more unknowns in each.
@@ -158,14 +154,11 @@ def error_bars(
     """
     arguments.check_progress(progress)
     with reported(progress):
-        if isinstance(case, Body) and isinstance(reference, Solved):
-            return body_refinement.obtain(case, reference)
-        if isinstance(case, Body) or isinstance(reference, Solved):
-            want = "what solve_body returned of a body, or what solve returned of a case"
-            raise InputError("reference", f"a {type(reference).__name__} of a {type(case).__name__}", want)
-        arguments.check_case(case)
-        arguments.check_run(reference, case, "reference")
-        bench = Bench(casefile.muscle(case), arguments.free_folder(store, "store"))
+        if arguments.is_of_body(reference, case):
+            return body_refinement.obtain(reference)
+        muscle = casefile.muscle(arguments.check_case(case))
+        arguments.check_run(reference, muscle, "reference")
+        bench = Bench(muscle, arguments.free_folder(store, "store"))
         return refinement.stored(reference) or refinement.obtain(bench, reference)
 
 
@@ -257,7 +250,7 @@ def write_report(comparison: Comparison, folder: str | Path) -> Path:
     return report.write(comparison, arguments.free_folder(folder, "folder"))
 
 
-def solve_body(body: Body, *, progress: Progress | None = None, **settings: Any) -> Solved:
+def solve_body(body: Body, *, progress: Progress | None = None, **settings: Any) -> Run:
     """Solve a body of any shape with the reference, FEniCSx.
 
     Parameters
@@ -272,7 +265,7 @@ def solve_body(body: Body, *, progress: Progress | None = None, **settings: Any)
 
     Returns
     -------
-    Solved
+    Run
         ``states``, each with ``points`` (n, 3) [mm] of the nodes and ``forces`` (3,) [N] by name of what is prescribed; the
         ``outcome``. How far they are from the truth on cells of this size, :func:`error_bars` says.
 
@@ -280,7 +273,4 @@ def solve_body(body: Body, *, progress: Progress | None = None, **settings: Any)
     arguments.check_progress(progress)
     with reported(progress):
         chosen = parse(fenicsx.BodySettings, settings, "settings")
-        check(body, chosen.element)
-        check_start(body)
-        solved = second_check.confirmed_body(body, fenicsx.solve_body(body, chosen))
-        return replace(solved, body=body, settings=chosen)
+        return second_check.confirmed_body(body, fenicsx.solve_body(body, chosen))

@@ -14,7 +14,7 @@ from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere, Vector
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body
 from fem_reference.problems.contact import Contact, Obstruction
-from fem_reference.runs.solved import Reached
+from fem_reference.runs.store import Frame
 from fem_reference.verification.parts import SYMMETRY, clamped, neo_hooke
 from fem_reference.verification.truths import find
 
@@ -62,7 +62,7 @@ def known_plate() -> float:
     return float(force(stretch=brentq(apart, 1 - PLATE_TRAVEL, 1.0, xtol=1e-15)))
 
 
-def pressed(lab: Lab, n: int, radius: float) -> Reached:
+def pressed(lab: Lab, n: int, radius: float) -> Frame:
     """A quarter of a large body, z >= 0, into which a ball of ``radius`` [mm] is pressed by APPROACH."""
     mesh = shapes.ball_octant(CORE, FAR, n, 2 * n + 2, "hexahedron", 2)
     law = Contact("z0", BALL_STIFFNESS, 5e-4)
@@ -73,22 +73,22 @@ def pressed(lab: Lab, n: int, radius: float) -> Reached:
     return lab.solve(body, "Q2/Q1", first_step=0.5, residual=1e-10, newton_iterations=25).last
 
 
-def force(state: Reached) -> float:
+def force(state: Frame) -> float:
     """The force of the whole ball [N]."""
     return 4 * float(state.forces["ball"][2])
 
 
-def contact_radius(state: Reached) -> float:
+def contact_radius(state: Frame) -> float:
     """The radius [mm] from the lever of the force on the quarter: Hertz's pressures have their middle at 3/8 of it."""
     return 8 / 3 * float(-state.moments["ball"][1] / state.forces["ball"][2])
 
 
-def peak_pressure(state: Reached) -> float:
+def peak_pressure(state: Frame) -> float:
     """The greatest pressure [MPa]."""
     return float(state.scalars["contact_pressure"])
 
 
-def ball(lab: Lab, value: Callable[[Reached], float], radius: float) -> Finding:
+def ball(lab: Lab, value: Callable[[Frame], float], radius: float) -> Finding:
     """A ``value`` of the pressed body."""
     state = pressed(lab, 4, radius)
     depth = 1000 * state.scalars["contact_depth"]

@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from fem_reference.assessment.catalogue import Entry, Lab, Ladder
+from fem_reference.assessment.catalogue import Entry, Lab, Refinement
 from fem_reference.effects import make
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body
@@ -75,7 +75,7 @@ ENTRIES: tuple[Entry, ...] = (
         because="Of x = rate times the longer load step, 1/16, implicit Euler without its first order leaves x^2 / 6 = 6.5e-4; the "
         "next mode, nine times as fast, has died out to 1e-5, and 1e-4 is how far the stretch is from small strain.",
         source="validation/damping.py, relaxation_rate",
-        ladder=Ladder(
+        refinement=Refinement(
             (4, 8, 16),
             SECONDS,
             order=1,

@@ -5,11 +5,11 @@ from functools import partial
 
 import numpy as np
 
-from fem_reference.assessment.catalogue import Entry, Lab, Ladder
+from fem_reference.assessment.catalogue import Entry, Lab, Refinement
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
-from fem_reference.runs.solved import Reached
+from fem_reference.runs.store import Frame
 from fem_reference.verification.parts import neo_hooke, sliding
 from fem_reference.verification.truths import find
 
@@ -20,7 +20,7 @@ ANGLE = 1.0  # [rad], between the ends: the faces are at 15.7 and 25.4 mm
 
 
 @dataclass(frozen=True)
-class Bend:
+class Flexed:
     """A block of ``thickness`` from x = 0 and of ``length`` [mm] about y = 0, bent by ``angle`` [rad] times the frame number."""
 
     thickness: float
@@ -35,12 +35,12 @@ class Bend:
         return moves
 
 
-def bent(lab: Lab, n: int, element: str, mu: float, faces: tuple[str, ...]) -> tuple[Floats, Reached]:
+def bent(lab: Lab, n: int, element: str, mu: float, faces: tuple[str, ...]) -> tuple[Floats, Frame]:
     """The half y >= 0 of the block in 2n by 2n by 1 cells: its nodes at rest (n, 3) [mm], and bent; its lateral ``faces`` stay in
     their planes, ``mu`` [MPa].
     """
     mesh = shapes.box((2 * n, 2 * n, 1), (THICKNESS, LENGTH / 2, WIDTH), ELEMENTS[element][0], 2)
-    end = Prescribed("y1", "y1", (0, 1, 2), Bend(THICKNESS, LENGTH, ANGLE))
+    end = Prescribed("y1", "y1", (0, 1, 2), Flexed(THICKNESS, LENGTH, ANGLE))
     body = Body(mesh, neo_hooke(mu, BULK), (*sliding("y0"), end, *sliding(*faces)), (0.0, 1.0))
     return mesh.points, lab.solve(body, element, first_step=0.5, residual=1e-9).last
 
@@ -81,7 +81,7 @@ BLOCK = partial(
     relative=True,
     kind="closed form",
     source="Rivlin 1949, doi 10.1098/rspa.1949.0004; validation/rivlin.py Flexure",
-    ladder=Ladder((1, 2, 3), THICKNESS / 2, order=4),
+    refinement=Refinement((1, 2, 3), THICKNESS / 2, order=4),
 )
 FREE = "one lateral face is free, so that the block may change its width"
 
@@ -97,7 +97,7 @@ ENTRIES: tuple[Entry, ...] = (
         truth=TRUE.moment,
         within=5e-5,
         because="discretisation of order 4, 1e-5 with 8 cells through the thickness; the material's K/mu of 1e6 adds 1e-6",
-        ladder=Ladder((1, 2, 4), THICKNESS / 2, order=4),
+        refinement=Refinement((1, 2, 4), THICKNESS / 2, order=4),
     ),
     BLOCK(
         name="flexure_moment_hexahedra",
@@ -122,7 +122,9 @@ ENTRIES: tuple[Entry, ...] = (
         truth=lambda: TRUE.radii()[0],
         within=1e-4,
         because="discretisation, 3e-5 with 6 cells through the thickness (Q2/Q1)",
-        ladder=Ladder((1, 2, 3), THICKNESS / 2, order=None, note="the error changes its sign between meshes: no order"),
+        refinement=Refinement(
+            (1, 2, 3), THICKNESS / 2, order=None, note="the error changes its sign between meshes: no order"
+        ),
     ),
     BLOCK(
         name="flexure_thickness",

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.assessment.catalogue import Entry, Lab, Ladder
+from fem_reference.assessment.catalogue import Entry, Lab, Refinement
 from fem_reference.effects import Effect, make
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems import shapes
@@ -108,7 +108,7 @@ HEART = partial(
     relative=True,
     kind="published",
     source="Land et al. 2015, doi 10.1098/rspa.2015.0641: readings of its figures at second hand, see validation/land.py",
-    ladder=Ladder((2, 3), AROUND, order=None),  # the truth is published with few digits: no order
+    refinement=Refinement((2, 3), AROUND, order=None),  # the truth is published with few digits: no order
     slow=True,
     slow_negative_control=True,
 )
@@ -125,7 +125,7 @@ ENTRIES: tuple[Entry, ...] = (
         truth=land.TIP_OF_BEAM,
         within=0.003,
         because=f"0.3 %: {BOUND}; {FINE}, as its clamped edges are singular",
-        ladder=Ladder((2, 3), 1.0, order=None),
+        refinement=Refinement((2, 3), 1.0, order=None),
     ),
     *(
         HEART(

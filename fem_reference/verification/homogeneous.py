@@ -15,7 +15,7 @@ from fem_reference.effects import Effect, make
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.paths import Affine, Along, Matrix, Radial
-from fem_reference.runs.solved import Reached
+from fem_reference.runs.store import Frame
 from fem_reference.verification.parts import SURFACE, SYMMETRY, resistance
 from fem_reference.verification.truths import find
 
@@ -97,7 +97,7 @@ class Specimen:
         mesh = shapes.box((2, 2, 2), SIZE, ELEMENTS[self.element][0])
         return Body(mesh, acting, MODES[self.mode][0](self.amount), (0, 1), Along(self.fibre))
 
-    def last(self, lab: Lab) -> Reached:
+    def last(self, lab: Lab) -> Frame:
         """Its state."""
         return lab.solve(self.body(), self.element, **STEPS).last
 

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from fem_reference.assessment.catalogue import Entry, Finding, Lab, Ladder, order
+from fem_reference.assessment.catalogue import Entry, Finding, Lab, Refinement, order
 from fem_reference.effects import Effect, make
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import shapes
@@ -151,7 +151,7 @@ ENTRIES: tuple[Entry, ...] = (
         relative=True,
         because="A step that turns the mode by x = 2 pi / 80 slows it down by x^2 / 12 = 5.1e-4.",
         source="validation/inertia.py, first_frequency",
-        ladder=Ladder((20, 40, 80), PERIOD, order=2, note="sizes are seconds of a step"),
+        refinement=Refinement((20, 40, 80), PERIOD, order=2, note="sizes are seconds of a step"),
     ),
     MOVING(
         name="swing_energy",
@@ -164,7 +164,6 @@ ENTRIES: tuple[Entry, ...] = (
         wrong={"spectral_radius": 0.0},
         truth=0.0,
         within=0.01,
-        relative=False,
         because="Nothing takes energy away; 1 % in ten periods of 60 steps is what is asked for.",
         kind="property",
         source="conservation of energy",

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.polynomial import Chebyshev
 from scipy.optimize import brentq, minimize_scalar
 
-from fem_reference.assessment.catalogue import Entry, Lab, Ladder
+from fem_reference.assessment.catalogue import Entry, Lab, Refinement
 from fem_reference.effects import Effect, make
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
 from fem_reference.problems.paths import Radial
-from fem_reference.runs.solved import Solved
+from fem_reference.runs.store import Run
 from fem_reference.verification.parts import SYMMETRY, clamped, mooney_rivlin, neo_hooke, ramp
 from fem_reference.verification.truths import find
 
@@ -37,7 +37,7 @@ Reading = tuple[
 
 
 def stretches(largest: float, count: int) -> tuple[float, ...]:
-    """From 1 to the largest, closer at both ends: where a polynomial through values is good in between."""
+    """Stretches from 1 to the largest, closer at both ends: where a polynomial through values is good in between."""
     along = (1 - np.cos(np.linspace(0, np.pi, count))) / 2
     return tuple((1 + (largest - 1) * along).tolist())
 
@@ -47,10 +47,10 @@ def sphere(element: str, n: int, degree: int) -> Cells:
     return shapes.sphere_octant(INNER, OUTER, n, 2 * n, ELEMENTS[element][0], degree)
 
 
-def slope(solved: Solved) -> Chebyshev:
+def slope(solved: Run) -> Chebyshev:
     """The slope of the energy over the frames [N mm]."""
-    end = solved.last.frame
-    frames, energies = zip(*((state.frame, state.scalars["energy"]) for state in solved.states), strict=True)
+    end = solved.last.number
+    frames, energies = zip(*((state.number, state.scalars["energy"]) for state in solved.states), strict=True)
     return Chebyshev.fit(frames, energies, len(frames) - 1, domain=[frames[0], end]).deriv()
 
 
@@ -80,7 +80,7 @@ def pressed(lab: Lab, n: int, mu: float) -> float:
     return float(np.linalg.norm(state.points[inside], axis=1).mean() / INNER)
 
 
-def tube(lab: Lab, n: int, element: str, ends: tuple[str, ...], degree: int) -> Solved:
+def tube(lab: Lab, n: int, element: str, ends: tuple[str, ...], degree: int) -> Run:
     """A quarter of the tube, whose inner face is moved out to STRETCH, and whose ``ends`` stay in their planes."""
     mesh = shapes.tube_quarter(INNER, OUTER, LENGTH, (2 * n, 2 * n, 1), ELEMENTS[element][0], degree)
     grown = Prescribed("inner", "inner", (0, 1), Radial(1.0, (1.0, 1.0, 0.0), ((1.0, 0.0), (2.0, 1.0))))
@@ -162,7 +162,7 @@ ENTRIES: tuple[Entry, ...] = (
         truth=lambda: true_pressure(laws.neo_hooke(MU)),
         within=2e-4,
         because="discretisation of order 4, 5e-5 with 6 cells through the wall; the polynomial of the energy adds 1e-6",
-        ladder=Ladder((1, 2, 3), INNER / 2, order=4),
+        refinement=Refinement((1, 2, 3), INNER / 2, order=4),
         slow=True,
         slow_negative_control=True,
     ),
@@ -177,7 +177,7 @@ ENTRIES: tuple[Entry, ...] = (
         truth=lambda: true_pressure(laws.neo_hooke(MU)),
         within=4e-4,
         because="discretisation of order 4, 1.1e-4 with 4 cells through the wall; the polynomial of the energy adds 1e-6",
-        ladder=Ladder((1, 2), INNER / 2, order=4),
+        refinement=Refinement((1, 2), INNER / 2, order=4),
         slow=True,
     ),
     FINITE(
@@ -205,7 +205,7 @@ ENTRIES: tuple[Entry, ...] = (
         truth=true_pressed,
         within=4e-4,
         because="discretisation of order 4, 8e-5 with 4 cells through the wall (P2/P1)",
-        ladder=Ladder((1, 2), INNER / 2, order=4),
+        refinement=Refinement((1, 2), INNER / 2, order=4),
     ),
     LIMIT(
         name="inflation_limit_pressure",
@@ -255,7 +255,7 @@ ENTRIES: tuple[Entry, ...] = (
         truth=lambda: true_tube(0),
         within=5e-5,
         because="discretisation of order 4, 1.1e-5 with 6 cells through the wall (Q2/Q1)",
-        ladder=Ladder((1, 2, 3), INNER / 2, order=4),
+        refinement=Refinement((1, 2, 3), INNER / 2, order=4),
         slow=True,
     ),
     FINITE(
@@ -269,6 +269,6 @@ ENTRIES: tuple[Entry, ...] = (
         truth=lambda: true_tube(1),
         within=5e-5,
         because="discretisation of order 4, 1e-5 with 6 cells through the wall (P2/P1)",
-        ladder=Ladder((1, 2, 3), INNER / 2, order=4),
+        refinement=Refinement((1, 2, 3), INNER / 2, order=4),
     ),
 )

@@ -6,7 +6,7 @@ from typing import Any
 
 from fem_reference.assessment import second_check
 from fem_reference.problems.body import Body
-from fem_reference.runs.solved import Solved
+from fem_reference.runs.store import Run
 from fem_reference.solvers import fenicsx, scikit_fem
 from fem_reference.solvers.fenicsx.session import Session
 
@@ -19,13 +19,13 @@ class FemLab:
     def __init__(self, session: Session) -> None:
         self.session = session
 
-    def solve(self, body: Body, element: str, **settings: Any) -> Solved:
+    def solve(self, body: Body, element: str, **settings: Any) -> Run:
         """The states of ``body`` by the reference, FEniCSx; none may take for ever."""
         limited = {"time_limit": _TIME_LIMIT} | settings
         solved = self.session.solve(body, fenicsx.BodySettings(element=element, **limited))
         return second_check.confirmed_body(body, solved)
 
-    def second(self, body: Body, element: str, **settings: Any) -> Solved:
+    def second(self, body: Body, element: str, **settings: Any) -> Run:
         """The states of ``body`` by the second opinion, scikit-fem."""
         return scikit_fem.solve_body(body, scikit_fem.ScikitBodySettings(element=element, **settings))
 

@@ -42,7 +42,6 @@ LAGGED = Entry(
     wrong={"residual": 1e-2},
     truth=0.0,
     within=1e-9,
-    relative=False,
     because="Both end where the residual is below 1e-11 N, far below it as a rule; where the bar is softest (some 0.006 N/mm) that "
     "would leave 2e-9 mm.",
     kind="property",

@@ -5,12 +5,12 @@ from functools import partial
 
 import numpy as np
 
-from fem_reference.assessment.catalogue import Entry, Lab, Ladder
+from fem_reference.assessment.catalogue import Entry, Lab, Refinement
 from fem_reference.effects import Effect, make
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
 from fem_reference.problems.paths import Turn
-from fem_reference.runs.solved import Solved
+from fem_reference.runs.store import Run
 from fem_reference.verification.homogeneous import BULK, MU, NEO, SIZE, STEPS, Specimen, stretch_entry
 from fem_reference.verification.parts import SURFACE, SYMMETRY, clamped, farthest, neo_hooke, ramp, sliding
 from fem_reference.verification.truths import find
@@ -55,7 +55,7 @@ def loaded(
     prescribed: tuple[Prescribed, ...],
     frames: int = 1,
     bulk: float = BULK,
-) -> Solved:
+) -> Run:
     """The states of a block under a ``load``, up to so many ``frames``."""
     body = Body(wet_block(wet), (*neo_hooke(MU, bulk), load), prescribed, tuple(range(frames + 1)))
     return lab.solve(body, "P2/P1", **STEPS)
@@ -110,7 +110,6 @@ ENTRIES: tuple[Entry, ...] = (
         wrong={"density": FAT},
         truth=MUSCLE * FREE_FALL * float(np.prod(LARGE)),
         within=2e-9,
-        relative=False,
         because="The forces of a discrete equilibrium sum to zero whatever the mesh, but for the residual: it is 1e-10 N as a root "
         "of a sum of squares over 150 free nodes, and the sum of all may be the root of 150 times as large.",
         kind="closed form",
@@ -130,7 +129,7 @@ ENTRIES: tuple[Entry, ...] = (
         because="Discretisation: the top of 8 cells converges at twice the degree of the element, order 4.",
         kind="closed form",
         source="validation/loads.py, column_top: balance integrated by hand",
-        ladder=Ladder((2, 4, 8), HEIGHT, order=4),
+        refinement=Refinement((2, 4, 8), HEIGHT, order=4),
     ),
     LOAD(
         name="pressed_volume",
@@ -158,7 +157,6 @@ ENTRIES: tuple[Entry, ...] = (
         wrong={"faces": SURFACE[:-1]},
         truth=0.0,
         within=1e-12,
-        relative=False,
         because="A pressure on a closed surface has no resultant, on a discrete one either, but for the residual: 1e-13 N may add "
         "up over 75 free nodes to 9 times as much.",
         kind="property",
@@ -174,7 +172,6 @@ ENTRIES: tuple[Entry, ...] = (
         wrong={"load": dead(-0.2 * MU)},
         truth=0.0,
         within=1e-10,
-        relative=False,
         because="A pressure turns with the surface, but for the residual: 1e-13 N may add up to 1e-12 N, and the block that stands "
         "bends under a force at its top by 1 mm for every 0.05 N: 2e-11 mm, before the turn and after.",
         kind="property",

@@ -10,7 +10,7 @@ from fem_reference.effects import Effect, make
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.body import ELEMENTS, Prescribed
 from fem_reference.problems.paths import Rest
-from fem_reference.runs.solved import Solved
+from fem_reference.runs.store import Run
 
 SURFACE = ("x0", "x1", "y0", "y1", "z0", "z1")  # of a box
 NO_GRADIENT = ((0.0, 0.0, 0.0),) * 3
@@ -20,7 +20,6 @@ YES = partial(
     unit="1",
     truth=1.0,
     within=0.1,
-    relative=False,
     because="it is yes (1) or no (0), and nothing between",
     kind="property",
 )
@@ -29,7 +28,7 @@ UP_AND_GONE = [{"frame": 0.0, "amount": 0.0}, {"frame": 1.0, "amount": 1.0}, {"f
 
 
 def ramp(full: float = 1.0) -> list[dict[str, float]]:
-    """From nothing at frame 0 to ``full`` at frame 1, as scene files write it."""
+    """A ramp from nothing at frame 0 to ``full`` at frame 1, as scene files write it."""
     return [{"frame": 0.0, "amount": 0.0}, {"frame": 1.0, "amount": full}]
 
 
@@ -78,7 +77,7 @@ def nearest(points: Floats, place: Iterable[float]) -> int:
     return int(np.argmin(np.linalg.norm(points - np.array(tuple(place)), axis=1)))
 
 
-def relaxation_rate(solved: Solved, numbers: tuple[int, int], seconds: float) -> float:
+def relaxation_rate(solved: Run, numbers: tuple[int, int], seconds: float) -> float:
     """The rate [1/s] at which the top of a body, its greatest z, goes back to rest between two states, ``seconds`` apart."""
     rest = solved.states[0].points[:, 2].max()
     ends = [solved.states[number].points[:, 2].max() - rest for number in numbers]

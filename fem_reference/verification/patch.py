@@ -8,7 +8,7 @@ from fem_reference.assessment.catalogue import Entry, Lab
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.paths import Along, Matrix, Turn
-from fem_reference.runs.solved import Reached
+from fem_reference.runs.store import Frame
 from fem_reference.verification.fibres import active
 from fem_reference.verification.homogeneous import BULK, NEO, SIZE, STEPS, Material, X, everywhere
 from fem_reference.verification.parts import SURFACE, farthest, resistance
@@ -40,9 +40,7 @@ def turn(share: float) -> Turn:
     return Turn(AXIS, share * ANGLE, CENTRE, knots=((1.0, 0.0), (2.0, 1.0)))
 
 
-def states(
-    lab: Lab, material: Material, element: str, faces: tuple[str, ...], further: float
-) -> tuple[Reached, Reached]:
+def states(lab: Lab, material: Material, element: str, faces: tuple[str, ...], further: float) -> tuple[Frame, Frame]:
     """A warped box before and after a turn of its ``faces``, z1 or the whole surface by ``further`` times as much: this in one
     step, two ends in as many as it takes. Before, at frame 1, it is at rest or contracted, as its material is.
     """
@@ -80,7 +78,6 @@ BLOCK = Entry(
     wrong={"further": 1.01},
     truth=0.0,
     within=1e-10,
-    relative=False,
     because=f"A turned body is a linear function of the body at rest: {LEFT}.",
     kind="property",
     source="Objectivity: a law sees C = F^T F only.",

@@ -81,7 +81,6 @@ ENTRIES = tuple(
         wrong={"grading": UNIFORM if grading == GRADED else GRADED},
         truth=float(find("rims").far_order(np.pi, 0.5, grading)),
         within=within,
-        relative=False,
         because=because,
         kind="closed form",
         source="validation/rims.py: Williams 1952",

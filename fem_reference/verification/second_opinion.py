@@ -16,7 +16,7 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed
 from fem_reference.problems.paths import Affine, Along, Rest, Turn
-from fem_reference.runs.solved import Reached
+from fem_reference.runs.store import Frame
 from fem_reference.verification import fibres
 from fem_reference.verification.cook import Panel
 from fem_reference.verification.homogeneous import HEART, MOONEY, MU, NEO, Specimen
@@ -50,7 +50,7 @@ def agreement(
     return Finding(max(found.values()), note=f"{note}; {first.scalars['newton_iterations']:.0f} Newton iterations")
 
 
-def differences(first: Reached, second: Reached, rest: Floats) -> dict[str, float]:
+def differences(first: Frame, second: Frame, rest: Floats) -> dict[str, float]:
     """Between two states of a body: of node positions over the greatest displacement from ``rest`` (n, 3), and relative ones of
     energies, and of forces and moments over their greatest.
     """
@@ -145,7 +145,6 @@ def opinion(name: str, title: str, body: Callable[[], Body], element: str, withi
         wrong={"error": 0.01},
         truth=0.0,
         within=within,
-        relative=False,
         because=because,
         kind="second solver",
         source="scikit-fem's elements; derivatives by jets, own assembly and Newton's method, scipy's sparse LU",

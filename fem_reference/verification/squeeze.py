@@ -12,7 +12,7 @@ from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
 from fem_reference.problems.paths import Affine
-from fem_reference.runs.solved import Reached, Solved
+from fem_reference.runs.store import Frame, Run
 from fem_reference.verification.parts import NO_GRADIENT, SYMMETRY, YES, clamped, farthest, frames, neo_hooke
 from fem_reference.verification.truths import find
 
@@ -23,7 +23,7 @@ RESIDUAL = 1e-11  # [N, mm3]
 GLUED_TO, GLUED_STEPS = 0.4, 12
 
 
-def smooth(lab: Lab, element: str, bulk: float, *, growing: bool = False, back: float = 1.0) -> tuple[Reached, ...]:
+def smooth(lab: Lab, element: str, bulk: float, *, growing: bool = False, back: float = 1.0) -> tuple[Frame, ...]:
     """All states of an eighth of a cube there and as much of the way ``back``: at even steps, or where they are ``growing`` at the
     ends of both paths.
     """
@@ -36,7 +36,7 @@ def smooth(lab: Lab, element: str, bulk: float, *, growing: bool = False, back: 
     return (*solved.states[:-1], solved.last)
 
 
-def _finding(value: float, states: tuple[Reached, ...]) -> Finding:
+def _finding(value: float, states: tuple[Frame, ...]) -> Finding:
     """The finding with the cost of the squeeze, and the smallest det F of all its states."""
     scalars = [state.scalars for state in states]
     smallest = min(min(one["min_det_F_quadrature"], one["min_det_F_vertices"]) for one in scalars)
@@ -62,7 +62,7 @@ def distance_from_rest(lab: Lab, element: str, bulk: float, *, growing: bool, ba
     return _finding(farthest(states[-1].points, states[0].points), states)
 
 
-def glued(lab: Lab, element: str, count: int, height: float, **settings: Any) -> Solved:
+def glued(lab: Lab, element: str, count: int, height: float, **settings: Any) -> Run:
     """The states of a cube of ``count`` cells a side between plates that it sticks to, down to a ``height``."""
     mesh = shapes.box((count,) * 3, (1.0, 1.0, 1.0), ELEMENTS[element][0])
     top = Prescribed("top", "z1", (0, 1, 2), Affine(NO_GRADIENT, (0.0, 0.0, height - 1)))
@@ -70,10 +70,11 @@ def glued(lab: Lab, element: str, count: int, height: float, **settings: Any) ->
     return lab.solve(body, element, first_step=1.0, smallest_step=0.005, residual=RESIDUAL, **settings)
 
 
-def _end_note(solved: Solved, height: float) -> str:
+def _end_note(solved: Run, height: float) -> str:
     last = solved.states[-1]
     return (
-        f"{solved.outcome.status}: {solved.outcome.message}. Last state kept at {1 - (1 - height) * last.frame:.3f} of the height: "
+        f"{solved.outcome.status}: {solved.outcome.message}. "
+        f"Last state kept at {1 - (1 - height) * last.number:.3f} of the height: "
         f"det F at least {last.scalars['min_det_F_quadrature']:.3f} at quadrature points, "
         f"{last.scalars['min_det_F_vertices']:.3f} at vertices, V/V0 {last.scalars['volume_ratio']:.5f}"
     )
@@ -133,7 +134,6 @@ ENTRIES: tuple[Entry, ...] = (
         given={"element": "Q2/Q1", "bulk": 10.0},
         wrong={"bulk": 0.99 * 10.0},
         truth=lambda: loads.squeezed_volume(MU, 10.0, HEIGHT),
-        relative=False,
     ),
     *(
         SMOOTH(
@@ -146,7 +146,6 @@ ENTRIES: tuple[Entry, ...] = (
             negative_control="the plates stop a thousandth of their way before they are back",
             wrong={"back": 0.999},
             truth=0.0,
-            relative=False,
             because=f"{EXACT}; of an elastic body nothing remembers the squeeze",
             kind="property",
             source="a hyperelastic body that nothing loads or moves is at rest",

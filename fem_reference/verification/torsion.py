@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from fem_reference.assessment.catalogue import Entry, Lab, Ladder
+from fem_reference.assessment.catalogue import Entry, Lab, Refinement
 from fem_reference.effects import Effect
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed
@@ -64,7 +64,7 @@ SQUARE = partial(
     relative=True,
     kind="closed form",
     source="Timoshenko and Goodier 1970, art. 109; validation/torsion.py",
-    ladder=Ladder((2, 4, 8), SIDE / 2, order=4),
+    refinement=Refinement((2, 4, 8), SIDE / 2, order=4),
 )
 
 ENTRIES: tuple[Entry, ...] = (
@@ -78,7 +78,7 @@ ENTRIES: tuple[Entry, ...] = (
         truth=lambda: rivlin.Torsion(MU / 2, 0.0, RADIUS, TWIST).moment(),
         within=5e-4,
         because="discretisation of order 4, 8e-5 with 8 cells along the radius; the material's K/mu of 1e6 adds 1e-6",
-        ladder=Ladder((1, 2, 4), RADIUS / 2, order=4),
+        refinement=Refinement((1, 2, 4), RADIUS / 2, order=4),
         slow=True,
         slow_negative_control=True,
     ),
@@ -92,7 +92,7 @@ ENTRIES: tuple[Entry, ...] = (
         truth=lambda: rivlin.Torsion(MU / 2, 0.0, RADIUS, TWIST).moment(),
         within=1e-4,
         because="discretisation of order 4, 1.6e-5 with 6 cells along the radius; the material's K/mu of 1e6 adds 1e-6",
-        ladder=Ladder((1, 2, 3), RADIUS / 2, order=4),
+        refinement=Refinement((1, 2, 3), RADIUS / 2, order=4),
         slow=True,
         slow_negative_control=True,
     ),
@@ -106,7 +106,7 @@ ENTRIES: tuple[Entry, ...] = (
         truth=lambda: rivlin.Torsion(MU / 2, 0.0, RADIUS, TWIST).axial_force(),
         within=1e-3,
         because="discretisation of order 4, 1.7e-4 with 6 cells along the radius: a force of second order in the twist",
-        ladder=Ladder((1, 2, 3), RADIUS / 2, order=4),
+        refinement=Refinement((1, 2, 3), RADIUS / 2, order=4),
         slow=True,
         slow_negative_control=True,
     ),

@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from fem_reference.assessment.catalogue import Entry, Lab, Ladder
+from fem_reference.assessment.catalogue import Entry, Lab, Refinement
 from fem_reference.effects import make
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body, Prescribed
@@ -47,7 +47,7 @@ VISCOUS = partial(
     relative=True,
     kind="closed form",
 )
-HALVED = partial(Ladder, size=SECONDS, order=1, extrapolated=True)
+HALVED = partial(Refinement, size=SECONDS, order=1, extrapolated=True)
 EULER = "by implicit Euler, whose sizes are seconds of a load step; the value is extrapolated from the last two"
 
 ENTRIES: tuple[Entry, ...] = (
@@ -60,7 +60,7 @@ ENTRIES: tuple[Entry, ...] = (
         because="The last load step shortens the block by x of its height then, 1/64 in the longer steps. By hand the potential "
         "errs by -2 x + 16/3 x^2 of the viscous part, 0.7 of the force; without the first order 0.7 * 8/3 x^2 = 4.6e-4 is left.",
         source="validation/viscosity.py, squeeze_force",
-        ladder=HALVED((32, 64, 128), note=f"force {EULER}"),
+        refinement=HALVED((32, 64, 128), note=f"force {EULER}"),
     ),
     VISCOUS(
         name="viscous_creep",
@@ -71,6 +71,6 @@ ENTRIES: tuple[Entry, ...] = (
         because="Of x = rate times the longer load step = 0.047 implicit Euler without its first order leaves x^2 / 6 = 3.7e-4; "
         "1e-4 is how far the strain is from a small one.",
         source="validation/viscosity.py, creep_rate",
-        ladder=HALVED((8, 16, 32), note=f"rate {EULER}"),
+        refinement=HALVED((8, 16, 32), note=f"rate {EULER}"),
     ),
 )

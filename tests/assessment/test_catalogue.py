@@ -1,10 +1,10 @@
-"""An entry is measured with what is given or what is wrong, up its ladder, and beside its truth."""
+"""An entry is measured with what is given or what is wrong, over its refinement, and beside its truth."""
 
 import math
 
 import pytest
 
-from fem_reference.assessment.catalogue import Finding, Ladder, order, result
+from fem_reference.assessment.catalogue import Finding, Refinement, order, result
 from tests.verification.stand_ins import entry
 
 
@@ -25,7 +25,7 @@ def test_a_measurement_may_be_a_finding_with_a_note() -> None:
 
 def test_a_ladder_ends_with_its_finest_mesh() -> None:
     # 1 + h^2 of h = 2 and 1 falls at order 2 to 1.
-    one = entry("bar", square, given={"height": 4.0}, wrong={}, ladder=Ladder((1, 2), 2.0, order=2))
+    one = entry("bar", square, given={"height": 4.0}, wrong={}, refinement=Refinement((1, 2), 2.0, order=2))
     found = one.find(None)
     assert (found.value, found.order, found.ladder) == (2.0, 2.0, ((2.0, 5.0), (1.0, 2.0)))
 
@@ -37,14 +37,16 @@ def test_a_negative_control_is_measured_on_the_finest_mesh_alone() -> None:
         asked.append(count)
         return height
 
-    one = entry("bar", noted, given={"height": 1.0}, wrong={"height": 2.0}, ladder=Ladder((1, 2, 4), 1.0, order=2))
+    one = entry(
+        "bar", noted, given={"height": 1.0}, wrong={"height": 2.0}, refinement=Refinement((1, 2, 4), 1.0, order=2)
+    )
     found = one.find(None, with_negative_control=True)
     assert (found.value, found.order, found.ladder, asked) == (2.0, None, (), [4])
 
 
 def test_an_error_of_first_order_is_extrapolated_away() -> None:
-    ladder = Ladder((1, 2, 4), 1.0, order=1, extrapolated=True, note="steps")
-    one = entry("creep", square, given={"height": 3.0, "power": 1}, wrong={"height": 6.0}, ladder=ladder)
+    refinement = Refinement((1, 2, 4), 1.0, order=1, extrapolated=True, note="steps")
+    one = entry("creep", square, given={"height": 3.0, "power": 1}, wrong={"height": 6.0}, refinement=refinement)
     found = one.find(None)
     assert (found.value, found.order, found.note) == (1.0, 1.0, "steps")
     assert [value for _, value in found.ladder] == [4.0, 2.5, 1.75]
@@ -52,7 +54,7 @@ def test_an_error_of_first_order_is_extrapolated_away() -> None:
 
 
 def test_without_an_order_none_is_measured() -> None:
-    one = entry("bar", square, given={"height": 4.0}, wrong={}, ladder=Ladder((1, 2), 2.0, order=None))
+    one = entry("bar", square, given={"height": 4.0}, wrong={}, refinement=Refinement((1, 2), 2.0, order=None))
     assert one.find(None).order is None
 
 

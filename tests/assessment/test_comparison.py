@@ -11,7 +11,7 @@ from fem_reference.assessment.comparison import compare
 from fem_reference.assessment.error_bars import ErrorBar, ErrorBars
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines
-from fem_reference.problems.muscle import Setup
+from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Outcome, Run
 from fem_reference.scenes.case import Expectation
 

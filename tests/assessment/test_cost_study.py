@@ -1,42 +1,86 @@
-"""What a study keeps of a run: its errors, and the settings that distinguish it."""
+"""Files of studies: read back whole, and refused with file and key where they are damaged."""
 
+import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-import numpy as np
 import pytest
-import shapes
-import small
 
-from fem_reference.foundations.mesh import Polylines
-from fem_reference.metrics import MeasurementContext
-from fem_reference.runs.store import Outcome, Run
-from fem_reference.scenes import casefile
-from fem_reference.scenes.case import SolverChoice
-from fem_reference.studies.cost import errors, settings_of
-from fem_reference.studies.ladders import Trial
-
-BOX = shapes.skin(shapes.box((2, 2, 2), (10, 10, 10)))
-FIBRE = Polylines(np.array([[5.0, 5, 1], [5, 5, 9]]), np.array([0, 2]))
+from fem_reference.assessment.cost_study import facts, load, load_all
+from fem_reference.foundations.errors import InputError
+from tests.assessment.test_recommendation import RMS, TIME, study
 
 
-def run(folder: str, *scales: float) -> Run:
-    """A box that grows by ``scales`` about its corner, a frame each."""
-    positions = np.array([scale * BOX.points for scale in scales])
-    return Run(
-        "run", "recorded", Outcome("converged", ""), tuple(range(len(scales))), BOX, positions, folder=Path(folder)
-    )
+def without(*keys: Any) -> Callable[[dict[str, Any]], None]:
+    def change(table: dict[str, Any]) -> None:
+        for key in keys[:-1]:
+            table = table[key]
+        del table[keys[-1]]
+
+    return change
 
 
-def test_an_error_is_the_greatest_magnitude_of_either_sign() -> None:
-    truth = run("truth", 1.0, 2.0)
-    context = MeasurementContext.of(replace(truth, fibres=FIBRE, fibre_positions=None), FIBRE, ())
-    found = errors(run("mine", 1.0, 1.8), truth, context)
-    assert found["volume.deviation"] == pytest.approx(100 * (1 - 0.9**3), rel=1e-9)  # 1.8 for 2, in % of the truth
-    assert errors(run("truth", 1.0, 1.8), truth, context) == {}  # the truth has none
+def put(value: Any, *keys: Any) -> Callable[[dict[str, Any]], None]:
+    def change(table: dict[str, Any]) -> None:
+        for key in keys[:-1]:
+            table = table[key]
+        table[keys[-1]] = value
+
+    return change
 
 
-def test_a_setting_that_is_its_solvers_own_is_no_setting(tmp_path) -> None:
-    scene = casefile.read_muscle(small.write(tmp_path / "bar"))
-    choice = SolverChoice(solver="fenicsx", element="P2/P1", newton_iterations=7)
-    assert settings_of(Trial(scene, choice, "reference")) == {"newton_iterations": 7}
+DAMAGE = {
+    "no features": (without("features"), "features.size: got nothing, want this number"),
+    "a feature less": (without("features", "triangles"), "features.triangles: got nothing, want this number"),
+    "a size of zero": (put(0.0, "features", "size"), "features.size: got 0, want more than 0"),
+    "a feature that is text": (put("large", "features", "motion"), 'features.motion: got "large", want '),
+    "a negative feature": (put(-1.0, "features", "motion"), "features.motion: got -1.0, want "),
+    "foreign unit": (put("inch", "units", RMS), f'units.{RMS}: got "inch", want mm'),
+    "another unit of ours": (put("%", "units", RMS), f'units.{RMS}: got "%", want mm'),
+    "unit of nobody": (put("furlong", "units", "mine.own"), 'units.mine.own: got "furlong", want one of '),
+    "an error below zero": (put(-1.0, "points", 1, "errors", RMS), f"points[1].errors.{RMS}: got -1.0, want "),
+    "an error beyond all": (put(1e999, "points", 1, "errors", RMS), f"points[1].errors.{RMS}: got inf, want "),
+    "a bar below zero": (put(-1.0, "bars", RMS), f"bars.{RMS}: got -1.0, want "),
+    "a time below zero": (put(-1.0, "points", 0, "costs", TIME), f"points[0].costs.{TIME}: got -1.0, want "),
+    "an error without a unit": (
+        put(1.0, "points", 2, "errors", "a.b"),
+        "points[2].errors.a.b: got an error without a unit",
+    ),
+    "a point that is none": (put(3, "points", 1), "points[1]: got 3, want "),
+    "a point without its solver": (without("points", 1, "solver"), "points[1].solver: got nothing, want "),
+    "a scene that is none": (put([1], "points", 0, "choice", "scene"), "points[0].choice.scene: got [1], want "),
+    "half a mesh": (
+        put({"muscle.tet_size": "4 mm"}, "points", 0, "choice", "scene"),
+        "points[0].choice.scene.muscle.refinements: got nothing, want ",
+    ),
+    "a mesh of no size": (
+        put({"muscle.tet_size": "fine", "muscle.refinements": 1}, "points", 0, "choice", "scene"),
+        'points[0].choice.scene.muscle.tet_size: got "fine", want ',
+    ),
+    "another format": (put(9, "format"), "format: got 9, want 1"),
+    "no case": (without("case"), "case: got nothing, want "),
+}
+
+
+@pytest.mark.parametrize("what", DAMAGE)
+def test_a_damaged_study_is_refused_with_file_and_key(what: str, tmp_path: Path) -> None:
+    damage, want = DAMAGE[what]
+    path = tmp_path / "study.json"
+    table = json.loads(json.dumps(facts(study("bar", 50), {"machine": "here"})))
+    damage(table)
+    path.write_text(json.dumps(table).replace("Infinity", "1e999"))
+    with pytest.raises(InputError) as refused:
+        load_all(path)
+    assert str(refused.value).startswith(f"{path}: {want}")
+
+
+def test_a_file_is_read_back_whole(tmp_path: Path) -> None:
+    given = replace(study("bar", 50), bars={RMS: 1.0})
+    path = tmp_path / "study.json"
+    path.write_text(json.dumps(facts(given, {"machine": "here"})))
+    assert vars(load(path)) == vars(given)
+    path.write_text("[]")
+    with pytest.raises(InputError, match=r"got \[\], want a study as the verb study writes it"):
+        load_all(path)

@@ -12,7 +12,7 @@ from fem_reference.assessment.fronts import Point
 from fem_reference.assessment.recommendation import recommend
 from fem_reference.foundations.errors import InputError
 
-RMS, TIME = "surface_deviation.rms", "seconds_per_frame"
+RMS, TIME, PERCENT = "surface_deviation.rms", "seconds_per_frame", "fibre_length.rms_percent"
 SETTINGS = (
     (1, 0.2, 0.001),
     (3, 0.1, 0.003),
@@ -207,3 +207,20 @@ def test_tetrahedra_are_recommended_in_the_size_of_the_case_itself() -> None:
     found = recommend(fine | {"refinements": 0.0}, "new", [with_tets(one) for one in STUDIES], RMS, {"error": 1.0})
     assert found.best is not None
     assert found.best.point.choice["scene"] == {"muscle.tet_size": "24 mm", "muscle.refinements": 0}
+
+
+def own_study(known: dict[str, float], bar: float = 0.0) -> CaseStudy:
+    """A study of the small scene: errors of 0.2, 0.1 and 0.02 of 50 mm in 1, 3 and 10 ms, and the truth in 2 s."""
+    about = ("bar", "fenicsx", "reference", "", "", {"solver": "fenicsx"}, "converged", "")
+    found = study("bar", 50, bar=bar)
+    points = (*found.points, Point(*about, {}, {TIME: 2.0}))
+    return replace(found, points=points, features=known, bars={RMS: bar} if bar else {})
+
+
+def test_a_case_whose_bones_are_still_is_compared_by_no_motion() -> None:
+    still = features(0.0)
+    with pytest.raises(InputError, match="new: got bones that do not move, want a study of the case itself"):
+        recommend(still, "new", [study("a", 50)], RMS, {"error": 5.0})
+    with pytest.raises(InputError, match="got none of a case whose bones move"):
+        recommend(features(50), "new", [replace(study("a", 50), features=still)], RMS, {"error": 5.0})
+    assert recommend(still, "a", [replace(study("a", 50), features=still)], RMS, {"error": 5.0}).best is not None

@@ -18,7 +18,7 @@ from fem_reference.assessment.measured import CurrentMeasures, sample
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines
 from fem_reference.metrics import Measure
-from fem_reference.problems.muscle import Setup
+from fem_reference.problems.setup import Setup
 from fem_reference.report import regression_texts
 from fem_reference.runs.store import Outcome, Run
 

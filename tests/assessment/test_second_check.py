@@ -20,8 +20,7 @@ from fem_reference.foundations.mesh import Surface
 from fem_reference.foundations.motion import Rotation as Turn
 from fem_reference.foundations.motion import Translation
 from fem_reference.geometry.intersections import crossings, overlaps, self_crossings
-from fem_reference.geometry.penetrations import Body as Within
-from fem_reference.geometry.penetrations import depths
+from fem_reference.geometry.penetrations import ClosedSurface, depths
 from fem_reference.geometry.rigid_bodies import Box, Sphere
 from fem_reference.geometry.sectors import attached_shares
 from fem_reference.geometry.skins import attached_skin
@@ -33,8 +32,7 @@ from fem_reference.problems.body import Body, Prescribed
 from fem_reference.problems.muscle import Problem
 from fem_reference.problems.paths import Affine
 from fem_reference.runs import store
-from fem_reference.runs.solved import Reached, Solved
-from fem_reference.runs.store import Outcome, Run
+from fem_reference.runs.store import Frame, Outcome, Run, collected
 from fem_reference.scenes import casefile
 from fem_reference.studies.execution import Bench
 from fem_reference.verification import second_check as catalogue
@@ -51,7 +49,7 @@ def ball(radius: float, at=(0.0, 0.0, 0.0)) -> tuple[Surface, Sphere]:
 
 def deepest(body: Surface, radius: float, at) -> float:
     surface, form = ball(radius, at)
-    return depths(Within(body), surface, form, STILL).deepest()[0]
+    return depths(ClosedSurface(body), surface, form, STILL).deepest()[0]
 
 
 BLOCK = shapes.skin(shapes.box((2, 2, 3), (10, 10, 40)))
@@ -76,7 +74,7 @@ def test_a_thin_needle_between_the_vertices_of_a_coarse_block_is_found_all_along
     turned = needle.moved_to(needle.points[:, [2, 0, 1]] + [-5.0, 3.3, 17.7])
     low, high = turned.points.min(axis=0), turned.points.max(axis=0)
     form = Box(tuple((low + high) / 2), tuple(high - low), 0.0)
-    found, place = depths(Within(BLOCK), turned, form, STILL).deepest()
+    found, place = depths(ClosedSurface(BLOCK), turned, form, STILL).deepest()
     # The nearest side of the block: y = 0 from 3.3, or the way back along x.
     assert_allclose(found, 3.4, atol=0.2)
     assert place[0] > 3.0
@@ -356,10 +354,10 @@ def test_bodies_reach_their_frames_and_meet_what_is_prescribed() -> None:
     path = Affine(((0.0, 0.0, 0.5), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
     body = Body(mesh, (), (Prescribed("top", "z1", (0, 1), path),), (0.0, 0.5, 1.0))
 
-    def solved(points: list, frames=(0.0, 0.5, 1.0)) -> Solved:
-        return Solved(tuple(Reached(f, p, {}, {}) for f, p in zip(frames, points, strict=True)), CONVERGED)
+    def solved(points: list, frames=(0.0, 0.5, 1.0)) -> Run:
+        return collected([Frame(f, points=p) for f, p in zip(frames, points, strict=True)], CONVERGED)
 
-    def wrong(one: Solved) -> list[str]:
+    def wrong(one: Run) -> list[str]:
         return [check.name for check in of_body(body, one) if not check.met]
 
     true = [mesh.points + path(mesh.points, frame) for frame in body.frames]
@@ -433,5 +431,5 @@ def test_a_path_that_writes_into_its_points_is_asked_like_any_other() -> None:
         return np.multiply(points, 0, out=points)
 
     body = Body(mesh, (effects.make("neo_hooke", mu=0.01),), (Prescribed("low", "z0", (0, 1, 2), still),), (0.0,))
-    solved = Solved((Reached(0.0, mesh.points, {}, {}),), Outcome("converged", ""))
+    solved = collected([Frame(0.0, points=mesh.points)], Outcome("converged", ""))
     assert all(one.met for one in of_body(body, solved))

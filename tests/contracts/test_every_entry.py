@@ -8,8 +8,7 @@ import pytest
 
 from fem_reference.assessment.catalogue import Entry, Kind, result
 from fem_reference.problems.body import Body
-from fem_reference.runs.solved import Reached, Solved
-from fem_reference.runs.store import Outcome
+from fem_reference.runs.store import Frame, Outcome, Run, collected
 from fem_reference.verification import runner
 
 ENTRIES = runner.entries()
@@ -32,9 +31,9 @@ def test_every_entry_states_what_a_reader_needs() -> None:
 def test_an_entry_finds_its_truth(entry: Entry, fem_lab) -> None:
     found = result(entry, entry.find(fem_lab), 0.0, with_negative_control=False)
     assert found.word == "pass", (found.finding, found.truth, found.within)
-    if entry.ladder is not None and entry.ladder.order is not None:
+    if entry.refinement is not None and entry.refinement.order is not None:
         # Less than in theory is room for meshes that are not fine enough yet.
-        assert found.finding.order is None or found.finding.order > entry.ladder.order - 0.5
+        assert found.finding.order is None or found.finding.order > entry.refinement.order - 0.5
 
 
 @pytest.mark.slow
@@ -53,16 +52,15 @@ class Reading:
     def __init__(self) -> None:
         self.cells = defaultdict[str, list[int]](list)
 
-    def solve(self, body: Body, element: str, **settings: float) -> Solved:  # noqa: ARG002
+    def solve(self, body: Body, element: str, **settings: float) -> Run:  # noqa: ARG002
         self.cells[body.mesh.kind].append(len(body.mesh.cells))
         around = {entry.name: np.ones(3) for entry in (*body.prescribed, *body.obstructions)}
-        return Solved(
-            tuple(
-                Reached(frame, body.mesh.points + (frame - body.frames[0]), around, around, defaultdict(lambda: 1.0))
-                for frame in body.frames
-            ),
-            Outcome("converged", "", {}),
-        )
+        points, scalars = body.mesh.points, defaultdict[str, float](lambda: 1.0)
+        states = [
+            Frame(number, points=points + (number - body.frames[0]), forces=around, moments=around, scalars=scalars)
+            for number in body.frames
+        ]
+        return collected(states, Outcome("converged", "", {}))
 
     second = solve
 

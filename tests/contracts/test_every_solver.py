@@ -14,8 +14,9 @@ from fem_reference.foundations.records import Record, parse
 from fem_reference.io import files
 from fem_reference.problems import scalar
 from fem_reference.problems.body import Body, Prescribed
-from fem_reference.problems.muscle import AttachedVertices, Problem
+from fem_reference.problems.muscle import Problem
 from fem_reference.problems.paths import Turn
+from fem_reference.problems.setup import AttachedVertices
 from fem_reference.problems.shapes import box
 from fem_reference.runs.store import Frame
 from fem_reference.scenes import casefile
@@ -152,10 +153,10 @@ def test_attached_vertices_follow_their_bones(name, tmp_path) -> None:
 def test_a_field_has_a_value_at_every_node_and_a_cost(name) -> None:
     solver = solvers.find(name, "tests", "solve_field")
     built = scalar.build(casefile.read("rod"))
-    solution = solver.solve_field(built, parse(solver.settings, solver.example, name))
+    solution = solver.run(built, parse(solver.settings, solver.example, name))
     assert solution.outcome.status == "converged"
     assert solution.outcome.message
-    assert solution.values.shape == built.fixed.shape
+    assert solution.values[0].shape == built.fixed.shape
     assert np.isfinite(solution.values).all()
     assert all(np.isfinite(value) for value in solution.outcome.cost.values())
 
@@ -166,11 +167,11 @@ def test_a_body_turns_with_its_ends(name) -> None:
     mesh, turn = box((1, 1, 2), (1.0, 2.0, 3.0), "tetrahedron"), Turn((0.0, 1.0, 0.0), 0.4, (0.0, 0.0, 0.0))
     ends = tuple(Prescribed(end, end, (0, 1, 2), turn) for end in ("z0", "z1"))
     body = Body(mesh, MUSCLE, ends, (0.0, 0.5, 1.0))
-    solved = solver.solve_body(body, parse(solver.settings, solver.example, name))
+    solved = solver.run(body, parse(solver.settings, solver.example, name))
     assert solved.outcome.status == "converged"
-    assert [state.frame for state in solved.states] == [0.0, 0.5, 1.0]
+    assert [state.number for state in solved.states] == [0.0, 0.5, 1.0]
     for state in solved.states:
-        assert state.points == pytest.approx(mesh.points + turn(mesh.points, state.frame), abs=1e-7)
+        assert state.points == pytest.approx(mesh.points + turn(mesh.points, state.number), abs=1e-7)
     assert all(np.isfinite(value) for value in solved.outcome.cost.values())
 
 

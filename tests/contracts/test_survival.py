@@ -23,9 +23,11 @@ from fem_reference.assessment.stress import Stress
 from fem_reference.export.folders import new_folder
 from fem_reference.foundations import scratch, subprocesses
 from fem_reference.io import files
+from fem_reference.problems.problem import AtRest
 from fem_reference.runs import cut_off, store
 from fem_reference.runs.states import write_arrays
-from fem_reference.runs.store import Frame, Outcome, Run, Writer
+from fem_reference.runs.store import Frame, Outcome, Run
+from fem_reference.runs.writer import Writer
 from fem_reference.scenes import casefile
 from fem_reference.solvers.fenicsx import jobs
 from fem_reference.studies.execution import Bench
@@ -111,7 +113,7 @@ def test_a_command_that_is_killed_ends_as_if_it_had_not_been(tmp_path: Path) -> 
 
 def begun(folder: Path, frames: int = 2, status: str | None = None) -> Writer:
     """A run of which some frames are stored, and something is kept to go on from."""
-    writer = Writer(folder, IDENTITY, SURFACE)
+    writer = Writer(folder, IDENTITY, AtRest(SURFACE))
     for number in IDENTITY["frames"][:frames]:  # type: ignore[index]
         writer.add(Frame(number, SURFACE.points + number, scalars={"energy": 1.0 * number}))
     writer.cut_off.folder.mkdir()
@@ -125,7 +127,7 @@ def begun(folder: Path, frames: int = 2, status: str | None = None) -> Writer:
 def test_a_writer_goes_on_where_a_run_was_cut_off(status: str | None, tmp_path: Path) -> None:
     begun(tmp_path / "run", status=status)
     (tmp_path / "run" / "surface" / ".frame_0010-1.vtp").touch()
-    writer = Writer(tmp_path / "run", IDENTITY | {"name": "other"}, SURFACE)
+    writer = Writer(tmp_path / "run", IDENTITY | {"name": "other"}, AtRest(SURFACE))
     assert writer.cut_off == cut_off.CutOff(tmp_path / "run" / "restart", (0, 5))
     writer.add(Frame(5, SURFACE.points + 6, scalars={"energy": 6.0}))  # one that is there already
     assert writer.frames == (0, 5)
@@ -154,7 +156,7 @@ def test_a_run_that_cannot_go_on_begins_anew(change: str, tmp_path: Path) -> Non
         others = {"frames": (0, 5), "solver": "another", "versions": {"versions": {"numpy": "3"}}}
         key = change.removeprefix("other ")
         identity[{"versions": "origin"}.get(key, key)] = others[key]
-    assert Writer(tmp_path / "run", identity, SURFACE).frames == ()
+    assert Writer(tmp_path / "run", identity, AtRest(SURFACE)).frames == ()
     assert not (tmp_path / "run" / "surface").exists()
 
 
@@ -240,7 +242,7 @@ def test_a_run_whose_folder_cannot_be_written_into_any_more_keeps_what_it_has(tm
         writer.add(Frame(10, SURFACE.points + 10, scalars={"energy": 10.0}))
     (tmp_path / "run" / "surface").unlink()
     surfaces.rename(tmp_path / "run" / "surface")
-    assert Writer(tmp_path / "run", IDENTITY, SURFACE).frames == (0, 5)
+    assert Writer(tmp_path / "run", IDENTITY, AtRest(SURFACE)).frames == (0, 5)
     assert len(list((tmp_path / "run" / "surface").iterdir())) == 2
 
 

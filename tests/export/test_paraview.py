@@ -25,10 +25,12 @@ from fem_reference.foundations.motion import apply
 from fem_reference.io import files
 from fem_reference.problems import muscle
 from fem_reference.problems.body import reference_nodes
+from fem_reference.problems.problem import AtRest
 from fem_reference.runs import store
 from fem_reference.runs.results import Results
 from fem_reference.runs.states import NodalState
 from fem_reference.runs.store import Frame, Outcome
+from fem_reference.runs.writer import Writer
 from fem_reference.scenes import casefile
 from validation import homogeneous, laws
 
@@ -73,7 +75,7 @@ def written(folder, scene, setup, tets: TetMesh, fibres: Polylines) -> store.Run
     """The run of closed form as a solver would have stored it."""
     along = np.tile([0.0, 0, 1], (len(tets.tets), 1))
     identity = {"name": "reference", "solver": "fenicsx", "frames": FRAMES, "origin": {"scene": scene.key}}
-    writer = store.Writer(folder, identity, setup.surface, fibres, tets, along)
+    writer = Writer(folder, identity, AtRest(setup.surface, fibres, tets, along))
     weights = reference_nodes("tetrahedron", 2)
     nodes = np.einsum("kc,mcx->mkx", np.column_stack([1 - weights.sum(axis=1), weights]), tets.points[tets.tets])
     for number in FRAMES:
@@ -274,6 +276,6 @@ def test_the_worst_corner_of_a_bent_tetrahedron_is_the_least() -> None:
     moved = np.zeros((1, 10, 3))
     moved[0, :, 0] = -0.2 * nodes[:, 0] ** 2
     state = NodalState(moved, np.zeros((1, 0)), np.zeros((0, 0, 3)))
-    block = paraview._interior(Results(mesh, (), {0: state}), 0)
+    block = paraview.interior(Results(mesh, (), {0: state}), 0)
     assert block.of_cells["det_F_at_worst_corner"] == pytest.approx([0.2])
     assert block.of_cells["det_F"] == pytest.approx([1 - 0.4 * 0.5])  # its middle is at x = 0.5

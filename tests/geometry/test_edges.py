@@ -123,7 +123,7 @@ def test_angles_are_exact_where_arccos_has_no_digits() -> None:
     fold = 1e-10
     for sign in (1, -1):
         points = np.array([[0.0, 0, 0], [0, 1, 0], [-1, 0.5, 0], [1, 0.5, -sign * np.tan(fold)]])
-        edges = Edges(np.array([[0, 1]]), np.array([[2, 3]]), np.ones(1))
+        edges = Edges(np.array([[0, 1]]), np.array([[0, 1]]), np.array([[2, 3]]), np.ones(1))
         assert_allclose(edges.angles(points), sign * fold, rtol=1e-12)
 
 
@@ -222,7 +222,7 @@ def test_a_fold_beyond_half_a_turn_is_the_smaller_angle() -> None:
     for run, reference in ((here, there), (there, here)):
         found = taken(run_of(tet, run), run_of(tet, reference))
         assert found["dihedral_angle.max"].values <= 180
-    alone = Edges(edges.ends[[shared]], edges.opposite[[shared]], np.ones(1))
+    alone = Edges(edges.ends[[shared]], edges.beside[[shared]], edges.opposite[[shared]], np.ones(1))
     assert_allclose(np.degrees(dihedral_angle.wrapped(alone.angles(there) - alone.angles(here))), 20, rtol=1e-10)
     assert_allclose(dihedral_angle.wrapped(np.array([-np.pi, np.pi, 1e-20])), [np.pi, np.pi, 1e-20], rtol=0, atol=0)
 

@@ -52,7 +52,7 @@ def test_another_surface_size_attachment_or_code_is_another_mesh(
     ):
         cached(mesher, surface, size, shares, tmp_path)
     assert mesher.count == 5
-    monkeypatch.setattr(kept_meshes, "_code", lambda: "another")
+    monkeypatch.setattr(kept_meshes, "code", lambda: "another")
     cached(mesher, BOX, 3.0, SHARES, tmp_path)
     assert mesher.count == 6
     assert cached(mesher, BOX, 3.0, SHARES, None).maker == "gmsh"

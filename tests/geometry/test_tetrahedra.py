@@ -203,7 +203,7 @@ def test_what_gmsh_says_is_passed_on() -> None:
     with pytest.raises(
         InputError, match=r"two.ply: got a surface that gmsh refuses \(Exception: .+\), want a clean surface"
     ):
-        tetrahedra._run("gmsh", twice, 16.0)
+        tetrahedra.run("gmsh", twice, 16.0)
 
 
 @pytest.mark.parametrize(
@@ -211,7 +211,7 @@ def test_what_gmsh_says_is_passed_on() -> None:
     [(-11, "", "it crashed with signal 11"), (1, "one\ntwo\n", "two"), (1, "", "without a word")],
 )
 def test_the_last_words_of_a_mesher(code: int, said: str, words: str) -> None:
-    assert tetrahedra._last_words(subprocess.CompletedProcess([], code, "", said)) == words
+    assert tetrahedra.last_words(subprocess.CompletedProcess([], code, "", said)) == words
 
 
 CORNER = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1], [-1, -2, 1]])
@@ -229,14 +229,14 @@ SIXTH = Surface(CORNER[:4], boundary(np.array([[0, 1, 2, 3]]))[0], "corner.ply")
 )
 def test_what_a_mesher_must_not_give_is_named(points: np.ndarray, tets: list[list[int]], what: str) -> None:
     with pytest.raises(InputError, match=f"corner.ply: got {what}"):
-        tetrahedra._checked(TetMesh(points, np.array(tets)), SIXTH)
+        tetrahedra.checked(TetMesh(points, np.array(tets)), SIXTH)
 
 
 def test_only_the_largest_part_is_kept_outward() -> None:
     box = shapes.box((2, 2, 2), (1.0, 1.0, 1.0))
     apart, hinged = [27, 28, 29, 30], [0, 1, 27, 28]
     tets = np.concatenate([box.tets[:, [1, 0, 2, 3]], [apart, hinged]])
-    kept = tetrahedra._checked(TetMesh(np.concatenate([box.points, CORNER[:4] + 7]), tets), shapes.skin(box))
+    kept = tetrahedra.checked(TetMesh(np.concatenate([box.points, CORNER[:4] + 7]), tets), shapes.skin(box))
     assert_array_equal(kept.points, box.points)
     assert_allclose(tet_volumes(kept.points, kept.tets), 1 / 48)
 
@@ -253,4 +253,4 @@ def test_no_room_for_tetrahedra_is_not_the_fault_of_the_surface(monkeypatch: pyt
     ended = subprocess.CompletedProcess([], 1, "", "OSError: [Errno 28] No space left on device")
     monkeypatch.setattr(tetrahedra.subprocess, "run", lambda *_, **__: ended)
     with pytest.raises(OSError, match=r"cannot be written: No space left on device; tetrahedra of .* need room there"):
-        tetrahedra._run("gmsh", shapes.sphere(1), 5.0)
+        tetrahedra.run("gmsh", shapes.sphere(1), 5.0)

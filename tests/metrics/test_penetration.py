@@ -16,7 +16,7 @@ from fem_reference.geometry.exemption import Exemption
 from fem_reference.geometry.rigid_bodies import Box, HalfSpace, Sphere
 from fem_reference.io.files import read_surface, write_surface
 from fem_reference.metrics import Measure, MeasurementContext, at_rest, measure, penetration
-from fem_reference.problems.muscle import AttachedVertices, RigidBody, Setup
+from fem_reference.problems.setup import AttachedVertices, RigidBody, Setup
 from fem_reference.runs.store import Outcome, Run
 
 RADIUS = 20.0

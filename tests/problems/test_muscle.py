@@ -12,6 +12,7 @@ from fem_reference.foundations.mesh import Polylines
 from fem_reference.io import files
 from fem_reference.metrics import MeasurementContext, penetration
 from fem_reference.problems import muscle, of_case
+from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Outcome, Run
 from fem_reference.solvers import fenicsx
 
@@ -52,7 +53,7 @@ def scene(folder, cells, within: str = "1.5 mm", effects: str = "listed"):
     return fr.make_case(table, folder)
 
 
-def deepest(rest: muscle.Setup, numbers, positions) -> np.ndarray:
+def deepest(rest: Setup, numbers, positions) -> np.ndarray:
     run = Run("run", "test", Outcome("converged", ""), tuple(numbers), rest.surface, np.array(positions), None, None)
     lines = Polylines(rest.surface.points[:2], np.array([0, 2]))
     context = MeasurementContext.of(run, lines, rest.bones, rest.exempt)

@@ -14,7 +14,6 @@ from fem_reference.geometry.skins import Skin
 from fem_reference.geometry.tetrahedra import tetrahedralise
 from fem_reference.io import files
 from fem_reference.problems import fibre_field, muscle
-from fem_reference.problems.muscle_body import as_body
 from fem_reference.report.overview import case_facts
 from fem_reference.runs.store import Frame
 from fem_reference.scenes import casefile
@@ -164,7 +163,7 @@ ramp = [{ frame = 0, amount = 0.0 }, { frame = 20, amount = 1.0 }]
 
 def test_directions_only_where_an_effect_needs_them(bar, built) -> None:
     assert built.directions is None
-    assert as_body(built).fibre is None
+    assert built.body.fibre is None
     text = (bar / "case.toml").read_text()
     (bar / "case.toml").write_text(text.replace("[fibres]", f"{FIBRE}\n[fibres]"))
     along = build(bar).directions
@@ -176,7 +175,7 @@ def test_directions_only_where_an_effect_needs_them(bar, built) -> None:
 
 
 def test_as_a_body_its_bones_prescribe_their_facets_and_the_rest_is_free(built) -> None:
-    body = as_body(built)
+    body = built.body
     skin, _ = boundary(built.mesh.tets)
     parts = [tuple(sorted(facet)) for facets in body.mesh.facets.values() for facet in facets.tolist()]
     assert sorted(parts) == sorted(tuple(sorted(facet)) for facet in skin.tolist())
@@ -196,7 +195,7 @@ def test_a_stiffness_of_an_attachment_reaches_the_body(bar) -> None:
     scene = casefile.read(bar)
     soft = scene.attachment[1].model_copy(update={"stiffness": 0.1})
     scene = scene.model_copy(update={"attachment": (scene.attachment[0], soft)})
-    body = as_body(muscle.build(scene, muscle.setup(scene)))
+    body = muscle.build(scene, muscle.setup(scene)).body
     assert [entry.stiffness for entry in body.prescribed] == [None, 0.1]
     assert (body.prescribed[0].on, type(body.prescribed[1].on)) == ("origin", Skin)
     # A load may still act on what springs attach, and what is free is free of both.
@@ -288,7 +287,7 @@ def test_a_body_may_be_attached_by_nothing(squeezed) -> None:
     built = build_scene(squeezed)
     assert built.attached == ()
     assert built.mesh.facets == {}
-    body = as_body(built)
+    body = built.body
     assert body.prescribed == ()
     assert list(body.mesh.facets) == ["free"]
     assert len(body.mesh.facets["free"]) == len(boundary(built.mesh.tets)[0])

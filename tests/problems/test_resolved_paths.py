@@ -13,8 +13,8 @@ from fem_reference.geometry.rigid_bodies import Sphere
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body, Prescribed
 from fem_reference.problems.contact import Obstruction
-from fem_reference.problems.muscle import AttachedVertices, RigidBody, Setup
 from fem_reference.problems.paths import Affine, Follows, From, Rest, Turn
+from fem_reference.problems.setup import AttachedVertices, RigidBody, Setup
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers.common.frame_loop import follow
 from fem_reference.solvers.common.load_steps import Attempt, StepSizes, march

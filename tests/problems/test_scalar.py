@@ -156,16 +156,17 @@ def test_points_that_delaunay_cannot_do(tmp_path, points, match) -> None:
 
 
 def test_the_listings_refuse_what_they_do_not_have(tmp_path) -> None:
+    (offer,) = listing.SOLVES
     with pytest.raises(InputError, match="value 0 on the left and slope -1 on the right"):
-        listing.solve_field(build(scene(tmp_path)), listing.ListingSettings())
+        offer.run(build(scene(tmp_path)), listing.ListingSettings())
     plate = build(scene(tmp_path, domain=fields.square(tmp_path, 4), boundary=[{"on": "rim", "value": 0}]))
     sloped = scene(
         tmp_path, domain=fields.square(tmp_path, 4), boundary=[{"on": "rim", "slope": 0}], effect=[DIFFUSION, REACTION]
     )
     with pytest.raises(InputError, match=r"listing 4\.5 has no slopes"):
-        listing.solve_field(build(sloped), listing.ListingSettings())
+        offer.run(build(sloped), listing.ListingSettings())
     with pytest.raises(InputError, match=r"listing 4\.5 has none"):
-        listing.solve_field(plate, listing.ListingSettings(peclet=1.0))
+        offer.run(plate, listing.ListingSettings(peclet=1.0))
 
 
 def spoken(capsys, *arguments: str) -> tuple[int, str, str]:

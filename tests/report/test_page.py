@@ -21,7 +21,7 @@ from fem_reference.foundations.motion import Translation
 from fem_reference.geometry.rigid_bodies import HalfSpace
 from fem_reference.geometry.tessellation import tessellated
 from fem_reference.metrics import Measure, MeasurementContext
-from fem_reference.problems.muscle import RigidBody, Setup
+from fem_reference.problems.setup import RigidBody, Setup
 from fem_reference.report import gallery, page
 from fem_reference.report import sections as folder_of_sections
 from fem_reference.report.at_frames import label

@@ -1,5 +1,6 @@
 """The page of a study: its sentences, its tables at the same cost or error, and a drawing whose axes the reader chooses."""
 
+import html
 import json
 import math
 import re
@@ -9,7 +10,9 @@ import pytest
 
 from fem_reference.assessment.cost_study import CaseStudy, Study
 from fem_reference.assessment.fronts import Point
+from fem_reference.assessment.recommendation import recommend
 from fem_reference.report import study_page, write_study
+from tests.assessment.test_recommendation import RMS, TIME, features, own_study
 
 UNITS = {"surface_deviation.rms": "mm", "fibre_length.rms_percent": "%", "volume.deviation": "%"}
 
@@ -173,3 +176,36 @@ def test_settings_are_tried_on_cases_that_they_were_not_chosen_on(tmp_path) -> N
     plain = re.sub(r"<[^>]+>|&#8239;", "", text)
     assert "with the best of the same settings: 0% in the median, 0% at most" in plain
     assert math.isclose(max(one.loss for one in study_page.transfers(whole.cases, "surface_deviation.rms")), 0.0)
+
+
+@pytest.mark.parametrize("own_bar", [0.0, 0.5, 2.0])
+def test_at_most_means_the_same_on_the_page_of_the_study(own_bar: float) -> None:
+    known = features(50)
+    case = own_study(known, bar=own_bar)
+    rows = {same: rows for same, _, rows in study_page.matched(case)}
+    levels = [row.at for row in rows[RMS]]
+    assert levels
+    for row in rows[RMS]:
+        cheapest = next(iter(row.best.values()))
+        assert recommend(known, "bar", [case], RMS, {"error": row.at}).best.point.label == cheapest.label
+    for error in (0.4, 0.6, 2.9, 3.1, 4.9, 5.1, 6.9, 7.1, 9.9, 12.1):
+        found = recommend(known, "bar", [case], RMS, {"error": error}).best
+        best = list(study_page.at_same_error(case.certain, RMS, TIME, error).best.values())
+        assert (None if found is None else found.point.label) == (best[0].label if best else None), error
+    for row in rows[TIME]:
+        assert (
+            recommend(known, "bar", [case], RMS, {"time": row.at}).best.point.label
+            == next(iter(row.best.values())).label
+        )
+
+
+def test_the_page_says_that_the_bar_is_in_its_table() -> None:
+    case = own_study(features(50), bar=2.0)
+    case = replace(case, units=case.units | dict.fromkeys(study_page.SHOWN, "mm"))
+    text = study_page.render(Study((case,)))
+    table = text[text.index("The same surface deviation, rms: time of a frame") :]
+    plain = html.unescape(re.sub(r"<[^>]+>", "", table)).replace("\N{NARROW NO-BREAK SPACE}", " ")
+    assert "with the error bar of the truth, 2 mm, at most" in plain
+    # At most 10 mm: 5 mm were measured in 3 ms; at most 2 mm: the truth.
+    assert "0.00300 ssweeps = 3, 5 mm measured" in plain
+    assert "reference, as it is, the truth itself" in plain

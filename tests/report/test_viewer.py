@@ -17,7 +17,7 @@ from browser import PROGRAM, Browser
 from fem_reference.assessment import local_fields
 from fem_reference.assessment.error_bars import ErrorBar, ErrorBars
 from fem_reference.foundations.mesh import Polylines
-from fem_reference.problems.muscle import RigidBody
+from fem_reference.problems.setup import RigidBody
 from fem_reference.report import page, viewer, viewer_fields
 from fem_reference.report.sections import frames
 from tests.report import test_page as test_report

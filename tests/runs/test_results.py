@@ -10,9 +10,11 @@ from acting import TURN, make
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, TetMesh
 from fem_reference.problems.body import reference_nodes
+from fem_reference.problems.problem import AtRest
 from fem_reference.runs import results, states, store
 from fem_reference.runs.results import NAMES, Results
 from fem_reference.runs.states import NodalState
+from fem_reference.runs.writer import Writer
 from validation import laws
 from validation.fibre_laws import FibreActive, FibrePassive, FibrePassiveFebio
 
@@ -208,12 +210,12 @@ def test_bad_input_is_named() -> None:
         other.evaluate(POINTS, 0)
 
 
-def stored(folder, state: NodalState | None, fibre: Floats | None = FIBRES) -> store.Writer:
+def stored(folder, state: NodalState | None, fibre: Floats | None = FIBRES) -> Writer:
     """A run of one frame."""
     surface = shapes.skin(MESH)
     identity = {"name": "reference", "solver": "test", "origin": {"scene": "none"}, "frames": (0,)}
-    writer = store.Writer(folder, identity, surface, None, MESH, fibre)
-    writer.add(store.Frame(0, surface.points, tets=MESH.points, state=state))
+    writer = Writer(folder, identity, AtRest(surface, None, MESH, fibre))
+    writer.add(store.Frame(0, surface.points, points=MESH.points, state=state))
     writer.close(store.Outcome("converged", "done"))
     return writer
 

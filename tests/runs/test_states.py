@@ -8,16 +8,19 @@ import numpy as np
 import pytest
 import shapes
 import small
+from stand_ins import solve_by
 
 import fem_reference as fr
 from fem_reference import cli
 from fem_reference.export import paraview
 from fem_reference.foundations.mesh import Polylines
 from fem_reference.problems.body import ELEMENTS, Cells
-from fem_reference.runs import states, store
+from fem_reference.problems.problem import AtRest
+from fem_reference.runs import states
 from fem_reference.runs.key import versions
 from fem_reference.runs.states import NodalState
 from fem_reference.runs.store import Frame, Outcome
+from fem_reference.runs.writer import Writer
 from fem_reference.scenes import casefile
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import resources
@@ -40,7 +43,7 @@ def solved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     def refuse(*_: object) -> None:
         raise AssertionError("it is solved again")
 
-    monkeypatch.setattr(Bench, "_solve", refuse)
+    solve_by(monkeypatch, fenicsx, refuse)
 
     def write(*, kept: tuple[int, ...]) -> list[str]:
         bench = Bench(scene, tmp_path / "out" / "runs")
@@ -66,7 +69,7 @@ def _write(place: Path, bench: Bench, numbers: tuple[int, ...], kept: tuple[int,
     fibres = Polylines(np.column_stack([np.full((8, 2), 5.0), [1, 5, 10, 20, 2, 3, 4, 8]]), [0, 4, 8])
     origin = {"scene": bench.scene.key, "versions": versions()}
     identity = {"name": "reference", "solver": "fenicsx", "frames": numbers, "origin": origin}
-    writer = store.Writer(place, identity, rest, fibres, mesh, np.tile([0.0, 0, 1], (len(mesh.tets), 1)))
+    writer = Writer(place, identity, AtRest(rest, fibres, mesh, np.tile([0.0, 0, 1], (len(mesh.tets), 1))))
     state = NodalState(np.zeros((len(mesh.tets), 10, 3)), np.zeros((len(mesh.tets), 4)), np.zeros((0, 0, 3)))
     for number in numbers:
         frame = Frame(number, rest.points, fibres.points, mesh.points)
@@ -161,9 +164,9 @@ def test_a_run_that_was_cut_off_without_states_does_not_go_on_with_them(tmp_path
     (place / "run.json").write_text(json.dumps(facts | {"status": "running"}))
     identity = {"name": "reference", "solver": "fenicsx", "frames": scene.numbers}
     origin = {"scene": scene.key, "versions": versions()}
-    assert store.Writer(place, identity | {"origin": origin}, bench.setup().surface).frames == scene.numbers
+    assert Writer(place, identity | {"origin": origin}, bench.setup().rest).frames == scene.numbers
     origin["settings"] = Settings(store_state=True).model_dump(mode="json")
-    assert store.Writer(place, identity | {"origin": origin}, bench.setup().surface).frames == ()
+    assert Writer(place, identity | {"origin": origin}, bench.setup().rest).frames == ()
 
 
 def test_bodies_carry_no_states_by_default() -> None:

@@ -9,8 +9,10 @@ import shapes
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines
+from fem_reference.problems.problem import AtRest
 from fem_reference.runs import store
-from fem_reference.runs.store import Frame, Outcome, Writer
+from fem_reference.runs.store import Frame, Outcome
+from fem_reference.runs.writer import Writer
 
 SURFACE = shapes.sphere(1, 10.0)
 FIBRES = Polylines(np.array([[0.0, 0, -9], [0, 0, 0], [0, 0, 9], [1, 0, -5], [1, 0, 5]]), np.array([0, 3, 5]))
@@ -20,7 +22,7 @@ IDENTITY = {"name": "reference", "solver": "test", "origin": {"case": "none"}, "
 
 
 def write(folder, *, close=True):
-    writer = Writer(folder, IDENTITY, SURFACE, FIBRES, MESH)
+    writer = Writer(folder, IDENTITY, AtRest(SURFACE, FIBRES, MESH))
     for number in (0, 5):
         shift = np.array([0.1 * number, 0, 0])
         scalars, residuals = {"energy": 2.0 * number}, (1.0, 0.1) if number else ()
@@ -69,8 +71,8 @@ def test_progress_is_logged_with_how_far_and_how_long(tmp_path, caplog) -> None:
 @pytest.mark.parametrize(("quiet", "printed"), [(3600.0, [0, 3]), (0.0, [0, 1, 2, 3])])
 def test_progress_is_reported_now_and_then(tmp_path, caplog, monkeypatch, quiet, printed) -> None:
     caplog.set_level(logging.INFO, logger="fem_reference")
-    monkeypatch.setattr(store, "QUIET", quiet)
-    writer = Writer(tmp_path / "run", IDENTITY | {"frames": (0, 1, 2, 3)}, SURFACE, None, None)
+    monkeypatch.setattr("fem_reference.runs.writer.QUIET", quiet)
+    writer = Writer(tmp_path / "run", IDENTITY | {"frames": (0, 1, 2, 3)}, AtRest(SURFACE))
     for number in range(4):
         writer.add(Frame(number, SURFACE.points))
     assert [number for number in range(4) if f"frame {number} (" in caplog.text] == printed
@@ -84,7 +86,7 @@ def test_a_run_that_was_cut_off_is_no_result(tmp_path) -> None:
 
 
 def test_only_a_converged_run_is_finished(tmp_path) -> None:
-    writer = Writer(tmp_path / "run", IDENTITY, SURFACE, None, None)
+    writer = Writer(tmp_path / "run", IDENTITY, AtRest(SURFACE))
     writer.add(Frame(0, SURFACE.points))
     writer.close(Outcome("diverged", "no"))
     assert store.load(tmp_path / "run").outcome.status == "diverged"
@@ -113,7 +115,7 @@ def test_writing_again_starts_afresh(tmp_path) -> None:
 
 
 def test_a_run_of_lines_alone_keeps_its_rest_state(tmp_path) -> None:
-    writer = Writer(tmp_path / "run", IDENTITY, SURFACE, FIBRES, MESH)
+    writer = Writer(tmp_path / "run", IDENTITY, AtRest(SURFACE, FIBRES, MESH))
     for number in (0, 5):  # straight lines are elsewhere than the fibres from the first frame on
         writer.add(Frame(number, None, FIBRES.points + number + 1))
     writer.close(Outcome("converged", "done"))

@@ -12,7 +12,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Surface, enclosed_volume
 from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
-from fem_reference.problems.muscle import AttachedVertices, RigidBody, Setup
+from fem_reference.problems.setup import AttachedVertices, RigidBody, Setup
 from fem_reference.solvers import arap
 
 USUAL = {

@@ -10,7 +10,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import enclosed_volume
 from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
-from fem_reference.problems.muscle import AttachedVertices, Setup
+from fem_reference.problems.setup import AttachedVertices, Setup
 from fem_reference.solvers import arap, arap_pbd
 from fem_reference.solvers.pbd import PbdConstraints
 from fem_reference.solvers.pbd_kernels import distances, volume

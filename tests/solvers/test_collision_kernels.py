@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere
 from fem_reference.geometry.signed_distance import FAR, Grid, build
-from fem_reference.problems.muscle import RigidBody
+from fem_reference.problems.setup import RigidBody
 from fem_reference.solvers import collision_kernels as collision
 
 BALL = shapes.sphere(2, 20.0)

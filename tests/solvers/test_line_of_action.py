@@ -19,7 +19,8 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines
 from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
-from fem_reference.problems.muscle import Problem, RigidBody
+from fem_reference.problems.muscle import Problem
+from fem_reference.problems.setup import RigidBody
 from fem_reference.report import gallery
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import line_of_action
@@ -55,7 +56,7 @@ def test_a_straight_line_is_between_ends_that_go_with_their_bones() -> None:
     assert outcome.status == "converged"
     assert outcome.message == "2 lines, straight; no surface"
     assert [frame.number for frame in frames] == [0, 5, 10]
-    assert all(frame.surface is None and frame.tets is None for frame in frames)
+    assert all(frame.surface is None and frame.points is None for frame in frames)
     for frame in frames:
         # The first fibre ends on top, the second begins there.
         tops = apply(SWING.pose(frame.number), np.array([[5.0, 5, 30], [4, 5, 30]]))

@@ -15,7 +15,8 @@ from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
 from fem_reference.geometry.embedding import Locator
 from fem_reference.geometry.rigid_bodies import HalfSpace
-from fem_reference.problems.muscle import Problem, RigidBody
+from fem_reference.problems.muscle import Problem
+from fem_reference.problems.setup import RigidBody
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import mass_spring
 from fem_reference.solvers.spring_kernels import Network, PrescribedPath, advance, forces
@@ -230,7 +231,7 @@ def test_fixed_vertices_follow_their_bones_where_the_tets_do_not_resolve_them() 
 def test_surface_and_fibres_go_with_the_tetrahedra() -> None:
     given = bar(BEND)
     _, frames = solved(given)
-    carried = Locator(given.mesh).embed(given.fibres.points).interpolate(given.mesh, frames[-1].tets)
+    carried = Locator(given.mesh).embed(given.fibres.points).interpolate(given.mesh, frames[-1].points)
     assert_allclose(frames[-1].fibres, carried, atol=1e-12)
     assert np.abs(frames[-1].surface - given.surface.points).max() > 1
     assert frames[-1].scalars["inverted_tets"] == 0
@@ -288,13 +289,13 @@ def test_bones_keep_masses_out() -> None:
     given = replace(bar(None, (0, 40)), bones=(floor,))
     soft = {"stiffness": "0.01 N/mm", "gravity": "0, -40, 0 m/s^2", "damping": "0.001 N s/m"}
     _, sagging = solved(given, **soft)
-    assert sagging[-1].tets[:, 1].min() < -2.5
+    assert sagging[-1].points[:, 1].min() < -2.5
     outcome, frames = solved(given, **soft, collision={"gap": "0.5 mm", "stiffness": 1.0})
     assert outcome.status == "converged"
     # Each step ends with its projection, of a plane exactly: round-off is left.
     fixed = np.isin(given.mesh.points[:, 2], (0, 30))
-    assert_allclose(frames[-1].tets[~fixed, 1].min(), 0.5 + 0.5, atol=1e-9)
-    assert_allclose(frames[-1].tets[fixed], given.mesh.points[fixed], atol=1e-12)
+    assert_allclose(frames[-1].points[~fixed, 1].min(), 0.5 + 0.5, atol=1e-9)
+    assert_allclose(frames[-1].points[fixed], given.mesh.points[fixed], atol=1e-12)
 
 
 def test_cost() -> None:

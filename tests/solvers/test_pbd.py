@@ -12,7 +12,8 @@ from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
 from fem_reference.geometry.rigid_bodies import Sphere
 from fem_reference.geometry.signed_distance import build
-from fem_reference.problems.muscle import AttachedVertices, Problem, RigidBody, Setup
+from fem_reference.problems.muscle import Problem
+from fem_reference.problems.setup import AttachedVertices, RigidBody, Setup
 from fem_reference.solvers import pbd
 
 USUAL = {

@@ -13,7 +13,7 @@ from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
 from fem_reference.io import files
 from fem_reference.problems import muscle
-from fem_reference.problems.muscle import AttachedVertices, RigidBody, Setup
+from fem_reference.problems.setup import AttachedVertices, RigidBody, Setup
 from fem_reference.scenes import casefile
 from fem_reference.solvers import pbd_program
 from fem_reference.solvers.pbd_kernels import dihedral, dihedrals

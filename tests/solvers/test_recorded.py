@@ -14,8 +14,10 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Surface
 from fem_reference.foundations.records import parse
 from fem_reference.io import files
-from fem_reference.problems.muscle import Setup
-from fem_reference.runs.store import Frame, Writer
+from fem_reference.problems.problem import AtRest
+from fem_reference.problems.setup import Setup
+from fem_reference.runs.store import Frame
+from fem_reference.runs.writer import Writer
 from fem_reference.solvers import recorded
 
 REST = shapes.sphere(1, 30.0)
@@ -102,7 +104,7 @@ def test_a_time_series(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, leads_to
 
 def test_a_stored_run(tmp_path: Path) -> None:
     identity = {"name": "pbd", "solver": "pbd", "origin": {}, "frames": FRAMES}
-    writer = Writer(tmp_path / "run", identity, REST, None, None)
+    writer = Writer(tmp_path / "run", identity, AtRest(REST))
     for number in FRAMES:
         writer.add(Frame(number, moved(number)))
     assert json.loads((tmp_path / "run" / "run.json").read_text())["numbers"] == list(FRAMES)

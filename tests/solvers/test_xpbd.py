@@ -13,7 +13,7 @@ from fem_reference.foundations.mesh import Surface, enclosed_volume
 from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
 from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere
-from fem_reference.problems.muscle import AttachedVertices, RigidBody, Setup
+from fem_reference.problems.setup import AttachedVertices, RigidBody, Setup
 from fem_reference.solvers import pbd, xpbd
 from fem_reference.solvers.collision_kernels import CollidingBone
 from fem_reference.solvers.xpbd import XpbdConstraints, XpbdStep

@@ -6,15 +6,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapes
+import small
 
 from fem_reference.assessment.error_bars import ErrorBar, ErrorBars
+from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines
 from fem_reference.metrics import MeasurementContext
 from fem_reference.runs.store import Outcome, Run
+from fem_reference.scenes import casefile
+from fem_reference.scenes.case import SolverChoice
 from fem_reference.studies import cost
+from fem_reference.studies.ladders import Trial
 
 BALL = shapes.sphere(1, 10.0)
 LINE = Polylines(np.array([[0.0, 0, -8], [0, 0, 8]]), np.array([0, 2]))
+BOX = shapes.skin(shapes.box((2, 2, 2), (10, 10, 10)))
+FIBRE = Polylines(np.array([[5.0, 5, 1], [5, 5, 9]]), np.array([0, 2]))
 
 
 def run(folder: str, *shifts: float) -> Run:
@@ -44,3 +51,35 @@ def test_errors_are_those_of_the_worst_frame_and_none_of_the_truth_itself() -> N
     found = cost.errors(run("other", 0, -1, 2, 2.5), truth, context)
     assert found["surface_deviation.rms"] == pytest.approx(2.0, rel=1e-12)
     assert cost.errors(run("truth", 0, 1, 2, 3), truth, context) == {}
+
+
+def grown(folder: str, *scales: float) -> Run:
+    """A box that grows by ``scales`` about its corner, a frame each."""
+    positions = np.array([scale * BOX.points for scale in scales])
+    return Run(
+        "run", "recorded", Outcome("converged", ""), tuple(range(len(scales))), BOX, positions, folder=Path(folder)
+    )
+
+
+def test_an_error_is_the_greatest_magnitude_of_either_sign() -> None:
+    truth = grown("truth", 1.0, 2.0)
+    context = MeasurementContext.of(replace(truth, fibres=FIBRE, fibre_positions=None), FIBRE, ())
+    found = cost.errors(grown("mine", 1.0, 1.8), truth, context)
+    assert found["volume.deviation"] == pytest.approx(100 * (1 - 0.9**3), rel=1e-9)  # 1.8 for 2, in % of the truth
+    assert cost.errors(grown("truth", 1.0, 1.8), truth, context) == {}  # the truth has none
+
+
+def test_a_setting_that_is_its_solvers_own_is_no_setting(tmp_path) -> None:
+    scene = casefile.read_muscle(small.write(tmp_path / "bar"))
+    choice = SolverChoice(solver="fenicsx", element="P2/P1", newton_iterations=7)
+    assert cost.settings_of(Trial(scene, choice, "reference")) == {"newton_iterations": 7}
+
+
+def test_a_file_of_no_study_is_named_and_a_folder_of_none_is(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=f'--out: got "{tmp_path}", where no study is'):
+        cost.stored(tmp_path)
+    (tmp_path / "study").mkdir()
+    path = tmp_path / "study" / "study.json"
+    path.write_text("[]")
+    with pytest.raises(InputError, match=rf"{path}: got \[\], want a study as the verb study writes it"):
+        cost.stored(tmp_path)

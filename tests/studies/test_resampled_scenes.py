@@ -8,6 +8,7 @@ import small
 
 from fem_reference.problems import muscle
 from fem_reference.scenes import casefile
+from fem_reference.studies.execution import Bench
 from fem_reference.studies.resampled_scenes import _nearest, resample
 
 
@@ -24,3 +25,15 @@ def test_a_vertex_is_attached_where_the_nearest_is() -> None:
     ball = shapes.sphere(1, 10.0)
     beside = ball.points * 1.02 + np.random.default_rng(5).uniform(-0.3, 0.3, ball.points.shape)
     assert np.array_equal(_nearest(ball, beside), np.arange(len(ball.points)))
+
+
+def test_a_resampled_scene_has_one_key_wherever_its_study_is(tmp_path: Path) -> None:
+    scene = casefile.read_muscle(small.write(tmp_path / "bar"))
+    keys, runs = set(), set()
+    for name in ("here", "elsewhere"):
+        bench = Bench(scene, tmp_path / name)
+        other = resample(scene, bench.setup(), -1, tmp_path / name / "surfaces")
+        keys.add(other.key)
+        runs.add(Bench(other, tmp_path / name).folder(other.candidate[0], "candidate[0]").name)
+    assert len(keys) == len(runs) == 1
+    assert keys != {scene.key}

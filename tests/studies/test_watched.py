@@ -18,6 +18,7 @@ from fem_reference import cli
 from fem_reference.effects import make
 from fem_reference.problems import guess, muscle, of_case
 from fem_reference.problems.estimates import STRESS_TOLERANCE, estimates
+from fem_reference.problems.setup import Setup
 from fem_reference.problems.stresses import StressSamples, StressSizes, kirchhoff
 from fem_reference.runs.store import Frame, Outcome, Run
 from fem_reference.scenes import casefile
@@ -128,7 +129,7 @@ def test_a_motion_allows_stresses_of_its_own_size(tmp_path) -> None:
     known = estimates(scene, rest)
     assert known.stress_tolerance == pytest.approx(STRESS_TOLERANCE * 0.01 * 0.1, rel=0.1)
     together = tuple(replace(entry, bone=rest.attached[1].bone) for entry in rest.attached)
-    alike = estimates(scene, muscle.Setup(rest.surface, rest.bones, together, rest.frames, rest.interval))
+    alike = estimates(scene, Setup(rest.surface, rest.bones, together, rest.frames, rest.interval))
     assert alike.travel == pytest.approx(4.0)
     assert alike.stress_tolerance < 1e-4 * known.stress_tolerance
 

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from fem_reference.runs.solved import Reached, Solved
-from fem_reference.runs.store import Outcome
+from fem_reference.runs.store import Frame, Outcome, collected
 from fem_reference.verification import inflation, truths
 
 
@@ -22,8 +21,8 @@ def test_the_slope_of_the_energy_is_the_pressure() -> None:
 
     for largest, count in ((1.6, 8), (inflation.BEYOND, 10)):
         frames = inflation.stretches(largest, count)
-        states = tuple(Reached(frame, np.zeros((0, 3)), {}, {}, {"energy": energy(frame)}) for frame in frames)
-        curve = inflation.slope(Solved(states, Outcome("converged", "", {})))
+        states = tuple(Frame(frame, scalars={"energy": energy(frame)}) for frame in frames)
+        curve = inflation.slope(collected(states, Outcome("converged", "", {})))
         for stretch in (1.2, 1.5, largest):
             pressure = curve(stretch) / (np.pi / 2 * inflation.INNER**3 * stretch**2)
             assert pressure == pytest.approx(sphere.pressure(stretch), rel=3e-6)
@@ -31,4 +30,4 @@ def test_the_slope_of_the_energy_is_the_pressure() -> None:
 
 def test_a_slope_of_what_was_not_reached_says_why() -> None:
     with pytest.raises(ArithmeticError, match="diverged: too far"):
-        inflation.slope(Solved((), Outcome("diverged", "too far", {})))
+        inflation.slope(collected((), Outcome("diverged", "too far", {})))

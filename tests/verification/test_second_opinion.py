@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from fem_reference.runs.solved import Reached
+from fem_reference.runs.store import Frame
 from fem_reference.verification.second_opinion import differences
 
 
 def test_each_kind_of_difference_is_felt() -> None:
     rest = np.zeros((2, 3))
 
-    def state(x: float = 2.0, energy: float = 4.0, force: float = 5.0, moment: float = 8.0) -> Reached:
+    def state(x: float = 2.0, energy: float = 4.0, force: float = 5.0, moment: float = 8.0) -> Frame:
         points = np.array([[0.0, 0.0, x], [1.0, 0.0, 0.0]])
         forces, moments = {"top": np.array([force, 1.0, 0.0])}, {"top": np.array([0.0, 0.0, moment])}
-        return Reached(1.0, points, forces, moments, {"energy": energy})
+        return Frame(1.0, points=points, forces=forces, moments=moments, scalars={"energy": energy})
 
     def changed(**values: float) -> dict[str, float]:
         return {name: value for name, value in differences(state(), state(**values), rest).items() if value}

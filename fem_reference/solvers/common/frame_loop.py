@@ -12,8 +12,9 @@ import numpy as np
 from fem_reference.foundations.mesh import TET_FACES, Floats, Polylines, Surface, TetMesh, diagonal
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.signed_distance import Grid
-from fem_reference.problems.muscle import AttachedVertices, Problem, RigidBody, Setup
+from fem_reference.problems.muscle import Problem
 from fem_reference.problems.resolved_paths import posed, skipped
+from fem_reference.problems.setup import AttachedVertices, RigidBody, Setup
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers.common.state_checks import StateCheck, Trouble, first_trouble, surface_checks
 

@@ -8,46 +8,30 @@ from fem_reference.effects import Effect
 from fem_reference.foundations.records import Record
 from fem_reference.problems.body import Body
 from fem_reference.problems.muscle import Problem
+from fem_reference.problems.problem import Task
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs.cut_off import CutOff
-from fem_reference.runs.scalar import Solution
-from fem_reference.runs.solved import Solved
-from fem_reference.runs.store import Outcome, Sink
+from fem_reference.runs.store import Frame, Outcome, Run, Sink, collected
 
-Task = Literal["solve", "solve_field", "solve_body"]
 Moves = Literal["surface", "tetrahedra", "lines", "nothing"]
 
 
-class SolveMuscle[S: Record](Protocol):
-    """Solves muscles."""
+class Solve[P, S: Record](Protocol):
+    """Solves problems of a kind."""
 
-    def __call__(self, problem: Problem, settings: S, sink: Sink, /) -> Outcome:
+    def __call__(self, problem: P, settings: S, sink: Sink, /) -> Outcome:
         """Sink every requested frame as it is reached. Physics that fails is a status with a sentence and never an exception;
-        what was reached before stays.
+        what was reached before stays. A scalar field is one frame, not-a-number where the status says that it failed.
         """
 
 
-class GoOn[S: Record](Protocol):
-    """Solves muscles from where a run was cut off."""
+class GoOn[P, S: Record](Protocol):
+    """Solves problems from where a run was cut off."""
 
-    def __call__(self, problem: Problem, settings: S, sink: Sink, cut_off: CutOff, /) -> Outcome:
-        """As ``SolveMuscle``, from the last stored frame that the solver kept enough of, which need not be the last of all, else
-        from the first; it ends as the run would have ended.
+    def __call__(self, problem: P, settings: S, sink: Sink, cut_off: CutOff, /) -> Outcome:
+        """As ``Solve``, from the last stored frame that the solver kept enough of, which need not be the last of all, else from
+        the first; it ends as the run would have ended.
         """
-
-
-class SolveField[S: Record](Protocol):
-    """Solves scalar fields."""
-
-    def __call__(self, problem: FieldProblem, settings: S, /) -> Solution:
-        """The field at the nodes of the mesh, not-a-number where the status says that it failed."""
-
-
-class SolveBody[S: Record](Protocol):
-    """Solves bodies of any shape."""
-
-    def __call__(self, body: Body, settings: S, /) -> Solved:
-        """The states at the body's frames, as far as they were reached."""
 
 
 class CheckEffects[S: Record](Protocol):
@@ -84,66 +68,76 @@ class TableRow(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Solver[S: Record]:
-    """What a solver's file offers for one task.
+class Solver[P, S: Record]:
+    """What a solver's file offers for one task: ``solve``.
 
     ``settings``: the record of its own settings. ``example``: some of them, as scene files write them, which contract tests solve
     with. ``require``: MissingSoftware where what it needs under such settings is not installed. ``check_problem`` of one whose
-    settings speak of what a case has. ``slow``: it takes more than a few seconds on a small problem. ``table``: its rows of the
-    page table-5-1.
+    settings speak of what a case has. ``slow``: it takes more than a few seconds on a small problem. ``go_on`` of one
+    that takes long: any other begins again from rest. ``table``: its rows of the page table-5-1.
     """
 
     task: ClassVar[Task]
     solves: ClassVar[str]
 
     settings: type[S]
+    solve: Solve[P, S]
     example: Mapping[str, Any]
     require: Callable[[S], None] = _nothing
     check_problem: CheckProblem[S] | None = None
     slow: bool = False
     table: tuple[TableRow, ...] = ()
+    go_on: GoOn[P, S] | None = None
+
+    def fills(self, settings: S) -> bool:  # noqa: ARG002
+        """True where it needs the problem meshed."""
+        return True
+
+    def run(self, problem: P, settings: S) -> Run:
+        """The run of a problem, in memory."""
+        return solved(self.solve, problem, settings)
 
 
 @dataclass(frozen=True, kw_only=True)
-class MuscleSolver[S: Record](Solver[S]):
+class MuscleSolver[S: Record](Solver[Problem, S]):
     """A solver of muscles; ``moves``: what carries its unknowns, whose mesh its accuracy and cost depend on;
     ``check_effects`` of one that simulates the effects of a scene, None of one that does not; ``fibres``: whether one of surfaces
-    needs the fibres under such settings: without them it is given a ``Setup``, as the muscle is not filled for it. ``go_on`` of one
-    that takes long: any other begins again from rest.
+    needs the fibres under such settings: without them it is given a ``Setup``, as the muscle is not filled for it.
     """
 
     task = "solve"
     solves = "muscles"
 
-    solve: SolveMuscle[S]
     moves: Moves = "surface"
     check_effects: CheckEffects[S] | None = None
     fibres: Callable[[S], bool] = _none
-    go_on: GoOn[S] | None = None
 
     def fills(self, settings: S) -> bool:
-        """Whether it needs the muscle filled with tetrahedra and fibres."""
+        """True where it needs the muscle filled with tetrahedra and fibres."""
         return self.moves not in ("surface", "nothing") or self.fibres(settings)
 
 
 @dataclass(frozen=True, kw_only=True)
-class FieldSolver[S: Record](Solver[S]):
+class FieldSolver[S: Record](Solver[FieldProblem, S]):
     """A solver of scalar fields."""
 
     task = "solve_field"
     solves = "scalar fields"
 
-    solve_field: SolveField[S]
-
 
 @dataclass(frozen=True, kw_only=True)
-class BodySolver[S: Record](Solver[S]):
+class BodySolver[S: Record](Solver[Body, S]):
     """A solver of bodies of any shape."""
 
     task = "solve_body"
     solves = "finite element bodies"
 
-    solve_body: SolveBody[S]
+
+def solved[P, S: Record](solve: Solve[P, S], problem: P, settings: S) -> Run:
+    """The run of a problem, in memory."""
+    frames: list[Frame] = []
+    outcome = solve(problem, settings, frames.append)
+    return collected(frames, outcome)
 
 
 @dataclass(frozen=True)

@@ -25,15 +25,14 @@ from fem_reference.foundations.subprocesses import command
 from fem_reference.geometry.embedding import Locator
 from fem_reference.problems.body import Body, check_element, check_quadrature
 from fem_reference.problems.muscle import Problem
-from fem_reference.problems.muscle_body import as_body
 from fem_reference.runs.cut_off import CutOff
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers.common.protocol import BodySolver, FieldSolver, MuscleSolver
-from fem_reference.solvers.fenicsx import resources
+from fem_reference.solvers.fenicsx import field, resources
 from fem_reference.solvers.fenicsx.field import FieldSettings, solve_field
 from fem_reference.solvers.fenicsx.jobs import Job, Kept, kept, stored_state
 from fem_reference.solvers.fenicsx.processes import require_installed, running
-from fem_reference.solvers.fenicsx.session import present, session, shared, solve_body
+from fem_reference.solvers.fenicsx.session import present, session, shared, solve_body, solve_on
 from fem_reference.solvers.fenicsx.settings import BodySettings, Settings
 
 log = logging.getLogger(__name__)
@@ -74,15 +73,16 @@ def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
     """Solve every requested frame in worker processes; frames carry surface, fibres and tets."""
     require(settings)
     with scratch.folder() as folder:
-        return _solve(problem, as_body(problem), settings, sink, folder, None)
+        return _solve(problem, settings, sink, folder, None)
 
 
 def go_on(problem: Problem, settings: Settings, sink: Sink, cut_off: CutOff) -> Outcome:
     """As ``solve``, from the last stored frame of a run that was cut off; states are kept until the caller removes them."""
     require(settings)
-    body = as_body(problem)
-    there = kept(cut_off, body)
-    again = settings.reuse and not any("interval" in effect.needs for effect in body.effects)  # states serve again
+    there = kept(cut_off, problem.body)
+    again = settings.reuse and not any(
+        "interval" in effect.needs for effect in problem.body.effects
+    )  # states serve again
     if there.frames:
         log.info("begun before; going on from what is kept up to frame %d", there.frames[-1])
 
@@ -92,14 +92,15 @@ def go_on(problem: Problem, settings: Settings, sink: Sink, cut_off: CutOff) -> 
             for number in problem.frames[: problem.frames.index(frame.number)]:
                 there.place(number).unlink(missing_ok=True)
 
-    return _solve(problem, body, settings, pass_on, there.folder, there)
+    return _solve(problem, settings, pass_on, there.folder, there)
 
 
-def _solve(problem: Problem, body: Body, settings: Settings, sink: Sink, folder: Path, kept: Kept | None) -> Outcome:
-    settings = _planned(_with_states(problem, body, settings), body)
+def _solve(problem: Problem, settings: Settings, sink: Sink, folder: Path, kept: Kept | None) -> Outcome:
+    body = problem.body
+    settings = _planned(_with_states(problem, settings), body)
     job = folder.resolve() / "job.pickle"  # a process that is shared may have been started elsewhere
     job.write_bytes(pickle.dumps(Job(body, settings, _samples(problem), kept)))
-    passed: list[int] = list(kept.frames) if kept else []
+    passed: list[float] = list(kept.frames) if kept else []
     outcome = _solved(job, settings, lambda frame: _pass_on(problem, frame, sink, passed))
     if outcome.status != "converged" and body.frames[0] < body.first and not passed:
         begin = (
@@ -123,13 +124,13 @@ def _solved(job: Path, settings: Settings, sink: Sink) -> Outcome:
     return own.run(job, settings.time_limit, take, "frames")
 
 
-def _pass_on(problem: Problem, frame: Frame, sink: Sink, passed: list[int]) -> None:
+def _pass_on(problem: Problem, frame: Frame, sink: Sink, passed: list[float]) -> None:
     """A frame that is wanted, its number noted in ``passed``; what relaxes before the first is not."""
     if frame.number in problem.frames:
         if not passed and (overlap := frame.scalars.get("overlap_at_rest", 0.0)) > 0:
             frame = replace(frame, note=f"{frame.note}, {overlap:.2g} mm of overlap with bones at rest removed")
-        passed.append(int(frame.number))
-        sink(_with_attachment_errors(problem, replace(frame, number=int(frame.number))))
+        passed.append(frame.number)
+        sink(_with_attachment_errors(problem, frame))
 
 
 def _with_attachment_errors(problem: Problem, frame: Frame) -> Frame:
@@ -191,12 +192,12 @@ def _check_ranks(settings: Settings, place: str) -> None:
         raise InputError(place, settings.ranks, "1, on which multigrid works")
 
 
-def _with_states(problem: Problem, body: Body, settings: Settings) -> Settings:
+def _with_states(problem: Problem, settings: Settings) -> Settings:
     """The settings with whether states are kept: as asked for, else where those of all frames are small."""
     if settings.store_state is not None:
         return settings
-    steps = any("interval" in effect.needs for effect in body.effects)
-    size = len(problem.frames) * resources.state(body.mesh, settings.element, steps=steps)
+    steps = any("interval" in effect.needs for effect in problem.effects)
+    size = len(problem.frames) * resources.state(problem.body.mesh, settings.element, steps=steps)
     return settings.model_copy(update={"store_state": size <= resources.MOST_STATES})
 
 
@@ -252,6 +253,6 @@ SOLVES = (
         check_effects=check_effects,
         slow=True,
     ),
-    FieldSolver(settings=FieldSettings, solve_field=solve_field, example={}, require=require, slow=True),
-    BodySolver(settings=BodySettings, solve_body=solve_body, example={}, require=require, slow=True),
+    FieldSolver(settings=FieldSettings, solve=field.solve, example={}, require=require, slow=True),
+    BodySolver(settings=BodySettings, solve=solve_on, example={}, require=require, slow=True),
 )

@@ -54,7 +54,7 @@ def distribute(problem: FieldProblem) -> mesh.Mesh:
 
 
 def nodes(space: Any, problem: FieldProblem) -> Ints:
-    """Which node of the problem stands at each unknown of ``space``, (N,)."""
+    """The node of the problem (N,) that stands at each unknown of ``space``."""
     msh, layout, count = space.mesh, space.dofmap.dof_layout, len(problem.mesh.points)
     corners = np.asarray(msh.geometry.input_global_indices)[msh.geometry.dofmap]
     found = np.empty(space.dofmap.index_map.size_local, np.int64)

@@ -11,22 +11,24 @@ from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fem_reference.effects import Energy, Ramped
+from fem_reference.effects import Effect, Energy, Ramped
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.problems.body import Body, Prescribed
 from fem_reference.solvers.common.load_steps import Attempt
 from fem_reference.solvers.common.state_checks import StateCheck, Trouble, first_trouble
-from fem_reference.solvers.fenicsx import choice, compiling, contact_points, forms, meshes
+from fem_reference.solvers.fenicsx import compiling, contact_points, forms, meshes
 from fem_reference.solvers.fenicsx.boundary_conditions import PointSprings, PrescribedRegion
 from fem_reference.solvers.fenicsx.clock import Clock
 from fem_reference.solvers.fenicsx.contact import ContactForces
 from fem_reference.solvers.fenicsx.determinants import Determinants
-from fem_reference.solvers.fenicsx.known import Known, State
-from fem_reference.solvers.fenicsx.linear import Factorised
+from fem_reference.solvers.fenicsx.known import Known, KnownState
+from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolver
+from fem_reference.solvers.fenicsx.multigrid import Multigrid
 from fem_reference.solvers.fenicsx.newton import Newton
 from fem_reference.solvers.fenicsx.nodal import Nodal
 from fem_reference.solvers.fenicsx.path import Path, settle
 from fem_reference.solvers.fenicsx.reactions import Reactions
+from fem_reference.solvers.fenicsx.resources import SMALL
 from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.spent import Spent
 from fem_reference.solvers.fenicsx.stability import Stability, has_energy
@@ -54,15 +56,10 @@ class AssembledBody:
     def __init__(self, body: Body, settings: BodySettings) -> None:
         self.comm, self.reuse = MPI.COMM_WORLD, settings.reuse
         self.effects = body.effects
-        # Whether the energy changes by what deforms the body only.
-        self.conserves = not any(
-            isinstance(one, Energy) and (isinstance(one, Ramped) or not one.stored) for one in self.effects
-        )
+        self.conserves = not any(map(_is_changed_from_outside, self.effects))
         self.judged = False  # whether its energy gap is: then a state halfway is worth it where work is not resolved
         self.mesh = meshes.distribute(self.comm, body.mesh)
-        # Where each of this rank's own cells stood in the body's mesh.
-        own = self.mesh.topology.index_map(3).size_local
-        self.cells: Ints = np.asarray(self.mesh.topology.original_cell_index, np.int64)[:own]
+        self.cells = meshes.own_cells(self.mesh)
         self.local = {int(cell): i for i, cell in enumerate(self.cells)}
         self.unknowns = meshes.unknowns(self.mesh, settings.element)
         self.displacement = Displacement(self.unknowns)
@@ -76,11 +73,9 @@ class AssembledBody:
         self.validity = Validity(self.determinants, form, body)
         self.spent = Spent()
         self.system = System(form, self.unknowns, settings.element, self.conditions, self.spent)
-        symmetric = has_energy(body)
-        self.system.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)  # type: ignore[arg-type]  # as its stubs have it
-        self.linear = choice.make(self.system, symmetric, settings, self.spent)
+        self.linear = _linear_solver(self.system, has_energy(body), settings, self.spent)
         self.newton = Newton(self.system, self.linear, self.determinants, settings, self.spent)
-        counts = symmetric and isinstance(self.linear, Factorised)
+        counts = isinstance(self.linear, Factorised) and self.linear.symmetric
         self.stability = Stability(self.system, cast(Factorised, self.linear), self.unknowns) if counts else None
         self.contact = self.system.contact = self._contact(body, form) if body.contact else None
         self.system.balance_units()
@@ -89,16 +84,15 @@ class AssembledBody:
         self.checks: tuple[StateCheck, ...] = inside if self.contact is None else (self.contact, *inside)
         self.reactions = Reactions(self.system, self.conditions, self.contact)
         self.known = Known(self.comm)
-        self.recalled: State | None = None
+        self.recalled: KnownState | None = None
         self.modes: float | None = None  # of the state that was examined last
         self.at = body.frames[0]  # the frame of the last good state
         self.nodes = meshes.Nodes(body.mesh, self.cells, self.displacement)
-        self.nodal = (
-            Nodal(self.cells, settings.element, self.displacement, self.clock) if settings.store_state else None
-        )
+        stored = self.cells, settings.element, self.displacement, self.clock
+        self.nodal = Nodal(*stored) if settings.store_state else None
 
     def _condition(self, entry: Prescribed, form: forms.Form) -> PrescribedRegion | PointSprings:
-        """What prescribes ``entry``."""
+        """The condition of ``entry`` on this rank's unknowns."""
         if isinstance(entry.on, str):
             return PrescribedRegion(self.displacement, entry, form.regions[entry.on])
         parents = self.displacement.dofs.ravel()
@@ -106,7 +100,7 @@ class AssembledBody:
         return PointSprings(self.unknowns, entry, points)
 
     def _contact(self, body: Body, form: forms.Form) -> ContactForces:
-        """What obstructions do."""
+        """The contact of bones with this rank's points."""
         law, space, parents = body.contact, self.displacement.space, self.displacement.dofs.ravel()
         assert law is not None  # asked for only where it is there
         if isinstance(law.on, str):
@@ -125,7 +119,7 @@ class AssembledBody:
 
     @property
     def size(self) -> int:
-        """How many unknowns there are, over all ranks."""
+        """The number of unknowns, over all ranks."""
         return int(self.unknowns.function_space.dofmap.index_map.size_global)
 
     def attempt(self, frame: float) -> Attempt:
@@ -188,7 +182,7 @@ class AssembledBody:
         """Have solved ``frame`` before, with these ``unknowns`` (n,) and negative ``modes``."""
         if self.reuse and not self.clock.matters:
             self.set_frame(frame)
-            self.known.add(State(self._acting(frame), unknowns, modes))
+            self.known.add(KnownState(self._acting(frame), unknowns, modes))
 
     def take_up(self, frame: float, unknowns: Floats, *, recalled: bool) -> None:
         """Be in the state of ``frame`` with ``unknowns`` (n,), as when it was reached."""
@@ -212,7 +206,7 @@ class AssembledBody:
         return np.concatenate([amounts, allowed, *poses, *values])
 
     def set_frame(self, frame: float) -> None:
-        """What acts and is prescribed at ``frame``."""
+        """Set what acts and is prescribed at ``frame``."""
         self.set_amounts(frame)
         for one in self.conditions:
             one.move_to(frame)
@@ -245,12 +239,12 @@ class AssembledBody:
             with self.clock.slow(np.array(self.unknowns.x.array)):
                 modes = self.stability.negative_modes()
         if self.reuse and not self.clock.matters:
-            self.known.add(State(self._acting(frame), np.array(self.unknowns.x.array), modes))
+            self.known.add(KnownState(self._acting(frame), np.array(self.unknowns.x.array), modes))
         self.modes = modes
         return modes
 
     def modes_of_material(self) -> float:
-        """Of the negative modes of the present state, those that the material has for certain."""
+        """The negative modes of the present state that the material has for certain."""
         assert self.stability is not None  # it has counted some
         with self.clock.slow(np.array(self.unknowns.x.array)):
             return self.stability.of_material()
@@ -265,15 +259,15 @@ class AssembledBody:
         return float(self.comm.allreduce(fem.assemble_scalar(form), MPI.SUM))
 
     def node_positions(self) -> Floats:
-        """Where the nodes of the body's mesh are now (n, 3) [mm]."""
+        """The present positions (n, 3) [mm] of the nodes of the body's mesh."""
         return self.nodes.positions()
 
     def state(self) -> dict[str, Any]:
-        """By name, the arrays of ``states.NodalState``; nothing where they were not asked for."""
+        """The arrays of ``states.NodalState`` by name; nothing where they were not asked for."""
         return {} if self.nodal is None else self.nodal.state().arrays
 
     def positions(self, cells: Ints, points: Floats) -> Floats:
-        """Where the material points ``points`` (n, 3), each seen from cell ``cells`` (n,), are now; (n, 3) on every rank."""
+        """The present positions (n, 3) [mm] of ``points`` (n, 3) at rest, each of a cell of ``cells`` (n,); on every rank."""
         displacement = fem.Function(self.displacement.space)
         displacement.x.array[:] = self.unknowns.x.array[self.displacement.dofs.ravel()]
         mine = np.array([i for i, cell in enumerate(cells) if int(cell) in self.local], dtype=np.int64)
@@ -283,3 +277,18 @@ class AssembledBody:
         for indices, values in self.comm.allgather((mine, moved)):
             result[indices] = values
         return result
+
+
+def _is_changed_from_outside(effect: Effect) -> bool:
+    """True of an energy that changes though the body does not deform."""
+    return isinstance(effect, Energy) and (isinstance(effect, Ramped) or not effect.stored)
+
+
+def _linear_solver(system: System, symmetric: bool, settings: BodySettings, spent: Spent) -> LinearSolver:
+    """The solver of linear systems that ``settings`` ask for, or the one for the size of the ``system``."""
+    system.matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)  # type: ignore[arg-type]  # as its stubs have it
+    kind = settings.linear_solver or ("direct" if system.matrix.getSize()[0] < SMALL else "lagged")
+    if kind == "multigrid":
+        return Multigrid(system, settings.element, spent)
+    precision = settings.precision or ("double" if kind == "direct" else "single")
+    return Factorised(system.matrix, symmetric, kind == "lagged", precision, spent)

@@ -35,12 +35,12 @@ class PrescribedRegion:
 
     @property
     def prescribed(self) -> Floats:
-        """What (n,) the unknowns ``dofs`` shall be now."""
+        """The values (n,) that the unknowns ``dofs`` shall have now."""
         return np.ravel(np.reshape(self.wanted.x.array, (-1, 3))[self.nodes][:, self.along])
 
     @property
     def targets(self) -> Floats:
-        """What (n,) the unknowns ``exact`` shall be."""
+        """The values (n,) that the unknowns ``exact`` shall have."""
         return self.prescribed if self.entry.stiffness is None else np.zeros(0)
 
     def springs(self, form: Form) -> Any:
@@ -59,7 +59,7 @@ class PrescribedRegion:
 
     def force(self, residual: Floats, now: Floats, shared: Ints) -> tuple[Floats, Floats]:
         """The force (3,) [N] and its moment (3,) [N mm] about the origin that this rank's part of the region takes, from the
-        out-of-balance ``residual`` of what acts in the body and the unknowns ``now``. Of an unknown that several regions prescribe
+        ``residual`` of what acts in the body and the unknowns ``now``. Of an unknown that several regions prescribe
         each takes an equal part: ``shared`` (n,) says how many do.
         """
         places, forces = self.rest + now[self.all], np.zeros_like(self.rest)
@@ -84,7 +84,7 @@ class PointSprings:
 
     @property
     def prescribed(self) -> Floats:
-        """Where (3 n,) the points shall be now [mm]."""
+        """The places (3 n,) [mm] where the points shall be now."""
         return self.wanted.ravel()
 
     def move_to(self, frame: float) -> None:
@@ -101,7 +101,7 @@ class PointSprings:
         return self.points.cells, self.points.basis, self.stiffness[:, :, None] * np.eye(3)
 
     def force(self, _residual: Floats, now: Floats, _shared: Ints) -> tuple[Floats, Floats]:
-        """As ``PrescribedRegion.force``: of springs, it is what they pull with."""
+        """The force of the springs and its moment, as ``PrescribedRegion.force`` has them."""
         pulls = -self._pulls(now)
         return pulls.sum(axis=0), np.cross(self.points.positions(now), pulls).sum(axis=0)
 

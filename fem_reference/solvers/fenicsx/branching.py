@@ -7,9 +7,11 @@ from petsc4py import PETSc
 from fem_reference.foundations.mesh import Floats
 from fem_reference.solvers.fenicsx.body import AssembledBody
 from fem_reference.solvers.fenicsx.linear import Factorised
+from fem_reference.solvers.fenicsx.spent import Spent
+from fem_reference.solvers.fenicsx.stability import displacements, softest
 
 _LARGER = (1, 2, 4, 8)  # how much larger perturbations are tried, where the state comes back or none is found
-_SHIFT, _GROWTH, _ITERATIONS = 1e-6, 4.0, 40
+_SHIFT, _GROWTH = 1e-6, 4.0
 
 
 def leave(body: AssembledBody, frame: float, share: float) -> float | None:
@@ -42,48 +44,35 @@ def lowest(body: AssembledBody) -> Floats:
     """The displacement of the unknowns (n,), 1 mm at most, along which the energy falls most: by inverse iteration with a shift
     that makes the tangent definite.
     """
-    system, stability = body.system, body.stability
+    system, stability, dofs = body.system, body.stability, body.displacement.dofs
     assert stability is not None  # asked for only where modes are counted
     system.linearise()
-    free = np.zeros(system.size)
-    free[body.displacement.dofs.ravel()] = 1.0
+    free, diagonal = np.zeros(system.size), system.b.duplicate()
+    free[dofs.ravel()] = 1.0
     free[system.fixed] = 0.0
-    mask, diagonal = system.b.duplicate(), system.b.duplicate()
-    mask.array[:] = free[: system.owned]
+    mask = free[: system.owned]
     system.matrix.getDiagonal(diagonal)
-    sums = np.array([np.abs(diagonal.array * mask.array).sum(), mask.array.sum()])
-    total, count = body.comm.allreduce(sums, MPI.SUM)
+    total, count = body.comm.allreduce(np.array([np.abs(diagonal.array * mask).sum(), mask.sum()]), MPI.SUM)
     shift = _SHIFT * total / count
-    while True:
-        solver = _shifted(system.matrix, diagonal, mask, shift, body)
-        if solver.negative_pivots() <= stability.pressures:
-            break
+    while (solver := _shifted(system.matrix, shift * mask, body.spent)).negative_pivots() > stability.pressures:
         shift *= _GROWTH
-    vector, image = system.b.duplicate(), system.b.duplicate()
-    vector.array[:] = mask.array * np.random.default_rng(body.comm.rank).normal(size=len(mask.array))
-    for _ in range(_ITERATIONS):
-        vector.normalize()
-        solver.solve(vector, image, 1e-10)
-        vector.array[:] = image.array * mask.array
-    return _largest_is_one(vector, body)
-
-
-def _shifted(matrix: PETSc.Mat, diagonal: PETSc.Vec, mask: PETSc.Vec, shift: float, body: AssembledBody) -> Factorised:
-    raised, moved = matrix.duplicate(copy=True), diagonal.duplicate()
-    moved.array[:] = diagonal.array + shift * mask.array
-    raised.setDiagonal(moved)
-    raised.setOption(PETSc.Mat.Option.SYMMETRIC, True)  # type: ignore[arg-type]  # as its stubs have it
-    return Factorised(raised, True, False, "double", body.spent)
-
-
-def _largest_is_one(vector: PETSc.Vec, body: AssembledBody) -> Floats:
-    """The vector over this rank's unknowns (n,), its greatest entry 1."""
-    found: Floats = np.array(body.unknowns.x.array) * 0
-    found[: body.system.owned] = vector.array
-    ends = body.comm.allgather((found.max(initial=0.0), found.min(initial=0.0)))
-    high, low = max(end[0] for end in ends), min(end[1] for end in ends)
-    found /= high if high >= -low else low
+    moves = np.where(system.fixed[dofs], 0.0, displacements(softest(solver, system, dofs), system, dofs))
+    found = np.zeros(system.size)
+    high, low = (
+        body.comm.allreduce(moves.max(initial=0.0), MPI.MAX),
+        body.comm.allreduce(moves.min(initial=0.0), MPI.MIN),
+    )
+    found[dofs] = moves / (high if high >= -low else low)
     return found
+
+
+def _shifted(matrix: PETSc.Mat, shift: Floats, spent: Spent) -> Factorised:
+    """The factors of the matrix with a ``shift`` (n,) of its diagonal."""
+    raised, diagonal = matrix.duplicate(copy=True), matrix.getDiagonal()
+    diagonal.array[:] += shift
+    raised.setDiagonal(diagonal)
+    raised.setOption(PETSc.Mat.Option.SYMMETRIC, True)  # type: ignore[arg-type]  # as its stubs have it
+    return Factorised(raised, True, False, "double", spent)
 
 
 def _size(body: AssembledBody) -> float:

@@ -1,4 +1,4 @@
-"""Which material points may be near an obstruction: whole patches of them, the points of a cell, are out of reach until their nodes
+"""Material points that may be near a bone: whole patches of them, the points of a cell, are out of reach until their nodes
 have gone as far as they were away.
 """
 

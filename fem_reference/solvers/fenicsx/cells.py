@@ -26,7 +26,7 @@ class _Element(ctypes.Structure):
 
 
 class Structure(NamedTuple):
-    """Where the entries of a matrix over this rank's unknowns are, ghosts too: ``starts`` of rows in the sorted ``columns``."""
+    """The places of the entries of a matrix over this rank's unknowns, ghosts too: ``starts`` of rows in the sorted ``columns``."""
 
     starts: Places
     columns: Places
@@ -85,8 +85,8 @@ class CellSums:
         return Structure(found.indptr.astype(np.int32), found.indices.astype(np.int32))
 
     def places(self, structure: Structure, fixed: NDArray[np.bool_]) -> Places:
-        """Where in the entries of ``structure`` those of each cell are (m, u, u); those of an unknown that is ``fixed`` (n,) are at
-        one place beyond the last.
+        """The places of the entries of each cell (m, u, u) in those of ``structure``; those of an unknown that is ``fixed`` (n,)
+        are at one place beyond the last.
         """
         found = np.empty((*self.unknowns.shape, self.unknowns.shape[1]), np.int32)
         self.code.find_places(
@@ -98,13 +98,13 @@ class CellSums:
         return found
 
     def add_residual(self, residual: Floats) -> None:
-        """Add what is out of balance to ``residual`` (n,), over this rank's unknowns, ghosts too."""
+        """Add the forces of cells to ``residual`` (n,), over this rank's unknowns, ghosts too."""
         for some in self._chunks():
             self._add(self.form.derivatives.first, some, residual)
         self._stabilise(residual)
 
     def add_tangent(self, into: Tangent, residual: Floats, moves: Floats | None, *, pointwise: bool = False) -> None:
-        """Add the tangent ``into`` its entries, and what is out of balance to ``residual``: where there are ``moves`` (n,) of the
+        """Add the tangent ``into`` its entries, and the forces to ``residual``: where there are ``moves`` (n,) of the
         displacement, what they change it by as well, to first order. ``pointwise``: as if the pressure followed the volume at
         every point, and was no unknown of its own.
         """
@@ -122,7 +122,7 @@ class CellSums:
         )
 
     def softness(self) -> Floats:
-        """By cell, the mass matrix (m, p, p) of the pressures [mm3/MPa] over what resists them: twice the shear stiffness, by the
+        """The mass matrix (m, p, p) by cell of the pressures [mm3/MPa] over what resists them: twice the shear stiffness, by the
         mean of the diagonal of the energy's second derivatives, and the bulk modulus.
         """
         rows, basis = self._diagonal(), self._pressures()
@@ -152,7 +152,7 @@ class CellSums:
             np.subtract.at(into.entries, own, into.unit**2 * self.projection)
 
     def _projection(self) -> Floats:
-        """By cell, the second derivative (m, p, p) [mm3/MPa] of minus the energy of ``body.is_stabilised``, at rest."""
+        """The second derivative (m, p, p) by cell [mm3/MPa] of minus the energy of ``body.is_stabilised``, at rest."""
         rows, basis = self._diagonal(), self._pressures()
         shear = [rows[i * self.form.kinds + k] for i in range(3) for k in range(3) if i != k]
         found = np.empty((self.count, basis.shape[1], basis.shape[1]))
@@ -166,7 +166,7 @@ class CellSums:
         return found
 
     def _diagonal(self) -> list[int]:
-        """Where the second derivatives by one variable twice stand among the derivatives at a point."""
+        """The places of the second derivatives by one variable twice among the derivatives at a point."""
         count = 3 * self.form.kinds + 1
         return [count + v * count - v * (v - 1) // 2 for v in range(count)]
 
@@ -180,7 +180,7 @@ class CellSums:
         return np.asarray(self.form.derivatives.second.eval(self.mesh, cells))
 
     def _volumes(self, some: slice) -> Floats:
-        """What each point of some cells stands for (m, q) [mm3]."""
+        """The volumes (m, q) [mm3] that the points of some cells stand for."""
         slopes = np.einsum("mgi,qgr->mqir", self.corners[some], self.kept[1])
         return np.asarray(np.abs(np.linalg.det(slopes)) * self.kept[0])
 
@@ -233,14 +233,14 @@ def _address(array: NDArray[Any]) -> ctypes.c_void_p:
 
 
 def _unknowns(space: fem.FunctionSpace) -> Places:
-    """By cell, ghosts too, its unknowns: component by component of the displacement, then the pressures."""
+    """The unknowns of each cell, ghosts too: component by component of the displacement, then the pressures."""
     parts = [space.sub(0).sub(component) for component in range(3)]
     parts += [space.sub(1)] if space.num_sub_spaces > 1 else []
     return np.concatenate([part.dofmap.list for part in parts], axis=1).astype(np.int32)
 
 
 def _tables(element: str, msh: Any, rule: tuple[Floats, Floats]) -> dict[str, Floats]:
-    """What ``cells.c`` needs of an element at the points of a ``rule``."""
+    """The tables of an element at the points of a ``rule`` that ``cells.c`` needs."""
     kind, degree, pressure = ELEMENTS[element]
     points, weights = rule
     cell, warped = basix.CellType[kind], basix.LagrangeVariant.gll_warped

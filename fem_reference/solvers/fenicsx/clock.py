@@ -44,7 +44,7 @@ class Clock:
 
     @property
     def matters(self) -> bool:
-        """Whether anything feels how fast time passes."""
+        """True where anything feels how fast time passes."""
         return self.step is not None
 
     def start(self, frame: float, unknowns: Floats) -> None:
@@ -62,7 +62,7 @@ class Clock:
         self.at = frame
 
     def begins(self) -> bool:
-        """Whether the next load step is the first in which a body with inertia moves; its acceleration has to be known."""
+        """True where a body with inertia moves for the first time in the next load step; its acceleration has to be known."""
         return self.resting and self.at >= self.first
 
     def instant(self, unknowns: Floats) -> None:
@@ -95,14 +95,14 @@ class Clock:
                 one.x.array[:] = values
 
     def arrays(self) -> dict[str, Floats]:
-        """What is to be known of the last load step beside the unknowns that it ended with."""
+        """The arrays to be known of the last load step beside the unknowns that it ended with."""
         if self.step is None:
             return {}
         found = {"before": np.array(self.step.before.x.array)}
         return found | ({"velocity": self.velocity, "acceleration": self.acceleration} if self.momentum else {})
 
     def facts(self) -> dict[str, Any]:
-        """As ``arrays``, the numbers."""
+        """The numbers to be known, beside the ``arrays``."""
         rate = None if self.step is None else float(self.step.rate.value)
         return {"at": self.at, "resting": self.resting, "rate": rate}
 

@@ -31,7 +31,7 @@ _LOCKS = 64  # forms share them; one that is taken shows that something is compi
 
 @cache
 def machine() -> str:
-    """What kind of processor this is, as a hash: what is compiled for one need not run on another."""
+    """The kind of this processor, as a hash: what is compiled for one need not run on another."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
         known = next(line for line in lines if line.startswith(("flags", "Features")))

@@ -29,7 +29,7 @@ _RIM = 0.25
 
 @dataclass(frozen=True, eq=False)
 class Pressed:
-    """What one obstruction does: ``gap`` (m,) [mm], negative inside, of the points ``near`` (m,), no other point is within the
+    """Contact with one bone: ``gap`` (m,) [mm], negative inside, of the points ``near`` (m,), no other point is within the
     smoothing; and of the ``pressed`` points (k,) among them the ``pressure`` (k,) [MPa per rest area], ``traction`` (k, 3) and its
     ``slope`` (k, 3, 3) [MPa/mm].
     """
@@ -47,7 +47,7 @@ Tractions = tuple[Ints, Floats]
 
 
 class ContactForces:
-    """What obstructions do to this rank's contact points."""
+    """Contact of bones with this rank's points."""
 
     def __init__(
         self,
@@ -79,7 +79,7 @@ class ContactForces:
             self.now = [self._pressed(i, carried.rest + self.moved) for i in range(len(self.obstructions))]
 
     def _pressed(self, i: int, nodes: Floats) -> Pressed:
-        """What an obstruction does, with the ``nodes`` (m, 3) [mm] that carry the points; these feel what overlaps at rest less."""
+        """The contact with one bone, with the ``nodes`` (m, 3) [mm] that carry the points: less of what overlaps at rest."""
         pose = self.obstructions[i].pose(self.frame)
         turn, local = pose[:3, :3], partial(self._local, i, self.frame, self.moved)
         near, (gap, gradient, bend) = self.nearby[i].find((nodes - pose[:3, 3]) @ turn, local)
@@ -92,25 +92,25 @@ class ContactForces:
         return Pressed(near, gap, near[some], pressure, pressure[:, None] * normal, slope)
 
     def _local(self, i: int, frame: float, moved: Floats, some: Ints) -> Floats:
-        """Where ``some`` points (k,) are in the frame of an obstruction, with nodes ``moved`` (m, 3) by ``frame``: (k, 3) [mm]."""
+        """The places (k, 3) [mm] of ``some`` points (k,) in the frame of a bone, with nodes ``moved`` (m, 3) by ``frame``."""
         pose = self.obstructions[i].pose(frame)
         return np.asarray((self._places(moved, some) - pose[:3, 3]) @ pose[:3, :3])
 
     def _places(self, moved: Floats, some: Ints) -> Floats:
-        """Where ``some`` points (k,) are, with nodes ``moved`` (m, 3): (k, 3) [mm]."""
+        """The places (k, 3) [mm] of ``some`` points (k,), with nodes ``moved`` (m, 3)."""
         return np.asarray(self.points.rest[some] + self.points.carried.shares[some] @ moved)
 
     def presses(self) -> bool:
-        """Whether an obstruction presses a point, of any rank."""
+        """True where a bone presses a point, of any rank."""
         return bool(self.comm.allreduce(any(len(one.pressed) for one in self.now), MPI.LOR))
 
     def tractions(self) -> Tractions:
-        """What all of them do."""
+        """The tractions of all bones."""
         which = np.concatenate([np.zeros(0, np.int64), *(one.pressed for one in self.now)])
         return which, np.concatenate([np.zeros((0, 3)), *(one.traction for one in self.now)])
 
     def predicted(self, frame: float, moves: Floats) -> Tractions:
-        """As ``tractions``, if the unknowns made ``moves`` and the obstructions went on to ``frame``, linearly in both."""
+        """The ``tractions`` if the unknowns made ``moves`` and the bones went on to ``frame``, linearly in both."""
         which, found = self.tractions()
         ahead, carried = [np.zeros((0, 3))], self.points.carried
         for entry, one in zip(self.obstructions, self.now, strict=True):
@@ -129,8 +129,8 @@ class ContactForces:
             self.points.add_forces(residual, -self.points.areas[which, None] * found, which)
 
     def tangent(self) -> Iterator[tuple[Ints, Floats, Floats]]:
-        """The slope of the residual, obstruction by obstruction: cells (p,) of the points in contact, the basis (p, k) that
-        carries them, and the slope (p, 3, 3) of what is out of balance there.
+        """The slope of the residual, bone by bone: cells (p,) of the points in contact, the basis (p, k) that carries them, and
+        the slope (p, 3, 3) there.
         """
         for one in self.now:
             if len(touched := one.pressed):
@@ -138,7 +138,7 @@ class ContactForces:
                 yield self.points.cells[touched], self.points.basis[touched], -areas * one.slope
 
     def forces(self) -> dict[str, tuple[Floats, Floats]]:
-        """By name of an obstruction, the force (3,) [N] that it exerts on this rank's points and its moment (3,) [N mm] about the
+        """The force (3,) [N], by name of a bone, that it exerts on this rank's points and its moment (3,) [N mm] about the
         origin.
         """
         found = {}

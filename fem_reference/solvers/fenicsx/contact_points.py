@@ -1,4 +1,4 @@
-"""Contact points, and points that springs pull at: where they are in the cells, how displacement reaches them."""
+"""Contact points, and points that springs pull at: their places in the cells, and the nodes that carry them."""
 
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -31,7 +31,7 @@ class ContactPoints:
     dofs: Ints
 
     def positions(self, unknowns: Floats) -> Floats:
-        """Where the points are now (n, 3) [mm]."""
+        """The present positions (n, 3) [mm] of the points."""
         carried = self.carried
         return np.asarray(self.rest + carried.shares @ unknowns[carried.dofs])
 
@@ -122,7 +122,7 @@ def _element(space: fem.FunctionSpace) -> Any:
 
 
 def _sides(topology: Any, facets: Ints) -> Ints:
-    """Of each facet of a cell that is this rank's own: the cell, and which of the cell's facets it is, (f, 2)."""
+    """The cell of each facet of this rank's own cells, and which of the cell's facets it is, (f, 2)."""
     cells, back = topology.connectivity(2, 3), topology.connectivity(3, 2)
     own = topology.index_map(3).size_local
     beside = [(int(cells.links(facet)[0]), facet) for facet in facets]

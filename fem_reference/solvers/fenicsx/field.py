@@ -11,7 +11,8 @@ from fem_reference.foundations import scratch
 from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import Time
 from fem_reference.problems.scalar import FieldProblem
-from fem_reference.runs.scalar import Solution
+from fem_reference.runs.store import Frame, Outcome, Run, Sink
+from fem_reference.solvers.common.protocol import solved
 from fem_reference.solvers.fenicsx.processes import require_installed
 from fem_reference.solvers.fenicsx.session import present, session
 
@@ -22,7 +23,7 @@ class FieldSettings(Record):
     time_limit: Time | None = None
 
 
-def solve_field(problem: FieldProblem, settings: FieldSettings) -> Solution:
+def solve(problem: FieldProblem, settings: FieldSettings, sink: Sink) -> Outcome:
     """Solve in the process that is shared now or in one of its own; one that dies is the status *crashed*, not an exception."""
     require_installed()
     values = np.full(len(problem.fixed), np.nan)
@@ -36,4 +37,11 @@ def solve_field(problem: FieldProblem, settings: FieldSettings) -> Solution:
     with scratch.folder() as folder, nullcontext(shared) if shared else session() as solver:
         job = folder.resolve() / "job.pickle"  # a process that is shared may have been started elsewhere
         job.write_bytes(pickle.dumps(problem))
-        return Solution(values, solver.run(job, settings.time_limit, take, "fields"))
+        outcome = solver.run(job, settings.time_limit, take, "fields")
+    sink(Frame.of_field(problem, values, problem.form))
+    return outcome
+
+
+def solve_field(problem: FieldProblem, settings: FieldSettings) -> Run:
+    """The run of a scalar field, in memory."""
+    return solved(solve, problem, settings)

@@ -37,7 +37,7 @@ class UflFunctions:
 
 
 class Derivatives(NamedTuple):
-    """Of an energy, all its first derivatives at the quadrature points, and these with the upper triangle of the second ones:
+    """All first derivatives of an energy at the quadrature points, and these with the upper triangle of the second ones:
     compiled expressions of what ``cells.c`` names.
     """
 
@@ -46,8 +46,9 @@ class Derivatives(NamedTuple):
 
 
 class Form:
-    """What acts in a body. Of the energy its ``derivatives``, with ``kinds`` variables a component of the displacement; what has an
-    amount of zero over whole frames is not in these there. ``loads`` on the surface, a residual, 0 where there are none.
+    """The weak form of a body. Of the energy its ``derivatives``, with ``kinds`` variables a component of the displacement; what
+    has an amount of zero over whole frames is not in these there. ``loads`` on the surface, a residual, 0 where there are
+    none.
 
     ``energy`` that is stored as an integral, det F as ``determinant``, the ``fibre_stretch`` that energies see (None
     without fibres); to be set: the amounts of effects (``set_amounts``), and the ``step`` of time (None where nothing depends on
@@ -88,7 +89,7 @@ class Form:
         self.derivatives = self._made[self._quiet(frame)]
 
     def _quiet(self, frame: float) -> tuple[bool, ...]:
-        """Of each effect whether it is left out at a frame."""
+        """True of each effect that is left out at a frame."""
         return tuple(any(a <= frame <= b for a, b in spans) for spans in self.silent)
 
     def _derivatives(self, acting: list[tuple[Effect, Any]], state: State, by: "_Variables") -> Derivatives:
@@ -164,7 +165,9 @@ def _step(effects: list[Effect], space: fem.FunctionSpace) -> TimeStep | None:
 
 @dataclass(frozen=True)
 class _Variables:
-    """What the energy at a point is differentiated by: ``F`` and ``displacement``, and the ``pressure`` where there is one."""
+    """The variables by which the energy at a point is differentiated: ``F`` and ``displacement``, and the ``pressure`` where
+    there is one.
+    """
 
     F: Any
     displacement: Any
@@ -201,7 +204,7 @@ def _rows(F: Any) -> list[list[Any]]:
 
 
 def _silent(effect: Effect, frames: tuple[float, ...]) -> list[tuple[float, float]]:
-    """From which of the ``frames`` to which next one an energy is zero."""
+    """The spans from one of the ``frames`` to the next over which an energy is zero."""
     if not isinstance(effect, Energy) or not isinstance(effect, Ramped):
         return []
     knots = [knot.frame for knot in effect.ramp]

@@ -3,13 +3,14 @@
 import json
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, fingerprint
 from fem_reference.problems.body import Body
+from fem_reference.problems.problem import Task
 from fem_reference.runs.cut_off import CutOff
 from fem_reference.runs.states import NodalState, read_arrays
 from fem_reference.solvers.fenicsx.settings import BodySettings
@@ -31,7 +32,7 @@ class Kept:
 
 
 def kept(cut_off: CutOff, body: Body) -> Kept:
-    """What can be gone on from; anything else that an earlier process left in the folder is removed."""
+    """The states to go on from; anything else that an earlier process left in the folder is removed."""
     whole = Kept(cut_off.folder.resolve(), fingerprint(body.mesh.points, body.mesh.cells))
     frames = tuple(number for number in cut_off.numbers if _is_of(whole, number))
     cut_off.folder.mkdir(exist_ok=True)
@@ -55,9 +56,11 @@ class Job:
     ``kept``: where states are kept, if they are.
     """
 
+    task: ClassVar[Task] = "solve_body"
+
     body: Body
     settings: BodySettings
-    samples: dict[str, tuple[Ints, Floats]]
+    samples: dict[str, tuple[Ints, Floats]] = field(default_factory=dict)
     kept: Kept | None = None
 
 

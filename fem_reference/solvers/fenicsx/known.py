@@ -14,7 +14,7 @@ _MOST = 512e6
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class KnownState:
     """``unknowns`` (n,) in equilibrium under ``acting`` (m,), all numbers that determine it, and its ``negative_modes``."""
 
     acting: Floats
@@ -27,15 +27,15 @@ class Known:
 
     def __init__(self, comm: MPI.Comm) -> None:
         self.comm = comm
-        self.states: list[State] = []
+        self.states: list[KnownState] = []
 
-    def add(self, state: State) -> None:
+    def add(self, state: KnownState) -> None:
         """Keep a state; it is in equilibrium."""
         self.states.append(state)
         size = self.comm.allreduce(state.unknowns.nbytes + state.acting.nbytes, MPI.MAX)
         del self.states[: max(0, len(self.states) - max(1, int(_MOST / size)))]
 
-    def find(self, acting: Floats) -> State | None:
+    def find(self, acting: Floats) -> KnownState | None:
         """The state under ``acting``, None where there is none."""
         same = np.array([np.abs(one.acting - acting).max(initial=0.0) <= _SAME for one in self.states], bool)
         self.comm.Allreduce(MPI.IN_PLACE, same, MPI.LAND)

@@ -3,14 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from fem_reference.foundations.mesh import Floats, place_of
 from fem_reference.solvers.fenicsx.body import AssembledBody
 from fem_reference.solvers.fenicsx.linear import Factorised, LinearSolveError
+from fem_reference.solvers.fenicsx.stability import displacements, softest
 
-_ITERATIONS = 40  # of inverse iteration
 # The share of the smallest load step over which slopes are taken.
 _DIFFERENCE = 1e-3
 # Of the smallest load steps. One that failed was up to two of them, and the distance is known to a factor.
@@ -58,7 +57,7 @@ def _limit_point(body: AssembledBody, difference: float) -> LimitPoint | None:
     system.contact = body.contact
     system.linearise()
     linear.changed()
-    mode = _softest(body)
+    mode = softest(body.linear, body.system, body.displacement.dofs)
     stiffness = _stiffness(body, mode)
     if abs(stiffness) > _SOFT * _stiffness_at_rest(body):
         return None
@@ -81,7 +80,7 @@ def _stiffness_at_rest(body: AssembledBody) -> float:
     body.unknowns.x.array[:] = 0
     body.system.linearise()
     body.linear.changed()
-    found = _stiffness(body, _softest(body))
+    found = _stiffness(body, softest(body.linear, body.system, body.displacement.dofs))
     body.unknowns.x.array[:], body.system.contact = now, body.contact
     body.system.linearise()
     body.linear.changed()
@@ -89,7 +88,7 @@ def _stiffness_at_rest(body: AssembledBody) -> float:
 
 
 def _motion(body: AssembledBody, difference: float) -> Floats:
-    """What the unknowns (n,) change by from the present state over a small ``difference`` in frames, to first order."""
+    """The change of the unknowns (n,) from the present state over a small ``difference`` in frames, to first order."""
     system, frame = body.system, body.at + difference
     body.set_frame(frame)
     moves = -system.missing()
@@ -105,27 +104,6 @@ def _motion(body: AssembledBody, difference: float) -> Floats:
     return found
 
 
-def _softest(body: AssembledBody) -> PETSc.Vec:
-    """The mode of the least eigenvalue of the tangent as it is, with its pressures; of length 1 in its displacements."""
-    system = body.system
-    moves = np.zeros(system.size)
-    moves[body.displacement.dofs.ravel()] = 1.0
-    moves[system.fixed] = 0.0
-    moves = moves[: system.owned]
-    if not body.comm.allreduce(moves.any(), MPI.LOR):
-        raise LinearSolveError("nothing is left to move")
-    vector: PETSc.Vec = system.b.duplicate()
-    image: PETSc.Vec = system.b.duplicate()
-    image.array[:] = moves * np.random.default_rng(body.comm.rank).normal(size=len(moves))
-    for _ in range(_ITERATIONS):
-        vector.array[:] = image.array * moves
-        vector.normalize()
-        body.linear.solve(vector, image, 1e-10)
-    vector.array[:] = image.array * moves
-    image.scale(float(vector.dot(vector)) ** -0.5)
-    return image
-
-
 def _stiffness(body: AssembledBody, mode: PETSc.Vec) -> float:
     """Twice the energy of a ``mode`` by the tangent as it is."""
     image = mode.duplicate()
@@ -135,9 +113,7 @@ def _stiffness(body: AssembledBody, mode: PETSc.Vec) -> float:
 
 def _largest(body: AssembledBody, mode: PETSc.Vec) -> tuple[float, float, float]:
     """The rest position [mm] where a mode moves most."""
-    found: Floats = np.zeros(body.system.size)
-    found[: body.system.owned] = mode.array
-    lengths = np.linalg.norm(found[body.displacement.dofs].reshape(-1, 3), axis=1)
+    lengths = np.linalg.norm(displacements(mode, body.system, body.displacement.dofs), axis=1)
     i = int(np.argmax(lengths))
     place = body.displacement.space.tabulate_dof_coordinates()[i].tolist()
     _, (x, y, z) = max(body.comm.allgather((float(lengths[i]), place)))

@@ -38,7 +38,7 @@ class LinearSolver(Protocol):
         """Solve for ``x``, up to ``tolerance`` times the norm of ``b``; ``LinearSolveError`` where that does not succeed."""
 
     def solve_exactly(self) -> bool:
-        """From now on solve each system exactly; whether that is another way than until now."""
+        """Solve each system exactly from now on; True where that is another way than until now."""
 
 
 class Factorised:
@@ -81,7 +81,7 @@ class Factorised:
         self.fresh = False
 
     def solve_exactly(self) -> bool:
-        """From now on by a factorisation of each matrix, in double precision; whether that is another way than until now."""
+        """Factorise each matrix from now on, in double precision; True where that is another way than until now."""
         if not self.lagged:
             return False
         self.lagged = self.fresh = self.there = False
@@ -130,8 +130,9 @@ class Factorised:
         return bool(self.krylov.is_converged)
 
     def negative_pivots(self) -> int:
-        """Of the matrix as it is, factorised where it is not yet. Where single precision does not resolve the directions in which
-        the matrix is softest, double precision is used from then on. ``LinearSolveError`` where it cannot be factorised.
+        """The negative pivots of the matrix as it is, factorised where it is not yet. Where single precision does not resolve the
+        directions in which the matrix is softest, double precision is used from then on. ``LinearSolveError`` where it cannot
+        be factorised.
         """
         if not self.fresh:
             self.factorise()
@@ -141,8 +142,8 @@ class Factorised:
         return int(self.factors.getMumpsInfog(_NEGATIVE))
 
     def _resolved(self) -> bool:
-        """Whether the factorisation M is the matrix A in the softest directions too: in a vector v, which inverse iteration turned
-        towards them, M^-1 A v is v but for a tenth. So none of them can have another sign in M.
+        """True where the factorisation M is the matrix A in the softest directions too: in a vector v, which inverse iteration
+        turned towards them, M^-1 A v is v but for a tenth. So none of them can have another sign in M.
         """
         random = np.random.default_rng(self.matrix.comm.rank)
         image = self.matrix.createVecLeft()

@@ -23,6 +23,11 @@ def distribute(comm: MPI.Comm, cells: Cells) -> mesh.Mesh:
     )
 
 
+def own_cells(msh: mesh.Mesh) -> Ints:
+    """The cells (m,) of the body's mesh that are this rank's own, in the rank's order."""
+    return np.asarray(msh.topology.original_cell_index, np.int64)[: msh.topology.index_map(3).size_local]
+
+
 _VARIANT = basix.LagrangeVariant.gll_warped
 
 
@@ -47,7 +52,7 @@ def _corners(msh: mesh.Mesh, facets: Ints) -> Ints:
 
 
 def _original_points(msh: mesh.Mesh) -> Ints:
-    """By vertex of this rank, the point of the body's mesh."""
+    """The point of the body's mesh at each vertex of this rank."""
     connected = msh.topology.connectivity(3, 0)
     corners = connected.array.reshape(connected.num_nodes, 4 if msh.topology.cell_name() == "tetrahedron" else 8)
     points = np.full(msh.topology.index_map(0).size_local + msh.topology.index_map(0).num_ghosts, -1, np.int64)
@@ -65,7 +70,7 @@ class Nodes:
         self.moves = displacement.tabulated(reference_nodes(cells.kind, cells.degree), len(own))
 
     def positions(self) -> Floats:
-        """Where the nodes are now (n, 3) [mm], on every rank."""
+        """The present positions (n, 3) [mm] of the nodes, on every rank."""
         points = np.array(self.cells.points)
         for own, moved in self.comm.allgather((self.own, self.moves.at(self.unknowns.array))):
             if len(own):

@@ -19,7 +19,7 @@ from fem_reference.solvers.fenicsx.system import System
 
 _SMOOTHING = 2  # the degree of the polynomial
 _MOST = 200  # iterations; and how many more than with a fresh preconditioner are worth it
-_TIRED = 15
+_STALE = 15
 
 
 class Multigrid:
@@ -41,21 +41,21 @@ class Multigrid:
         self.krylov.setOperators(self.matrix, self.matrix)
         self.krylov.getPC().setType("python")
         self.krylov.getPC().setPythonContext(self.blocks)
-        self.worn, self.first = True, 0
+        self.stale, self.first = True, 0
 
     def changed(self) -> None:
         """The matrix is another now; the preconditioner serves on."""
 
     def solve(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> None:
         """Solve for ``x``, up to ``tolerance`` times the norm of ``b``; ``LinearSolveError`` where that does not succeed."""
-        fresh = self.worn
+        fresh = self.stale
         if fresh:
             self._renew()
         if self._iterate(b, x, tolerance):
             iterations = self.krylov.getIterationNumber()
             per_digit = iterations / -np.log10(tolerance)
             self.first = per_digit if fresh else self.first
-            self.worn = per_digit > 1.5 * self.first and iterations > _TIRED
+            self.stale = per_digit > 1.5 * self.first and iterations > _STALE
             return
         if not fresh:
             self._renew()
@@ -79,7 +79,7 @@ class Multigrid:
             stiff, coupling = (self.matrix.createSubMatrix(self.sets[0], columns) for columns in self.sets)
             self.blocks.renew(stiff, coupling, self._cycle(stiff), self._mass())
         self.spent.counts["factorisations"] += 1
-        self.worn = False
+        self.stale = False
 
     def _cycle(self, stiff: PETSc.Mat) -> PETSc.PC:
         """One cycle between the two elements."""
@@ -106,8 +106,8 @@ class Multigrid:
         return cycle
 
     def _interpolation(self, element: str, displaced: Ints) -> tuple[PETSc.Mat, Ints]:
-        """From the linear element to the quadratic one on the same cells, 0 where something is prescribed; and which unknowns of
-        the former are: those at corners where one of the latter is.
+        """The interpolation from the linear element to the quadratic one on the same cells, 0 where something is prescribed; and
+        the unknowns of the former that are: those at corners where one of the latter is.
         """
         cells, system = self.system.cells, self.system
         kind, degree, _ = ELEMENTS[element]

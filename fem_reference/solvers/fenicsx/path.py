@@ -1,4 +1,4 @@
-"""Whether the states that a body took one after the other belong to one path: signs of a jump that ask for no other solution."""
+"""Signs of a jump between the states that a body took one after the other; they ask for no other solution."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING
@@ -32,8 +32,8 @@ class Path:
         self.unknowns, self.forces = np.array(system.unknowns.x.array), self._forces()
 
     def jumped(self, before: Floats) -> Smallest | None:
-        """Where det F falls to next to nothing of itself on the straight line from the unknowns ``before`` to those at present, as
-        a share of itself; None where it does not. A body that deforms steadily in small steps never gets there.
+        """The least det F, as a share of itself, on the straight line from the unknowns ``before`` to those at present; None where
+        it is not next to nothing. A body that deforms steadily in small steps never gets there.
         """
         unknowns = self.system.unknowns.x
         after, values = np.array(unknowns.array), []
@@ -90,7 +90,7 @@ class Path:
         return gap
 
     def _forces(self) -> Floats:
-        """What cells are out of balance by (n,), on the ranks that own the unknowns."""
+        """The forces of cells (n,) on the ranks that own the unknowns."""
         self.system.work.array[:] = 0
         self.system.cells.add_residual(self.system.work.array)
         self.system.work.scatter_reverse(la.InsertMode.add)

@@ -34,7 +34,7 @@ MARK = "@fem_reference "  # begins each line of the worker's output that is mean
 
 
 def installed() -> bool:
-    """Whether FEniCSx is."""
+    """True where FEniCSx is installed."""
     return any(importlib.util.find_spec(name) for name in ("dolfinx_solver", "dolfinx"))
 
 
@@ -61,14 +61,14 @@ class Process:
         self.errors.extend(line for line in self.process.stderr if line.strip())
 
     def events(self) -> Iterator[dict[str, Any]]:
-        """What it reports, until its output ends."""
+        """The events that it reports, until its output ends."""
         assert self.process.stdout is not None
         for line in self.process.stdout:
             if line.startswith(MARK):
                 yield json.loads(line.removeprefix(MARK))
 
     def ending(self, kept: str) -> Outcome:
-        """How it ended without a report; ``kept`` says what there is all the same."""
+        """The outcome where it ended without a report; ``kept`` says what there is all the same."""
         code = self.process.wait()
         self.listener.join(timeout=5)  # its last lines may still arrive
         if self.overran is not None:

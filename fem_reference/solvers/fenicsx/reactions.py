@@ -22,7 +22,7 @@ class Reactions:
         self.system, self.conditions, self.contact = system, conditions, contact
 
     def now(self, *, divided: bool) -> tuple[Forces, Forces]:
-        """By name of what is prescribed, the force (3,) [N] that keeps it there and its moment (3,) [N mm] about the origin. What
+        """The force (3,) [N], by name of what is prescribed, that keeps it there and its moment (3,) [N mm] about the origin. What
         an unknown of several regions takes is ``divided`` between them, so that all forces are in balance, or counts in each.
         """
         balance, now = self.system.reactions(), np.array(self.system.unknowns.x.array)
@@ -36,7 +36,7 @@ class Reactions:
 
     @cached_property
     def _shared(self) -> Ints:
-        """By how many regions each unknown (n,) is prescribed."""
+        """The number of regions (n,) that prescribe each unknown."""
         count = np.zeros(len(self.system.unknowns.x.array), np.int64)
         for one in self.conditions:
             if isinstance(one, PrescribedRegion):

@@ -28,7 +28,7 @@ _GLANCE = 0.2  # [s] for which is looked how busy the cores are
 
 
 def unknowns(cells: Cells, element: str) -> int:
-    """How many unknowns a body of ``cells`` has with an ``element``, about: every edge has a node of a quadratic one."""
+    """The number of unknowns of a body of ``cells`` with an ``element``, about: every edge has a node of a quadratic one."""
     kind, degree, pressure = ELEMENTS[element]
     corners = cells.cells[:, : 4 if kind == "tetrahedron" else 8]
     count = len(np.unique(corners))
@@ -93,7 +93,7 @@ def _fitting(element: str, count: int) -> list[Literal["direct", "lagged", "mult
 
 
 def idle_cores() -> int:
-    """How many of the cores that this process may use nobody uses; all of them where the system does not say."""
+    """The number of idle cores among those that this process may use; all of them where the system does not say."""
     mine = os.sched_getaffinity(0)
     before = _idle(mine)
     if before is None:
@@ -116,7 +116,7 @@ def _idle(cores: set[int]) -> float | None:
 
 
 def ranks(settings: BodySettings, count: int) -> int:
-    """How many ranks a solution of ``count`` unknowns shall have: two where that pays and a core is free for each."""
+    """The number of ranks for a solution of ``count`` unknowns: two where that pays and a core is free for each."""
     if settings.linear_solver == "multigrid" or count < _WORTH_RANKS:
         return 1
     return 2 if idle_cores() >= 2 else 1

@@ -44,7 +44,7 @@ class Restart:
 
     @property
     def _acting(self) -> str:
-        """What acts in the body, in words."""
+        """The effects and the contact law, in words."""
         contact = self.body.contact
         law = "no contact" if contact is None else f"contact {contact.law.stiffness:g} {contact.law.smoothing:g}"
         return " ".join([*map(repr, self.body.effects), law])

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from contextvars import ContextVar
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,7 @@ from fem_reference.foundations import scratch
 from fem_reference.foundations.subprocesses import command
 from fem_reference.problems.body import Body, check_quadrature
 from fem_reference.problems.checks import check
-from fem_reference.runs.solved import Reached, Solved
-from fem_reference.runs.store import Outcome
+from fem_reference.runs.store import Frame, Outcome, Run, Sink, collected
 from fem_reference.solvers.fenicsx.jobs import Job, stored_state
 from fem_reference.solvers.fenicsx.processes import Process, installed, require_installed, running
 from fem_reference.solvers.fenicsx.settings import BodySettings
@@ -29,19 +29,23 @@ class Session:
         self.process: Process | None = None
         self.closed = False
 
-    def solve(self, body: Body, settings: BodySettings) -> Solved:
-        """The states of ``body``; a process that dies is the status *crashed*, and one that takes longer than the time limit is
-        ended and *timed out* or *stalled*, not an exception. RuntimeError once it is closed.
+    def solve(self, body: Body, settings: BodySettings) -> Run:
+        """The run of ``body``, in memory."""
+        frames: list[Frame] = []
+        outcome = self.follow(body, settings, frames.append)
+        return replace(collected(frames, outcome), solver="fenicsx", body=body, settings=settings)
+
+    def follow(self, body: Body, settings: BodySettings, sink: Sink) -> Outcome:
+        """The frames of ``body`` into ``sink``; a process that dies is the status *crashed*, and one that takes longer than the
+        time limit is ended and *timed out* or *stalled*, not an exception. RuntimeError once it is closed.
         """
         if self.closed:
             raise RuntimeError("the session is closed")
         check(body, settings.element)
         check_quadrature(settings.element, settings.quadrature_degree, "quadrature_degree")
         job = self.folder / "job.pickle"
-        job.write_bytes(cloudpickle.dumps(Job(body, settings, {})))
-        states: list[Reached] = []
-        outcome = self.run(job, settings.time_limit, lambda event: states.append(_state(event)), "states")
-        return Solved(tuple(states), outcome)
+        job.write_bytes(cloudpickle.dumps(Job(body, settings)))
+        return self.run(job, settings.time_limit, lambda event: sink(_state(event)), "states")
 
     def run(self, job: Path, time_limit: float | None, sink: Callable[[dict[str, Any]], None], kept: str) -> Outcome:
         """Solve the ``job`` in a file, with each frame that is reported given to ``sink``; ``kept`` names what that keeps."""
@@ -63,7 +67,7 @@ _WORKER = "fem_reference.solvers.fenicsx.worker"
 
 
 def _followed(process: Process, job: Path, sink: Callable[[dict[str, Any]], None], kept: str) -> Outcome:
-    """How ``process`` comes through the ``job``."""
+    """The outcome of the ``job`` in ``process``."""
     process.feed(str(job))
     count = 0
     for event in process.events():
@@ -74,15 +78,22 @@ def _followed(process: Process, job: Path, sink: Callable[[dict[str, Any]], None
     return process.ending(f"{count} {kept} are kept")
 
 
-def _state(event: dict[str, Any]) -> Reached:
+def _state(event: dict[str, Any]) -> Frame:
     path = Path(event["file"])
     with np.load(path, allow_pickle=False) as arrays:
         forces, moments = (
             {name.removeprefix(kind): arrays[name] for name in arrays if name.startswith(kind)}
             for kind in ("force ", "moment ")
         )
-        solved = event["scalars"], stored_state(arrays), tuple(event["residuals"])
-        state = Reached(event["frame"], arrays["nodes"], forces, moments, *solved)
+        state = Frame(
+            event["frame"],
+            points=arrays["nodes"],
+            scalars=event["scalars"],
+            state=stored_state(arrays),
+            forces=forces,
+            moments=moments,
+            residuals=tuple(event["residuals"]),
+        )
     path.unlink()
     return state
 
@@ -99,12 +110,26 @@ def session() -> Iterator[Session]:
             own.closed = True
 
 
-def solve_body(body: Body, settings: BodySettings) -> Solved:
-    """The states of ``body`` by the session that is shared now, or else by one of its own."""
+@contextmanager
+def _opened() -> Iterator[Session]:
+    """The session that is shared now, or else one of its own."""
     if (shared_now := present()) is not None:
-        return shared_now.solve(body, settings)
-    with session() as own:
-        return own.solve(body, settings)
+        yield shared_now
+    else:
+        with session() as own:
+            yield own
+
+
+def solve_on(body: Body, settings: BodySettings, sink: Sink) -> Outcome:
+    """The frames of ``body`` into ``sink``, by the session that is shared now or by one of its own."""
+    with _opened() as solver:
+        return solver.follow(body, settings, sink)
+
+
+def solve_body(body: Body, settings: BodySettings) -> Run:
+    """The run of ``body``, in memory, by the session that is shared now or by one of its own."""
+    with _opened() as solver:
+        return solver.solve(body, settings)
 
 
 _shared: ContextVar[Session | None] = ContextVar("shared", default=None)

@@ -16,7 +16,7 @@ class BodySettings(Record):
     ``element``: one of ``body.ELEMENTS``. ``first_step`` and ``smallest_step`` bound the load step: it grows by half after an
     easy step (at most 5 Newton iterations), up to ``largest_step`` where there is one, and is halved when Newton needs more than
     ``newton_iterations`` or a cell inverts.
-    ``residual`` [N, mm3] ends Newton's iteration: the norm of out-of-balance nodal forces and of the volume equation.
+    ``residual`` [N, mm3] ends Newton's iteration: the norm of the nodal forces and of the volume equation.
     ``quadrature_degree``: of the polynomials that are integrated exactly on a straight cell, by default what the element needs.
     ``linear_solver``: how the linear systems of Newton's method are solved: ``"direct"``, each exactly, by a factorisation of its
     own; ``"lagged"``, as exactly as it is worth it, by FGMRES with a factorisation that serves until a new one is cheaper, and

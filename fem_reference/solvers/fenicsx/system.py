@@ -1,4 +1,4 @@
-"""The equations of a body in equilibrium: what is out of balance, and its tangent, summed from cells, springs, loads and contact.
+"""The equations of a body in equilibrium: residual and tangent, summed from cells, springs, loads and contact.
 
 Every method is collective: all ranks call it.
 """
@@ -73,7 +73,7 @@ class System:
         self.prescribed_diagonal = diagonal[own]  # each row has its diagonal entry, in the order of the rows
 
     def residual(self, tractions: Tractions | None = None) -> float:
-        """Sum what is out of balance into ``b``, and return its norm; ``tractions`` of contact other than those at present may be
+        """Sum the residual into ``b``, and return its norm; ``tractions`` of contact other than those at present may be
         given.
         """
         with self.spent.on("assembly"):
@@ -84,8 +84,8 @@ class System:
     def linearise(
         self, moves: Floats | None = None, tractions: Tractions | None = None, *, pointwise: bool = False
     ) -> float:
-        """As ``residual``, and sum the tangent into ``matrix``; what ``moves`` (n,) of prescribed unknowns change is added to first
-        order. ``pointwise``: see ``cells``.
+        """Sum the ``residual``, and the tangent into ``matrix``; what ``moves`` (n,) of prescribed unknowns change is added to
+        first order. ``pointwise``: see ``cells``.
         """
         with self.spent.on("assembly"):
             entries = self.tangent.entries
@@ -105,7 +105,7 @@ class System:
         return [terms for terms in (self.springs, self.loads) if terms is not None]
 
     def _finish(self, tractions: Tractions | None, moves: Floats | None) -> float:
-        """What is not of the cells, and the parts of other ranks."""
+        """Add what is not of the cells, and the parts of other ranks; the norm of the residual."""
         for terms in self._on_surface:
             terms.add_residual(self.work.array, moves)
         for tie in self.ties:
@@ -139,19 +139,19 @@ class System:
             self.tangent.unit = self.scale[pressures] = float(np.sqrt(stiff / coupling))
 
     def missing(self) -> Floats:
-        """By how much (n,) the unknowns are more than what is prescribed; 0 where nothing is."""
+        """The unknowns less what is prescribed of them (n,); 0 where nothing is."""
         found = np.zeros(self.size)
         for one in self.conditions:
             found[one.exact] = self.unknowns.x.array[one.exact] - one.targets
         return found
 
     def lacking(self) -> bool:
-        """Whether on any rank an unknown is not what is prescribed, but for rounding."""
+        """True where an unknown on any rank is not what is prescribed, but for rounding."""
         most = np.abs(self.missing()).max(initial=0.0)
         return bool(self.unknowns.function_space.mesh.comm.allreduce(most, MPI.MAX) > _ROUNDING)
 
     def reactions(self) -> Floats:
-        """What is out of balance (n,) without springs and without what is prescribed, on the ranks that own the unknowns."""
+        """The residual (n,) without springs and without what is prescribed, on the ranks that own the unknowns."""
         self.work.array[:] = 0
         self.cells.add_residual(self.work.array)
         if self.loads:

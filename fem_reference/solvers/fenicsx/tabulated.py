@@ -11,7 +11,7 @@ from fem_reference.foundations.mesh import Floats, Ints
 
 
 def geometry(msh: mesh.Mesh, points: Floats, cells: Ints | slice) -> tuple[Floats, Floats]:
-    """Of ``cells`` (m,), the rest positions (m, q, 3) of reference ``points`` (q, 3) [mm], and their slopes (m, q, 3, 3) there."""
+    """The rest positions (m, q, 3) [mm] of reference ``points`` (q, 3) in ``cells`` (m,), and their slopes (m, q, 3, 3) there."""
     kind, degree = basix.CellType[msh.topology.cell_name()], msh.geometry.cmap.degree
     element = basix.create_element(basix.ElementFamily.P, kind, degree, basix.LagrangeVariant.gll_warped)
     values = element.tabulate(1, points)[..., 0]

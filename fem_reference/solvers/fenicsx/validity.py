@@ -70,7 +70,7 @@ class Ranges:
             self.frames.setdefault(one.law, set()).add(frame)
 
     def facts(self) -> list[Any]:
-        """What there is to know, in JSON's types."""
+        """The facts, in JSON's types."""
         return [[law, frame, how, sorted(self.frames[law])] for law, (frame, how) in self.first.items()]
 
     def know(self, facts: list[Any]) -> None:
@@ -118,7 +118,7 @@ class Validity:
         return Trouble("collapsed", why)
 
     def examine(self, frame: float) -> tuple[dict[str, float], list[Outside]]:
-        """Of the present state, that of a ``frame``: the extremes of the means and in how many cells a law is outside its range,
+        """The extremes of the means in the present state, that of a ``frame``, and in how many cells a law is outside its range,
         ``outside_law``; and each law outside it.
         """
         scalars: dict[str, float] = {}
@@ -145,7 +145,7 @@ class Validity:
         ]
 
     def _means(self, measure: str) -> Floats:
-        """By cell of this rank (n,)."""
+        """The means over the cells of this rank (n,)."""
         if len(self.cells) == 0:
             return np.zeros(0)
         return np.average(self.values[measure]().reshape(self.volumes.shape), axis=1, weights=self.volumes)
@@ -162,7 +162,7 @@ class Validity:
 
 
 def _volumes(msh: mesh.Mesh, count: int, rule: Rule) -> tuple[Floats, Floats]:
-    """Of the first ``count`` cells at rest: the volumes (n, q) [mm3] that the points of a ``rule`` stand for, and the centres
+    """The volumes (n, q) [mm3] that the points of a ``rule`` stand for in the first ``count`` cells at rest, and the centres
     (n, 3) [mm].
     """
     points, weights = rule

@@ -5,6 +5,7 @@ import json
 import pickle
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 
 from fem_reference.foundations.subprocesses import end_with_starter
 from fem_reference.foundations.usage import forget_peak_memory, peak_memory
+from fem_reference.problems.problem import Task
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.solvers.fenicsx import dolfinx_door  # noqa: F401 - first
 from fem_reference.solvers.fenicsx.jobs import Job
@@ -102,8 +104,8 @@ class Worker:
         return result
 
     def solve_exactly(self) -> bool:
-        """From now on solve linear systems exactly; whether that is another way than until now. What is left of an inexact solution
-        moves a body that is next to free far away.
+        """Solve linear systems exactly from now on; True where that is another way than until now. What is left of an inexact
+        solution moves a body that is next to free far away.
         """
         other = self.body.linear.solve_exactly()
         self.exact |= other
@@ -127,8 +129,8 @@ class Worker:
         )
 
     def negative_modes(self, frame: float) -> dict[str, float]:
-        """In how many directions the energy falls from the state of a frame that was reached, where that can be known; the time
-        for it is no part of solving.
+        """The number of directions in which the energy falls from the state of a frame that was reached, where it can be known;
+        the time for it is no part of solving.
         """
         begin = time.perf_counter()
         modes = self.body.examine(frame)
@@ -156,7 +158,7 @@ class Worker:
         return "limit point", f"{limit}; {self.sentence(reached)}"
 
     def sentence(self, reached: Step) -> str:
-        """Why a frame could not be reached, where, and what to try."""
+        """The reason why a frame could not be reached, where, and what to try."""
         other = "a larger bulk modulus" if self.collapse else "smaller cells"
         self.ranges.add(reached.at, self.body.validity.examine(reached.at)[1])
         return (
@@ -168,7 +170,7 @@ class Worker:
         )
 
     def deepest(self) -> str:
-        """Where contact is deepest, if there is any."""
+        """The place where contact is deepest, if there is any."""
         contact = self.body.contact
         return f", and contact is deepest, {contact.deepest()}" if contact else ""
 
@@ -240,6 +242,14 @@ def solve_field(problem: FieldProblem, folder: Path) -> None:
     report(**outcome)
 
 
+def solve_body(job: Job, folder: Path) -> None:
+    """March a body through its frames."""
+    Worker(job, folder).run()
+
+
+_SOLVE: dict[Task, Callable[[Any, Path], None]] = {"solve_field": solve_field, "solve_body": solve_body}
+
+
 def report(**event: Any) -> None:
     """A line for the process that started this one."""
     sys.stdout.write(f"{MARK}{json.dumps(event)}\n")
@@ -254,10 +264,7 @@ def main(argument: str) -> None:
     for line in sys.stdin if argument == "-" else [argument]:
         path = Path(line.strip())
         job = pickle.loads(path.read_bytes())
-        if isinstance(job, FieldProblem):
-            solve_field(job, path.parent)
-        else:
-            Worker(job, path.parent).run()
+        _SOLVE[job.task](job, path.parent)
         gc.collect()
 
 

@@ -4,12 +4,13 @@
 """
 
 from fem_reference.solvers.common.protocol import BodySolver, FieldSolver
+from fem_reference.solvers.scikit_fem import body, field
 from fem_reference.solvers.scikit_fem.body import ScikitBodySettings, solve_body
 from fem_reference.solvers.scikit_fem.field import ScikitFieldSettings, assemble, solve_field, space
 
 __all__ = ["SOLVES", "ScikitBodySettings", "ScikitFieldSettings", "assemble", "solve_body", "solve_field", "space"]
 
 SOLVES = (
-    FieldSolver(settings=ScikitFieldSettings, solve_field=solve_field, example={}),
-    BodySolver(settings=ScikitBodySettings, solve_body=solve_body, example={}),
+    FieldSolver(settings=ScikitFieldSettings, solve=field.solve, example={}),
+    BodySolver(settings=ScikitBodySettings, solve=body.solve, example={}),
 )

@@ -14,10 +14,9 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.records import Record
 from fem_reference.problems.body import ELEMENTS, Body, Prescribed, check_quadrature
 from fem_reference.problems.checks import check
-from fem_reference.runs.solved import Reached, Solved
-from fem_reference.runs.store import Outcome
+from fem_reference.runs.store import Frame, Outcome, Run, Sink
 from fem_reference.solvers.common.load_steps import Attempt, Step, StepSizes, march
-from fem_reference.solvers.common.protocol import Trade
+from fem_reference.solvers.common.protocol import Trade, solved
 from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.scikit_fem.equations import Equations
 
@@ -25,7 +24,7 @@ log = logging.getLogger(__name__)
 
 _HALVINGS = 10
 _ROUNDING = 1e-14  # of what is prescribed, over the size of the body
-_GROWTH = 10.0  # of the out-of-balance forces, above which a Newton step is halved
+_GROWTH = 10.0  # of the residual, above which a Newton step is halved
 
 
 class ScikitBodySettings(Record):
@@ -33,7 +32,7 @@ class ScikitBodySettings(Record):
 
     ``element``: one of ``body.ELEMENTS``. ``first_step`` and ``smallest_step`` bound the load step, by default one to each
     frame: it grows by half after an easy step (at most 5 Newton iterations) and is halved when Newton needs more than
-    ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3] ends Newton's iteration: the norm of out-of-balance nodal forces
+    ``newton_iterations`` or a cell inverts. ``residual`` [N, mm3] ends Newton's iteration: the norm of the nodal forces
     and of the volume equation. ``quadrature_degree``: of the polynomials that are integrated exactly on a straight cell, by
     default what the element needs.
     """
@@ -46,7 +45,7 @@ class ScikitBodySettings(Record):
     quadrature_degree: int | None = Field(default=None, gt=0)
 
 
-def solve_body(body: Body, settings: ScikitBodySettings) -> Solved:
+def solve(body: Body, settings: ScikitBodySettings, sink: Sink) -> Outcome:
     """The states of ``body`` at its frames, as far as they can be reached."""
     check(body, settings.element)
     check_quadrature(settings.element, settings.quadrature_degree, "quadrature_degree")
@@ -63,7 +62,7 @@ def solve_body(body: Body, settings: ScikitBodySettings) -> Solved:
         raise InputError("effects", ", ".join(timed), "effects without rates, as this solver knows no time")
     begin = time.perf_counter()
     march_of = March(body, settings)
-    states = [march_of.state(Step(body.frames[0]))]
+    sink(march_of.state(Step(body.frames[0])))
     counts = {"newton_iterations": 0.0, "load_steps": 0.0, "cut_backs": 0.0}
 
     def cost() -> dict[str, float]:
@@ -76,15 +75,20 @@ def solve_body(body: Body, settings: ScikitBodySettings) -> Solved:
             counts[name] += count
         if not step.last.converged:
             sentence = f"{step.last.detail} beyond frame {step.at:.4g}; try other cells or a smaller motion"
-            return Solved(tuple(states), Outcome(step.last.status, sentence, cost()))
-        states.append(march_of.state(step))
+            return Outcome(step.last.status, sentence, cost())
+        sink(march_of.state(step))
         log.debug("frame %g: %d Newton iterations", step.frame, step.iterations)
-    return Solved(tuple(states), Outcome("converged", f"all {len(states)} frames reached", cost()))
+    return Outcome("converged", f"all {len(body.frames)} frames reached", cost())
+
+
+def solve_body(body: Body, settings: ScikitBodySettings) -> Run:
+    """The run of ``body``, in memory."""
+    return solved(solve, body, settings)
 
 
 @dataclass(frozen=True, eq=False)
 class _Tangent:
-    """The equations at ``unknowns`` (N,): the out-of-balance forces ``residual`` (N,) and their derivative ``matrix`` (N, N)."""
+    """The equations at ``unknowns`` (N,): their ``residual`` (N,) and its derivative ``matrix`` (N, N)."""
 
     unknowns: Floats
     residual: Floats
@@ -179,19 +183,19 @@ class March:
                     values |= dict(zip((3 * nodes + i).tolist(), moved[:, i].tolist(), strict=True))
         return np.array(list(values), np.int64), np.array(list(values.values()))
 
-    def state(self, step: Step) -> Reached:
+    def state(self, step: Step) -> Frame:
         """The present unknowns as a state."""
         equations, unknowns = self.equations, self.unknowns
         places = equations.space.rest + unknowns[: equations.space.rest.size].reshape(-1, 3)
         residual, _ = equations.assembled(unknowns, step.frame, springs=False)
         fixed = {entry.name: self._force(entry, places, residual) for entry in self.body.prescribed}
         inside, vertices = equations.smallest_determinants(unknowns)
-        return Reached(
+        return Frame(
             step.frame,
-            places[equations.space.nodes],
-            {name: force for name, (force, _) in fixed.items()},
-            {name: moment for name, (_, moment) in fixed.items()},
-            {
+            points=places[equations.space.nodes],
+            forces={name: force for name, (force, _) in fixed.items()},
+            moments={name: moment for name, (_, moment) in fixed.items()},
+            scalars={
                 "min_det_F_quadrature": inside,
                 "min_det_F_vertices": vertices,
                 "volume_ratio": equations.volume_ratio(unknowns),

@@ -1,4 +1,4 @@
-"""The equations of a body: out-of-balance forces and their tangent, summed from what acts, each differentiated by jets."""
+"""The equations of a body: residual and tangent, summed from what acts, each differentiated by jets."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -53,17 +53,17 @@ class Equations:
         self.inside = inside
         self.parts = [_Part(inside, self._energy_law, self._felt())]
         loads = [effect for effect in body.effects if isinstance(effect, Load)]
-        self.parts += [part for load in loads for part in self._surface(load.on, partial(_load_law, load))]
+        everything, surface = list(range(VARIABLES)), self.space.surface
+        self.parts += [_Part(surface(load.on), partial(_load_law, load), everything) for load in loads]
         self.springs = [
-            part
+            _Part(surface(str(entry.on)), partial(_spring_law, entry), everything)
             for entry in body.prescribed
             if entry.stiffness is not None
-            for part in self._surface(str(entry.on), partial(_spring_law, entry))
         ]
         self.stabilising = self._projection() if is_stabilised(element) else None
 
     def assembled(self, unknowns: Floats, frame: float, springs: bool = True) -> tuple[Floats, Any]:
-        """The out-of-balance forces (N,) [N, mm3] and their tangent (N, N), with the pull of ``springs`` or without."""
+        """The residual (N,) [N, mm3] and its tangent (N, N), with the pull of ``springs`` or without."""
         residual = np.zeros(len(unknowns))
         blocks = []
         for part in self.parts + (self.springs if springs else []):
@@ -133,9 +133,6 @@ class Equations:
         fibre = None if points.fibre is None else points.fibre.reshape(-1, 3)
         energy = _jet(total_energy(self._acting(frame), _state(jets, fibre)), jets[0])
         return energy.slope, energy.curvature
-
-    def _surface(self, region: str, law: Law) -> list[_Part]:
-        return [_Part(points, law, list(range(VARIABLES))) for points in self.space.surface(region)]
 
 
 def _of_cells(part: _Part, points: Points, unknowns: Floats, frame: float) -> tuple[Floats, Floats]:

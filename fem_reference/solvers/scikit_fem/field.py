@@ -19,8 +19,8 @@ from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.foundations.records import Record
 from fem_reference.geometry.field_mesh import FieldMesh
 from fem_reference.problems.scalar import FieldProblem, at
-from fem_reference.runs.scalar import Solution
-from fem_reference.runs.store import Outcome
+from fem_reference.runs.store import Frame, Outcome, Run, Sink
+from fem_reference.solvers.common.protocol import solved
 
 QUADRATURE_DEGREE = 8
 _SINGULAR = 1e15  # condition numbers above leave no correct digit
@@ -96,14 +96,22 @@ def assemble(problem: FieldProblem) -> tuple[Any, Floats]:
     return A, b + _fluxes(problem)
 
 
-def solve_field(problem: FieldProblem, settings: ScikitFieldSettings) -> Solution:
+def solve(problem: FieldProblem, settings: ScikitFieldSettings, sink: Sink) -> Outcome:
     """Assemble and solve."""
     if settings.form == "galerkin":
-        return replace(_solved(replace(problem, tau=None)), form="galerkin")
-    return _solved(problem)
+        problem = replace(problem, tau=None)
+    values, outcome = _solved(problem)
+    sink(Frame.of_field(problem, values, problem.form))
+    return outcome
 
 
-def _solved(problem: FieldProblem) -> Solution:
+def solve_field(problem: FieldProblem, settings: ScikitFieldSettings) -> Run:
+    """The run of a scalar field, in memory."""
+    return solved(solve, problem, settings)
+
+
+def _solved(problem: FieldProblem) -> tuple[Floats, Outcome]:
+    """The values (N,) at the nodes and how it ended."""
     begin = time.perf_counter()
     A, b = assemble(problem)
     assembled = time.perf_counter()
@@ -125,11 +133,11 @@ def _solved(problem: FieldProblem) -> Solution:
             return _failed(len(b), f"the equations have no unique solution (condition number {condition:.1e})")
         values[free] = factors.solve(b[free] - A[free][:, ~free] @ values[~free])
     cost = {"seconds_assembly": assembled - begin, "seconds_solve": time.perf_counter() - assembled}
-    return Solution(values, Outcome("converged", f"{len(b)} nodes", cost | {"unknowns": float(free.sum())}))
+    return values, Outcome("converged", f"{len(b)} nodes", cost | {"unknowns": float(free.sum())})
 
 
-def _failed(count: int, why: str) -> Solution:
-    return Solution(np.full(count, np.nan), Outcome("diverged", why))
+def _failed(count: int, why: str) -> tuple[Floats, Outcome]:
+    return np.full(count, np.nan), Outcome("diverged", why)
 
 
 def _place(problem: FieldProblem, basis: Any, laid: Flat) -> Place:
@@ -148,7 +156,7 @@ def _slope_weights(basis: Any) -> Floats:
 
 
 def _order(problem: FieldProblem, basis: Any) -> Any:
-    """Which of scikit-fem's unknowns stands at each node of the problem."""
+    """The unknown of scikit-fem that stands at each node of the problem."""
     vertices = basis.nodal_dofs[0]
     if problem.order == 1:
         return vertices
@@ -162,7 +170,7 @@ def _order(problem: FieldProblem, basis: Any) -> Any:
 
 
 def _fluxes(problem: FieldProblem) -> Floats:
-    """What flows in over the boundary, (N,): the integral of k slope times each hat function, by Gauss's rule of 3 points."""
+    """The flow over the boundary (N,): the integral of k slope times each hat function, by Gauss's rule of 3 points."""
     b = np.zeros(len(problem.fixed))
     for flux in problem.fluxes:
         ends = problem.mesh.points[flux.facets]

@@ -67,7 +67,7 @@ class Points:
 
     @property
     def rates(self) -> Floats:
-        """How the variables at each point change with the unknowns of its cell, (m, q, 13, 3 k + l)."""
+        """The slopes of the variables at each point by the unknowns of its cell, (m, q, 13, 3 k + l)."""
         m, q, k = self.values.shape
         rates = np.zeros((m, q, VARIABLES, 3 * k + self.pressures.shape[2]))
         for i in range(3):
@@ -113,85 +113,58 @@ class Space:
     @cached_property
     def inside(self) -> Points:
         """The points of the quadrature of all cells."""
-        X, W = get_quadrature(self.nodal.refdom, self.degree)
-        return self._points(X, W, np.arange(len(self.corners)))
+        return self._points(skfem.Basis, get_quadrature(self.nodal.refdom, self.degree))
 
     @cached_property
     def vertices(self) -> Points:
         """The corners of all cells; they have no weight that means anything."""
         corners = self.nodal.refdom.p
-        return self._points(corners, np.ones(corners.shape[1]), np.arange(len(self.corners)))
+        return self._points(skfem.Basis, (corners, np.ones(corners.shape[1])))
 
-    def sides(self, region: str) -> list[tuple[Ints, Ints]]:
-        """By number of the side in the reference cell: its corners there, and the cells that have it in ``region``."""
+    def facets(self, region: str) -> Ints:
+        """The facets of scikit-fem's mesh in ``region``; InputError where one of them is not of one cell."""
         wanted = np.unique(np.sort(self.cells.facets[region], axis=1), axis=0)
         found = []
-        for side in self.nodal.refdom.facets:
+        for side, facets in zip(self.nodal.refdom.facets, self.mesh.t2f, strict=True):
             own = np.sort(self.corners[:, side], axis=1)
-            same = np.concatenate([wanted, own])
-            _, number = np.unique(same, axis=0, return_inverse=True)
-            inside = np.isin(number[len(wanted) :], number[: len(wanted)])
-            found.append((np.asarray(side, np.int64), np.flatnonzero(inside)))
-        if sum(len(cells) for _, cells in found) != len(wanted):
+            _, number = np.unique(np.concatenate([wanted, own]), axis=0, return_inverse=True)
+            found.append(facets[np.isin(number[len(wanted) :], number[: len(wanted)])])
+        if sum(map(len, found)) != len(wanted):
             raise InputError(f"facets.{region}", "facets that are not of one cell each", "facets of the surface")
-        return [(side, cells) for side, cells in found if len(cells)]
+        return np.concatenate(found)
 
     def nodes_on(self, region: str) -> Ints:
         """The nodes of the displacement on ``region``, each once."""
-        found = []
-        for side, cells in self.sides(region):
-            start, _, _, across = self._plane(side)
-            on = np.abs((self.nodal.doflocs - start) @ across) < 1e-12  # of the unit cell
-            found.append(self.basis.element_dofs[on][:, cells].ravel())
-        return np.unique(np.concatenate(found))
+        return np.unique(self.basis.get_dofs(self.facets(region)).all())
 
-    def surface(self, region: str) -> list[Points]:
-        """The points of the quadrature of the facets of ``region``, one entry for each side of the reference cell."""
-        flat, weights = get_quadrature(self.nodal.refdom.brefdom, self.degree)
-        found = []
-        for side, cells in self.sides(region):
-            start, along, up, across = self._plane(side)
-            X = start[:, None] + along[:, None] * flat[0] + up[:, None] * flat[1]
-            points = self._points(X, weights, cells)
-            # Nanson: an area vector goes over with the cofactors of the map.
-            mapping = self.mesh.mapping()
-            size = np.abs(np.broadcast_to(mapping.detDF(X, cells), points.weights.shape))
-            areas = size[..., None] * np.einsum("ikmq,i->mqk", mapping.invDF(X, cells), across)
-            lengths = np.linalg.norm(areas, axis=2)
-            found.append(replace(points, weights=lengths * weights, normals=areas / lengths[..., None]))
-        return found
+    def surface(self, region: str) -> Points:
+        """The points of the quadrature of the facets of ``region``."""
+        rule = get_quadrature(self.nodal.refdom.brefdom, self.degree)
+        return self._points(skfem.FacetBasis, rule, facets=self.facets(region))
 
-    def _plane(self, side: Ints) -> tuple[Floats, Floats, Floats, Floats]:
-        """A side of the reference cell: a corner, its two edges and its outward area vector, (3,) each."""
-        corners = self.nodal.refdom.p.T
-        start, along, up = corners[side[0]], corners[side[1]] - corners[side[0]], corners[side[-1]] - corners[side[0]]
-        across = np.cross(along, up)
-        return start, along, up, across * np.sign(across @ (start - corners.mean(axis=0)))
-
-    def _points(self, X: Floats, W: Floats, cells: Ints) -> Points:
-        """Points of ``cells`` at ``X`` (3, q) of the reference cell with weights ``W`` (q,)."""
-
-        def basis(like: Any) -> Any:
-            return skfem.Basis(
-                self.mesh, like.elem, quadrature=(X, W), elements=cells, dofs=like.dofs, disable_doflocs=True
-            )
-
-        own = basis(self.basis)
-        shape = (len(cells), len(W))
+    def _points(self, kind: Any, rule: tuple[Floats, Floats], **where: Ints) -> Points:
+        """The points of a ``rule`` on a ``kind`` of basis of scikit-fem, ``where`` it is."""
+        own, *others = (
+            kind(self.mesh, basis.elem, quadrature=rule, dofs=basis.dofs, disable_doflocs=True, **where)
+            for basis in (self.basis, self.pressure)
+            if basis is not None
+        )
+        shape = own.dx.shape
         values = [np.broadcast_to(np.asarray(function[0]), shape) for function in own.basis]
         slopes = [np.broadcast_to(function[0].grad, (3, *shape)) for function in own.basis]
-        dofs = (3 * self.basis.element_dofs.T[cells, :, None] + np.arange(3)).reshape(len(cells), -1)
+        dofs = (3 * own.element_dofs.T[:, :, None] + np.arange(3)).reshape(shape[0], -1)
         pressures = np.zeros((*shape, 0))
-        if self.pressure is not None:
-            entries = [np.broadcast_to(np.asarray(entry[0]), shape) for entry in basis(self.pressure).basis]
+        for pressure in others:
+            entries = [np.broadcast_to(np.asarray(entry[0]), shape) for entry in pressure.basis]
             pressures = np.stack(entries, axis=-1)
-            dofs = np.concatenate([dofs, self.rest.size + self.pressure.element_dofs.T[cells]], axis=1)
+            dofs = np.concatenate([dofs, self.rest.size + pressure.element_dofs.T], axis=1)
         return Points(
-            cells=cells,
+            cells=np.asarray(own.tind if own.tind is not None else np.arange(shape[0])),
             places=np.moveaxis(np.asarray(own.global_coordinates()), 0, -1),
             weights=np.asarray(own.dx),
             values=np.stack(values, axis=-1),
             slopes=np.moveaxis(np.stack(slopes), (0, 1), (3, 2)),
             pressures=pressures,
             dofs=dofs.astype(np.int64),
+            normals=np.moveaxis(np.asarray(own.normals), 0, -1) if "facets" in where else None,
         )

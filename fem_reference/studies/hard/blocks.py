@@ -18,8 +18,9 @@ from fem_reference.geometry.sectors import attached_shares
 from fem_reference.geometry.skins import attached_skin, spacing
 from fem_reference.geometry.tessellation import tessellated
 from fem_reference.problems.contact import check_exempt
-from fem_reference.problems.muscle import AttachedVertices, Problem, RigidBody, Setup, solid
+from fem_reference.problems.muscle import Problem, solid
 from fem_reference.problems.paths import Along
+from fem_reference.problems.setup import AttachedVertices, RigidBody, Setup
 from fem_reference.scenes.bones import Bone
 from fem_reference.studies.hard.records import FACES, Face, Hard, Hold, Lattice, Start
 

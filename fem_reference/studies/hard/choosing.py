@@ -3,8 +3,8 @@
 from typing import Any
 
 from fem_reference import solvers
+from fem_reference.problems.problem import Task
 from fem_reference.scenes.case import SolverChoice
-from fem_reference.solvers.common.protocol import Task
 
 REFERENCE, SECOND = "fenicsx", "scikit_fem"
 LIMIT = 120.0  # [s] of processor time of a run

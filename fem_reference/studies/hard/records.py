@@ -15,11 +15,11 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import FileName, Record, join, keys, parse
 from fem_reference.foundations.units import AreaStiffness, Point, PositiveLength
 from fem_reference.io import texts
+from fem_reference.problems.problem import Task
 from fem_reference.scenes import casefile
 from fem_reference.scenes.bones import Bone, Motion
 from fem_reference.scenes.case import HOME, Case, SolverChoice
 from fem_reference.scenes.muscle import Frames
-from fem_reference.solvers.common.protocol import Task
 from fem_reference.studies.hard.choosing import choices, task_of
 
 FOLDER = HOME / "cases" / "hard"

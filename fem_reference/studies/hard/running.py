@@ -20,12 +20,11 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.embedding import Locator
 from fem_reference.problems import of_case
 from fem_reference.problems.muscle import Problem
-from fem_reference.problems.muscle_body import as_body
-from fem_reference.problems.scalar import FieldProblem
+from fem_reference.problems.of_case import CaseProblem
+from fem_reference.problems.problem import NO_SURFACE
 from fem_reference.runs.key import made_with
-from fem_reference.runs.store import NO_SURFACE, Frame, Outcome
+from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes.case import SolverChoice
-from fem_reference.scenes.scalar import ScalarCase
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx.processes import CLOCK
 from fem_reference.studies.hard import blocks, jitters, steps
@@ -56,21 +55,20 @@ class Posed:
         self.truth: tuple[Floats, tuple[int, ...]] | None = None
 
     @cached_property
-    def problem(self) -> Problem | FieldProblem:
+    def problem(self) -> CaseProblem:
         """The problem; InputError where the case cannot be posed."""
         if self.hard.block is not None:
             return blocks.problem(self.hard)
         shipped = self.hard.shipped
         assert shipped is not None  # a Hard record has one of the two
         case = shipped.read()
-        built: Problem | FieldProblem = of_case.problem(case, of_case.setup(case))
-        return built
+        return of_case.problem(case, of_case.setup(case))
 
     @cached_property
     def range(self) -> tuple[float, float]:
         """The range of the constant boundary values of a scalar case."""
-        case = self.hard.shipped.read() if self.hard.shipped else None
-        assert isinstance(case, ScalarCase)  # asked of no other
+        assert self.hard.shipped is not None  # asked of no other
+        case = of_case.scalar_case(self.hard.shipped.read())
         values = [float(entry.value) for entry in case.boundary if entry.value is not None]
         return min(values), max(values)
 
@@ -154,15 +152,16 @@ def _limited(seconds: float) -> Iterator[None]:
 
 def _solved(posed: Posed, choice: SolverChoice) -> Cell:
     """The cell of a solver that is asked for the case."""
-    built, hard = posed.problem, posed.hard
-    if isinstance(built, FieldProblem):
-        outcome, followed = _field(posed, built, choice)
+    hard, muscle = posed.hard, posed.problem.muscle
+    of_reference = choice.solver == REFERENCE
+    if muscle is None:
+        outcome, followed = _field(posed, choice)
     elif choice.solver == SECOND:
-        outcome, followed = _second(built, choice)
+        outcome, followed = _second(muscle, choice)
     else:
-        outcome, followed = _muscle(built, choice)
+        outcome, followed = _muscle(muscle, choice)
     blank = Cell(hard.name, choice.solver, "ok", "", outcome.status)
-    if choice.solver == REFERENCE and isinstance(built, Problem) and outcome.status == "converged":
+    if of_reference and muscle is not None and outcome.status == "converged":
         posed.truth = followed.positions, followed.numbers
     if posed.truth is not None and posed.truth[1][: len(followed.numbers)] == followed.numbers:
         followed = replace(followed, truth=posed.truth[0][: len(followed.numbers)])
@@ -177,11 +176,11 @@ def _solved(posed: Posed, choice: SolverChoice) -> Cell:
     else:
         found = stress.judge(blank, histories, hard.contrast)
     wanted = hard.steps or (steps.farthest(followed) if posed.in_steps and hard.start is None else None)
-    if choice.solver == REFERENCE and isinstance(built, Problem) and wanted is not None:
-        ends = steps.compare(built, choice, wanted)
+    if of_reference and muscle is not None and wanted is not None:
+        ends = steps.compare(muscle, choice, wanted)
         found = replace(found, sentence=f"{found.sentence}; {ends.sentence}")
         found = found if ends.same else replace(found, verdict="failed")
-    if choice.solver == REFERENCE and isinstance(built, Problem) and posed.jitters:
+    if of_reference and muscle is not None and posed.jitters:
         others = jitters.compare(
             hard, (outcome, followed), posed.jitters, lambda one: _muscle(_muscle_problem(one), choice)
         )
@@ -192,8 +191,8 @@ def _solved(posed: Posed, choice: SolverChoice) -> Cell:
 
 
 def _muscle_problem(hard: Hard) -> Problem:
-    built = Posed(hard).problem
-    assert isinstance(built, Problem)  # as that of the case is
+    built = Posed(hard).problem.muscle
+    assert built is not None  # as that of the case is
     return built
 
 
@@ -217,10 +216,10 @@ def _muscle(built: Problem, choice: SolverChoice) -> tuple[Outcome, Followed]:
 
 
 def _followed(built: Problem, frames: list[Frame]) -> Followed:
-    tets = [frame.tets for frame in frames if frame.tets is not None]
+    tets = [frame.points for frame in frames if len(frame.points)]
     whole = len(tets) == len(frames)
     return Followed(
-        tuple(frame.number for frame in frames),
+        tuple(int(frame.number) for frame in frames),
         built.surface,
         np.array([frame.surface for frame in frames if frame.surface is not None]),
         built.mesh if whole else None,
@@ -253,13 +252,13 @@ def _second(built: Problem, choice: SolverChoice) -> tuple[Outcome, Followed]:
         want = f"at most {_MOST_FOR_SECOND}: it is written in Python, to be right and not fast"
         raise InputError(choice.solver, f"{len(built.mesh.tets)} tetrahedra", want)
     offer = solvers.find(choice.solver, choice.solver, "solve_body")
-    solved = offer.solve_body(as_body(built), solvers.settings(choice, choice.solver, "solve_body"))
+    solved = offer.run(built.body, solvers.settings(choice, choice.solver, "solve_body"))
     where = Locator(built.mesh).embed(built.surface.points)
     frames = [
         Frame(
-            int(state.frame),
+            state.number,
             built.surface.points + where.interpolate(built.mesh, state.points - built.mesh.points),
-            tets=state.points,
+            points=state.points,
             scalars=state.scalars,
         )
         for state in solved.states
@@ -267,15 +266,17 @@ def _second(built: Problem, choice: SolverChoice) -> tuple[Outcome, Followed]:
     return solved.outcome, _followed(built, frames)
 
 
-def _field(posed: Posed, built: FieldProblem, choice: SolverChoice) -> tuple[Outcome, Followed]:
+def _field(posed: Posed, choice: SolverChoice) -> tuple[Outcome, Followed]:
     """By a solver of scalar fields, whose settings for bodies do not matter there."""
     offer = solvers.find(choice.solver, choice.solver, "solve_field")
     changes = posed.hard.settings.get(choice.solver, {})
     settings = solvers.settings(SolverChoice(solver=choice.solver, **changes), choice.solver, "solve_field")
-    solution = offer.solve_field(built, settings)
+    field = posed.problem.field
+    assert field is not None  # what is no muscle
+    solution = offer.run(field, settings)
     steps.check_not_stalled(solution.outcome)
     nothing = np.zeros((1, 0, 3))
-    return solution.outcome, Followed((0,), NO_SURFACE, nothing, values=solution.values[None], range=posed.range)
+    return solution.outcome, Followed((0,), NO_SURFACE, nothing, values=solution.values, range=posed.range)
 
 
 def _scene(found: Cell, followed: Followed) -> Scene | None:

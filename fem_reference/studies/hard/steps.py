@@ -60,7 +60,7 @@ def _end(built: Problem, choice: SolverChoice, until: int, count: int) -> tuple[
     frames = list[Frame]()
     outcome = fenicsx.solve(replace(built, frames=(built.frames[0], until)), settings, frames.append)
     check_not_stalled(outcome)
-    return outcome.status, frames[-1].tets if outcome.status == "converged" else None
+    return outcome.status, frames[-1].points if outcome.status == "converged" else None
 
 
 def check_not_stalled(outcome: Outcome) -> None:

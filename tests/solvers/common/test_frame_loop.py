@@ -2,8 +2,9 @@
 
 import pytest
 
-from fem_reference.problems.muscle import Setup
-from fem_reference.runs.store import NO_SURFACE, Frame, Outcome
+from fem_reference.problems.problem import NO_SURFACE
+from fem_reference.problems.setup import Setup
+from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers.common.frame_loop import each, follow, refused
 from fem_reference.solvers.common.state_checks import Trouble
 

@@ -200,7 +200,7 @@ def test_what_was_reached_is_kept_where_a_body_inverts(session) -> None:
     assert solved.outcome.status == "inverted"
     assert "Newton's method converged, but det F fell to" in solved.outcome.message
     assert solved.outcome.message.endswith("try a smaller motion or smaller cells")  # a body has no keys
-    assert [state.frame for state in solved.states] == [0.0, 0.25]
+    assert [state.number for state in solved.states] == [0.0, 0.25]
     with pytest.raises(ArithmeticError, match=r"inverted: Newton's method converged, but det F fell to"):
         _ = solved.last
 

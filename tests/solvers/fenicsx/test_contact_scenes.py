@@ -12,7 +12,6 @@ from fem_reference.geometry.rigid_bodies import Box
 from fem_reference.problems import muscle, shapes
 from fem_reference.problems.body import Body
 from fem_reference.problems.contact import Contact, Obstruction, nearest_on_path
-from fem_reference.problems.muscle_body import as_body
 from fem_reference.scenes import casefile
 from fem_reference.solvers import fenicsx
 from fem_reference.verification import parts
@@ -78,7 +77,7 @@ def test_ranks_change_nothing(tmp_path) -> None:
 @pytest.mark.usefixtures("needs_fenicsx")
 def test_what_overlaps_at_rest_is_relaxed_first_and_reported(tmp_path) -> None:
     case = scene(tmp_path / "bar", -4.6)  # 0.46 mm deep
-    assert as_body(muscle.build(case, muscle.setup(case))).frames == (-10.0, 0, 5, 10)
+    assert muscle.build(case, muscle.setup(case)).body.frames == (-10.0, 0, 5, 10)
     frames, depths = solved(case)
     assert [frame.number for frame in frames] == [0, 5, 10]
     first = frames[0].scalars
@@ -90,7 +89,7 @@ def test_what_overlaps_at_rest_is_relaxed_first_and_reported(tmp_path) -> None:
 def test_attached_vertices_are_exempt_from_contact(tmp_path) -> None:
     case = scene(tmp_path / "bar", -5.5)
     rest = muscle.setup(case)
-    body = as_body(muscle.build(case, rest))
+    body = muscle.build(case, rest).body
     assert [entry.name for entry in body.obstructions] == ["floor", "lid", "ball"]
     assert [type(effect).__name__ for effect in body.effects] == ["NeoHooke", "Incompressible"]
     heights = body.contact.on.points[:, 2]
@@ -105,7 +104,7 @@ def test_attached_vertices_are_exempt_from_contact(tmp_path) -> None:
 def test_only_some_bones_are_obstacles(tmp_path) -> None:
     some = CONTACT.replace("\n\n", '\nbones = ["ball"]\n\n')
     case = scene(tmp_path / "bar", -5.5, some)
-    assert [entry.name for entry in as_body(muscle.build(case, muscle.setup(case))).obstructions] == ["ball"]
+    assert [entry.name for entry in muscle.build(case, muscle.setup(case)).body.obstructions] == ["ball"]
     with pytest.raises(InputError, match=r'effect\[2\]\.bones: got "bal", want one of floor, lid, ball'):
         scene(tmp_path / "other", -5.5, some.replace("ball", "bal"))
 
@@ -149,7 +148,7 @@ def test_what_relaxes_waits_for_the_first_frame(tmp_path) -> None:
     )
     path.write_text(turning)
     case = casefile.read(path)
-    body = as_body(muscle.build(case, muscle.setup(case)))
+    body = muscle.build(case, muscle.setup(case)).body
     assert body.first == 0
     assert body.obstructions[1].pose(-10.0) == pytest.approx(np.eye(4))
     top = np.array([[5.0, 5.0, 40.0]])

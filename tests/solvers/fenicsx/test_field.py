@@ -11,7 +11,7 @@ import pytest
 
 from fem_reference.foundations.errors import MissingSoftware
 from fem_reference.problems.scalar import FieldProblem, Flux, build
-from fem_reference.runs.scalar import Solution
+from fem_reference.runs.store import Run
 from fem_reference.solvers import fenicsx, scikit_fem
 from fem_reference.solvers.fenicsx import FieldSettings, field
 
@@ -26,7 +26,7 @@ pytestmark = [
 DIFFUSION = {"name": "diffusion", "coefficient": 0.7}
 
 
-def assert_agrees(problem: FieldProblem) -> Solution:
+def assert_agrees(problem: FieldProblem) -> Run:
     """Both discretisations are the same and their quadrature exact for the formulas here: they differ by rounding, 1e-9 at most."""
     solution = fenicsx.solve_field(problem, FieldSettings())
     peer = scikit_fem.solve_field(problem, scikit_fem.ScikitFieldSettings())
@@ -120,7 +120,7 @@ def test_a_quadratic_field_is_met_exactly(tmp_path) -> None:
     )
     problem = build(scene)
     x, y = problem.mesh.nodes[2].T
-    assert fenicsx.solve_field(problem, FieldSettings()).values == pytest.approx(x**2 - x * y + 2, abs=1e-10)
+    assert fenicsx.solve_field(problem, FieldSettings()).values[0] == pytest.approx(x**2 - x * y + 2, abs=1e-10)
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -138,7 +138,7 @@ def test_a_closed_surface_fixed_at_some_vertices(tmp_path, order) -> None:
         element=fields.element(order, "supg" if order == 2 else "galerkin"),
     )
     problem = build(scene)
-    values = assert_agrees(problem).values
+    values = assert_agrees(problem).values[0]
     assert values[[2, 7, 0]].tolist() == [1, -1, 0.5]
 
 
@@ -166,7 +166,7 @@ def test_equations_without_a_unique_solution_are_a_status(tmp_path) -> None:
     assert solution.outcome.status == "diverged"
     assert "no unique solution (null pivots in their factorisation: 1)" in solution.outcome.message
     assert np.isnan(solution.values).all()
-    assert solution.values.shape == (3,)
+    assert solution.values[0].shape == (3,)
 
 
 def test_a_formula_without_a_value_is_a_status(tmp_path) -> None:
@@ -192,7 +192,7 @@ def test_a_process_that_dies_is_a_status(tmp_path, monkeypatch) -> None:
     solution = solved_by("import sys; sys.exit('no memory')", FieldSettings(), tmp_path, monkeypatch)
     assert solution.outcome.status == "crashed"
     assert "exit status 1 (no memory); 0 fields are kept" in solution.outcome.message
-    assert solution.values.shape == (3,)
+    assert solution.values[0].shape == (3,)
     assert np.isnan(solution.values).all()
 
 

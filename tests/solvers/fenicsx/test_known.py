@@ -10,8 +10,8 @@ from mpi4py import MPI
 from fem_reference.solvers.fenicsx import known
 
 
-def state(*acting: float) -> known.State:
-    return known.State(np.array(acting), np.zeros(3), None)
+def state(*acting: float) -> known.KnownState:
+    return known.KnownState(np.array(acting), np.zeros(3), None)
 
 
 def test_a_state_is_known_where_nothing_that_acts_differs_by_more_than_rounding() -> None:

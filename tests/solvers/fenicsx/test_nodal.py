@@ -38,7 +38,7 @@ def test_a_block_stretched_by_a_half_with_free_sides(fem_lab, element: str) -> N
     effects = MATRIX if "/" in element else PENALTY
     body = Body(mesh, effects, tuple(fixed), (0.0, 1.0))
     solved = fenicsx.solve_body(body, BodySettings(element=element, first_step=1, residual=1e-12, store_state=True))
-    states = {state.frame: state.state for state in (solved.states[0], solved.last)}
+    states = {state.number: state.state for state in (solved.states[0], solved.last)}
     made = Results(TetMesh(mesh.points, mesh.cells), effects, states)
     rest, found = (made.evaluate(mesh.points * 0.98 + 0.01, frame) for frame in (0.0, 1.0))
     assert np.abs(rest["cauchy_stress"]).max() < 1e-15

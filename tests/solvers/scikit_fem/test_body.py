@@ -9,7 +9,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import parse
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed, reference_nodes
-from fem_reference.runs.solved import Solved
+from fem_reference.runs.store import Run
 from fem_reference.solvers.scikit_fem import ScikitBodySettings, solve_body
 from fem_reference.solvers.scikit_fem.body import March
 from fem_reference.solvers.scikit_fem.equations import Equations
@@ -56,7 +56,7 @@ def moved(name: str, on: str, components: tuple[int, ...], by=nowhere, **keys) -
 SLIDING = (moved("x", "x0", (0,)), moved("y", "y0", (1,)), moved("z", "z0", (2,)))
 
 
-def solved(body: Body, element: str, **settings) -> Solved:
+def solved(body: Body, element: str, **settings) -> Run:
     solution = solve_body(body, ScikitBodySettings(element=element, **settings))
     assert solution.outcome.status == "converged", solution.outcome.message
     return solution
@@ -260,9 +260,9 @@ def test_normals_and_weights_satisfy_the_divergence_theorem(element, degree) -> 
     # The map of a cell is of degree 6 at most in all, along each axis of degree 2 at most: 8 is exact.
     closed, flux = np.zeros(3), 0.0
     for face in FACES:
-        for points in space.surface(face):
-            closed += (points.weights[..., None] * points.normals).sum(axis=(0, 1))
-            flux += (points.weights * (points.places * points.normals).sum(axis=2)).sum()
+        points = space.surface(face)
+        closed += (points.weights[..., None] * points.normals).sum(axis=(0, 1))
+        flux += (points.weights * (points.places * points.normals).sum(axis=2)).sum()
     assert closed == pytest.approx(np.zeros(3), abs=1e-11)
     assert flux == pytest.approx(3 * space.inside.weights.sum(), rel=1e-12)
 
@@ -294,6 +294,6 @@ def test_what_cannot_be_solved_is_named() -> None:
     with pytest.raises(InputError, match=r"mesh\.facets\['lid'\]: got index 0 to 5, want indices from 0 to 3"):
         solve_body(Body(strange, law("P1"), (moved("lid", "lid", ALL),), (0.0, 1.0)), settings)
     with pytest.raises(InputError, match=r"facets\.lid: got facets that are not of one cell each"):
-        Space(strange, "P1", 2).sides("lid")
+        Space(strange, "P1", 2).facets("lid")
     with pytest.raises(InputError, match="element: got"):
         solve_body(Body(straight, law("P1"), (), (0.0, 1.0)), ScikitBodySettings(element="P2/P1"))

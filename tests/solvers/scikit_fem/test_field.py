@@ -18,7 +18,7 @@ ENDS = [{"on": "left", "value": 0}, {"on": "right", "value": 1}]
 def solved(problem):
     solution = scikit_fem.solve_field(problem, ScikitFieldSettings())
     assert solution.outcome.status == "converged"
-    return solution.values
+    return solution.values[0]
 
 
 def advected(folder, peclet: float, form: str, order: int = 1):

@@ -5,7 +5,6 @@ import pytest
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import tet_volumes
-from fem_reference.problems.muscle_body import as_body
 from fem_reference.studies.hard import blocks, choosing, records, running
 
 CASES = {hard.name: hard for hard in records.read_all()}
@@ -48,4 +47,4 @@ def test_holds_that_would_tear_an_edge_are_refused() -> None:
 )
 def test_what_no_mesh_and_no_direction_resolves_is_refused(name, got, want) -> None:
     with pytest.raises(InputError, match=f"got {got}, want less.*{want}"):
-        as_body(blocks.problem(CASES[name]))
+        _ = blocks.problem(CASES[name]).body

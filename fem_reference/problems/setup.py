@@ -1,0 +1,115 @@
+"""Muscles before they are meshed: the surface, the bones that it is attached to and touches, and the frames wanted."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+import platformdirs
+from numpy.typing import NDArray
+
+from fem_reference.foundations.mesh import Floats, Ints, Surface
+from fem_reference.foundations.motion import RigidMotion
+from fem_reference.geometry.exemption import Exemption
+from fem_reference.geometry.rigid_bodies import Obstacle
+from fem_reference.geometry.sectors import attached_shares
+from fem_reference.geometry.signed_distance import cached
+from fem_reference.problems.body import Body
+from fem_reference.problems.problem import AtRest, Task
+
+# Up to here [mm] from a bone the distance to it is meant.
+DISTANCE_MARGIN = 12.0
+
+
+def kept_distances() -> Path:
+    """The folder where grids of distances are kept; it may be deleted."""
+    return platformdirs.user_cache_path("fem_reference") / "distances"
+
+
+@dataclass(frozen=True, eq=False)
+class RigidBody:
+    """A rigid bone: its ``surface`` at rest, its ``motion``, None where it rests, and how its distance shall be known, as
+    ``scene.Bone`` has it [mm]; or the ``solid`` of closed form whose vertices the surface has.
+    """
+
+    name: str
+    surface: Surface
+    motion: RigidMotion | None
+    distance_error: float = 0.05
+    distance_rounding: float = 1.0
+    solid: Obstacle | None = None
+
+    @cached_property
+    def shape(self) -> Obstacle:
+        """The signed distance to the surface, in the frame of rest; InputError where the surface of a file is not closed."""
+        named = replace(self.surface, place=f'bone "{self.name}": {self.surface.place}')
+        return self.solid or cached(
+            named, self.distance_error, DISTANCE_MARGIN, self.distance_rounding, kept_distances()
+        )
+
+    def pose(self, frame: float) -> Floats:
+        """The matrix (4, 4) that takes rest positions to positions at ``frame``."""
+        return np.eye(4) if self.motion is None else self.motion.pose(frame)
+
+
+@dataclass(frozen=True, eq=False)
+class AttachedVertices:
+    """An attachment: the ``vertices`` (k,) of the muscle surface attached to ``bone``, by springs of ``stiffness`` [MPa/mm] or
+    (None) exactly.
+    """
+
+    attachment: str
+    bone: RigidBody
+    vertices: Ints
+    stiffness: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """What a surface solver needs: the muscle ``surface`` at rest, the bones, the attached vertices, and the frames wanted;
+    ``interval`` [s] from a frame number to the next where the scene says it; ``start``, where the body is at the first frame, by
+    its rest positions (n, 3), where that is not at rest.
+    """
+
+    surface: Surface
+    bones: tuple[RigidBody, ...]
+    attached: tuple[AttachedVertices, ...]
+    frames: tuple[int, ...]
+    interval: float | None
+    start: Callable[[Floats], Floats] | None = field(default=None, kw_only=True)
+
+    task: ClassVar[Task] = "solve"
+    exact: ClassVar[None] = None  # no solution of a muscle is known as a formula
+    field: ClassVar[None] = None
+
+    @property
+    def rest(self) -> AtRest:
+        """The surface alone."""
+        return AtRest(self.surface)
+
+    @property
+    def body(self) -> Body | None:
+        """The finite elements that it is solved with, once it is filled with them."""
+        return None
+
+    def begin(self, rest: Floats) -> Floats:
+        """Where points that are at ``rest`` (n, 3) [mm] are at the first frame; an array of the caller's own."""
+        return np.array(rest) if self.start is None else np.array(self.start(rest))
+
+    @cached_property
+    def attached_vertices(self) -> Ints:
+        """The vertices (k,) of the surface that are attached to bones, attachment by attachment."""
+        return np.concatenate([np.zeros(0, np.int64), *(entry.vertices for entry in self.attached)])
+
+    @cached_property
+    def exempt(self) -> Exemption:
+        """The part of the surface that is exempt from contact with bones."""
+        attached = ((one.bone.name, attached_shares(self.surface, one.vertices)) for one in self.attached)
+        return Exemption.of(self.surface, attached)
+
+    @cached_property
+    def free(self) -> NDArray[np.bool_]:
+        """Mask (n,) of the vertices of the surface that may be in contact with bones."""
+        return ~self.exempt.vertices

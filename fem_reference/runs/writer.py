@@ -1,0 +1,132 @@
+"""Runs on disk while they are made: each frame is written as it is reached.
+
+A file appears whole or not at all; ``run.json`` after the frame files that it names. A run whose status is ``running`` was cut off;
+it is not read as a result, and goes on where its solver can, as one that crashed.
+"""
+
+import json
+import logging
+import math
+import shutil
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from fem_reference.io import files
+from fem_reference.problems.problem import NOTHING, AtRest
+from fem_reference.runs import cut_off, fields, states
+from fem_reference.runs.contents import FORMAT
+from fem_reference.runs.cut_off import CutOff
+from fem_reference.runs.store import Frame, Outcome
+
+log = logging.getLogger(__name__)
+
+# Between the first and the last frame, progress is reported no more often than this [s].
+QUIET = 1.0
+
+
+class Writer:
+    """Writes one run into ``folder``, which it empties first but for a run that was cut off and can go on; ``add`` each frame, then
+    ``close``. A frame that is stored already takes the place of the stored one and of all after it.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        identity: dict[str, Any],
+        rest: AtRest = NOTHING,
+    ) -> None:
+        """``identity``: ``name``, ``solver``, ``origin`` and ``frames`` (the numbers wanted), as they go into run.json; ``rest``:
+        the shapes that its frames move.
+        """
+        self.folder, self.rest = folder, rest
+        self.state: dict[str, Any] = {"format": FORMAT, **identity, "status": "running", "message": "", "numbers": []}
+        self.state |= {"scalars": {}, "residuals": [], "cost": {}, "parts": []}
+        self.begin, self.reported = time.perf_counter(), 0.0
+        if (stored := cut_off.stored(folder, identity)) is not None:
+            self.state = stored | {"name": identity["name"], "origin": identity["origin"]}
+            return
+        shutil.rmtree(folder) if folder.exists() else None
+        files.make_folder(folder)
+        self._write_state()
+
+    @property
+    def cut_off(self) -> CutOff:
+        """What is stored so far, for a solver that can go on."""
+        return CutOff(self.folder / cut_off.FOLDER, self.frames)
+
+    @property
+    def frames(self) -> tuple[int, ...]:
+        """The numbers of those stored so far."""
+        return tuple(self.state["numbers"])
+
+    def add(self, frame: Frame) -> None:
+        """Store a frame: its files first, then the index files and run.json."""
+        cut_off.truncate(self.state, frame.number)
+        parts: dict[str, Callable[[Path], None]] = {}
+        surface, lines, mesh = self.rest.surface, self.rest.fibres, self.rest.mesh
+        if (positions := frame.surface) is not None:
+            parts["surface"] = lambda path: files.write_surface(path, surface, positions)
+        elif frame.field is None and not self.frames:
+            self._write_rest()
+        if lines is not None and (fibres := frame.fibres) is not None:
+            parts["fibres"] = lambda path: files.write_polylines(path, lines, fibres)
+        if mesh is not None and len(frame.points):
+            parts["tets"] = lambda path: files.write_tets(path, mesh, frame.points)
+        stored = ["state"] if self._write_unknowns(frame) else []
+        if (solved := frame.field) is not None:
+            parts[fields.FOLDER] = lambda path: fields.write(path, solved)
+            self.state["origin"]["form"] = solved.form
+        self.state["numbers"].append(frame.number)
+        self.state["residuals"].append(frame.residuals)
+        self.state["parts"] = sorted([*parts, *stored])
+        for part, write in parts.items():
+            suffix = ".vtu" if part in ("tets", fields.FOLDER) else ".vtp"
+            (self.folder / part).mkdir(exist_ok=True)
+            write(self.folder / part / f"frame_{frame.number:04d}{suffix}")
+            names = [(number, f"{part}/frame_{number:04d}{suffix}") for number in self.state["numbers"]]
+            files.write_pvd(self.folder / f"{part}.pvd", names)
+        for name, value in (dict.fromkeys(self.state["scalars"], math.nan) | frame.scalars).items():
+            unknown: list[float | None] = [None] * (len(self.state["numbers"]) - 1)  # of effects that were added since
+            self.state["scalars"].setdefault(name, unknown).append(value if math.isfinite(value) else None)
+        self._write_state()
+        self._log_progress(frame)
+
+    def close(self, outcome: Outcome, **origin: Any) -> None:
+        """Store how it ended, and what more is known of its ``origin`` now."""
+        self.state["origin"] |= origin
+        cost = {"seconds": time.perf_counter() - self.begin} | outcome.cost
+        self.state |= {"status": outcome.status, "message": outcome.message, "cost": cost}
+        self._write_state()
+        if outcome.status not in (*cut_off.ENDED_EARLY, "stopped"):
+            cut_off.clear(self.folder)
+
+    def _write_unknowns(self, frame: Frame) -> bool:
+        """The unknowns of the tets, if the frame has them."""
+        if self.rest.mesh is None or frame.state is None:
+            return False
+        if not self.frames:
+            states.write_rest(self.folder, self.rest.mesh, self.rest.directions)
+        states.write(self.folder, frame.number, frame.state)
+        return True
+
+    def _write_rest(self) -> None:
+        """The rest state, which the first frame of a solver without a surface is not."""
+        (self.folder / "rest").mkdir(exist_ok=True)
+        surface, fibres = self.rest.surface, self.rest.fibres
+        files.write_surface(self.folder / "rest" / "surface.vtp", surface, surface.points)
+        if fibres is not None:
+            files.write_polylines(self.folder / "rest" / "fibres.vtp", fibres, fibres.points)
+
+    def _write_state(self) -> None:
+        files.write_text(self.folder / "run.json", json.dumps(self.state, indent=1, allow_nan=False))
+
+    def _log_progress(self, frame: Frame) -> None:
+        done, wanted = len(self.state["numbers"]), len(self.state["frames"])
+        passed = time.perf_counter() - self.begin
+        left = f", about {passed / (done - 1) * (wanted - done):.0f} s left" if 1 < done < wanted else ""
+        if 1 < done < wanted and passed - self.reported < QUIET:
+            return
+        self.reported, name, note = passed, self.state["name"], f", {frame.note}" if frame.note else ""
+        log.info("%s: frame %d (%d of %d)%s, %.0f s%s", name, frame.number, done, wanted, note, passed, left)

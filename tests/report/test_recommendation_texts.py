@@ -1,0 +1,49 @@
+"""A recommended setting in words: its error with the bar of the truth, and the reason where none is near enough."""
+
+import math
+
+import pytest
+
+from fem_reference.assessment.recommendation import recommend
+from fem_reference.report.recommendation_texts import facts, text
+from tests.assessment.test_recommendation import RMS, features, own_study
+
+
+def said(bar: float, **limits: float) -> str:
+    """The words on the case that was studied."""
+    found = recommend(features(50), "bar", [own_study(features(50), bar=bar)], RMS, limits)
+    return text(found, "bar", RMS, "mm", limits.get("error", math.inf))
+
+
+@pytest.mark.parametrize(
+    ("bar", "words"),
+    [
+        (
+            2.0,
+            "surface deviation, rms at most 7 mm (5 mm measured, and 2 mm, the error bar of the truth), 3 ms a frame",
+        ),
+        (0.0, "surface deviation, rms at most 5 mm (as measured: the truth has no error bar), 3 ms a frame"),
+    ],
+)
+def test_an_error_is_shown_with_the_bar_and_without(bar: float, words: str) -> None:
+    assert said(bar, error=7.0) == f"pbd: sweeps = 3\n{words}, measured on it"
+
+
+def test_the_reason_is_the_bar_where_it_is() -> None:
+    assert "without the bar it would be within the 2.50 mm" in said(2.0, error=2.5, time=0.01)
+    assert "the truth is known no better than 2 mm" in said(2.0, error=1.0)
+    nearest = said(2.0, time=0.0005)
+    assert nearest.splitlines()[1] == "the nearest: pbd: sweeps = 1"
+    assert "bar it would" not in nearest
+
+
+def test_facts_have_the_nearest_where_none_is_good_enough() -> None:
+    found = recommend(features(50), "bar", [own_study(features(50), bar=2.0)], RMS, {"error": 2.5, "time": 0.01})
+    table = facts(found, RMS)
+    assert (table["recommended"], table["error"], table["settings_considered"]) == (None, None, 4)
+    assert table["nearest"] == {
+        "choice": {"solver": "pbd", "sweeps": 10},
+        "error": 3.0,
+        "bar": 2.0,
+        "seconds_per_frame": 0.01,
+    }
