@@ -1,7 +1,7 @@
 """A reference and its candidates, measured and judged: what reports are written from."""
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from fem_reference.assessment.doubts import doubts
 from fem_reference.assessment.error_bars import ErrorBars, Of
@@ -52,7 +52,7 @@ class Comparison:
     """
 
     scene: Case
-    setup: CaseSetup
+    setup: Any
     reference: Run
     candidates: tuple[Run, ...]
     context: Context
