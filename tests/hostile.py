@@ -214,7 +214,7 @@ def read_words(folder: Path) -> None:
     except (ValueError, RecursionError):
         words = [text]
     for word in words:
-        for kind in units._EXAMPLE:
+        for kind in units.KINDS:
             _valued(units.quantity, word, kind)
         _valued(units.three, word, "a length")
         _valued(units.length_unit, word)
@@ -355,7 +355,7 @@ def _make_run(folder: Path) -> None:
     }
     writer = Writer(folder / "run", identity, AtRest(BALL, FIBRE, shapes.box((1, 1, 1), (5, 5, 5))))
     for number in NUMBERS:
-        tets = writer.mesh.points + number  # type: ignore[union-attr]
+        tets = writer.rest.mesh.points + number  # type: ignore[union-attr]
         state = NodalState(np.zeros((6, 10, 3)) + number, np.zeros((6, 4)), np.zeros((0, 0, 3)))
         writer.add(Frame(number, moved(number), FIBRE.points, tets, {"energy": 1.0 * number}, state=state))
     writer.close(Outcome("converged", "done", {"newton_iterations": 7.0}))

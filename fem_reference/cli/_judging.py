@@ -31,7 +31,7 @@ def _judge(scene: Case, options: argparse.Namespace, chosen: list[tuple[Candidat
     bars = refinement.obtain(bench, reference) if options.error_bar else refinement.offered(bench, reference)
     result = judging.compare(bench, reference, [(read | solved)[entry.name] for entry, _ in chosen], bars)
     asked = _asked(scene, options, [entry for entry, _ in chosen])
-    _, lines = written(options, asked, lambda folder, _, command: report.write(result, folder, command))
+    _, lines = written(options, asked, report.of_comparison(result))
     write_output(
         report.summary(result), "\n".join([comparison_text(result), *unturned(options, result.word), *lines]), options
     )

@@ -1,12 +1,13 @@
 """Pages of the command line: the parts of a command that determine them, and where they are written."""
 
 import argparse
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 
 from fem_reference.cli._printing import out
-from fem_reference.report import asked
 from fem_reference.report.asked import Asked, Part
+from fem_reference.report.asked import written as written_as
+from fem_reference.report.pages import Page
 from fem_reference.scenes.case import HOME, Candidate, Case
 
 
@@ -34,8 +35,6 @@ def candidates(scene: Case, chosen: Iterable[Candidate]) -> tuple[Part, ...]:
     )
 
 
-def written(
-    options: argparse.Namespace, page: Asked, write: Callable[[Path, str, str], Path]
-) -> tuple[Path, list[str]]:
+def written(options: argparse.Namespace, asked: Asked, page: Page) -> tuple[Path, list[str]]:
     """Write a page into ``--out``, by the name of ``--name`` where that is given; its path and what is printed."""
-    return asked.written(page, out(options), options.page_name, write)
+    return written_as(asked, page, out(options), options.page_name)

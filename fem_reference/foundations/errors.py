@@ -9,7 +9,7 @@ _SHOWN = 400
 
 
 class InputError(Exception):
-    """What somebody gave is not what is wanted: names the place (file and key), what was got and what is wanted.
+    """Input that is not usable: the place (file and key), what was got and what is wanted.
 
     >>> str(InputError("case.toml: effect[0].mu", '"1 mm"', "a pressure"))
     'case.toml: effect[0].mu: got "1 mm", want a pressure'
@@ -20,7 +20,7 @@ class InputError(Exception):
         self.place, self.got, self.want = place, got, want
 
     def __reduce__(self) -> tuple[type["InputError"], tuple[object, object, str]]:
-        """So that it goes from one process to another."""
+        """Enough to go from one process to another."""
         return type(self), (self.place, self.got, self.want)
 
 

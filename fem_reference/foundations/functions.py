@@ -6,7 +6,7 @@ import numpy as np
 
 
 class Functions(Protocol):
-    """What an expression may call besides operators, in numpy or symbolically."""
+    """Functions that an expression may call besides operators, in numpy or symbolically."""
 
     def exp(self, x: Any) -> Any:
         """The exponential of x."""

@@ -75,28 +75,23 @@ def constant(value: Any, like: Jet) -> Jet:
     return Jet(value + np.zeros_like(like.value), np.zeros_like(like.slope), np.zeros_like(like.curvature))
 
 
+def _differentiated(function: Callable[[Any], tuple[Any, Any, Any]]) -> Callable[[Any], Any]:
+    """A ``function`` that gives its value, first and second derivative, as one of jets, numbers and arrays."""
+
+    def of(x: Any) -> Any:
+        return x.chained(*function(x.value)) if isinstance(x, Jet) else function(np.asarray(x, float))[0]
+
+    return of
+
+
 class JetFunctions:
-    """``effects.Functions`` of jets, numbers and arrays."""
+    """``Functions`` of jets, numbers and arrays."""
 
-    def exp(self, x: Any) -> Any:
-        """The exponential of x."""
-        return _apply(x, lambda v: (e := np.exp(v), e, e))
-
-    def log(self, x: Any) -> Any:
-        """The natural logarithm of x > 0."""
-        return _apply(x, lambda v: (np.log(v), 1 / v, -1 / v**2))
-
-    def sqrt(self, x: Any) -> Any:
-        """The square root of x > 0."""
-        return _apply(x, lambda v: (root := np.sqrt(v), 0.5 / root, -0.25 / (v * root)))
-
-    def cos(self, x: Any) -> Any:
-        """The cosine of x [rad]."""
-        return _apply(x, lambda v: (cosine := np.cos(v), -np.sin(v), -cosine))
-
-    def sin(self, x: Any) -> Any:
-        """The sine of x [rad]."""
-        return _apply(x, lambda v: (sine := np.sin(v), np.cos(v), -sine))
+    exp = staticmethod(_differentiated(lambda v: (e := np.exp(v), e, e)))
+    log = staticmethod(_differentiated(lambda v: (np.log(v), 1 / v, -1 / v**2)))
+    sqrt = staticmethod(_differentiated(lambda v: (root := np.sqrt(v), 0.5 / root, -0.25 / (v * root))))
+    cos = staticmethod(_differentiated(lambda v: (cosine := np.cos(v), -np.sin(v), -cosine)))
+    sin = staticmethod(_differentiated(lambda v: (sine := np.sin(v), np.cos(v), -sine)))
 
     def above(self, x: Any, limit: Any, then: Any, otherwise: Any) -> Any:
         """``then`` where ``x > limit``, else ``otherwise``; the derivatives are those of the branch."""
@@ -105,16 +100,9 @@ class JetFunctions:
         if like is None:
             return np.where(chosen, then, otherwise)
         one, other = (branch if isinstance(branch, Jet) else constant(branch, like) for branch in (then, otherwise))
-        return Jet(*(np.where(chosen, getattr(one, part), getattr(other, part)) for part in _PARTS))
-
-
-_PARTS = ("value", "slope", "curvature")
+        parts = ("value", "slope", "curvature")
+        return Jet(*(np.where(chosen, getattr(one, part), getattr(other, part)) for part in parts))
 
 
 def _value(x: Any) -> Any:
     return x.value if isinstance(x, Jet) else x
-
-
-def _apply(x: Any, function: Callable[[Any], tuple[Any, Any, Any]]) -> Any:
-    """A ``function`` that gives its value, first and second derivative, of a jet, a number or an array."""
-    return x.chained(*function(x.value)) if isinstance(x, Jet) else function(np.asarray(x, float))[0]

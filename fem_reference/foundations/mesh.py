@@ -1,4 +1,4 @@
-"""Triangle surfaces and tetrahedral meshes: the records, what makes a surface usable, and how good tetrahedra are.
+"""Triangle surfaces, tetrahedral meshes and polylines: records, measures, and checks that a surface is usable.
 
 Vocabulary of shapes: points ``(n, 3)`` [mm], triangles ``(m, 3)`` and tets ``(k, 4)`` of point indices.
 """
@@ -185,8 +185,7 @@ def check_closed(surface: Surface) -> Surface:
     lost = len(points) - len(np.unique(triangles))
     if lost:
         raise InputError(surface.place, f"{lost} points that no triangle uses", "every point on the surface")
-    _check_fans(surface)
-    _check_one_part(surface)
+    _check_parts(surface)
     volume = enclosed_volume(points, triangles)
     if volume == 0:
         raise InputError(surface.place, "an enclosed volume of zero", "a body")
@@ -200,30 +199,27 @@ def _twins(triangles: Ints) -> tuple[Ints, Ints]:
     return pairs[:, 0], pairs[:, 1]
 
 
-def _parts(first: Ints, second: Ints, count: int) -> Ints:
+def connected_parts(first: Ints, second: Ints, count: int) -> Ints:
     """The number (count,) of the connected part that each of ``count`` things is in, ``first`` (e,) linked to ``second``."""
     links = coo_array((np.ones(len(first), bool), (first, second)), shape=(count, count))
     return np.asarray(connected_components(links, directed=False)[1], np.int64)
 
 
-def _check_fans(surface: Surface) -> None:
-    """InputError where the triangles around a vertex of a closed oriented surface are more than one fan."""
+def _check_parts(surface: Surface) -> None:
+    """InputError where the triangles around a vertex of a closed oriented surface are more than one fan, or where its triangles,
+    connected by edges, are more than one part.
+    """
     one, other = _twins(surface.triangles)
     after_one, after_other = (side - side % 3 + (side + 1) % 3 for side in (one, other))
     corners = surface.triangles.ravel()
-    fan = _parts(np.concatenate([one, after_one]), np.concatenate([after_other, other]), len(corners))
+    fan = connected_parts(np.concatenate([one, after_one]), np.concatenate([after_other, other]), len(corners))
     _, corner = np.unique(fan, return_index=True)
     wrong = np.flatnonzero(np.bincount(corners[corner]) > 1)
     if len(wrong):
         first = f"vertex {wrong[0]} at {place_of(surface.points[wrong[0]])}"
         got = f"{len(wrong)} vertices where parts touch, the first {first}"
         raise InputError(surface.place, got, "a manifold surface")
-
-
-def _check_one_part(surface: Surface) -> None:
-    """InputError where a closed surface is more than one part, connected by edges."""
-    one, other = _twins(surface.triangles)
-    part = _parts(one // 3, other // 3, len(surface.triangles))
+    part = connected_parts(one // 3, other // 3, len(surface.triangles))
     areas = np.bincount(part, weights=triangle_areas(surface.points, surface.triangles))
     if len(areas) > 1:
         middle = surface.points[surface.triangles[part == areas.argmin()]].mean(axis=(0, 1))

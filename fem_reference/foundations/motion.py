@@ -30,13 +30,10 @@ class Rotation:
         [0.0, 0.0, 1.0, 1.0]
         """
         angle = float(np.interp(frame, self.frames, self.angles))
-        x, y, z = np.asarray(self.axis, float) / np.linalg.norm(self.axis)
+        centre, (x, y, z) = np.asarray(self.centre), np.asarray(self.axis, float) / np.linalg.norm(self.axis)
         cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
         turn = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross  # Rodrigues' formula
-        pose = np.eye(4)
-        pose[:3, :3] = turn
-        pose[:3, 3] = np.asarray(self.centre) - turn @ np.asarray(self.centre)
-        return pose
+        return _pose(turn, centre - turn @ centre)
 
     def turning(self, points: Floats) -> Turning:  # noqa: ARG002
         """The keyframes."""
@@ -62,9 +59,7 @@ class Translation:
         [1.0, -14.0, 1.0, 1.0]
         """
         distance = float(np.interp(frame, self.frames, self.distances))
-        pose = np.eye(4)
-        pose[:3, 3] = distance * np.asarray(self.direction, float) / np.linalg.norm(self.direction)
-        return pose
+        return _pose(np.eye(3), distance * np.asarray(self.direction, float) / np.linalg.norm(self.direction))
 
     def turning(self, points: Floats) -> Turning:  # noqa: ARG002
         """The keyframes, between which nothing turns."""
@@ -72,6 +67,12 @@ class Translation:
 
 
 RigidMotion = Rotation | Translation
+
+
+def _pose(turn: Floats, shift: Floats) -> Floats:
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = turn, shift
+    return pose
 
 
 def apply(pose: Floats, points: Floats) -> Floats:

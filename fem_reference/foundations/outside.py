@@ -31,6 +31,6 @@ def only_record(module: ModuleType, places: Sequence[str], kinds: tuple[type[Rec
 
 
 def source(module: ModuleType) -> bytes:
-    """What stands in the file of a ``module`` outside the package, and nothing of one inside: its code counts elsewhere."""
+    """The content of the file of a ``module`` outside the package, and nothing of one inside: its code counts elsewhere."""
     file = Path(str(module.__file__)).resolve()
     return b"" if file.is_relative_to(_PACKAGE) else file.read_bytes()

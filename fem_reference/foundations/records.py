@@ -1,7 +1,7 @@
 """Strict frozen records read from TOML: an unknown key, a missing key or a wrong value is one InputError that names it."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from difflib import get_close_matches
 from typing import Annotated, Any
 
@@ -45,7 +45,7 @@ FileName = Annotated[str, AfterValidator(_check_file_name)]
 def parse[R: Record](record: type[R], table: object, place: str) -> R:
     """``table`` as a ``record``; ``place`` is what its keys are reported below, for example ``"case.toml: effect[0]"``."""
     try:
-        return record.model_validate(_frozen(table))
+        return record.model_validate(_turned(table, list, tuple))
     except RecursionError as error:
         raise InputError(place, "tables inside tables without end", "the keys of a file") from error
     except ValidationError as error:
@@ -71,18 +71,11 @@ def together(wrong: Sequence[InputError]) -> InputError:
     return InputError(first.place, first.got, f"{first.want}{shown}{more}")
 
 
-def _frozen(value: Any) -> Any:
-    """Lists as the tuples of records."""
+def _turned(value: Any, kind: type[Sequence[Any]], into: Callable[[Iterator[Any]], Any]) -> Any:
+    """A ``value`` of a file with all sequences of a ``kind``, lists of files or tuples of records, ``into`` the other."""
     if isinstance(value, dict):
-        return {key: _frozen(inside) for key, inside in value.items()}
-    return tuple(_frozen(inside) for inside in value) if isinstance(value, list) else value
-
-
-def _as_written(value: Any) -> Any:
-    """Tuples as the lists of files."""
-    if isinstance(value, dict):
-        return {key: _as_written(inside) for key, inside in value.items()}
-    return [_as_written(inside) for inside in value] if isinstance(value, tuple) else value
+        return {key: _turned(inside, kind, into) for key, inside in value.items()}
+    return into(_turned(inside, kind, into) for inside in value) if isinstance(value, kind) else value
 
 
 def join(place: str, key: str) -> str:
@@ -100,7 +93,7 @@ def _as_input_error(first: Any, record: type[Record], place: str, table: object)
         return InputError(join(place, path), "an unknown key", f"{meant}one of {', '.join(known)}")
     if first["type"] == "missing":
         return InputError(join(place, path), "nothing", "this key")
-    got = _as_written(first["input"])
+    got = _turned(first["input"], tuple, list)
     want = first["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
     return InputError(join(place, path), f'"{got}"' if isinstance(got, str) else repr(got), want)
 

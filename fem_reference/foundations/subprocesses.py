@@ -23,7 +23,7 @@ def environment(**settings: str) -> dict[str, str]:
 
 
 def end_with_starter() -> None:
-    """From now on this process ends a second or two after the one that started it, directly or not, even if that is killed."""
+    """End this process a second or two after the one that started it, directly or not, even if that is killed."""
     starter = os.environ.get(_STARTER)
     if starter is not None:
         threading.Thread(target=_watch, args=(int(starter),), daemon=True).start()
@@ -36,7 +36,7 @@ def _watch(process: int) -> None:
 
 
 def lives(process: int) -> bool:
-    """Whether a process does; one that ended and whose end nobody has taken note of does not."""
+    """True of a process that runs; one that ended and whose end nobody has taken note of does not live."""
     try:
         os.kill(process, 0)
         return Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] != "Z"

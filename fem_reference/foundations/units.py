@@ -8,7 +8,7 @@ import re
 from collections.abc import Sequence
 from functools import cache, partial
 from numbers import Real
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import pint
 from pydantic import BeforeValidator
@@ -16,37 +16,46 @@ from pydantic import BeforeValidator
 # The units [mm] that the coordinates of a file may be in, in scenes, beside frames and on the command line. Quantities with a
 # number may have any unit of their kind; here a slip such as "Mm", 1e9 mm, would go unseen.
 LENGTH_UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3, "in": 25.4, "ft": 304.8}
-# What people call each kind of quantity, and the unit that numbers of this kind have inside.
-_INSIDE = {
-    "a length": "mm",
-    "an angle": "rad",
-    "a pressure": "MPa",
-    "a fraction": "",
-    "a number": "",
-    "a time": "s",
-    "a volume": "mm^3",
-    "a density": "tonne/mm^3",
-    "an acceleration": "mm/s^2",
-    "a stiffness per area": "MPa/mm",
-    "a damping per volume": "MPa*s/mm^2",
-    "a viscosity": "MPa*s",
-    "a stiffness": "N/mm",
-    "a damping": "N*s/mm",
-    "a bending stiffness": "N*mm",
-    "a rate": "1/s",
+
+
+class Kind(NamedTuple):
+    """A kind of quantity: the ``unit`` that its numbers have inside, ``examples`` of one and of three in a file, the ``greatest``
+    magnitude, beyond all that exists and where digits are not lost, and the ways to write the unit of what has none.
+    """
+
+    unit: str
+    examples: tuple[str, ...]
+    greatest: float = 1e15
+    written: tuple[str, ...] = ()
+
+
+# By what people call them. The greatest length is a thousand kilometres, the greatest pressure ten times the stiffness of diamond.
+KINDS = {
+    "a length": Kind("mm", ('"2 mm"', '"146, 238, -431 mm"'), 1e9),
+    "an angle": Kind("rad", ('"30 deg"',), 1e6),
+    "a pressure": Kind("MPa", ('"30 kPa"', '"0, 6.25, 0 kPa"'), 1e7),
+    "a fraction": Kind("", ('"0.5 %"',), 1e6, ("", "%", "percent")),
+    "a number": Kind("", ('"0.5"',), written=("",)),
+    "a time": Kind("s", ('"0.01 s"',)),
+    "a volume": Kind("mm^3", ('"3 ml"',)),
+    "a density": Kind("tonne/mm^3", ('"1060 kg/m3"',)),
+    "an acceleration": Kind("mm/s^2", ('"9.81 m/s^2"', '"0, 0, -9.81 m/s^2"')),
+    "a stiffness per area": Kind("MPa/mm", ('"100 kPa/mm"',)),
+    "a damping per volume": Kind("MPa*s/mm^2", ('"1 Pa s/mm^2"',)),
+    "a viscosity": Kind("MPa*s", ('"300 kPa s"',)),
+    "a stiffness": Kind("N/mm", ('"200 N/m"',)),
+    "a damping": Kind("N*s/mm", ('"0.1 N s/m"',)),
+    "a bending stiffness": Kind("N*mm", ('"0.3 N mm"',)),
+    "a rate": Kind("1/s", ('"5 1/s"',)),
 }
-# How the unit of what has none may be written.
-_WRITTEN = {"a fraction": ("", "%", "percent"), "a number": ("",)}
 # A number, then what may be a unit.
 _NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.ASCII)
 # What a unit may not have: an exponent that is no integer of one or two digits, or that has an exponent itself, as in mm^9^9^9.
 _NO_UNIT = re.compile(r"(?:\^|\*\*)(?!\s*[+-]?\d{1,2}(?![\w.])(?!\s*(?:\^|\*\*)))", re.ASCII)
 # The most characters of a quantity, and of three.
 _LONGEST = 100
-# The greatest magnitude of each kind, in its unit inside: a thousand kilometres, ten times the stiffness of diamond; of others, and
-# how much what is above zero must have, beyond all that exists and where digits are not lost.
-_GREATEST = {"a length": 1e9, "a pressure": 1e7, "an angle": 1e6, "a fraction": 1e6}
-_GREATEST_OF_OTHERS, _SMALLEST = 1e15, 1e-30
+# The least that a quantity above zero must be, in its unit inside.
+_SMALLEST = 1e-30
 # Where an exponent follows a unit without a sign for it, as in m3.
 _EXPONENT = re.compile(r"(?<=[A-Za-z])(?=[23](?!\w))")
 
@@ -64,21 +73,22 @@ def quantity(text: object, kind: str) -> float:
     >>> quantity("30 kPa", "a pressure"), quantity("2 cm", "a length"), quantity("0.5 %", "a fraction")
     (0.03, 20.0, 0.005)
     """
-    wrong = ValueError(f"{kind}{' with its unit' if kind != 'a number' else ''}, such as {_EXAMPLE[kind]}")
+    own = KINDS[kind]
+    wrong = ValueError(f"{kind}{' with its unit' if kind != 'a number' else ''}, such as {own.examples[0]}")
     number, unit = _split(text)
     unit = _EXPONENT.sub("^", unit)
-    if not number or unit not in _WRITTEN.get(kind, (unit,)) or _NO_UNIT.search(unit):
+    if not number or unit not in (own.written or (unit,)) or _NO_UNIT.search(unit):
         raise wrong
     try:
         read = _registry().Quantity(float(number), _registry().parse_units(unit))
-        value = float(read.to(_INSIDE[kind] or "dimensionless").magnitude)
-        same = read.to_root_units().units == _registry().Quantity(1.0, _INSIDE[kind]).to_root_units().units
+        value = float(read.to(own.unit or "dimensionless").magnitude)
+        same = read.to_root_units().units == _registry().Quantity(1.0, own.unit).to_root_units().units
     except Exception as error:  # pint raises its own errors, tokenizer errors and TypeError for text that is no unit
         raise wrong from error
     if not math.isfinite(value) or not same:  # to pint an angle has no dimension, its root unit distinguishes it
         raise wrong
-    if abs(value) > (most := _GREATEST.get(kind, _GREATEST_OF_OTHERS)):
-        raise ValueError(f"{kind} of at most {most:g} {_INSIDE[kind]}".rstrip())
+    if abs(value) > own.greatest:
+        raise ValueError(f"{kind} of at most {own.greatest:g} {own.unit}".rstrip())
     return value
 
 
@@ -86,31 +96,6 @@ def _split(text: object) -> tuple[str, str]:
     """Number and unit as text; both empty where ``text`` does not begin with a number."""
     match = _NUMBER_AND_UNIT.fullmatch(text) if isinstance(text, str) and len(text) <= _LONGEST else None
     return (match[1], match[2]) if match else ("", "")
-
-
-_EXAMPLE = {
-    "a length": '"2 mm"',
-    "an angle": '"30 deg"',
-    "a pressure": '"30 kPa"',
-    "a fraction": '"0.5 %"',
-    "a number": '"0.5"',
-    "a time": '"0.01 s"',
-    "a volume": '"3 ml"',
-    "a density": '"1060 kg/m3"',
-    "an acceleration": '"9.81 m/s^2"',
-    "a stiffness per area": '"100 kPa/mm"',
-    "a damping per volume": '"1 Pa s/mm^2"',
-    "a viscosity": '"300 kPa s"',
-    "a stiffness": '"200 N/m"',
-    "a damping": '"0.1 N s/m"',
-    "a bending stiffness": '"0.3 N mm"',
-    "a rate": '"5 1/s"',
-}
-_EXAMPLE_OF_THREE = {
-    "a length": '"146, 238, -431 mm"',
-    "a pressure": '"0, 6.25, 0 kPa"',
-    "an acceleration": '"0, 0, -9.81 m/s^2"',
-}
 
 
 def three(text: object, kind: str) -> tuple[float, float, float]:
@@ -125,7 +110,7 @@ def three(text: object, kind: str) -> tuple[float, float, float]:
         x, y, z = (quantity(f"{number} {shared}", kind) for number, unit in parts if unit in ("", shared))
     except ValueError as error:
         noun = kind.split()[1]
-        raise ValueError(f"three {noun}s with one unit, such as {_EXAMPLE_OF_THREE[kind]}") from error
+        raise ValueError(f"three {noun}s with one unit, such as {KINDS[kind].examples[1]}") from error
     return x, y, z
 
 
@@ -142,7 +127,7 @@ def positive(text: object, kind: str) -> float:
     if not value > 0:
         raise ValueError("more than zero")
     if not value >= _SMALLEST:
-        raise ValueError(f"at least {_SMALLEST:g} {_INSIDE[kind]}".rstrip())
+        raise ValueError(f"at least {_SMALLEST:g} {KINDS[kind].unit}".rstrip())
     return value
 
 
@@ -172,7 +157,7 @@ def unit_of(metadata: Sequence[object]) -> str:
     ('tonne/mm^3', '')
     """
     readers = [entry.func for entry in metadata if isinstance(entry, BeforeValidator)]
-    return next((_INSIDE[reader.keywords["kind"]] for reader in readers if isinstance(reader, partial)), "")
+    return next((KINDS[reader.keywords["kind"]].unit for reader in readers if isinstance(reader, partial)), "")
 
 
 def written(value: Any, unit: str) -> Any:

@@ -108,7 +108,7 @@ def _listed(path: Path, chosen: VertexList, count: int) -> Ints:
 
 
 def _is_header(cell: str) -> bool:
-    """Whether the first cell of a list is a word: it has a letter, and does not begin as a number does (``1e5``)."""
+    """True where the first cell of a list is a word: it has a letter, and does not begin as a number does (``1e5``)."""
     return any(character.isalpha() for character in cell) and re.match(r"[-+.]?\d", cell) is None
 
 

@@ -36,7 +36,7 @@ ELEMENTS: dict[str, tuple[Kind, int, int | None]] = {
 
 
 def is_stabilised(element: str) -> bool:
-    """Whether an element has displacement and pressure of one degree, which alone leave the pressure free to oscillate.
+    """True of an element with displacement and pressure of one degree, which alone leave the pressure free to oscillate.
 
     It has the energy ``-1 / (4 mu) integral of (p - its mean in the cell)^2`` besides, with the shear modulus mu of the cell at
     rest, the mean of the second derivatives of the energy by F_ij, i != j. This energy falls with the square of the size of cells.
@@ -95,7 +95,7 @@ def check_quadrature(element: str, degree: int | None, place: str) -> None:
 
 
 def reference_nodes(kind: Kind, degree: int) -> Floats:
-    """Where the nodes of a cell are in its reference cell (the unit tetrahedron or the unit cube), (k, 3): the order that
+    """Places of the nodes of a cell in its reference cell (the unit tetrahedron or the unit cube), (k, 3): the order that
     ``Cells.cells`` has. Corners first, in the order of (z, y, x); then for degree 2 the other nodes in the same order.
     """
     ticks = np.arange(3) / 2

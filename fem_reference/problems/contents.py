@@ -15,7 +15,7 @@ from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
 
 
-def of_muscle(setup: Setup, case: MuscleCase) -> dict[str, Any]:
+def of_muscle(setup: Setup, case: MuscleCase) -> dict[str, object]:
     """The muscle, its bones, attachments, effects and frames."""
     surface = setup.surface
     return {
@@ -38,7 +38,7 @@ def of_muscle(setup: Setup, case: MuscleCase) -> dict[str, Any]:
     }
 
 
-def of_field(setup: FieldProblem, case: Case) -> dict[str, Any]:
+def of_field(setup: FieldProblem, case: Case) -> dict[str, object]:
     """The domain, the element, the weak form and the effects."""
     mesh, fixed = setup.mesh, int(np.isfinite(setup.fixed).sum())
     return {
@@ -61,7 +61,7 @@ def _parameters(effect: Effect) -> dict[str, str]:
 
 
 def _shape(bone: RigidBody) -> str:
-    """How fine the surface of a bone is, or what its closed form is."""
+    """The fineness of the surface of a bone, or its closed form."""
     if bone.solid is None:
         return f"{len(bone.surface.triangles)} triangles"
     kind = "".join(f" {letter.lower()}" if letter.isupper() else letter for letter in type(bone.solid).__name__)

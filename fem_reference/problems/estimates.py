@@ -1,4 +1,4 @@
-"""What is known of a muscle scene before it is solved, and the effects that it needs by that."""
+"""Estimates for the case of a muscle before it is solved, and the effects that it needs by them."""
 
 import logging
 from collections.abc import Mapping
@@ -99,7 +99,7 @@ class Decision:
 
 
 def decisions(scene: MuscleCase, rest: Setup) -> tuple[Decision, ...]:
-    """Of each effect of a scene whether that needs it, before it is solved."""
+    """Decisions on each effect of a case, before it is solved."""
     known, listed = estimates(scene, rest), scene.choice == "listed"
     return tuple(replace(decision(effect, effect.indicator(known), known), listed=listed) for effect in scene.effects)
 
@@ -111,7 +111,9 @@ def decision(effect: Effect, found: Indicator | None, known: Estimates) -> Decis
 
 
 def solved(known: Estimates, rest: Setup, bones: tuple[RigidBody, ...], number: float, at: Floats) -> Estimates:
-    """What was ``known`` before, with where the surface is ``at`` (n, 3) in a frame that was solved, beside those ``bones``."""
+    """Estimates that were ``known`` before, with where the surface is ``at`` (n, 3) in a frame that was solved, beside those
+    ``bones``.
+    """
     chosen, felt = _chosen(rest), rest.exempt.places(_PLACES)
     points, moved = rest.surface.points[chosen], at[chosen]
     return replace(
@@ -128,7 +130,7 @@ def _chosen(rest: Setup) -> Ints:
 
 
 def estimates(scene: MuscleCase, rest: Setup) -> Estimates:
-    """What effects ask of a scene: by a guess of where the surface goes, each point with the bones that it is nearest to."""
+    """Estimates that effects ask of a case, by a guess of where the surface goes, each point with the bones nearest to it."""
     frames, chosen = _sampled(scene.numbers), _chosen(rest)
     points, places = rest.surface.points[chosen], rest.exempt.places(_PLACES) @ rest.surface.points
     guess, felt = Guess.of(points, rest), Guess.of(places, rest)
@@ -183,7 +185,7 @@ def _shear(scene: MuscleCase) -> float:
 
 
 def _tension(scene: MuscleCase) -> float:
-    """What all fibres pull with at their length at rest [MPa], the mean over the frames."""
+    """The stress that all fibres pull with at their length at rest [MPa], the mean over the frames."""
     pulling = [one for one in scene.effects if isinstance(one, Energy) and one.stored and "fibre" in one.needs]
     amounts = [np.mean([one.amount(number) for number in scene.numbers]) for one in pulling]
     return float(sum(amount * fibre_tension(one, 1.0) for one, amount in zip(pulling, amounts, strict=True)))

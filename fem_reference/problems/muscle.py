@@ -220,7 +220,7 @@ def solid(bone: Bone) -> Obstacle | None:
 
 
 def _mesh_facts(rest: Setup, mesh: TetMesh, far: float) -> dict[str, float | str]:
-    """Who made the mesh, its size and quality, and for each attachment the area attached on the surface and on the tets and how
+    """The maker of the mesh, its size and quality, and for each attachment the area attached on the surface and on the tets and how
     many of its vertices are more than ``far`` [mm] from the facets attached: islands that tets do not resolve.
     """
     qualities = tet_qualities(mesh.points, mesh.tets)

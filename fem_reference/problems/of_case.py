@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Callable
-from typing import Any, Protocol, overload
+from typing import Protocol, overload
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.geometry.exemption import Exemption
@@ -24,8 +24,8 @@ log = logging.getLogger(__name__)
 
 
 class CaseSetup(AnyProblem, Protocol):
-    """What is known of a case before it is meshed, and all that judging its runs needs: the ``Setup`` of a muscle, or the whole
-    ``FieldProblem``.
+    """Facts on a case that are known before it is meshed, and all that judging its runs needs: the ``Setup`` of a muscle, or the
+    whole ``FieldProblem``.
     """
 
     @property
@@ -50,7 +50,7 @@ class CaseSetup(AnyProblem, Protocol):
 
 
 class CaseProblem(CaseSetup, Meshed, Protocol):
-    """What a solver of a case is given: the ``Problem`` of a muscle, or the ``FieldProblem``."""
+    """A problem as a solver of cases is given it: the ``Problem`` of a muscle, or the ``FieldProblem``."""
 
     @property
     def muscle(self) -> Problem | None:
@@ -58,8 +58,8 @@ class CaseProblem(CaseSetup, Meshed, Protocol):
 
 
 def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[Decision, ...]:
-    """Of each effect of a case whether that needs it, and why, by its setup that ``rest`` gives, by default a new one; nothing of
-    a scalar field, which needs all.
+    """Decisions whether a case needs each of its effects, and why, by its setup that ``rest`` gives, by default a new one; nothing
+    of a scalar field, which needs all.
     """
     if not isinstance(case, MuscleCase):
         return ()
@@ -68,7 +68,7 @@ def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[
     return decisions(case, known)
 
 
-def facts(case: Case, setup: CaseSetup) -> dict[str, Any]:
+def facts(case: Case, setup: CaseSetup) -> dict[str, object]:
     """Everything that a person asks of what a case is made of, as words and numbers by name."""
     if isinstance(case, MuscleCase) and isinstance(setup, Setup):
         return contents.of_muscle(setup, case)
@@ -76,8 +76,8 @@ def facts(case: Case, setup: CaseSetup) -> dict[str, Any]:
     return contents.of_field(setup, case)
 
 
-def known(case: Case, setup: CaseSetup) -> dict[str, Any]:
-    """What the motion of its bones does to a muscle, and why it needs its effects, in words; nothing of a scalar field."""
+def known(case: Case, setup: CaseSetup) -> dict[str, object]:
+    """The effect of the motion of its bones on a muscle, and why it needs its effects, in words; nothing of a scalar field."""
     if not isinstance(case, MuscleCase) or not isinstance(setup, Setup):
         return {}
     found = case.decisions or explained(case)

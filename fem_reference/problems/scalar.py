@@ -34,7 +34,7 @@ class Flux:
 
 @dataclass(frozen=True, eq=False)
 class FieldProblem:
-    """What a solver of scalar fields needs.
+    """A scalar field to be solved.
 
     ``order`` of the Lagrange elements; ``fixed`` (N,) the value at each node of them (the vertices, then for order 2 the middles of
     ``mesh.edges``), NaN where it is free; ``upper`` (m,) the share of each cell above the mean y; ``tau`` (m,) of the stabilised
@@ -76,7 +76,7 @@ class FieldProblem:
 
     @property
     def mesh_facts(self) -> dict[str, float]:
-        """What the mesh is like."""
+        """Size and quality of the mesh."""
         return {"cells": float(len(self.mesh.cells)), "nodes": float(len(self.fixed)), "mesh_peclet": self.peclet}
 
     @property

@@ -68,9 +68,9 @@ class AttachedVertices:
 
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """What a surface solver needs: the muscle ``surface`` at rest, the bones, the attached vertices, and the frames wanted;
-    ``interval`` [s] from a frame number to the next where the scene says it; ``start``, where the body is at the first frame, by
-    its rest positions (n, 3), where that is not at rest.
+    """The set-up of a muscle, all that a surface solver needs: its ``surface`` at rest, the bones, the attached vertices, and the
+    frames wanted; ``interval`` [s] from a frame number to the next where the scene says it; ``start``, where the body is at the
+    first frame, by its rest positions (n, 3), where that is not at rest.
     """
 
     surface: Surface
@@ -95,7 +95,7 @@ class Setup:
         return None
 
     def begin(self, rest: Floats) -> Floats:
-        """Where points that are at ``rest`` (n, 3) [mm] are at the first frame; an array of the caller's own."""
+        """The places (n, 3) at the first frame of points that are at ``rest`` (n, 3) [mm]; an array of the caller's own."""
         return np.array(rest) if self.start is None else np.array(self.start(rest))
 
     @cached_property

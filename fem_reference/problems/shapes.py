@@ -65,7 +65,7 @@ def mapped(blocks: Sequence[Block], kind: Kind, degree: int) -> Cells:
 
 
 def _lattice(counts: Counts, kind: Kind, degree: int) -> Ints:
-    """Where in the lattice of nodes the nodes of each cell are, (m, k, 3); tetrahedra are Kuhn's six of each cube."""
+    """Places of the nodes of each cell in the lattice of nodes, (m, k, 3); tetrahedra are Kuhn's six of each cube."""
     nodes = reference_nodes(kind, degree)
     if kind == "hexahedron":
         patterns = [nodes]
@@ -95,7 +95,7 @@ def _facets(cells: Ints, lattice: Ints, grid: tuple[int, ...], face: str, kind: 
 
 
 def facet_corners(kind: Kind) -> list[tuple[int, ...]]:
-    """Which corners of a cell are those of its facets: the order in a facet is that in the cell."""
+    """Corners of a cell that are those of its facets: the order in a facet is that in the cell."""
     if kind == "tetrahedron":
         return list(combinations(range(4), 3))
     corners = reference_nodes(kind, 1)

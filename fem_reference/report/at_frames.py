@@ -1,13 +1,14 @@
-"""What a frame is: a frame number of the case, with the time and the bones' angles there, where these are known."""
+"""Frames in words: a frame number of the case, with the time and the bones' angles there, where these are known."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fem_reference.foundations.motion import Rotation, Translation
+from fem_reference.problems.setup import RigidBody
 from fem_reference.report.words import number
 from fem_reference.scenes.case import Case
 
@@ -22,10 +23,16 @@ class Column:
 
 
 def columns(scene: Case, setup: Any) -> list[Column]:
-    """Time [s], where the case has any, and how far each bone that moves is turned [°] or shifted [mm]."""
+    """Time [s], where the case has any, and the motions of its bones."""
     interval = getattr(getattr(scene, "frames", None), "interval", None)
     found = [] if interval is None else [Column("time", "s", lambda frame: frame * float(interval))]
-    for bone in getattr(setup, "bones", ()):
+    return found + motions(getattr(setup, "bones", ()))
+
+
+def motions(bones: Iterable[RigidBody]) -> list[Column]:
+    """The angle [°] by which each bone that moves is turned, or the distance [mm] by which it is shifted."""
+    found = list[Column]()
+    for bone in bones:
         motion = bone.motion
         if isinstance(motion, Rotation):
             found.append(Column(bone.name, "°", _at(motion.frames, [math.degrees(angle) for angle in motion.angles])))

@@ -17,7 +17,7 @@ _FINEST = 1e-3
 
 
 class Keyframe(Record):
-    """Where the motion is at a frame number: at an ``angle`` or at a ``distance``."""
+    """The place of a motion at a frame number: at an ``angle`` or at a ``distance``."""
 
     frame: float
     angle: Angle | None = None

@@ -87,7 +87,7 @@ def _change(table: dict[str, Any], key: str, value: Any, place: str, *, add: boo
 
 
 def _near(table: dict[str, Any], parts: list[str | int]) -> str:
-    """What there is where ``parts`` of a key lead nowhere, as the end of a sentence."""
+    """The keys that there are where ``parts`` of a key lead nowhere, as the end of a sentence."""
     inside: Any = table
     part: Any
     for i, part in enumerate(parts):
@@ -258,7 +258,7 @@ def _check_forces(scene: MuscleCase) -> None:
 
 
 def _candidate_names(scene: Case) -> list[str]:
-    """What runs are called: the reference and each candidate, which have names of their own."""
+    """Names of runs: the reference and each candidate, which have names of their own."""
     names = ["reference", *(candidate.name for candidate in scene.candidate)]
     _check_once([*names, "candidates"], join(scene.place, "candidate"))
     return names

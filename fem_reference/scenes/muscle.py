@@ -44,8 +44,8 @@ class Outline(Record):
 
 
 class Attachment(Record):
-    """Which part of the muscle surface is attached to a bone: exactly one of ``vertices``, ``within`` (of the bone), ``outline``;
-    and how: by springs of a ``stiffness`` over its area, without it exactly.
+    """The part of the muscle surface that is attached to a bone: exactly one of ``vertices``, ``within`` (of the bone),
+    ``outline``; and how: by springs of a ``stiffness`` over its area, without it exactly.
     """
 
     name: Name
@@ -62,7 +62,7 @@ class Attachment(Record):
         return self
 
 
-class Polylines(Record):
+class PolylineFile(Record):
     """Fibres given as polylines in a file."""
 
     file: str
@@ -80,7 +80,7 @@ class Traced(Record):
 class Fibres(Record):
     """The fibres whose lengths are measured: exactly one of ``polylines`` and ``traced``."""
 
-    polylines: Polylines | None = None
+    polylines: PolylineFile | None = None
     traced: Traced | None = None
 
     @model_validator(mode="after")
@@ -151,7 +151,7 @@ class MuscleCase(Case):
 
     @property
     def facts(self) -> dict[str, str]:
-        """What the case is made of, in words, by name."""
+        """The contents of the case in words, by name."""
         return {
             "muscle": f"{self.muscle.surface}, tetrahedra of {self.muscle.tet_size / 2**self.muscle.refinements:g} mm",
             "bones": ", ".join(bone.name for bone in self.bone),

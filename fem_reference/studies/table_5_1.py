@@ -5,7 +5,6 @@ from collections.abc import Iterable
 from fnmatch import fnmatch
 from pathlib import Path
 
-from fem_reference import solvers
 from fem_reference.assessment.solver_table import Scenario, SolverKind, SolverResult, Table, solver_kinds
 from fem_reference.foundations.errors import InputError
 from fem_reference.metrics import Measure, MeasurementContext, in_tables, measure
@@ -41,20 +40,20 @@ def stand(scenes: Iterable[MuscleCase], store: Path, foreign: dict[str, list[Can
     read before anything is solved.
     """
     rows, scenarios, results, missing = solver_kinds(), list[Scenario](), list[SolverResult](), dict[str, str]()
-    benches = [Bench(scene, store) for scene in scenes]
+    benches = {scene.name: Bench(scene, store) for scene in scenes}
     read = {
-        bench.scene.name: [bench.read(entry.name, entry, "--candidate") for entry in foreign.get(bench.scene.name, [])]
-        for bench in benches
+        name: [bench.read(entry.name, entry, "--candidate") for entry in foreign.get(name, [])]
+        for name, bench in benches.items()
     }
-    for i, bench in enumerate(benches):
-        log.info("scene %d of %d: %s", i + 1, len(benches), bench.scene.name)
+    for i, (name, bench) in enumerate(benches.items()):
+        log.info("scene %d of %d: %s", i + 1, len(benches), name)
         try:
             bench.setup()
         except InputError as error:
-            log.info("%s is left out: %s", bench.scene.name, error)
-            missing[bench.scene.name] = str(error)
+            log.info("%s is left out: %s", name, error)
+            missing[name] = str(error)
             continue
-        scenario, found = _on(bench, rows, read[bench.scene.name])
+        scenario, found = _on(bench, rows, read[name])
         scenarios.append(scenario)
         results += found
     if foreign:
@@ -63,54 +62,43 @@ def stand(scenes: Iterable[MuscleCase], store: Path, foreign: dict[str, list[Can
     return Table(rows, tuple(scenarios), tuple(results), missing, versions(), machines)
 
 
-def chosen(scene: MuscleCase, row: SolverKind) -> list[tuple[Candidate, str]]:
-    """The solvers measured for a kind on a scene, and the place that says so."""
-    own = [
-        (candidate, f"candidate[{i}]")
-        for i, candidate in enumerate(scene.candidate)
-        if any(fnmatch(candidate.name, pattern) for pattern in row.of_case)
-    ]
-    return own + [(candidate, f"{row.name} of Table 5.1") for candidate in solvers.in_table(row.name)]
-
-
 def _on(
     bench: Bench[MuscleCase], rows: Iterable[SolverKind], foreign: list[Run]
 ) -> tuple[Scenario, list[SolverResult]]:
-    """How everybody stands on the scene of a bench."""
-    scene, numbers = bench.scene, bench.scene.numbers
-    reference = complete(bench.obtain("reference", scene.reference, "reference"), numbers)
+    """The results of all solvers on the scene of a bench, the reference first."""
+    scene = bench.scene
+    reference = complete(bench.obtain("reference", scene.reference, "reference"), scene.numbers)
     bars = refinement.stored(reference)
     assert reference.fibres is not None  # a reference has an interior
     context = MeasurementContext.of(reference, reference.fibres, bench.setup().bones, bench.setup().exempt)
-    found = [_result(scene, REFERENCE, reference, bars.of_deviations if bars else ())]
-    meeting = [(row.name, *entry) for row in rows for entry in chosen(scene, row)]
-    for i, (kind, candidate, place) in enumerate(meeting):
-        log.info("%s: %s, solver %d of %d", scene.name, candidate.name, i + 1, len(meeting))
-        run = complete(bench.obtain(candidate.name, candidate, place), numbers)
-        found.append(_result(scene, kind, run, measure(run, reference, context, METRICS)))
-    found += [_result(scene, FOREIGN, run, measure(run, reference, context, METRICS)) for run in foreign]
+    results = [_result(scene, REFERENCE, reference, bars.of_deviations if bars else ())]
+    chosen = _chosen(scene, rows)
+    for i, (kind, candidate, place) in enumerate(chosen):
+        log.info("%s: %s, solver %d of %d", scene.name, candidate.name, i + 1, len(chosen))
+        run = complete(bench.obtain(candidate.name, candidate, place), scene.numbers)
+        results.append(_result(scene, kind, run, measure(run, reference, context, METRICS)))
+    results += [_result(scene, FOREIGN, run, measure(run, reference, context, METRICS)) for run in foreign]
     triangles = len(reference.surface.triangles)
-    return Scenario(scene.name, scene.title, triangles, context.travel, reference.outcome), found
+    return Scenario(scene.name, scene.title, triangles, context.travel, reference.outcome), results
+
+
+def _chosen(scene: MuscleCase, rows: Iterable[SolverKind]) -> list[tuple[str, Candidate, str]]:
+    """The solvers measured on a scene, row by row: the kind, the candidate, and the place that names it."""
+    found = list[tuple[str, Candidate, str]]()
+    for row in rows:
+        for i, candidate in enumerate(scene.candidate):
+            if any(fnmatch(candidate.name, pattern) for pattern in row.of_case):
+                found.append((row.name, candidate, f"candidate[{i}]"))
+        found += [(row.name, candidate, f"{row.name} of Table 5.1") for candidate in solvers.in_table(row.name)]
+    return found
 
 
 def _result(scene: MuscleCase, kind: str, run: Run, measures: tuple[Measure, ...]) -> SolverResult:
+    cost, machine = run.outcome.cost, str(run.origin["machine"])
+    # Time of a frame number where a solver makes one for each, so says candidate.toml; else of a frame that is wanted.
+    each = cost.get("seconds_per_iteration", cost.get("seconds_per_frame"))
+    seconds = seconds_per_frame(run) if each is None else each
+    numbers, outcome, is_reference = run.numbers, run.outcome, kind == REFERENCE
     return SolverResult(
-        kind,
-        run.name,
-        run.solver,
-        scene.name,
-        run.outcome,
-        _seconds_per_frame(run),
-        measures,
-        run.numbers,
-        str(run.origin["machine"]),
-        of_reference=kind == REFERENCE,
+        kind, run.name, run.solver, scene.name, outcome, seconds, measures, numbers, machine, of_reference=is_reference
     )
-
-
-def _seconds_per_frame(run: Run) -> float | None:
-    """Time [s] for a frame number of a solver that makes one for each, so says ``candidate.toml``; else for a frame wanted."""
-    for key in ("seconds_per_iteration", "seconds_per_frame"):
-        if key in run.outcome.cost:
-            return run.outcome.cost[key]
-    return seconds_per_frame(run)

@@ -21,9 +21,10 @@ import small
 from fem_reference import cli, report
 from fem_reference.assessment.stress import Stress
 from fem_reference.export.folders import new_folder
-from fem_reference.foundations import scratch, subprocesses
+from fem_reference.foundations import subprocesses
 from fem_reference.io import files
 from fem_reference.problems.problem import AtRest
+from fem_reference.report import stress_page
 from fem_reference.runs import cut_off, store
 from fem_reference.runs.states import write_arrays
 from fem_reference.runs.store import Frame, Outcome, Run
@@ -248,7 +249,7 @@ def test_a_run_whose_folder_cannot_be_written_into_any_more_keeps_what_it_has(tm
 
 def write_both(folder: Path, word: str) -> None:
     """A page with its numbers, and an export."""
-    report.write_stress(Stress((), (), (), 0.0, {"said": 1000 * word}), folder, "page", "")
+    report.write(stress_page.page(Stress((), (), (), 0.0, {"said": 1000 * word})), folder, "page")
     with new_folder(folder / "exported") as part:
         files.write_text(part / "README.md", 1000 * word)
 
@@ -322,7 +323,7 @@ def dead() -> int:
     return process.pid
 
 
-def test_what_killed_processes_left_is_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_killed_processes_left_is_removed(tmp_path: Path) -> None:
     """And not what one that lives still writes, nor what is young."""
     gone, now = dead(), time.time()
     parts = [tmp_path / f".page-{number}.html" for number in (gone, os.getppid())]
@@ -334,20 +335,6 @@ def test_what_killed_processes_left_is_removed(tmp_path: Path, monkeypatch: pyte
     files.write_text(tmp_path / "page.html", "whole")
     files.clear(tmp_path / "exported")
     assert {path.name for path in tmp_path.iterdir()} == {"page.html", parts[1].name, parts[2].name}
-    monkeypatch.setattr(scratch.tempfile, "gettempdir", lambda: str(tmp_path))
-    with scratch.folder() as mine:
-        os.utime(mine, (now - 100, now - 100))
-        left = tmp_path / "fem_reference_scratch-left"
-        left.mkdir()
-        (left / ".lock").touch()
-        with scratch.folder() as young:
-            assert mine.is_dir()
-            assert left.is_dir()
-            assert young != mine
-        os.utime(left, (now - 100, now - 100))
-        with scratch.folder():
-            assert mine.is_dir()
-            assert not left.exists()
 
 
 def test_a_worker_ends_with_whom_it_works_for() -> None:

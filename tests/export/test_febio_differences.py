@@ -7,13 +7,11 @@ from xml.etree import ElementTree
 import feb_file
 import numpy as np
 import pytest
-import shapes
 import small
 
 import fem_reference as fr
 from fem_reference import cli
 from fem_reference.export import febio, febio_differences
-from fem_reference.export.febio_contact import overlaps
 from fem_reference.foundations.mesh import Surface
 from fem_reference.geometry.skins import attached_skin
 from fem_reference.problems.muscle import Problem
@@ -71,39 +69,6 @@ def test_the_file_says_it_whatever_the_name(springs: Problem) -> None:
     )
     named = replace(springs, attached=(top,), mesh=mesh, attached_skins={"a--b -->": springs.attached_skins["top"]})
     assert any("a- -b - ->" in text and "10 N/mm in all for 8" in text for text in comments(named))
-
-
-def overlapping(deep: float, name: str = "top") -> Problem:
-    """The bar, and a bone of this name that is ``deep`` [mm] in one of its sides between its ends."""
-    bar = feb_file.bar()
-    plate = shapes.skin(shapes.box((1, 1, 1), (10, 30, 6)))
-    plate = plate.moved_to(plate.points + [deep - 10, -10, 12])
-    far = plate.moved_to(plate.points - [100, 0, 0])
-    bones = tuple(replace(bone, surface=plate if bone.name == name else far) for bone in bar.bones)
-    return replace(bar, bones=bones)
-
-
-def radius(problem: Problem) -> float:
-    (contact,) = febio.model(problem).iterfind("Contact/contact[@type='sliding-elastic']")
-    return float(contact.find("search_radius").text)
-
-
-@pytest.mark.parametrize(("deep", "wanted"), [(0.0, 5.0), (0.15, 5.0), (0.19, 5.0), (0.21, 0.2), (0.5, 0.2)])
-def test_an_overlap_at_rest_presses_with_no_more_than_the_matrix_bears(deep: float, wanted: float) -> None:
-    """Ten shear moduli of 10 kPa press 0.2 mm deep where the stiffness is 500 kPa/mm."""
-    problem = overlapping(deep)
-    assert overlaps(problem) == {"top": pytest.approx(deep, abs=1e-12)}
-    assert radius(problem) == pytest.approx(wanted, rel=1e-12)
-    said = febio_differences.notes(problem)
-    assert len(said) == (deep > 0)
-    assert all(f"{deep:.2g} mm inside" in text and f"search_radius is {wanted:.2g} mm" in text for text in said)
-
-
-def test_a_bone_that_is_no_obstacle_may_overlap() -> None:
-    """The contact of the bar is by the bone "top" alone."""
-    problem = overlapping(0.5, "rests & <waits>")
-    assert overlaps(problem) == {"top": 0.0}
-    assert radius(problem) == 5.0
 
 
 def test_the_terminal_and_the_page_beside_the_file_say_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

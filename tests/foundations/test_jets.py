@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from acting import ENERGIES, FIBRE, deformations, make
 
-from fem_reference.effects import Numpy, State
+from fem_reference.effects import State
+from fem_reference.foundations.functions import Numpy
 from fem_reference.foundations.jets import Jet, JetFunctions, constant, variables
 
 FUNCTIONS = JetFunctions()

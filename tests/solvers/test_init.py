@@ -1,4 +1,4 @@
-"""A solver that a case has no settings for runs with those of the page table-5-1, wherever it is asked for."""
+"""Solvers as scene files name them, for the tasks that they offer, and with the settings of the page table-5-1."""
 
 from pathlib import Path
 
@@ -44,3 +44,21 @@ def test_a_name_of_a_shipped_case_and_of_a_folder_here_is_refused(tmp_path: Path
     ):
         casefile.read("hip_flexion")
     assert casefile.read("./hip_flexion").title == "A bar between two plates"
+
+
+def test_kernels_and_what_is_shared_are_no_solvers() -> None:
+    found = solvers.names()
+    assert {"fenicsx", "scikit_fem", "pbd", "recorded"} <= set(found)
+    assert not {name for name in found if name.endswith("_kernels") or name == "common"}
+
+
+def test_each_task_has_solvers_of_its_own() -> None:
+    assert "listing" in solvers.names("solve_field")
+    assert "listing" not in solvers.names("solve")
+    with pytest.raises(InputError, match=r'candidate\.solver: got "listing", which does not solve muscles'):
+        solvers.find("listing", "candidate")
+
+
+def test_only_some_simulate_the_effects_of_a_case() -> None:
+    assert solvers.takes_effects("fenicsx")
+    assert not solvers.takes_effects("pbd")

@@ -1,4 +1,4 @@
-"""Where every number comes from: effects, runs, the file of the scene."""
+"""Provenance of every number: effects, runs, the file of the case."""
 
 import json
 from pathlib import Path
@@ -7,17 +7,15 @@ from typing import Any
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.second_check import RECORD
 from fem_reference.foundations.errors import InputError
-from fem_reference.report.sections import Section
-from fem_reference.report.tables import runs
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Case
 
 
-def _facts(comparison: Comparison) -> dict[str, Any]:
+def facts(comparison: Comparison) -> dict[str, Any]:
     """Origins as one table each, and the scene."""
     scene = comparison.scene
     origins = [
-        (run, _flat({key: value for key, value in run.origin.items() if key != RECORD})) for run in runs(comparison)
+        (run, _flat({key: value for key, value in run.origin.items() if key != RECORD})) for run in comparison.runs
     ]
     return {"origins": origins, "scene_text": _scene_text(scene)}
 
@@ -30,7 +28,7 @@ def _flat(table: Any, key: str = "") -> list[tuple[str, Any]]:
 
 
 def changes(scene: Case) -> list[tuple[str, Any, Any]]:
-    """Where the scene differs from its file: key, value in the file, value here."""
+    """The keys in which a case differs from its file, with the value in the file and the value here."""
     if not scene.place.endswith(".toml"):  # made without a file
         return []
     try:
@@ -62,6 +60,3 @@ def _numbered(value: Any) -> Any:
 def _scene_text(scene: Case) -> str:
     path = Path(scene.place)
     return path.read_text(encoding="utf-8") if path.is_file() else ""
-
-
-SECTION = Section(90, _facts, of_reference=False)

@@ -1,4 +1,4 @@
-"""What a solver is: the calls it answers, and the records with which its file offers them."""
+"""Solvers: the calls that they answer, and the records with which their files offer these."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -29,8 +29,8 @@ class GoOn[P, S: Record](Protocol):
     """Solves problems from where a run was cut off."""
 
     def __call__(self, problem: P, settings: S, sink: Sink, cut_off: CutOff, /) -> Outcome:
-        """As ``Solve``, from the last stored frame that the solver kept enough of, which need not be the last of all, else from
-        the first; it ends as the run would have ended.
+        """Solve as ``Solve`` does, from the last stored frame that the solver kept enough of, which need not be the last of all,
+        else from the first; it ends as the run would have ended.
         """
 
 
@@ -69,7 +69,7 @@ class TableRow(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Solver[P, S: Record]:
-    """What a solver's file offers for one task: ``solve``.
+    """An offer of a solver's file for one task: ``solve``.
 
     ``settings``: the record of its own settings. ``example``: some of them, as scene files write them, which contract tests solve
     with. ``require``: MissingSoftware where what it needs under such settings is not installed. ``check_problem`` of one whose
@@ -131,6 +131,9 @@ class BodySolver[S: Record](Solver[Body, S]):
 
     task = "solve_body"
     solves = "finite element bodies"
+
+
+AnySolver = Solver[Any, Any]
 
 
 def solved[P, S: Record](solve: Solve[P, S], problem: P, settings: S) -> Run:

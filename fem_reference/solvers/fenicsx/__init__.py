@@ -77,7 +77,7 @@ def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
 
 
 def go_on(problem: Problem, settings: Settings, sink: Sink, cut_off: CutOff) -> Outcome:
-    """As ``solve``, from the last stored frame of a run that was cut off; states are kept until the caller removes them."""
+    """Solve from the last stored frame of a run that was cut off; states are kept until the caller removes them."""
     require(settings)
     there = kept(cut_off, problem.body)
     again = settings.reuse and not any(
@@ -156,7 +156,7 @@ def _with_attachment_errors(problem: Problem, frame: Frame) -> Frame:
 
 
 def _samples(problem: Problem) -> dict[str, tuple[Ints, Floats]]:
-    """Where displacement is wanted: by name, the tet of each point and the point at rest, as the tet's own map places it."""
+    """Places where displacement is wanted: by name, the tet of each point and the point at rest, as the tet's own map places it."""
     locator = Locator(problem.mesh)
     wanted = {"surface": problem.surface.points, "fibres": problem.fibres.points}
     return {name: (locator.embed(points).tets, np.asarray(points)) for name, points in wanted.items()}
