@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from fnmatch import fnmatch
 from pathlib import Path
 
+from fem_reference import solvers
 from fem_reference.assessment.solver_table import Scenario, SolverKind, SolverResult, Table, solver_kinds
 from fem_reference.foundations.errors import InputError
 from fem_reference.metrics import Measure, MeasurementContext, in_tables, measure
