@@ -54,6 +54,11 @@ class StoredStatistic(Record):
     values: tuple[float | None, ...]
     within: float | None = Field(ge=0)
 
+    @property
+    def numbers(self) -> Floats:
+        """The values (f,), NaN where there is none."""
+        return np.array(self.values, float)
+
 
 class Positions(Record):
     """Positions of the sampled ``vertices`` (s,) of ``CurrentMeasures.points`` in each frame, ``values`` (f, s, 3) [mm], and the
@@ -63,6 +68,12 @@ class Positions(Record):
     tolerance: float = Field(ge=0)
     values: tuple[tuple[tuple[float, float, float] | None, ...], ...]
     vertices: tuple[Annotated[int, Field(ge=0)], ...] = Field(min_length=1)
+
+    def points(self, count: int, place: str) -> Floats:
+        """The values, NaN where there is none; InputError at ``place`` where a vertex is none of ``count``."""
+        if max(self.vertices) >= count:
+            raise InputError(f"{place}: positions.vertices", max(self.vertices), f"0 to {count - 1}")
+        return np.array([[(math.nan,) * 3 if one is None else one for one in frame] for frame in self.values])
 
 
 class Baseline(Record):

@@ -12,7 +12,6 @@ from fem_reference.assessment.baseline import PLACES, POSITION_ROUNDING, Baselin
 from fem_reference.assessment.doubts import doubts
 from fem_reference.assessment.judge import Word
 from fem_reference.assessment.measured import CurrentMeasures
-from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.version import __version__
 
@@ -139,9 +138,7 @@ class _Frames(NamedTuple):
 
 def _moved(positions: Positions, current: CurrentMeasures) -> Judgement:
     """Judge that the sampled vertices are where they were: by the greatest distance [mm] of each frame."""
-    was = np.array([[(math.nan,) * 3 if point is None else point for point in frame] for frame in positions.values])
-    if max(positions.vertices) >= len(current.rest):
-        raise InputError("baseline: positions.vertices", max(positions.vertices), f"0 to {len(current.rest) - 1}")
+    was = positions.points(len(current.rest), "baseline")
     with np.errstate(over="ignore"):  # squares of what is that far away: it is infinitely far
         away = np.linalg.norm(current.points[:, list(positions.vertices)] - was, axis=2).max(axis=1)
     still = np.where(np.isnan(was).any(axis=(1, 2)), np.nan, 0.0)
@@ -151,14 +148,14 @@ def _moved(positions: Positions, current: CurrentMeasures) -> Judgement:
 
 def _unchanged(name: str, stored: StoredStatistic, now: Floats, current: CurrentMeasures) -> Judgement:
     """Judge that a statistic is what it was: the baseline is known but for rounding."""
-    was = _numbers(stored)
+    was = stored.numbers
     known = np.full(len(was), 0.5 * 10.0 ** -PLACES[stored.unit])
     return _judged("unchanged", (name, stored.unit), _Frames(was, now, was, known), stored.tolerance, current)
 
 
 def _within(name: str, stored: StoredStatistic, now: Floats, current: CurrentMeasures) -> Judgement:
     """Judge that a statistic is as near to the reference as it should be: that is known to its error bar."""
-    was, within = _numbers(stored), math.nan if stored.within is None else stored.within
+    was, within = stored.numbers, math.nan if stored.within is None else stored.within
     frames = _Frames(was, now, np.zeros(len(was)), current.bars(*name.split(".")))
     return _judged("within", (name, stored.unit), frames, within, current)
 
@@ -183,10 +180,6 @@ def _word(was: float, value: float, truth: float, bar: float, *, allowed: float)
     if math.isnan(truth):
         return "fail"
     return judge.judge(value, truth, allowed, bar)
-
-
-def _numbers(stored: StoredStatistic) -> Floats:
-    return np.array([math.nan if value is None else value for value in stored.values])
 
 
 def _notes(baseline: Baseline, current: CurrentMeasures, found: list[Judgement]) -> Iterator[str]:

@@ -155,14 +155,8 @@ def of_runs(current: CurrentMeasures, before: CurrentMeasures, was: str) -> Vers
 def of_baseline(current: CurrentMeasures, baseline: Baseline, was: str) -> Versions:
     """Against the measures and the sampled vertices of a baseline, rounded as they are there."""
     names = {name: stored.unit for name, stored in baseline.measures.items()}
-    known = {
-        name: np.array([math.nan if value is None else value for value in stored.values])
-        for name, stored in baseline.measures.items()
-    }
-    vertices = np.array(baseline.positions.vertices)
-    if vertices.max() >= len(current.rest):
-        raise InputError("--against: positions.vertices", vertices.max(), f"0 to {len(current.rest) - 1}")
-    then = np.array([[(math.nan,) * 3 if one is None else one for one in frame] for frame in baseline.positions.values])
+    known = {name: stored.numbers for name, stored in baseline.measures.items()}
+    vertices, then = np.array(baseline.positions.vertices), baseline.positions.points(len(current.rest), "--against")
     moved = np.linalg.norm(current.points[:, vertices] - then, axis=2)
     return Versions(current, was, _changes(current, names, known), vertices, moved, None)
 
