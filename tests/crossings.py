@@ -11,7 +11,7 @@ from fem_reference.geometry.rigid_bodies import Sphere
 from fem_reference.geometry.tessellation import tessellated
 from fem_reference.io import files
 from fem_reference.problems import of_case
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.runs.store import Outcome, Run
 from fem_reference.scenes import casefile
 
@@ -96,7 +96,7 @@ because = "it is the same"
 
 
 @cache
-def coarse(folder: Path) -> Problem:
+def coarse(folder: Path) -> MuscleProblem:
     """The bar whose surface has 2 x 2 x 3 cells."""
     files.write_surface(folder / "bar.ply", BLOCK, BLOCK.points)
     (folder / "case.toml").write_text(SCENE.replace('effects = "listed"\n', ""))
@@ -104,6 +104,6 @@ def coarse(folder: Path) -> Problem:
     return of_case.problem(case, of_case.setup(case))
 
 
-def resting(problem: Problem, **scalars) -> Run:
+def resting(problem: MuscleProblem, **scalars) -> Run:
     positions = np.broadcast_to(problem.surface.points, (len(problem.frames), *problem.surface.points.shape))
     return Run("reference", "fenicsx", CONVERGED, problem.frames, problem.surface, positions, scalars=scalars)

@@ -18,16 +18,16 @@ from fem_reference.geometry.skins import attached_skin
 from fem_reference.geometry.tessellation import tessellated
 from fem_reference.problems import shapes as bodies
 from fem_reference.problems.body import Body, Prescribed
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.paths import Affine
 from fem_reference.runs.store import Frame, Run, collected
 
 
-def lost(problem: Problem, run: Run) -> list[str]:
+def lost(problem: MuscleProblem, run: Run) -> list[str]:
     return [one.name for one in of_muscle(problem, run) if not one.met]
 
 
-def away(problem: Problem) -> Problem:
+def away(problem: MuscleProblem) -> MuscleProblem:
     """Without the ball."""
     return replace(problem, bones=problem.bones[:2])
 

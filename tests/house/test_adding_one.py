@@ -16,7 +16,7 @@ pytestmark = [
     pytest.mark.skipif(not processes.installed(), reason="FEniCSx is not installed"),
 ]
 PROJECT = Path(__file__).parents[2]
-FOLDERS = ("fem_reference", "cases", "meshes", "validation", "tests")
+FOLDERS = ("fem_reference", "cases", "meshes", "validation", "tests", "examples")
 
 
 class New(NamedTuple):
@@ -146,11 +146,10 @@ def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Mea
 '''.lstrip()
 
 SOLVER = '''
-"""Each vertex moves with the bones, the nearer the more: weights by the inverse square of the distance to what is attached."""
+"""Position based dynamics under another name."""
 
-from fem_reference.foundations.records import Record
-from fem_reference.problems.muscle import Setup
-from fem_reference.runs.store import Frame, Outcome, Sink
+from fem_reference.problems.setup import Setup
+from fem_reference.runs.store import Outcome, Sink
 from fem_reference.solvers import pbd
 from fem_reference.solvers.common.protocol import MuscleSolver, TableRow
 
@@ -159,13 +158,22 @@ _SETTINGS = {"sub_iterations": 2, "solver_iterations": 1, "damping": 0.1, "stret
 
 
 def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
-    """Position based dynamics under another name."""
+    """Every frame, as position based dynamics has it."""
     return pbd.solve(setup, settings, sink)
 
 
 SOLVES = (
     MuscleSolver(settings=Settings, solve=solve, example=_SETTINGS, table=(TableRow("PBD", "own_solver", _SETTINGS),)),
 )
+'''.lstrip()
+
+EXAMPLE = '''
+"""A half, by the public API."""
+
+import fem_reference as fr
+
+print("share of a pressure [MPa]:", fr.make_effect("neo_hooke", mu="5 kPa").mu * 100)
+# Ends in 0.5 within 1e-12: the unit of pressure is 1 MPa.
 '''.lstrip()
 
 KINDS = {
@@ -211,6 +219,10 @@ KINDS = {
             "fem_reference run own_case --solver listing --quiet": "pass: listing nodal_error",
             "pytest -q tests/contracts/test_every_case.py -k own_case": "passed",
         },
+    ),
+    "example": New(
+        {"examples/own_example.py": EXAMPLE},
+        {"pytest -q tests/house/test_examples.py -k own_example": "1 passed"},
     ),
     "truth": New(
         {"validation/own_truth.py": TRUTH},
