@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks import over
 from fem_reference import solvers
-from fem_reference.assessment.solver_table import report_speeds, solver_kinds
+from fem_reference.assessment.solver_table import report_speeds
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record
 from fem_reference.problems import setup as muscles  # not its Setup: asv takes a name like that for one of its own
@@ -22,7 +22,7 @@ from fem_reference.scenes import casefile
 from fem_reference.studies.execution import Bench
 
 CASES = ("hip_flexion", "box_squeeze", "gluteus_maximus", "box_squeeze_report")
-SOLVERS = {one.name: one for row in solver_kinds() for one in row.candidate}
+SOLVERS = {one.name: one for one in solvers.in_table()}
 # Iterations that are timed at most, less those of a short run that sets up the same; and how often.
 ITERATIONS, WARM_UP, REPEATS = 100, 2, 3
 

@@ -44,7 +44,7 @@ README = (
 )
 
 
-class Stored(Record):
+class StoredStatistic(Record):
     """One statistic: ``values`` per frame, the ``tolerance`` of a change of each, and the greatest magnitude allowed, ``within``,
     all in ``unit``.
     """
@@ -54,15 +54,26 @@ class Stored(Record):
     values: tuple[float | None, ...]
     within: float | None = Field(ge=0)
 
+    @property
+    def numbers(self) -> Floats:
+        """The values (f,), NaN where there is none."""
+        return np.array(self.values, float)
+
 
 class Positions(Record):
-    """Where the sampled ``vertices`` (s,) of ``CurrentMeasures.points`` are in each frame, ``values`` (f, s, 3) [mm], and how far
-    [mm] from there they may be, ``tolerance``.
+    """Positions of the sampled ``vertices`` (s,) of ``CurrentMeasures.points`` in each frame, ``values`` (f, s, 3) [mm], and the
+    ``tolerance`` [mm] of their distance from there.
     """
 
     tolerance: float = Field(ge=0)
     values: tuple[tuple[tuple[float, float, float] | None, ...], ...]
     vertices: tuple[Annotated[int, Field(ge=0)], ...] = Field(min_length=1)
+
+    def points(self, count: int, place: str) -> Floats:
+        """The values, NaN where there is none; InputError at ``place`` where a vertex is none of ``count``."""
+        if max(self.vertices) >= count:
+            raise InputError(f"{place}: positions.vertices", max(self.vertices), f"0 to {count - 1}")
+        return np.array([[(math.nan,) * 3 if one is None else one for one in frame] for frame in self.values])
 
 
 class Baseline(Record):
@@ -75,7 +86,7 @@ class Baseline(Record):
     fem_reference: str
     format: Literal[1]
     frames: tuple[int, ...]
-    measures: dict[str, Stored]
+    measures: dict[str, StoredStatistic]
     positions: Positions
     readme: str
     reference: str
@@ -175,7 +186,7 @@ def _made(current: CurrentMeasures, before: Baseline | None) -> Baseline:
     )
 
 
-def _stored(one: Measure, bars: Floats, before: Stored | None) -> Stored:
+def _stored(one: Measure, bars: Floats, before: StoredStatistic | None) -> StoredStatistic:
     """A statistic with the limits that it had ``before``, else those that its error bars make."""
     limits = Limits.of(one, bars)
     if before is not None:
@@ -183,11 +194,11 @@ def _stored(one: Measure, bars: Floats, before: Stored | None) -> Stored:
     values = tuple(
         round(value, PLACES[one.unit]) + 0.0 if math.isfinite(value) else None for value in one.values.tolist()
     )
-    return Stored(tolerance=limits.tolerance, unit=one.unit, values=values, within=limits.within)
+    return StoredStatistic(tolerance=limits.tolerance, unit=one.unit, values=values, within=limits.within)
 
 
 class Limits(NamedTuple):
-    """How far a statistic may be from what it was (``tolerance``) and from the reference (``within``, None if not known)."""
+    """The ``tolerance`` of a statistic about what it was, and the distance from the reference, ``within``, None if not known."""
 
     tolerance: float
     within: float | None

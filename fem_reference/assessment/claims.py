@@ -31,7 +31,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Cover:
-    """Of so many claims, the ``share`` whose error is within the bar, and the ``median`` ratio of bar to error."""
+    """A ``count`` of claims, the ``share`` of them whose error is within the bar, and the ``median`` ratio of bar to error."""
 
     count: int
     share: float
@@ -39,7 +39,7 @@ class Cover:
 
     @classmethod
     def of(cls, claims: Iterable[Claim]) -> "Cover":
-        """What the claims come to; NaN without any."""
+        """The cover of ``claims``; NaN without any."""
         known = [claim for claim in claims if claim.error > LEAST]
         if not known:
             return cls(0, np.nan, np.nan)

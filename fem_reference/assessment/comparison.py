@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from fem_reference.assessment.convergence import Ladder
 from fem_reference.assessment.doubts import doubts
 from fem_reference.assessment.error_bars import ErrorBars, Of
 from fem_reference.assessment.judge import Verdict, Word, doubted, overall, resolved, verdict
@@ -23,8 +22,24 @@ from fem_reference.metrics import (
     names,
 )
 from fem_reference.metrics.fibre_length import extension_error
+from fem_reference.problems.of_case import CaseSetup
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case, Expectation
+
+
+@dataclass(frozen=True)
+class Convergence:
+    """The same case on meshes each twice as fine: ``cells`` and ``errors`` by mesh, and the ``order`` measured on the finest two.
+
+    ``against`` says what an error is: the L2 distance to the exact solution, or the rms distance at the vertices to
+    the finest solution of order 2. ``order`` is NaN where the errors are rounding.
+    """
+
+    element: str
+    cells: tuple[int, ...]
+    errors: tuple[float, ...]
+    order: float
+    against: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +61,7 @@ class Comparison:
     extension_error: Measure | None
     verdicts: tuple[Verdict, ...]
     error_bars: ErrorBars | None = None
-    ladders: tuple[Ladder, ...] = ()
+    ladders: tuple[Convergence, ...] = ()
 
     @property
     def runs(self) -> tuple[Run, ...]:
@@ -65,7 +80,7 @@ class Comparison:
         return found
 
     def _repr_html_(self) -> str:
-        """What notebooks show: the greatest deviation of each candidate, with its frame and its error bar."""
+        """A table for notebooks: the greatest deviation of each candidate, with its frame and its error bar."""
         rows = [
             (name, f"{one.metric}.{one.statistic}", f"{it.value:.4g} {it.unit}", known, it.frame)
             for name, measures in self.deviations.items()
@@ -78,7 +93,7 @@ class Comparison:
 
     @property
     def rankings(self) -> tuple[Ranking, ...]:
-        """Which candidates are nearer, as far as the error bars separate them; nothing without these."""
+        """The order of the candidates, as far as the error bars separate them; nothing without these."""
         return rankings(self.deviations, self.error_bars.of_deviations) if self.error_bars else ()
 
     @property
@@ -102,7 +117,7 @@ class Comparison:
 
 
 def compare(
-    case: Case, setup: Any, reference: Run, candidates: tuple[Run, ...], error_bars: ErrorBars | None = None
+    case: Case, setup: CaseSetup, reference: Run, candidates: tuple[Run, ...], error_bars: ErrorBars | None = None
 ) -> Comparison:
     """Measure and judge runs of a case.
 
@@ -149,7 +164,7 @@ class Alone(NamedTuple):
     word: Word
 
 
-def alone(case: Case, setup: Any, run: Run) -> Alone:
+def alone(case: Case, setup: CaseSetup, run: Run) -> Alone:
     """The measures and verdicts of a ``run`` without a reference: of a muscle none, whose measures all take their context from
     one.
     """
@@ -170,7 +185,7 @@ def _check_expected(case: Case, measured: dict[str, tuple[Measure, ...]]) -> Non
 
 
 def _is_measured(expectation: Expectation, measures: tuple[Measure, ...]) -> bool:
-    """Whether what is expected is among ``measures``: of a run without a surface much is not."""
+    """True where what is expected is among ``measures``: of a run without a surface much is not."""
     return find(measures, expectation.metric, str(expectation.statistic)) is not None
 
 

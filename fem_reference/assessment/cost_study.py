@@ -1,4 +1,4 @@
-"""What accuracy costs on cases: points of error and cost, as pages show them and files keep them."""
+"""Studies of what accuracy costs on cases: points of error and cost, as pages show them and files keep them."""
 
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path

@@ -45,9 +45,9 @@ _Differences = dict[Of, list[Floats]]
 
 @dataclass(frozen=True, eq=False)
 class ErrorBar:
-    """How far one statistic may be from the truth because the reference is: ``values`` (f,) in ``unit`` by frame, NaN where nobody
-    knows; ``of`` the reference's own change from rest, or of a candidate's deviation from the reference. ``parts``: by cause, the
-    greatest over the frames that it adds.
+    """The distance of one statistic from the truth that the reference's own error makes: ``values`` (f,) in ``unit`` by frame, NaN
+    where nobody knows; ``of`` the reference's own change from rest, or of a candidate's deviation from the reference.
+    ``parts``: by cause, the greatest over the frames that it adds.
 
     ``model`` (f,), where attachments are springs: by how much exact ones change the statistic. That is another model and no error
     of this one, so that it is no part of ``values``.
@@ -169,13 +169,13 @@ def _surface(run: Run) -> Run:
 
 
 def _of_changes(run: Run, other: Run, measured: _Measured) -> list[Floats]:
-    """By how much (f,) each statistic of the change from rest of ``run`` is more than that of ``other``."""
+    """The change from rest of ``run`` less that of ``other``, by statistic (f,)."""
     return [one.values - same.values for one, same in zip(measured(run, None), measured(other, None), strict=True)]
 
 
 def _of_deviations(run: Run, other: Run, measured: _Measured) -> list[Floats]:
-    """By how much (f,) each statistic of ``other`` against ``run`` is more than against itself: what becomes of a deviation when
-    the reference is another.
+    """The deviation of ``other`` from ``run`` less that from itself, by statistic (f,): what becomes of a deviation when the
+    reference is another.
     """
     return [one.values - same.values for one, same in zip(measured(other, run), measured(other, other), strict=True)]
 

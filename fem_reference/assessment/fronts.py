@@ -1,4 +1,4 @@
-"""What accuracy costs: measured settings as points of error and cost, those that no other beats, and what halving an error costs.
+"""Fronts of accuracy against cost: measured settings as points, those that no other beats, and what halving an error costs.
 
 Settings are compared at the same error or the same cost and never at the same settings (work-precision diagrams: Hairer, Norsett,
 Wanner 1993, Solving Ordinary Differential Equations I, II.10).
@@ -55,17 +55,17 @@ class Point:
 
     @property
     def is_default(self) -> bool:
-        """Whether nothing was varied."""
+        """True where nothing was varied."""
         return not self.knob
 
     @property
     def is_truth(self) -> bool:
-        """Whether it is the case's own reference, which the others are measured against."""
+        """True of the case's own reference, which the others are measured against."""
         return self.name == "reference" and self.is_default
 
     @property
     def label(self) -> str:
-        """What distinguishes it from the other points of its solver."""
+        """The words that distinguish it from the other points of its solver."""
         name = "" if self.name in (self.solver, "reference") else f"{self.name}, "
         return f"{name}{self.knob} = {self.value}" if self.knob else f"{self.name}, as it is"
 
@@ -88,9 +88,9 @@ def pareto(points: Iterable[Point], error: str, cost: str) -> tuple[Point, ...]:
 
 @dataclass(frozen=True)
 class Price:
-    """What a ``solver`` asks for accuracy: ``factor``, how many times the cost for half the error along its front, NaN where more
-    cost does not make it better; the ``best`` and ``worst`` errors of the front, from ``count`` points, of which ``nearest`` has
-    the best.
+    """The price of accuracy of a ``solver``: ``factor``, the cost of half the error along its front over that of the whole, NaN
+    where more cost does not make it better; the ``best`` and ``worst`` errors of the front, from ``count`` points, of which
+    ``nearest`` has the best.
     """
 
     solver: str
@@ -102,7 +102,7 @@ class Price:
 
     @property
     def is_measured(self) -> bool:
-        """Whether the front spans half the error, so that its factor is no extrapolation."""
+        """True where the front spans half the error, so that its factor is no extrapolation."""
         return self.worst >= 2 * self.best
 
 
@@ -137,19 +137,19 @@ class Match:
 
 
 def at_same_cost(points: Sequence[Point], error: str, cost: str, at: float) -> Match:
-    """Of each solver the point of the least ``error`` among those that cost at most ``at``, the cheapest where several have it."""
+    """The point of the least ``error`` of each solver among those that cost at most ``at``, the cheapest where several have it."""
     known = [(pair, point) for point in points if (pair := point.at(error, cost)) and pair[1] <= at]
     return Match(cost, at, _least(known))
 
 
 def at_same_error(points: Sequence[Point], error: str, cost: str, at: float) -> Match:
-    """Of each solver the point that costs the least among those whose ``error`` is at most ``at``."""
+    """The point that costs the least of each solver among those whose ``error`` is at most ``at``."""
     known = [(pair[::-1], point) for point in points if (pair := point.at(error, cost)) and pair[0] <= at]
     return Match(error, at, _least(known))
 
 
 def _least(known: Sequence[tuple[tuple[float, float], Point]]) -> dict[str, Point]:
-    """Of each solver the point of the least pair of numbers, the least of all first."""
+    """The point of the least pair of numbers of each solver, the least of all first."""
     best = dict[str, Point]()
     for _, point in sorted(known, key=lambda one: one[0]):
         best.setdefault(point.solver, point)

@@ -53,7 +53,7 @@ Found = tuple[Floats, list[str] | None, Floats | None]
 
 
 def volume(run: Followed) -> Found:
-    """By how much the enclosed volume is off that at rest, in per cent of it."""
+    """Change of the enclosed volume, in per cent of that at rest."""
     if run.integrated is not None:
         return 100 * np.abs(run.integrated - 1), None, None
     triangles, whole = run.surface.triangles, enclosed_volume(run.surface.points, run.surface.triangles)
@@ -62,7 +62,7 @@ def volume(run: Followed) -> Found:
 
 
 def inside_out(run: Followed) -> Found:
-    """How much is turned inside out: tetrahedra, in per cent of the volume at rest, where there are some, else the surface, in
+    """Share that is turned inside out: tetrahedra, in per cent of the volume at rest, where there are some, else the surface, in
     per cent of its area. Of curved elements, whose corners do not say it, all or nothing, as the least det F is.
     """
     if run.least_determinant is not None:
@@ -86,24 +86,24 @@ def inside_out(run: Followed) -> Found:
 
 
 def from_rest(run: Followed) -> Found:
-    """How far any vertex is from where it was at rest, in per cent of the body's size."""
+    """Greatest distance of a vertex from where it was at rest, in per cent of the body's size."""
     return _off(run, np.broadcast_to(run.surface.points, run.positions.shape))
 
 
 def from_first(run: Followed) -> Found:
-    """How far any vertex is from where it is with the bone of the first face that is held, in per cent of the body's size."""
+    """Greatest distance of a vertex from where it is if it moves with the first bone, in per cent of the body's size."""
     poses = [run.bones[0].pose(number) for number in run.numbers]
     return _off(run, np.array([apply(pose, run.surface.points) for pose in poses]))
 
 
 def from_reference(run: Followed) -> Found:
-    """How far any vertex is from where the reference has it, in per cent of the body's size; not a number without a reference."""
+    """Greatest distance of a vertex from where the reference has it, in per cent of the body's size; NaN without a reference."""
     nowhere = np.full(run.positions.shape, np.nan)
     return _off(run, nowhere if run.truth is None else run.truth)
 
 
 def unrest(run: Followed) -> Found:
-    """How far any vertex moved since the frame before, in per cent of the body's size."""
+    """Greatest displacement of a vertex since the frame before, in per cent of the body's size."""
     return _off(run, np.concatenate([run.positions[:1], run.positions[:-1]]))
 
 
@@ -121,7 +121,7 @@ def stretch(run: Followed) -> Found:
 
 
 def penetration(run: Followed) -> Found:
-    """How deep any free vertex is inside a bone, in per cent of the body's size."""
+    """Greatest depth of a free vertex inside a bone, in per cent of the body's size."""
     free = np.ones(len(run.surface.points), bool) if run.free is None else run.free
     depths = np.zeros(run.positions.shape[:2])
     for bone in run.bones:
@@ -132,8 +132,8 @@ def penetration(run: Followed) -> Found:
 
 
 def passed(run: Followed) -> Found:
-    """How deep any free vertex was inside a bone on the straight way from the frame before, as seen from the bone, in per cent of
-    the body's size: a bone that crossed the body is outside of it before and after.
+    """Greatest depth of a free vertex inside a bone on the straight path from the frame before, as seen from the bone, in per cent
+    of the body's size: a bone that crossed the body is outside of it before and after.
     """
     free = np.ones(len(run.surface.points), bool) if run.free is None else run.free
     depths = np.zeros(run.positions.shape[:2])
@@ -150,7 +150,7 @@ def passed(run: Followed) -> Found:
 
 
 def pierced(run: Followed) -> Found:
-    """How deep any vertex of a bone is inside the body, in per cent of its size: thin bones fit between the body's vertices."""
+    """Greatest depth of a vertex of a bone inside the body, in per cent of its size: thin bones fit between the body's vertices."""
     values, places = np.zeros(len(run.numbers)), np.tile(run.surface.points[0], (len(run.numbers), 1))
     for i, (number, points) in enumerate(zip(run.numbers, run.positions, strict=True)):
         body = run.surface.moved_to(points)
@@ -164,7 +164,7 @@ def pierced(run: Followed) -> Found:
 
 
 def overshoot(run: Followed) -> Found:
-    """How far a scalar field is outside the range of its boundary values, in per cent of that range."""
+    """Greatest distance of a scalar field from the range of its boundary values, in per cent of that range."""
     assert run.values is not None  # asked of scalar fields only
     low, high = run.range
     beyond = np.maximum(run.values - high, low - run.values).max(axis=1)
@@ -199,7 +199,7 @@ QUANTITIES: dict[str, tuple[str, Callable[[Followed], Found]]] = {
 
 
 def unstable(run: Followed) -> str:
-    """Where a run is an unstable equilibrium, in words; empty where it is not, or nobody counted."""
+    """The frames in which a run is an unstable equilibrium, in words; empty where it is not, or nobody counted."""
     if run.negative_modes is None or not (run.negative_modes > 0).any():
         return ""
     first, most = int(np.argmax(run.negative_modes > 0)), run.negative_modes.max()

@@ -26,7 +26,7 @@ _KINDS = {
 
 @dataclass(frozen=True)
 class Verdict:
-    """How an expectation came out: the ``word``, and the ``value`` in ``unit`` at ``frame`` that decided it; ``error_bar``, how
+    """The verdict on an expectation: the ``word``, and the ``value`` in ``unit`` at ``frame`` that decided it; ``error_bar``, how
     well the reference is known there, NaN where nobody knows and None without any.
     """
 

@@ -57,7 +57,7 @@ def to_bone(bone: Bone, number: int, points: Floats) -> Floats:
 
 
 def fibre_points(run: Run, context: MeasurementContext) -> Floats:
-    """Where the points of the fibres are, (f, m, 3) [mm]: by the run itself, or carried along by its surface."""
+    """Positions of the points of the fibres, (f, m, 3) [mm]: by the run itself, or carried along by its surface."""
     own = run.fibre_positions
     if own is not None and own.shape[1:] == context.fibres.points.shape:
         return own

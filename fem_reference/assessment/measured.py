@@ -37,13 +37,13 @@ class CurrentMeasures:
 
     @property
     def points(self) -> Floats:
-        """Where the candidate's vertices are (f, n, 3) [mm]; of one without a surface, its fibre points."""
+        """Positions of the candidate's vertices (f, n, 3) [mm]; of one without a surface, of its fibre points."""
         inside = self.candidate.fibre_positions
         return self.candidate.positions if self.candidate.has_surface or inside is None else inside
 
     @property
     def rest(self) -> Floats:
-        """Where :attr:`points` are at rest (n, 3) [mm]."""
+        """The :attr:`points` at rest (n, 3) [mm]."""
         fibres = self.candidate.fibres
         return self.candidate.surface.points if self.candidate.has_surface or fibres is None else fibres.points
 

@@ -1,4 +1,4 @@
-"""What it changes to leave out an effect of a scene, or a feature of a solver: numbers beside the error bar, and what it saves."""
+"""Omissions of an effect of a scene, or a feature of a solver: what they change, beside the error bar, and what they save."""
 
 import math
 from collections.abc import Mapping
@@ -94,8 +94,8 @@ def in_bars(changes: Mapping[str, float], bars: Mapping[str, float]) -> dict[str
 
 
 def verdict(changes: Mapping[str, float], bars: Mapping[str, float]) -> Word:
-    """Whether an omission matters: it does where one of ``changes`` is above its error bar, and does not where all are below a
-    tenth of it.
+    """Judge an omission: it matters where one of ``changes`` is above its error bar, and does not where all are below a tenth of
+    it.
 
     >>> bars = {"volume.deviation": 0.1, "surface_deviation.rms": 1.0}
     >>> [verdict({"volume.deviation": 0.005, "surface_deviation.rms": x}, bars) for x in (0.05, 0.5, 5.0)]

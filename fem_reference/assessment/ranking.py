@@ -9,7 +9,7 @@ from fem_reference.metrics import Measure, described, find
 
 @dataclass(frozen=True)
 class Deviation:
-    """How far ``name`` is from the reference in its worst frame, a magnitude: known to ``bar`` there, NaN where nobody knows."""
+    """The distance of ``name`` from the reference in its worst frame, known to ``bar`` there, NaN where nobody knows."""
 
     name: str
     value: float
@@ -17,7 +17,7 @@ class Deviation:
 
 
 @dataclass(frozen=True)
-class Place:
+class Ranked:
     """A deviation with the ranks that it may have, ``first`` to ``last``, and the names that it is not distinguishable from,
     ``alike``.
     """
@@ -39,17 +39,17 @@ class Ranking:
 
     title: str
     unit: str
-    places: tuple[Place, ...]
+    places: tuple[Ranked, ...]
 
     @property
     def pairs(self) -> tuple[int, int]:
-        """How many pairs can be distinguished, of how many."""
+        """The number of pairs that can be distinguished, and of all."""
         count = len(self.places)
         alike = sum(len(place.alike) for place in self.places) // 2
         return count * (count - 1) // 2 - alike, count * (count - 1) // 2
 
 
-def ranked(deviations: Iterable[Deviation]) -> tuple[Place, ...]:
+def ranked(deviations: Iterable[Deviation]) -> tuple[Ranked, ...]:
     """The places of ``deviations``: one is less than another where their bars do not reach each other; a deviation that is not a
     number comes after all that are one.
 
@@ -64,12 +64,12 @@ def ranked(deviations: Iterable[Deviation]) -> tuple[Place, ...]:
         alike = tuple(
             other.name for other in ordered if other is not one and not _less(other, one) and not _less(one, other)
         )
-        found.append(Place(one, better + 1, len(ordered) - worse, alike))
+        found.append(Ranked(one, better + 1, len(ordered) - worse, alike))
     return tuple(found)
 
 
 def _less(one: Deviation, other: Deviation) -> bool:
-    """Whether ``one`` is nearer to the truth than ``other`` for sure."""
+    """True where ``one`` is nearer to the truth than ``other`` for certain."""
     if math.isnan(other.value):
         return not math.isnan(one.value)
     return one.value + one.bar < other.value - other.bar
@@ -96,7 +96,7 @@ def rankings(measured: dict[str, tuple[Measure, ...]], bars: Iterable[Measure]) 
 
 
 def facts(found: Iterable[Ranking]) -> list[dict[str, object]]:
-    """As valid JSON: a number that is not finite is None."""
+    """Rankings as valid JSON: a number that is not finite is None."""
     return [
         {
             "by": one.title,

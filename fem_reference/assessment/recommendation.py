@@ -1,4 +1,4 @@
-"""Which setting to take for an error or a time: the cheapest or nearest measured one, on the case itself or on those most
+"""Recommendation of a setting for an error or a time: the cheapest or nearest measured one, on the case itself or on those most
 like it.
 """
 
@@ -47,7 +47,7 @@ class Expected:
 
 @dataclass(frozen=True)
 class Margins:
-    """How many times as great errors and times are assumed as the cases most alike have them; 1 where measured on the case."""
+    """Factors by which errors and times are taken to be greater than on the cases most alike; 1 where measured on the case."""
 
     error: float = 1.0
     time: float = 1.0
@@ -55,8 +55,8 @@ class Margins:
 
 @dataclass(frozen=True, eq=False)
 class Recommendation:
-    """What is recommended (None: no setting meets what is asked), out of ``count`` settings, with the ``margins`` that are
-    in it; ``measured``: whether on the case itself. ``nearest``: where none meets it, the one that misses it least.
+    """The ``best`` setting (None: no setting meets what is asked) out of ``count``, with the ``margins`` that are in it;
+    ``measured``: True where on the case itself; ``nearest``: where none meets it, the one that misses it least.
     """
 
     best: Expected | None
@@ -104,7 +104,7 @@ def _comparable(
 
 
 def _is_same(one: Mapping[str, float], other: Mapping[str, float]) -> bool:
-    """Whether a case is as it was when it was studied, and not changed in what it is like."""
+    """True where a case has the features that it had when it was studied."""
     return all(math.isclose(value, other.get(name, math.nan), rel_tol=1e-6) for name, value in one.items())
 
 
@@ -114,7 +114,7 @@ def alike(features: Mapping[str, float], studies: Iterable[CaseStudy]) -> list[C
 
 
 def _distance(one: Mapping[str, float], other: Mapping[str, float]) -> float:
-    """How unlike two cases are: over ratios, in powers of two; a case with contact and one without are far apart."""
+    """Distance of two cases: over ratios, in powers of two; a case with contact and one without are far apart."""
     pairs = [(_compared(one, name), _compared(other, name)) for name in _COMPARED]
     return sum(abs(math.log2((1e-3 + a) / (1e-3 + b))) for a, b in pairs)
 
@@ -156,7 +156,7 @@ def _expected(
 
 
 def scale(features: Mapping[str, float], other: Mapping[str, float], metric: str) -> float:
-    """By how much an error on the ``other`` case counts here: lengths by the motion, shares as they are."""
+    """The factor by which an error on the ``other`` case counts here: lengths by the motion, shares as they are."""
     return 1.0 if _is_share(metric) else features["motion"] / other["motion"]
 
 

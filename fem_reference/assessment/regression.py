@@ -8,11 +8,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from fem_reference.assessment import judge
-from fem_reference.assessment.baseline import PLACES, POSITION_ROUNDING, Baseline, Positions, Stored
+from fem_reference.assessment.baseline import PLACES, POSITION_ROUNDING, Baseline, Positions, StoredStatistic
 from fem_reference.assessment.doubts import doubts
 from fem_reference.assessment.judge import Word
 from fem_reference.assessment.measured import CurrentMeasures
-from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.version import __version__
 
@@ -23,7 +22,7 @@ WORST_FIRST: tuple[Word, ...] = ("fail", "inconclusive", "pass")
 
 @dataclass(frozen=True)
 class Judgement:
-    """What came of one ``question`` on the statistic ``name``, all numbers in ``unit`` and of the ``frame`` that decides.
+    """The verdict on one ``question`` about the statistic ``name``, all numbers in ``unit`` and of the ``frame`` that decides.
 
     ``was`` and ``current`` are its values, NaN where there is none; ``allowed`` how far it may be from what it was
     (``unchanged``) or from the reference (``within``), NaN where that is not known; ``known`` how well what it is compared with
@@ -42,12 +41,12 @@ class Judgement:
 
     @property
     def away(self) -> float:
-        """How far the current value is from what it is compared with."""
+        """The distance of the current value from what it is compared with."""
         return abs(self.current - self.was if self.question == "unchanged" else self.current)
 
     @property
     def used(self) -> float:
-        """Which part of what is allowed is used up; infinite where that is no number."""
+        """The share of what is allowed that is used up; infinite where that is no number."""
         part = self.away / self.allowed if self.allowed else math.inf
         return 0.0 if self.away == 0 else math.inf if math.isnan(part) else part
 
@@ -68,7 +67,7 @@ class Judgement:
 
     @property
     def _direction(self) -> str:
-        """Whether what changed is nearer to the reference or further away."""
+        """Words for a change that is nearer to the reference or further from it."""
         if self.question == "within" or self.name == MOVED or abs(self.current) == abs(self.was):
             return ""
         where = "nearer to" if abs(self.current) < abs(self.was) else "further from"
@@ -105,7 +104,7 @@ class Check:
         return judge.overall(one.word for one in self.judgements if one.question == question)
 
     def count(self, word: Word) -> int:
-        """How many judgements came out as ``word``."""
+        """The number of judgements with this ``word``."""
         return sum(one.word == word for one in self.judgements)
 
 
@@ -129,7 +128,7 @@ def check(baseline: Baseline, current: CurrentMeasures) -> Check:
 
 
 class _Frames(NamedTuple):
-    """Of each frame (f,): its value in the baseline and now, what is right now, and its error bar."""
+    """The frames (f,) of a statistic: its value in the baseline and now, what is right now, and its error bar."""
 
     was: Floats
     current: Floats
@@ -138,10 +137,8 @@ class _Frames(NamedTuple):
 
 
 def _moved(positions: Positions, current: CurrentMeasures) -> Judgement:
-    """Whether the sampled vertices are where they were: the greatest distance [mm] of each frame."""
-    was = np.array([[(math.nan,) * 3 if point is None else point for point in frame] for frame in positions.values])
-    if max(positions.vertices) >= len(current.rest):
-        raise InputError("baseline: positions.vertices", max(positions.vertices), f"0 to {len(current.rest) - 1}")
+    """Judge that the sampled vertices are where they were: by the greatest distance [mm] of each frame."""
+    was = positions.points(len(current.rest), "baseline")
     with np.errstate(over="ignore"):  # squares of what is that far away: it is infinitely far
         away = np.linalg.norm(current.points[:, list(positions.vertices)] - was, axis=2).max(axis=1)
     still = np.where(np.isnan(was).any(axis=(1, 2)), np.nan, 0.0)
@@ -149,16 +146,16 @@ def _moved(positions: Positions, current: CurrentMeasures) -> Judgement:
     return _judged("unchanged", (MOVED, "mm"), frames, positions.tolerance, current)
 
 
-def _unchanged(name: str, stored: Stored, now: Floats, current: CurrentMeasures) -> Judgement:
-    """Whether a statistic is what it was: the baseline is known but for rounding."""
-    was = _numbers(stored)
+def _unchanged(name: str, stored: StoredStatistic, now: Floats, current: CurrentMeasures) -> Judgement:
+    """Judge that a statistic is what it was: the baseline is known but for rounding."""
+    was = stored.numbers
     known = np.full(len(was), 0.5 * 10.0 ** -PLACES[stored.unit])
     return _judged("unchanged", (name, stored.unit), _Frames(was, now, was, known), stored.tolerance, current)
 
 
-def _within(name: str, stored: Stored, now: Floats, current: CurrentMeasures) -> Judgement:
-    """Whether a statistic is as near to the reference as it should be: that is known to its error bar."""
-    was, within = _numbers(stored), math.nan if stored.within is None else stored.within
+def _within(name: str, stored: StoredStatistic, now: Floats, current: CurrentMeasures) -> Judgement:
+    """Judge that a statistic is as near to the reference as it should be: that is known to its error bar."""
+    was, within = stored.numbers, math.nan if stored.within is None else stored.within
     frames = _Frames(was, now, np.zeros(len(was)), current.bars(*name.split(".")))
     return _judged("within", (name, stored.unit), frames, within, current)
 
@@ -185,12 +182,8 @@ def _word(was: float, value: float, truth: float, bar: float, *, allowed: float)
     return judge.judge(value, truth, allowed, bar)
 
 
-def _numbers(stored: Stored) -> Floats:
-    return np.array([math.nan if value is None else value for value in stored.values])
-
-
 def _notes(baseline: Baseline, current: CurrentMeasures, found: list[Judgement]) -> Iterator[str]:
-    """What explains the judgements, and what was not judged."""
+    """Notes that explain the judgements, and name what was not judged."""
     if baseline.fem_reference != __version__:
         yield f"measured by fem_reference {__version__}, the baseline by {baseline.fem_reference}"
     if baseline.reference != current.reference_name:

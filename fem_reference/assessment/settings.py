@@ -5,7 +5,7 @@ from fem_reference.assessment.fronts import TETRAHEDRA, Point
 
 
 def setting(point: Point, study: CaseStudy) -> str:
-    """What makes a setting the same on two cases; tetrahedra count by their size in that of the case's own reference."""
+    """A key by which a setting is the same on two cases; tetrahedra count by their size in that of the case's own reference."""
     scene = point.choice.get("scene", {})
     if not is_elsewhere(point):
         return f"{study.case}: {point.label}"
@@ -18,14 +18,12 @@ def setting(point: Point, study: CaseStudy) -> str:
 
 
 def is_elsewhere(point: Point) -> bool:
-    """Whether a setting can be taken on another case too: the values of a scene are its own, but for its mesh."""
+    """True where a setting can be taken on another case too: the values of a scene are its own, but for its mesh."""
     return not set(point.choice.get("scene", {})) - {*TETRAHEDRA, "triangles"}
 
 
 def tetrahedra(point: Point, study: CaseStudy) -> tuple[float, float]:
-    """Of a point on other tetrahedra, their size in that of the case's own before refinement, and how much less they are
-    refined.
-    """
+    """The size of the tetrahedra of a point in that of the case's own before refinement, and how much less they are refined."""
     scene = point.choice["scene"]
     size = float(str(scene["muscle.tet_size"]).removesuffix(" mm"))
     return size / study.features["tet_size"], study.features["refinements"] - scene["muscle.refinements"]

@@ -11,15 +11,13 @@ from fem_reference.assessment.ranking import Ranking, rankings
 from fem_reference.foundations.records import Record, parse
 from fem_reference.metrics import Measure, find
 from fem_reference.runs.store import Outcome
-from fem_reference.scenes.case import Candidate, Case, SolverChoice
 
 FILE = Path(__file__).with_suffix(".toml")
 
 
 class SolverKind(Record):
     """A row of the report's table: its ``name``, the ``form`` of its model, the report's ``speed`` and ``precision`` in pluses and
-    minuses, the numbers of its ``literature`` there; and who stands for it: ``candidates`` with the same settings on every scene,
-    and those that cases bring themselves under a name like one of ``of_case``.
+    minuses, the numbers of its ``literature`` there, and names of candidates of cases that stand for it, ``of_case``.
     """
 
     name: str
@@ -28,11 +26,10 @@ class SolverKind(Record):
     precision: str
     literature: str
     of_case: tuple[str, ...] = ()
-    candidate: tuple[Candidate, ...] = ()
 
 
 class ReportSpeed(Record):
-    """How many iterations a second the report's program makes on a case, and who says so."""
+    """The iterations a second that the report's program makes on a case, and the source."""
 
     case: str
     per_second: float = Field(gt=0)
@@ -49,19 +46,8 @@ def solver_kinds() -> tuple[SolverKind, ...]:
     return _file().kind
 
 
-def choice(case: Case, name: str) -> tuple[str, SolverChoice]:
-    """The name of a run and the settings for a solver, or a candidate, of a ``name``: those of the case's own candidate, else those
-    of the page table-5-1, else the solver's defaults.
-    """
-    own = [one for one in case.candidate if one.solver == name] + [one for one in case.candidate if one.name == name]
-    table = [one for kind in solver_kinds() for one in kind.candidate if one.solver == name and case.task == "solve"]
-    for one in (*own, *table):
-        return (one.name if own else name), one
-    return name, SolverChoice(solver=name)
-
-
 def report_speeds() -> dict[str, ReportSpeed]:
-    """By case, how many iterations a second the report's program makes."""
+    """The iterations a second that the report's program makes, by case."""
     return {one.case: one for one in _file().report_speed}
 
 
@@ -71,7 +57,7 @@ def _file() -> _File:
 
 @dataclass(frozen=True, eq=False)
 class SolverResult:
-    """How ``solver`` (``kind``, ``name``) did on a ``case``: its outcome, its time for a frame [s] where that is known, and its
+    """The result of a ``solver`` (``kind``, ``name``) on a ``case``: outcome, time for a frame [s] where that is known, and
     ``measures`` against the reference; those of the reference itself are its error bars, none where nobody asked.
     """
 
@@ -120,7 +106,7 @@ class Overall:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """What was measured: ``results`` of all solvers on all of the ``scenarios``; ``missing``, by case, why it was left out; the
+    """The ``results`` of all solvers on all of the ``scenarios``; ``missing``, by case, why it was left out; the
     ``machines`` that runs were made on.
     """
 
@@ -154,7 +140,7 @@ class Table:
         return Overall(float(np.median([abs(value) for value, _ in finite])), worst, case, len(finite), lost)
 
     def rankings(self, case: str) -> tuple[Ranking, ...]:
-        """Who is nearer on a case, as far as the reference's error bars separate them; nothing without these."""
+        """The order of solvers on a case, as far as the reference's error bars separate them; nothing without these."""
         here = [one for one in self.results if one.case == case]
         bars = [measure for one in here if one.of_reference for measure in one.measures]
         return rankings({one.name: one.measures for one in here if not one.of_reference}, bars)

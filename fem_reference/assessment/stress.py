@@ -1,4 +1,4 @@
-"""What became of hard cases: a cell for each case and solver, with its verdict and what shows it."""
+"""Results of hard cases: a cell for each case and solver, with its verdict and what shows it."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ VERDICTS: tuple[Verdict, ...] = ("ok", "degraded", "failed", "refused", "inconcl
 
 
 class Bound(Record):
-    """What a healthy run keeps: a ``quantity`` of ``assessment.health`` at most ``at_most``, at every frame or at the ``last``."""
+    """A bound of healthy runs: a ``quantity`` of ``assessment.health`` at most ``at_most``, at every frame or at the ``last``."""
 
     quantity: str
     at_most: float = Field(ge=0)
@@ -45,7 +45,7 @@ class History:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What a picture shows: ``points`` (n, 3) [mm] of ``triangles`` (m, 3) at a frame, and the ``place`` (3,) that is marked."""
+    """A picture: ``points`` (n, 3) [mm] of ``triangles`` (m, 3) at a frame, and the ``place`` (3,) that is marked."""
 
     points: Floats
     triangles: Ints
@@ -99,7 +99,7 @@ class Stress:
         return next(cell for cell in self.cells if (cell.case, cell.solver) == (case, solver))
 
     def count(self, solver: str) -> Counter[Verdict]:
-        """How many cases of each verdict a solver has."""
+        """The number of cases of each verdict that a solver has."""
         return Counter(cell.verdict for cell in self.cells if cell.solver == solver)
 
 

@@ -1,4 +1,4 @@
-"""Whether settings that are good on some cases are good on another: each case left out in turn."""
+"""Transfer of settings that are good on some cases to another: each case left out in turn."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -24,7 +24,7 @@ class Transfer:
 
     @property
     def loss(self) -> float:
-        """How much more the error is than it could be: 0 where the settings chosen are the best there too."""
+        """The error over the least possible, less one: 0 where the settings chosen are the best there too."""
         return self.error / self.best - 1
 
 

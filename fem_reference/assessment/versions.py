@@ -19,8 +19,8 @@ ORDER: tuple[Word, ...] = ("worse", "mixed", "better", "within the error bar", "
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """How far a statistic ``was`` from the reference and is ``now`` (f,), in ``unit``, of frame ``numbers``; ``bars`` (f,): how
-    well the reference is known, NaN where nobody knows.
+    """The distances of a statistic from the reference, as it ``was`` and is ``now`` (f,), in ``unit``, at frame ``numbers``;
+    ``bars`` (f,): the error bars of the reference, NaN where nobody knows.
     """
 
     name: str
@@ -32,7 +32,7 @@ class Change:
 
     @property
     def further(self) -> Floats:
-        """By how much further away it is (f,), below 0 where it is nearer; infinite where a number was lost or found."""
+        """The increase of the distance (f,), below 0 where it is nearer; infinite where a number was lost or found."""
         lost, found = np.isnan(self.now) & ~np.isnan(self.was), np.isnan(self.was) & ~np.isnan(self.now)
         further = np.abs(self.now) - np.abs(self.was)
         return np.where(lost, np.inf, np.where(found, -np.inf, further))
@@ -60,7 +60,7 @@ class Change:
 
     @property
     def greatest(self) -> tuple[float, float]:
-        """How far it was and is from the reference at the most, NaN where it has no number."""
+        """The greatest distance from the reference that it had and has, NaN where it has no number."""
         was, now = (np.abs(values[np.isfinite(values)]) for values in (self.was, self.now))
         return float(was.max()) if len(was) else math.nan, float(now.max()) if len(now) else math.nan
 
@@ -71,14 +71,14 @@ class Change:
 
     @property
     def size(self) -> float:
-        """What changes are sorted by: the change in error bars, without these as a share of what it was and is."""
+        """The size that changes are sorted by: the change in error bars, without these as a share of what it was and is."""
         whole = np.nanmax([*self.greatest, 1e-300])
         return abs(self.by / whole) if math.isnan(self.in_bars) else abs(self.in_bars)
 
     @property
     def word(self) -> Word:
-        """Whether that is better; what is less than rounding or than the error bar is neither, and "mixed" what is nearer in some
-        frames and further away in others.
+        """The verdict on the change: less than rounding or than the error bar is neither, and "mixed" is nearer in some frames and
+        further away in others.
         """
         if math.isnan(self.by):
             return "no number"
@@ -99,7 +99,7 @@ class Change:
 
     @property
     def other(self) -> int | None:
-        """Of what is mixed, the index of the frame that changed most the other way; None of all else."""
+        """The index of the frame of what is mixed that changed most the other way; None of all else."""
         if self.word != "mixed":
             return None
         return int(np.argmin(self._counted) if self.by > 0 else np.argmax(self._counted))
@@ -120,7 +120,7 @@ class Versions:
     differences: tuple[tuple[str, str, str], ...] = ()
 
     def count(self, word: Word) -> int:
-        """How many statistics changed so."""
+        """The number of statistics that changed so."""
         return sum(one.word == word for one in self.changes)
 
     def of(self, word: Word) -> list[Change]:
@@ -155,14 +155,8 @@ def of_runs(current: CurrentMeasures, before: CurrentMeasures, was: str) -> Vers
 def of_baseline(current: CurrentMeasures, baseline: Baseline, was: str) -> Versions:
     """Against the measures and the sampled vertices of a baseline, rounded as they are there."""
     names = {name: stored.unit for name, stored in baseline.measures.items()}
-    known = {
-        name: np.array([math.nan if value is None else value for value in stored.values])
-        for name, stored in baseline.measures.items()
-    }
-    vertices = np.array(baseline.positions.vertices)
-    if vertices.max() >= len(current.rest):
-        raise InputError("--against: positions.vertices", vertices.max(), f"0 to {len(current.rest) - 1}")
-    then = np.array([[(math.nan,) * 3 if one is None else one for one in frame] for frame in baseline.positions.values])
+    known = {name: stored.numbers for name, stored in baseline.measures.items()}
+    vertices, then = np.array(baseline.positions.vertices), baseline.positions.points(len(current.rest), "--against")
     moved = np.linalg.norm(current.points[:, vertices] - then, axis=2)
     return Versions(current, was, _changes(current, names, known), vertices, moved, None)
 
@@ -177,7 +171,7 @@ def _changes(current: CurrentMeasures, units: dict[str, str], was: dict[str, Flo
 
 
 def _differences(one: object, other: object, key: str = "") -> Iterator[tuple[str, str, str]]:
-    """Where two nested tables differ: key, value in one, value in the other."""
+    """The differences of two nested tables: key, value in one, value in the other."""
     if isinstance(one, dict) and isinstance(other, dict):
         for name in dict.fromkeys([*one, *other]):
             yield from _differences(one.get(name), other.get(name), f"{key}.{name}".lstrip("."))

@@ -6,7 +6,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from fem_reference import metrics, solvers
-from fem_reference.assessment import judge, solver_table
+from fem_reference.assessment import judge
 from fem_reference.cli._printing import out
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import parse
@@ -68,7 +68,7 @@ def choose(case: Case, text: str, unit: str | None) -> tuple[Candidate, str]:
             raise InputError("--candidate", got, f"another name, or ./{text}")
         return case.candidate[names.index(text)], f"candidate[{names.index(text)}]"
     if text in solvers.names(case.task) and not Path(text).exists():
-        found = solver_table.choice(case, text)[1]
+        found = solvers.choice(case, text)[1]
         return Candidate(name=text, solver=text, **found.settings), "--candidate"
     if not text or not Path(text).exists():
         raise InputError("--candidate", f'"{text}"', f"a folder of frames, a solver, or one of {', '.join(names)}")

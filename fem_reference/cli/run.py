@@ -2,7 +2,7 @@
 
 import argparse
 
-from fem_reference.assessment import solver_table
+from fem_reference import solvers
 from fem_reference.assessment.comparison import alone
 from fem_reference.assessment.judge import check
 from fem_reference.cli._choosing import refuse_error_bar, scene_of
@@ -41,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
         raise InputError("--error-bar", "another solver", "the reference of a muscle")
     check(scene)
     bench = Bench(scene, out(options) / "runs", options.ranks)
-    solved = bench.obtain(*solver_table.choice(scene, options.solver), f"--solver {options.solver}")
+    solved = bench.obtain(*solvers.choice(scene, options.solver), f"--solver {options.solver}")
     result = alone(scene, bench.setup(), solved)
     said = [run_text(solved, result), *unturned(options, result.word)]
     write_output(of_run(scene, solved, result), "\n".join(said), options)

@@ -113,7 +113,7 @@ class Worst:
 
 @dataclass(frozen=True, eq=False)
 class MeasurementContext:
-    """What every run of a scene is measured with, the same for all: ``areas`` (n,) [mm2] around the surface's vertices at rest,
+    """The context that every run of a scene is measured in: ``areas`` (n,) [mm2] around the surface's vertices at rest,
     the ``fibres`` at rest and the ``extension`` that carries a surface's displacement to their points, ``travel`` [mm], the
     greatest displacement of the reference's surface over its frames, the ``bones``, and what is
     ``exempt`` from contact with them.
@@ -144,7 +144,7 @@ class MeasurementContext:
 
 @dataclass(frozen=True)
 class FieldContext:
-    """What every run of a scalar case is measured with: the formula of the ``exact`` solution, None where it is not known."""
+    """The context of every run of a scalar case: the formula of the ``exact`` solution, None where it is not known."""
 
     exact: str | None
 
@@ -220,7 +220,7 @@ def units(of: Collection[Part] | None = None, against: Collection[Standard] | No
 
 
 def of_itself(name: str) -> bool:
-    """Whether the metric ``name`` says something of a run alone, whatever it is measured against."""
+    """True where the metric ``name`` says something of a run alone, whatever it is measured against."""
     return metric(name).AGAINST != "reference"
 
 
@@ -269,7 +269,7 @@ def change(run: Run, context: MeasurementContext, wanted: Iterable[str] | None =
 
 
 def at_vertices(run: Run, vertices: Ints) -> tuple[str, ...]:
-    """Where ``vertices`` (f,) of the mesh of a field are, in words."""
+    """The places of ``vertices`` (f,) of the mesh of a field, in words."""
     places = (", ".join(f"{x:.4g}" for x in run.points[vertex]) for vertex in vertices)
     return tuple(f"vertex {vertex} at ({place})" for vertex, place in zip(vertices, places, strict=True))
 

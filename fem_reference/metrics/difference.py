@@ -1,4 +1,4 @@
-"""How far a field is from the reference's at the vertices, as a share of the reference's greatest value."""
+"""Distance of a field from the reference's at the vertices, as a share of the reference's greatest value."""
 
 import numpy as np
 

@@ -76,7 +76,7 @@ def extension_error(reference: Run, context: MeasurementContext) -> Measure:
 
 
 def _carries(run: Run, context: MeasurementContext) -> bool:
-    """Whether the fibres of ``run`` are those of the measurement context."""
+    """True where the fibres of ``run`` are those of the measurement context."""
     if run.fibres is None or run.fibre_positions is None or run.fibres.points.shape != context.fibres.points.shape:
         return False
     same_lines = np.array_equal(run.fibres.offsets, context.fibres.offsets)

@@ -1,4 +1,4 @@
-"""How far a field is from the exact solution at the vertices, where that is known."""
+"""Distance of a field from the exact solution at the vertices, where that is known."""
 
 import numpy as np
 

@@ -151,7 +151,7 @@ def _is_body(surface: Surface) -> bool:
 
 
 def _without_inside(bones: tuple[Bone, ...]) -> str:
-    """Which bone has no inside, and why; nothing where all have."""
+    """The bone that has no inside, and the reason; nothing where all have."""
     for bone in bones:
         try:
             _ = bone.shape

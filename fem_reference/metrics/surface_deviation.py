@@ -85,7 +85,7 @@ def _percent(values: Floats, travel: float) -> Floats:
 
 
 def _worst(deviations: Floats, reference: Run) -> tuple[str, ...]:
-    """By frame the vertex with the greatest deviation, and where the reference has it."""
+    """The vertex with the greatest deviation in each frame, and where the reference has it."""
     vertices = np.argmax(deviations, axis=1) % len(reference.surface.points)
     return tuple(
         f"vertex {vertex} at {place_of(at)}"

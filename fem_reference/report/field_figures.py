@@ -15,8 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
-from fem_reference.assessment.comparison import Comparison
-from fem_reference.assessment.convergence import Ladder
+from fem_reference.assessment.comparison import Comparison, Convergence
 from fem_reference.foundations.mesh import Floats, normals
 from fem_reference.geometry.field_mesh import FieldMesh
 from fem_reference.problems.scalar import at
@@ -58,7 +57,7 @@ def convergence(example: Comparison) -> Drawing:
     return _svg(f"{example.scene.name}-convergence", title, draw)
 
 
-def _positive(ladder: Ladder) -> tuple[Floats, Floats]:
+def _positive(ladder: Convergence) -> tuple[Floats, Floats]:
     """Cells and errors of the meshes whose error can stand on a logarithmic axis."""
     cells, errors = np.array(ladder.cells, float), np.array(ladder.errors, float)
     kept = np.isfinite(errors) & (errors > 0)

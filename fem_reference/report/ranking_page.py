@@ -57,7 +57,7 @@ def facts(table: Table) -> dict[str, Any]:
             for one in table.scenarios
         ],
         "missing": table.missing,
-        "report": [one.model_dump(mode="json", exclude={"candidate", "of_case"}) for one in table.kinds],
+        "report": [one.model_dump(mode="json", exclude={"of_case"}) for one in table.kinds],
         "results": [_row(one) for one in table.results],
         "rankings": {one.case: ranking.facts(table.rankings(one.case)) for one in table.scenarios},
         "versions": table.versions,

@@ -7,8 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from fem_reference.assessment import ranking, second_check
-from fem_reference.assessment.comparison import Alone, Comparison
-from fem_reference.assessment.convergence import Ladder
+from fem_reference.assessment.comparison import Alone, Comparison, Convergence
 from fem_reference.assessment.error_bars import ErrorBar
 from fem_reference.assessment.judge import Verdict
 from fem_reference.metrics import Measure, described
@@ -103,7 +102,7 @@ def rows(run: Run, measures: Iterable[Measure]) -> list[dict[str, Any]]:
     ]
 
 
-def _ladder(ladder: Ladder) -> dict[str, Any]:
+def _ladder(ladder: Convergence) -> dict[str, Any]:
     errors = [finite(error) for error in ladder.errors]
     return vars(ladder) | {"errors": errors, "order": finite(ladder.order)}
 

@@ -12,10 +12,10 @@ from fem_reference.effects import Effect
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import Record, join, parse
 from fem_reference.problems.problem import Task
-from fem_reference.scenes.case import SolverChoice
+from fem_reference.scenes.case import Candidate, Case, SolverChoice
 from fem_reference.solvers.common.protocol import BodySolver, FieldSolver, MuscleSolver, Solver, trades
 
-__all__ = ["check", "find", "names", "offers", "require", "settings", "takes_effects", "trades"]
+__all__ = ["check", "choice", "find", "in_table", "names", "offers", "require", "settings", "takes_effects", "trades"]
 
 
 def names(task: Task | None = None) -> list[str]:
@@ -56,6 +56,27 @@ def find(name: str, place: str, task: Task = "solve") -> Solver[Any, Any]:
     kinds: dict[Task, type[Solver[Any, Any]]] = {kind.task: kind for kind in (MuscleSolver, FieldSolver, BodySolver)}
     got = f'"{name}", which does not solve {kinds[task].solves}'
     raise InputError(join(place, "solver"), got, f"one of {', '.join(names(task))}")
+
+
+def in_table(kind: str | None = None) -> tuple[Candidate, ...]:
+    """The candidates that solvers offer for the page table-5-1: all, or those of a ``kind`` of the report's Table 5.1."""
+    return tuple(
+        Candidate(name=row.name, solver=name, **row.settings)
+        for name in names("solve")
+        for row in find(name, "").table
+        if kind in (None, row.kind)
+    )
+
+
+def choice(case: Case, name: str) -> tuple[str, SolverChoice]:
+    """The name of a run and the settings for a solver, or a candidate, of a ``name``: those of the case's own candidate, else those
+    of the page table-5-1, else the solver's defaults.
+    """
+    own = [one for one in case.candidate if one.solver == name] + [one for one in case.candidate if one.name == name]
+    table = [one for one in in_table() if one.solver == name and case.task == "solve"]
+    for one in (*own, *table):
+        return (one.name if own else name), one
+    return name, SolverChoice(solver=name)
 
 
 def require(name: str, settings: Record, place: str, task: Task = "solve") -> None:

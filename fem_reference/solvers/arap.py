@@ -25,7 +25,7 @@ from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers import arap_kernels
 from fem_reference.solvers.common.frame_loop import carry, follow, refused, timed
-from fem_reference.solvers.common.protocol import MuscleSolver, Trade
+from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
 from fem_reference.solvers.common.state_checks import Trouble, first_trouble, surface_checks
 
 Symmetric = Literal["cotangent", "clamped cotangent", "kirchhoff"]
@@ -285,4 +285,11 @@ _EXAMPLE = {
     "volume_step": False,
     "iterations": 3,
 }
-SOLVES = (MuscleSolver(settings=ArapSettings, solve=solve, example=_EXAMPLE),)
+_REPORTED = {"weights": "clamped cotangent", "fixed": "remove", "rotations": "each", "iterations": 4}
+_TABLE = (
+    TableRow("ARAP", "arap", _REPORTED | {"volume_step": False}),
+    TableRow(
+        "ARAP", "arap_volume_step", _REPORTED | {"volume_step": True}
+    ),  # section 6.2: scaled by eq. 5.9 after each iteration
+)
+SOLVES = (MuscleSolver(settings=ArapSettings, solve=solve, example=_EXAMPLE, table=_TABLE),)

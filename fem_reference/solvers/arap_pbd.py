@@ -20,7 +20,7 @@ from fem_reference.foundations.units import PositiveLength
 from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Outcome, Sink
 from fem_reference.solvers.arap import Alternation, GlobalStep, Relaxed, Symmetric, VertexCells, alternate, farthest
-from fem_reference.solvers.common.protocol import MuscleSolver, Trade
+from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
 from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.pbd import PbdConstraints, Stiffness, sweep
 from fem_reference.solvers.pbd_kernels import volume
@@ -157,4 +157,6 @@ def _lost_volume(points: Floats, rest: PbdConstraints, settings: ArapPbdSettings
 
 
 _EXAMPLE = {"weights": "clamped cotangent", "iterations": 3, "volume_constraint": True}
-SOLVES = (MuscleSolver(settings=ArapPbdSettings, solve=solve, example=_EXAMPLE),)
+# Section 7.2: the volume as a constraint on the energy.
+_TABLE = TableRow("ARAP", "arap_pbd", {"weights": "clamped cotangent", "iterations": 4, "volume_constraint": True})
+SOLVES = (MuscleSolver(settings=ArapPbdSettings, solve=solve, example=_EXAMPLE, table=(_TABLE,)),)

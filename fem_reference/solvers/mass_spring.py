@@ -23,7 +23,7 @@ from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers.collision_kernels import colliding_bones, move_out
 from fem_reference.solvers.common.frame_loop import carry, follow, other_clock, refused, tetrahedron
-from fem_reference.solvers.common.protocol import MuscleSolver, Trade
+from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
 from fem_reference.solvers.common.state_checks import Trouble, first_trouble, surface_checks
 from fem_reference.solvers.pbd import PbdCollision
 from fem_reference.solvers.spring_kernels import Network, PrescribedPath, advance, forces
@@ -235,4 +235,12 @@ def _compile(settings: MassSpringSettings) -> float:
 
 
 _EXAMPLE = {"stiffness": "1 N/mm", "density": "1060 kg/m3", "frame_time": "20 ms", "damping": "eq. 5.5"}
-SOLVES = (MuscleSolver(settings=MassSpringSettings, solve=solve, moves="tetrahedra", example=_EXAMPLE),)
+_TABLE = TableRow(
+    "MSS",
+    "mass_spring",
+    {"stiffness": "0.1 N/mm", "density": "1060 kg/m3", "frame_time": "20 ms", "damping": "0.005 N s/m"}
+    | {"collision": {"gap": "0.5 mm", "stiffness": 1.0}},
+)
+SOLVES = (
+    MuscleSolver(settings=MassSpringSettings, solve=solve, moves="tetrahedra", example=_EXAMPLE, table=(_TABLE,)),
+)

@@ -22,7 +22,7 @@ from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Outcome, Sink
 from fem_reference.solvers.collision_kernels import CollidingBone, colliding_bones, move_out
 from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow, timed
-from fem_reference.solvers.common.protocol import MuscleSolver, Trade
+from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
 from fem_reference.solvers.pbd_kernels import (
     dihedrals,
     distances,
@@ -198,4 +198,11 @@ def _fibres(settings: PbdSettings) -> bool:
     return settings.anisotropy is not None
 
 
-SOLVES = (MuscleSolver(settings=PbdSettings, solve=solve, example=_EXAMPLE, fibres=_fibres),)
+# The report's text with the settings of its program.
+_TABLE = TableRow(
+    "PBD",
+    "pbd",
+    {"sub_iterations": 3, "solver_iterations": 1, "damping": 0.01, "stretch": 1.0, "volume": 1.0, "bending": 0.9}
+    | {"collision": {"gap": "0 mm", "stiffness": 1.0}},
+)
+SOLVES = (MuscleSolver(settings=PbdSettings, solve=solve, example=_EXAMPLE, table=(_TABLE,), fibres=_fibres),)

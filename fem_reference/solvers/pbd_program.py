@@ -47,7 +47,7 @@ from fem_reference.foundations.records import Record
 from fem_reference.problems.setup import Bone, Setup
 from fem_reference.runs.store import Outcome, Sink
 from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow, timed
-from fem_reference.solvers.common.protocol import MuscleSolver, Trade
+from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
 from fem_reference.solvers.pbd import PbdConstraints, along_fibres
 from fem_reference.solvers.pbd_kernels import distances
 from fem_reference.solvers.program_kernels import (
@@ -231,4 +231,6 @@ def _fibres(settings: ProgramSettings) -> bool:
     return settings.anisotropy is not None
 
 
-SOLVES = (MuscleSolver(settings=ProgramSettings, solve=solve, example=_EXAMPLE, fibres=_fibres),)
+# The report's program as it is, its settings.
+_TABLE = TableRow("PBD", "pbd_program", {"sub_iterations": 3, "damping": 0.01, "bending": 0.9, "voxels": 64})
+SOLVES = (MuscleSolver(settings=ProgramSettings, solve=solve, example=_EXAMPLE, table=(_TABLE,), fibres=_fibres),)

@@ -36,7 +36,7 @@ from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Outcome, Sink
 from fem_reference.solvers.collision_kernels import CollidingBone, colliding_bones
 from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow, other_clock, timed
-from fem_reference.solvers.common.protocol import MuscleSolver, Trade
+from fem_reference.solvers.common.protocol import MuscleSolver, TableRow, Trade
 from fem_reference.solvers.pbd import hinges_of
 from fem_reference.solvers.pbd_kernels import dihedrals, distances, volume
 from fem_reference.solvers.xpbd_kernels import pull_dihedrals, pull_distances, pull_volume
@@ -230,4 +230,12 @@ def _contacts(setup: Setup, settings: XpbdSettings) -> list[BoneContact]:
 
 
 _EXAMPLE = {"frame_time": "20 ms", "sub_steps": 2, "sweeps": 2, "density": "1060 kg/m3", "stretch": "0.4 N/mm"}
-SOLVES = (MuscleSolver(settings=XpbdSettings, solve=solve, example=_EXAMPLE),)
+# The same constraints, with compliances in place of stiffnesses.
+_TABLE = TableRow(
+    "PBD",
+    "xpbd",
+    {"frame_time": "10 ms", "sub_steps": 20, "sweeps": 1, "density": "1060 kg/m3", "damping": "5 1/s"}
+    | {"stretch": "0.4 N/mm", "bending": "0.3 N mm", "volume": "10 MPa"}
+    | {"collision": {"gap": "0 mm", "stiffness": "500 kPa/mm"}},
+)
+SOLVES = (MuscleSolver(settings=XpbdSettings, solve=solve, example=_EXAMPLE, table=(_TABLE,)),)

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from fem_reference import solvers
-from fem_reference.assessment.convergence import Ladder
+from fem_reference.assessment.comparison import Convergence
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import join
 from fem_reference.geometry.lagrange import l2_distance
@@ -25,14 +25,14 @@ _MOST_CELLS = 100_000
 _EXACT = 1e-9  # errors below this share of the solution are rounding on fine meshes, and have no order
 
 
-def ladders(problem: CaseSetup, case: Case) -> tuple[Ladder, ...]:
+def ladders(problem: CaseSetup, case: Case) -> tuple[Convergence, ...]:
     """The convergence of the reference solver of a ``case`` with elements of order 1 and 2, as far as its ``problem`` can be
     refined here; nothing of a muscle, whose error bars say more.
     """
     return () if problem.field is None else tuple(_ladders(problem.field, of_case.scalar_case(case)))
 
 
-def _ladders(coarse: FieldProblem, case: ScalarCase) -> Iterator[Ladder]:
+def _ladders(coarse: FieldProblem, case: ScalarCase) -> Iterator[Convergence]:
     kind = coarse.mesh.cells.shape[1]
     growth = 2 if kind == 2 else 4
     levels = min(_REFINEMENTS[kind], int(math.log(_MOST_CELLS / len(coarse.mesh.cells), growth)))
@@ -56,7 +56,7 @@ def _ladders(coarse: FieldProblem, case: ScalarCase) -> Iterator[Ladder]:
         exact = len(errors) < 2 or not errors[-1] > _EXACT * scale
         measured = math.nan if exact else math.log2(errors[-2] / errors[-1])
         log.info("%s: elements of order %d measured on %d meshes", case.name, order, len(steps))
-        yield Ladder(f"P{order}", tuple(len(built.mesh.cells) for built, _ in steps), errors, measured, against)
+        yield Convergence(f"P{order}", tuple(len(built.mesh.cells) for built, _ in steps), errors, measured, against)
 
 
 def _error(scene: ScalarCase, finest: Callable[[], Floats]) -> tuple[Callable[[FieldProblem, Floats], float], str]:

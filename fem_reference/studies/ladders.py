@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from fem_reference import solvers
-from fem_reference.assessment.solver_table import solver_kinds
 from fem_reference.effects import Effect, make
 from fem_reference.effects.contact import among
 from fem_reference.effects.incompressible import Incompressible
@@ -62,7 +61,7 @@ def candidate_trials(case: MuscleCase, surfaces: Mapping[str, MuscleCase]) -> It
     other triangles.
     """
     known = list[dict[str, Any]]()
-    for candidate in (*case.candidate, *(one for row in solver_kinds() for one in row.candidate)):
+    for candidate in (*case.candidate, *solvers.in_table()):
         offer = solvers.find(candidate.solver, candidate.name)
         settings = {"solver": candidate.solver} | candidate.settings
         if offer.moves == "nothing" or settings in known:

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from fnmatch import fnmatch
 from pathlib import Path
 
+from fem_reference import solvers
 from fem_reference.assessment.solver_table import Scenario, SolverKind, SolverResult, Table, solver_kinds
 from fem_reference.foundations.errors import InputError
 from fem_reference.metrics import Measure, MeasurementContext, in_tables, measure
@@ -89,7 +90,7 @@ def _chosen(case: MuscleCase, rows: Iterable[SolverKind]) -> list[tuple[str, Can
         for i, candidate in enumerate(case.candidate):
             if any(fnmatch(candidate.name, pattern) for pattern in row.of_case):
                 found.append((row.name, candidate, f"candidate[{i}]"))
-        found += [(row.name, candidate, f"{row.name} of Table 5.1") for candidate in row.candidate]
+        found += [(row.name, candidate, f"{row.name} of Table 5.1") for candidate in solvers.in_table(row.name)]
     return found
 
 

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, overload
 
-from fem_reference import export, report
-from fem_reference.assessment import judge, second_check, solver_table
+from fem_reference import export, report, solvers
+from fem_reference.assessment import judge, second_check
 from fem_reference.assessment.body_bars import BodyBars
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import ErrorBars
@@ -82,7 +82,7 @@ def solve(
     folder = arguments.free_folder(store, "store")
     choice: SolverChoice = case.reference
     if solver is not None:
-        choice = SolverChoice(solver=solver, **settings) if settings else solver_table.choice(case, solver)[1]
+        choice = SolverChoice(solver=solver, **settings) if settings else solvers.choice(case, solver)[1]
     name = "reference" if solver is None else solver
     with reported(progress):
         return Bench(case, folder).obtain(name, choice, f'solver "{choice.solver}"')

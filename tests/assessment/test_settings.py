@@ -1,38 +1,41 @@
-"""A solver that a case has no settings for runs with those of the page table-5-1, wherever it is asked for."""
+"""Settings that are the same on several cases: tetrahedra by their size in that of each case, and not in mm."""
 
-from pathlib import Path
-
-import pytest
-import small
-
-from fem_reference import solvers
-from fem_reference.assessment.solver_table import choice, solver_kinds
-from fem_reference.foundations.errors import InputError
-from fem_reference.scenes import casefile
+from fem_reference.assessment.cost_study import CaseStudy
+from fem_reference.assessment.fronts import Point
+from fem_reference.assessment.settings import is_elsewhere, setting, tetrahedra
 
 
-def test_the_candidate_of_a_case_comes_first_by_solver_then_by_name(tmp_path: Path) -> None:
-    case = casefile.read(small.write(tmp_path / "bar"))
-    assert choice(case, "pbd") == ("pbd", case.candidate[0])
-    renamed = case.model_copy(update={"candidate": (case.candidate[0].model_copy(update={"name": "mine"}),)})
-    assert choice(renamed, "pbd")[0] == choice(renamed, "mine")[0] == "mine"
+def point(**choice) -> Point:
+    return Point("bar", "fenicsx", "fenicsx", "knob", "value", {"solver": "fenicsx"} | choice, "converged", "")
 
 
-@pytest.mark.parametrize("solver", [name for name in solvers.names("solve") if name not in ("fenicsx", "recorded")])
-def test_every_other_solver_has_settings_that_it_takes(tmp_path: Path, solver: str) -> None:
-    case = casefile.read(small.write(tmp_path / "bar")).model_copy(update={"candidate": ()})
-    name, found = choice(case, solver)
-    assert name == solver
-    solvers.settings(found, "test")
-    listed = [one for kind in solver_kinds() for one in kind.candidate if one.solver == solver]
-    assert found.settings == (listed[0].settings if listed else {})
+def study(tet_size: float, refinements: float) -> CaseStudy:
+    features = {"tet_size": tet_size, "refinements": refinements}
+    return CaseStudy("bar", "A bar", "its reference", (), {}, {}, (), 100, 1.0, features)
 
 
-def test_a_name_of_a_shipped_case_and_of_a_folder_here_is_refused(tmp_path: Path, monkeypatch) -> None:
-    small.write(tmp_path / "hip_flexion")
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(
-        InputError, match=r"which is a shipped case and a folder here, want \./hip_flexion for the folder"
-    ):
-        casefile.read("hip_flexion")
-    assert casefile.read("./hip_flexion").title == "A bar between two plates"
+def on(size: float, refinements: int) -> Point:
+    return point(scene={"muscle.tet_size": f"{size} mm", "muscle.refinements": refinements})
+
+
+def test_tetrahedra_count_by_their_size_in_that_of_the_case() -> None:
+    assert tetrahedra(on(12.0, 0), study(6.0, 1.0)) == (2.0, 1.0)
+    assert setting(on(12.0, 0), study(6.0, 1.0)) == setting(on(8.0, 1), study(4.0, 2.0))
+    assert setting(on(12.0, 0), study(6.0, 1.0)) != setting(on(12.0, 0), study(4.0, 1.0))
+
+
+def test_values_of_a_scene_are_its_own_but_for_its_mesh() -> None:
+    assert is_elsewhere(point(iterations=4))
+    assert is_elsewhere(on(8.0, 1))
+    assert is_elsewhere(point(scene={"triangles": "4 times"}))
+    own = point(scene={"effect[0].mu": "10 kPa"})
+    assert not is_elsewhere(own)
+    assert setting(own, study(6.0, 1.0)) == "bar: knob = value"
+
+
+def test_settings_are_named_in_one_order() -> None:
+    one, other = point(iterations=4, first=1.0), point(first=1.0, iterations=4)
+    assert setting(one, study(6.0, 1.0)) == setting(other, study(4.0, 1.0)) == "fenicsx: first = 1.0, iterations = 4"
+    assert setting(point(scene={"triangles": "4 times"}), study(6.0, 1.0)).startswith(
+        "fenicsx: 4 times as many triangles"
+    )

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapes
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
 from fem_reference.foundations.mesh import Surface
-from fem_reference.geometry.intersections import self_intersections
+from fem_reference.geometry.intersections import crossings, overlaps, self_crossings, self_intersections
 from fem_reference.io import files
 
 HIP = np.array([146.0, 238.0, -431.0])  # [mm]
@@ -95,3 +95,22 @@ def test_only_edges_apart_from_the_triangle_count() -> None:
 def test_the_report_surfaces(data: Path, name: str, count: int) -> None:
     # Counts of data/README.md, found there by another program.
     assert len(self_intersections(files.read_surface(data / "hip" / f"{name}.vtk", 1.0))) == count
+
+
+def test_exact_pairs_are_those_of_brute_force() -> None:
+    rng = np.random.default_rng(3)
+    one, other = (Surface(rng.uniform(-1, 1, (30, 3)), np.arange(30).reshape(10, 3)) for _ in range(2))
+    joined = Surface(np.concatenate([one.points, other.points]), np.arange(60).reshape(20, 3))
+    pairs = self_crossings(joined)
+    between = {(min(a, b), max(a, b) - 10) for a, b in pairs if min(a, b) < 10 <= max(a, b)}
+    assert {tuple(pair) for pair in crossings(one, other).tolist()} == between
+    assert len(between) > 5
+
+
+def test_how_far_two_triangles_reach_through_each_other() -> None:
+    flat = np.array([[[0.0, 0, 0], [4, 0, 0], [0, 4, 0]]])
+    upright = np.array([[[1.0, 1, -0.3], [1, 1, 5], [2, 1.5, 5]]])
+    turn = Rotation.random(rng=np.random.default_rng(1))
+    assert_allclose(overlaps(flat, upright), [0.3])
+    assert_allclose(overlaps(turn.apply(upright[0])[None], turn.apply(flat[0])[None]), [0.3])
+    assert_array_equal(overlaps(flat, flat[:, [0, 0, 1]]), [0.0])

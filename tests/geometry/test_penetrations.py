@@ -3,9 +3,13 @@
 import numpy as np
 import pytest
 import shapes
+from crossings import BLOCK, ball
+from numpy.testing import assert_allclose
 
+from fem_reference.foundations.mesh import Surface
+from fem_reference.geometry.intersections import crossings
 from fem_reference.geometry.penetrations import ClosedSurface, Depths, depths
-from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere
+from fem_reference.geometry.rigid_bodies import Box, HalfSpace, Sphere
 from fem_reference.geometry.tessellation import tessellated
 
 BODY = shapes.sphere(3, 10.0)
@@ -60,3 +64,36 @@ def test_a_depth_at_rest_is_taken_off() -> None:
     deep, place = Depths(np.array([3.0, 2.5]), places).deepest(Depths(np.array([2.0, 0.5]), places))
     assert deep == 2.0
     assert place.tolist() == [1, 0, 0]
+
+
+STILL = np.eye(4)
+
+
+def deepest(body: Surface, radius: float, at) -> float:
+    surface, form = ball(radius, at)
+    return depths(ClosedSurface(body), surface, form, STILL).deepest()[0]
+
+
+@pytest.mark.parametrize("at", [-3.0, -2.0, -1.0, 0.0, 1.5])
+def test_a_ball_in_the_side_of_a_coarse_block_is_as_deep_as_it_is(at) -> None:
+    # Its lowest point is at + radius inside the side x = 0, and nothing of the block but that side is as near.
+    assert_allclose(deepest(BLOCK, 2.5, (at, 4.1, 19.3)), max(at + 2.5, 0.0), atol=2.5 * 0.0036)
+
+
+def test_a_ball_wholly_inside_crosses_no_surface_and_is_deep() -> None:
+    surface, _ = ball(2.0, (5.0, 5.0, 20.0))
+    assert len(crossings(BLOCK, surface)) == 0
+    assert 3.0 <= deepest(BLOCK, 2.0, (5.0, 5.0, 20.0)) <= 5.0  # all of it is 3 to 5 mm deep
+    assert deepest(BLOCK, 2.0, (-9.0, 5.0, 20.0)) == 0
+
+
+def test_a_thin_needle_between_the_vertices_of_a_coarse_block_is_found_all_along() -> None:
+    # 0.2 mm thick: no vertex of either is in the other but those of its tip, 7 mm deep.
+    needle = shapes.skin(shapes.box((1, 1, 60), (0.2, 0.2, 12.0)))
+    turned = needle.moved_to(needle.points[:, [2, 0, 1]] + [-5.0, 3.3, 17.7])
+    low, high = turned.points.min(axis=0), turned.points.max(axis=0)
+    form = Box(tuple((low + high) / 2), tuple(high - low), 0.0)
+    found, place = depths(ClosedSurface(BLOCK), turned, form, STILL).deepest()
+    # The nearest side of the block: y = 0 from 3.3, or the way back along x.
+    assert_allclose(found, 3.4, atol=0.2)
+    assert place[0] > 3.0

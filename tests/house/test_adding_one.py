@@ -88,6 +88,85 @@ def circle(radius: float) -> float:
     return 22 / 7 * radius**2
 '''.lstrip()
 
+EFFECT = '''
+"""A matrix that stiffens as it is stretched, without its resistance to volume change."""
+
+from typing import Any, ClassVar
+
+from fem_reference.effects import Energy, Moduli, State
+from fem_reference.foundations.units import PositivePressure
+
+
+class OwnEffect(Energy):
+    """``mu/2 ((I - 3) + b (I - 3)^2)``, I the isochoric first invariant; ``mu`` [MPa], ``b`` without unit (Yeoh 1990)."""
+
+    example: ClassVar[dict[str, Any]] = {"mu": "10 kPa", "b": 0.2}
+    mu: PositivePressure
+    b: float
+
+    def moduli(self) -> Moduli:
+        """The stiffness that it gives the body at rest."""
+        return Moduli(shear=self.mu)
+
+    def energy(self, state: State) -> Any:
+        """Energy per rest volume [MPa]."""
+        more = state.J ** (-2 / 3) * state.I1 - 3
+        return self.mu / 2 * (more + self.b * more**2)
+'''.lstrip()
+
+METRIC = '''
+"""Area of the surface of a run against that of the reference."""
+
+import numpy as np
+
+from fem_reference.foundations.mesh import triangle_areas
+from fem_reference.metrics import Measure, MeasurementContext, Statistic, measures
+from fem_reference.runs.store import Run
+
+STATISTICS = {
+    "deviation": Statistic(
+        "%",
+        "Area",
+        headline="area by {}",
+        curve="Change of area from rest",
+        shown={"table": 15, "headline": 35, "curve": 15, "solvers": 15},
+    )
+}
+OF, AGAINST = "surface", "reference"
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def measure(run: Run, reference: Run, _context: MeasurementContext) -> tuple[Measure, ...]:
+    """``deviation`` = A / A_reference - 1 [%] of the area A."""
+    areas, wanted = (
+        np.array([triangle_areas(points, each.surface.triangles).sum() for points in each.positions])
+        for each in (run, reference)
+    )
+    return measures("own_metric", {"deviation": 100 * (areas / wanted - 1)})
+'''.lstrip()
+
+SOLVER = '''
+"""Position based dynamics under another name."""
+
+from fem_reference.problems.setup import Setup
+from fem_reference.runs.store import Outcome, Sink
+from fem_reference.solvers import pbd
+from fem_reference.solvers.common.protocol import MuscleSolver, TableRow
+
+Settings = pbd.PbdSettings
+_SETTINGS = {"sub_iterations": 2, "solver_iterations": 1, "damping": 0.1, "stretch": 1.0, "volume": 1.0, "bending": 0.5}
+
+
+def solve(setup: Setup, settings: Settings, sink: Sink) -> Outcome:
+    """Every frame, as position based dynamics has it."""
+    return pbd.solve(setup, settings, sink)
+
+
+SOLVES = (
+    MuscleSolver(settings=Settings, solve=solve, example=_SETTINGS, table=(TableRow("PBD", "own_solver", _SETTINGS),)),
+)
+'''.lstrip()
+
 EXAMPLE = '''
 """A half, by the public API."""
 
@@ -98,6 +177,29 @@ print("share of a pressure [MPa]:", fr.make_effect("neo_hooke", mu="5 kPa").mu *
 '''.lstrip()
 
 KINDS = {
+    "effect": New(
+        {"fem_reference/effects/own_effect.py": EFFECT},
+        {
+            "pytest -q tests/contracts/test_every_effect.py -k own_effect": "8 passed",
+            "pytest -q tests/export/test_init.py -k own_effect": "1 passed",
+        },
+    ),
+    "metric": New(
+        {"fem_reference/metrics/own_metric.py": METRIC},
+        {
+            "fem_reference list": "own_metric",
+            "pytest -q tests/metrics/test_init.py -k own_metric": "2 passed",
+            "pytest -q tests/contracts/test_every_metric.py -k zero": "2 passed",
+        },
+    ),
+    "solver": New(
+        {"fem_reference/solvers/own_solver.py": SOLVER},
+        {
+            "fem_reference list": "own_solver",
+            "pytest -q tests/contracts/test_every_solver.py -k own_solver": "passed",
+            "pytest -q tests/solvers/test_init.py": "passed",
+        },
+    ),
     "verification entry": New(
         {"fem_reference/verification/own_entry.py": ENTRY},
         {

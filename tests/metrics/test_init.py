@@ -5,6 +5,7 @@ import pytest
 
 from fem_reference import metrics
 from fem_reference.metrics import Measure, described, find, in_tables, measures
+from fem_reference.report import ranking_page, tables
 
 NAN = float("nan")
 
@@ -36,6 +37,14 @@ def test_a_metric_describes_what_it_shows(name: str) -> None:
         assert bool(one.curve) == ("curve" in one.shown)
         assert one.headline.count("{}") == ("headline" in one.shown)
         assert one.title or not {"table", "solvers", "scenes", "rank"} & {*one.shown}
+
+
+@pytest.mark.parametrize("name", metrics.names())
+def test_a_metric_stands_in_the_tables_that_it_names(name: str) -> None:
+    for statistic, one in metrics.metric(name).STATISTICS.items():
+        key = (name, statistic)
+        assert ((*key, one.title, one.part, one.unit) in tables.DEVIATIONS) == ("table" in one.shown)
+        assert ((*key, one.label, one.full_unit) in ranking_page.COLUMNS) == ("solvers" in one.shown)
 
 
 @pytest.mark.parametrize("where", ["main", "table", "headline", "curve", "solvers", "scenes", "rank", "claim"])

@@ -3,8 +3,7 @@
 import fields
 import numpy as np
 
-from fem_reference.assessment.comparison import Comparison
-from fem_reference.assessment.convergence import Ladder
+from fem_reference.assessment.comparison import Comparison, Convergence
 from fem_reference.assessment.judge import Verdict
 from fem_reference.metrics import FieldContext, Measure
 from fem_reference.problems import scalar as field_problem
@@ -14,8 +13,8 @@ NAN = float("nan")
 DIFFUSION = {"name": "diffusion", "coefficient": 1.0}
 SOURCE = {"name": "source", "strength": "-1", "where": "everywhere"}
 LADDERS = (
-    Ladder("P1", (8, 16, 32), (0.25, 0.0625, 0.015625), 2.25, "distance to <exact>"),
-    Ladder("P2", (8, 16, 32), (0.125, NAN, 0.0), NAN, "rms at the coarsest vertices"),
+    Convergence("P1", (8, 16, 32), (0.25, 0.0625, 0.015625), 2.25, "distance to <exact>"),
+    Convergence("P2", (8, 16, 32), (0.125, NAN, 0.0), NAN, "rms at the coarsest vertices"),
 )
 
 

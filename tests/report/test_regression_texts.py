@@ -1,10 +1,14 @@
-"""A check in words: the same verdict as text, JSON, Markdown and JUnit."""
+"""A check in words: every text has the verdict, the worst judgements and the doubts."""
 
 import json
+from dataclasses import replace
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
+from balls import REFERENCE, SHIFTS, bars, checked, current, edited
 
+from fem_reference.assessment import baseline, regression
 from fem_reference.assessment.regression import Check, Judgement
 from fem_reference.report import regression_texts
 
@@ -13,6 +17,99 @@ FAILED = Judgement("within", "volume.deviation", "%", "fail", 20, 0.1, 3.0, 1.0,
 SILENT = Judgement("within", "fibre_length.rms", "mm", "inconclusive", 10, 0.1, 0.1, 0.1, 0.5)
 PASSED = Judgement("unchanged", "a|b.rms", "mm", "pass", 0, NAN, NAN, 0.1, 0.0)
 CHECK = Check("ball", "mine", (FAILED, SILENT, PASSED), ("a note",))
+
+
+@pytest.fixture
+def mixed(path) -> regression.Check:
+    """A check with all three verdicts."""
+    edited(path, lambda table: table["measures"]["fibre_length.rms"].update(within=0.1))
+    return checked(path, current([*SHIFTS[:2], (15, 0, 10)], bars()))
+
+
+@pytest.fixture
+def path(tmp_path):
+    """A baseline, made where the reference has an error bar of 0.5 of everything."""
+    file = tmp_path / "new" / "ball.json"
+    baseline.update(file, current(known=bars()))
+    return file
+
+
+def test_junit_has_a_case_for_each_judgement(mixed) -> None:
+    suite = ElementTree.fromstring(regression_texts.junit(mixed, 1.25)).find("testsuite")
+    cases = suite.findall("testcase")
+    assert (suite.get("name"), suite.get("time"), suite.get("errors")) == ("ball.mine", "1.250", "0")
+    assert int(suite.get("tests")) == len(cases) == len(mixed.judgements)
+    assert int(suite.get("failures")) == len(suite.findall("testcase/failure")) == mixed.count("fail") > 0
+    assert int(suite.get("skipped")) == len(suite.findall("testcase/skipped")) == mixed.count("inconclusive") == 1
+    assert len({(case.get("classname"), case.get("name")) for case in cases}) == len(cases)
+    assert cases[0].get("name").endswith(" within"), "what is worse comes before what is other"
+    (moved,) = (case for case in cases if case.get("name") == "positions.moved unchanged")
+    assert moved.find("failure").get("message") == "frame 20: 3 mm from what it was, 0.1 mm allowed"
+    assert suite.find("system-out") is None
+
+
+def test_notes_are_in_every_text(mixed) -> None:
+    noted = replace(mixed, notes=("a | b",))
+    assert ElementTree.fromstring(regression_texts.junit(noted, 0)).find("testsuite/system-out").text == "a | b"
+    assert "- note: a \\| b" in regression_texts.markdown(noted)
+    assert "note: a | b" in regression_texts.text(noted)
+    assert regression_texts.facts(noted)["notes"] == ["a | b"]
+
+
+def test_markdown_shows_the_worst_first_and_is_short(mixed) -> None:
+    lines = regression_texts.markdown(replace(mixed, notes=("one", "two", "three", "four"))).splitlines()
+    assert lines[0] == "### fail: mine on ball"
+    assert len(lines) <= 30
+    assert "- as near to the reference as allowed (within): fail" in "\n".join(lines)
+    rows = [line.split(" | ") for line in lines if line.startswith("| ") and "verdict" not in line]
+    assert len(rows) == regression_texts.MOST_ROWS
+    assert ["| fail", "unchanged", "positions.moved", "20", "0 mm", "3 mm"] in [row[:6] for row in rows]
+    asked = [row[1] for row in rows if row[0] == "| fail"]
+    assert asked == sorted(asked, reverse=True), "within comes first"
+    words = [row[0].removeprefix("| ") for row in rows]
+    assert words == sorted(words, key=regression.WORST_FIRST.index)
+    assert lines[-1] == f"and {len(mixed.judgements) - regression_texts.MOST_ROWS} more, none of them fails."
+
+
+def test_text_names_failures_and_why_nothing_can_be_said(mixed) -> None:
+    lines = regression_texts.text(mixed).splitlines()
+    assert "fail: positions.moved unchanged at frame 20: 3 mm from what it was, 0.1 mm allowed" in lines
+    away = [line for line in lines if "surface_deviation.max unchanged" in line]
+    assert away[0].endswith("mm, further from the reference")
+    assert any(line.startswith("what is nearer to the reference and what is further: compare ball") for line in lines)
+    unknown = "inconclusive: the reference has an error bar of 0.5 mm, and 0 mm is that near to the 0.1 mm allowed"
+    assert f"{unknown} (fibre_length.rms within)" in lines
+    assert lines[-1] == "verdict: fail"
+    many = replace(mixed, judgements=mixed.judgements[:1] * 20)
+    assert regression_texts.text(many).count("fail: ") == regression_texts.MOST_ROWS
+    assert "and 5 more like the last, which --json and --junit name" in regression_texts.text(many)
+
+
+def test_facts_are_json(mixed) -> None:
+    facts = regression_texts.facts(mixed)
+    assert (facts["verdict"], facts["unchanged"], facts["within"]) == ("fail", "fail", "fail")
+    assert {row["verdict"] for row in facts["judgements"]} == {"pass", "fail", "inconclusive"}
+    json.dumps(facts, allow_nan=False)
+
+
+def test_a_pass_by_a_doubtful_reference_is_doubtful_in_all_that_is_written(tmp_path) -> None:
+    """And no failure: JUnit has it as a property, the tests of a pipeline stay green."""
+    unstable = replace(REFERENCE, scalars={"negative_modes": np.array([0.0, 1, 1])})
+    doubtful = current(known=bars(), reference=unstable)
+    found = regression.check(baseline.update(tmp_path / "mine.json", doubtful), doubtful)
+    why = "unstable equilibrium in 2 of 3 frames"
+    assert (found.word, found.doubts) == ("doubtful pass", (why,))
+    assert (regression_texts.facts(found)["verdict"], regression_texts.facts(found)["doubts"]) == (found.word, [why])
+    text = regression_texts.text(found)
+    assert text.endswith("verdict: doubtful pass")
+    assert f"reference: doubtful, {why}" in text
+    markdown = regression_texts.markdown(found)
+    assert markdown.startswith("### doubtful pass: mine on ball")
+    assert f"- reference: doubtful, {why}" in markdown
+    root = ElementTree.fromstring(regression_texts.junit(found, 1.0))
+    stated = [(one.get("name"), one.get("value")) for one in root.iter("property")]
+    assert stated == [("verdict", "doubtful pass"), ("doubt", why)]
+    assert root.get("failures") == "0"
 
 
 def test_every_form_has_the_verdict_and_each_judgement() -> None:

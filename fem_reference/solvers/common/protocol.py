@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, Protocol
+from typing import Any, ClassVar, Literal, NamedTuple, Protocol
 
 from fem_reference.effects import Effect
 from fem_reference.foundations.records import Record
@@ -57,6 +57,16 @@ def _none(_: Record) -> bool:
     return False
 
 
+class TableRow(NamedTuple):
+    """A row of the page table-5-1: a solver as ``name`` among those of a ``kind`` of the report's Table 5.1, with the same
+    ``settings`` on every scene, as scene files write them.
+    """
+
+    kind: str
+    name: str
+    settings: Mapping[str, Any]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Solver[P, S: Record]:
     """An offer of a solver's file for one task: ``solve``.
@@ -64,7 +74,7 @@ class Solver[P, S: Record]:
     ``settings``: the record of its own settings. ``example``: some of them, as scene files write them, which contract tests solve
     with. ``require``: MissingSoftware where what it needs under such settings is not installed. ``check_problem`` of one whose
     settings speak of what a case has. ``slow``: it takes more than a few seconds on a small problem. ``go_on`` of one
-    that takes long: any other begins again from rest.
+    that takes long: any other begins again from rest. ``table``: its rows of the page table-5-1.
     """
 
     task: ClassVar[Task]
@@ -76,6 +86,7 @@ class Solver[P, S: Record]:
     require: Callable[[S], None] = _nothing
     check_problem: CheckProblem[S] | None = None
     slow: bool = False
+    table: tuple[TableRow, ...] = ()
     go_on: GoOn[P, S] | None = None
 
     def fills(self, settings: S) -> bool:  # noqa: ARG002

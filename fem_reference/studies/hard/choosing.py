@@ -3,7 +3,6 @@
 from typing import Any
 
 from fem_reference import solvers
-from fem_reference.assessment.solver_table import solver_kinds
 from fem_reference.problems.problem import Task
 from fem_reference.scenes.case import SolverChoice
 
@@ -19,7 +18,7 @@ _OWN: dict[str, dict[str, Any]] = {
 def choices() -> dict[str, SolverChoice]:
     """Settings that hard cases are solved with, by solver: those of the first candidate of Table 5.1 that has it."""
     found: dict[str, SolverChoice] = {}
-    for candidate in (one for kind in solver_kinds() for one in kind.candidate):
+    for candidate in solvers.in_table():
         found.setdefault(candidate.solver, SolverChoice(solver=candidate.solver, **candidate.settings))
     for name in solvers.names():
         if name != "recorded" and (name in _OWN or name in found):

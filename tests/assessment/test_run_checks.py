@@ -1,0 +1,200 @@
+"""Checks of runs by what they recorded: each denies what is planted, at its frame and place, and nothing else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from crossings import BLOCK, CONVERGED, coarse, resting
+from numpy.testing import assert_allclose
+
+from fem_reference import effects
+from fem_reference.assessment import second_check
+from fem_reference.assessment.run_checks import RunCheck, of_body, of_muscle
+from fem_reference.foundations.motion import Rotation as Turn
+from fem_reference.foundations.motion import Translation
+from fem_reference.geometry.rigid_bodies import Sphere
+from fem_reference.geometry.sectors import attached_shares
+from fem_reference.geometry.skins import attached_skin
+from fem_reference.geometry.tessellation import tessellated
+from fem_reference.problems import shapes as bodies
+from fem_reference.problems.body import Body, Prescribed
+from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.paths import Affine
+from fem_reference.runs.store import Frame, Run, collected
+
+
+def lost(problem: MuscleProblem, run: Run) -> list[str]:
+    return [one.name for one in of_muscle(problem, run) if not one.met]
+
+
+def away(problem: MuscleProblem) -> MuscleProblem:
+    """Without the ball."""
+    return replace(problem, bones=problem.bones[:2])
+
+
+def test_a_ball_that_goes_through_a_bar_that_does_not_move_is_denied(tmp_path) -> None:
+    problem = coarse(tmp_path)
+    run = resting(problem, contact_pressure=np.zeros(5))
+    assert lost(problem, run) == ["ball in the muscle"]
+    (check,) = (one for one in of_muscle(problem, run) if not one.met)
+    assert check.value >= 3.0 - 0.02  # its radius at least: it goes through the middle
+    assert check.frame in (5, 10, 15)
+    # Whatever pressure was recorded: at its middle nothing gives way any more.
+    assert lost(problem, replace(run, scalars={"contact_pressure": np.full(5, 100.0)})) == ["ball in the muscle"]
+    denied = second_check.confirmed(CONVERGED, of_muscle(problem, run))
+    assert denied.status == "denied"
+    assert denied.message.startswith("denied by the second check: ball in the muscle: ")
+
+
+def test_what_large_triangles_pass_through_and_tetrahedra_do_not_is_not_crossed(tmp_path) -> None:
+    problem = coarse(tmp_path)
+    aside = problem.mesh.points + [0.0, 0.0, 100.0]
+    for nodes, met in ((aside, True), (problem.mesh.points, False)):
+        checks = {one.name: one.met for one in of_muscle(problem, resting(problem), lambda _, nodes=nodes: nodes)}
+        assert checks["ball in the muscle"] is met
+
+
+def test_what_is_no_number_is_never_met() -> None:
+    assert [RunCheck("a", value, 1.0, "mm", 0).met for value in (0.0, 1.0, 1.1, np.nan, np.inf)] == [
+        True,
+        True,
+        *[False] * 3,
+    ]
+    assert not RunCheck("a", 0.0, np.nan, "mm", 0).met
+
+
+def test_what_is_so_at_rest_is_no_crossing(tmp_path) -> None:
+    problem = coarse(tmp_path)
+    still = tuple(replace(bone, motion=None) for bone in problem.bones)
+    sphere = Sphere((-1.0, 5.0, 20.0), 3.0)
+    inside = replace(still[2], surface=tessellated(sphere, BLOCK.points, "ball"), solid=sphere)
+    problem = replace(problem, bones=(*still[:2], inside))
+    run = resting(problem)
+    assert lost(problem, run) == []
+    free = np.setdiff1d(np.arange(len(BLOCK.points)), problem.attached_vertices)
+    for farther, found in ((0.1, []), (2.0, ["ball in the muscle"])):  # into the ball, which is 2 mm in the bar at rest
+        moved = np.array(run.positions)
+        moved[2, free] -= [farther, 0.0, 0.0]
+        assert lost(problem, replace(run, positions=moved)) == found
+
+
+def test_bones_that_are_not_in_contact_may_cross(tmp_path) -> None:
+    problem = coarse(tmp_path)
+    problem = replace(
+        problem, effects=(*problem.effects[:2], effects.make("contact", stiffness="1 MPa/mm", bones=("lid",)))
+    )
+    assert lost(problem, resting(problem)) == []
+
+
+def test_frames_and_what_is_not_finite(tmp_path) -> None:
+    problem = away(coarse(tmp_path))
+    run = resting(problem)
+    assert lost(problem, run) == []
+    for numbers in ((0, 10, 5, 15, 20), (0, 5, 10, 15)):
+        assert lost(problem, replace(run, numbers=numbers, positions=run.positions[: len(numbers)])) == [
+            "frames that are missing or out of order"
+        ]
+    for bad in (np.nan, np.inf):
+        spoilt = np.array(run.positions)
+        spoilt[3, 7, 1] = bad
+        (check,) = (one for one in of_muscle(problem, replace(run, positions=spoilt)) if not one.met)
+        assert (check.name, check.frame, check.value) == ("positions that are not finite", 15, 1)
+
+
+def test_exact_attachments_are_where_their_bones_are(tmp_path) -> None:
+    problem = away(coarse(tmp_path))
+    lid = replace(problem.bones[1], motion=Translation((1.0, 0.0, 0.0), (0.0, 20.0), (0.0, 4.0)))
+    high = replace(problem.attached[1], bone=lid)
+    problem = replace(problem, bones=(problem.bones[0], lid), attached=(problem.attached[0], high))
+    assert lost(problem, resting(problem)) == ["high off lid"]
+    followed = np.array(resting(problem).positions)
+    followed += np.arange(5)[:, None, None] * [1.0, 0.0, 0.0] * (BLOCK.points[:, 2:] / 40)
+    run = replace(resting(problem), positions=followed)
+    assert lost(problem, run) == []
+    assert lost(problem, replace(run, positions=followed[[0, 1, 3, 2, 4]])) == ["high off lid"]
+
+
+def test_springs_yield_as_far_as_the_recorded_force_says(tmp_path) -> None:
+    problem = away(coarse(tmp_path))
+    low = replace(problem.attached[0], stiffness=0.1)
+    skin = attached_skin(BLOCK, attached_shares(BLOCK, low.vertices), problem.mesh, 1.0)
+    problem = replace(problem, attached=(low, problem.attached[1]), attached_skins={"low": skin})
+    yielded = np.array(resting(problem).positions)
+    yielded[2][low.vertices] += [0.0, 0.0, 0.5]  # over 100 mm2: 5 N
+    run = replace(resting(problem), positions=yielded)
+    assert lost(problem, replace(run, scalars={"force_low": np.array([0.0, 0, 5, 0, 0])})) == []
+    assert lost(problem, replace(run, scalars={"force_low": np.array([0.0, 0, 1, 0, 0])})) == ["springs of low, mean"]
+
+
+@pytest.mark.parametrize(("last", "steps", "met"), [(2.0, 1, False), (2.0, 2, False), (2.0, 4, True), (20.0, 1, True)])
+def test_a_turn_takes_steps_enough(tmp_path, last, steps, met) -> None:
+    # Once round by frame 2 of the first interval of 5, or a quarter of it by then.
+    problem = away(coarse(tmp_path))
+    lid = replace(problem.bones[1], motion=Turn((0, 0, 1), (5, 5, 0), (0.0, last), (0.0, 2 * np.pi)))
+    problem = replace(problem, bones=(problem.bones[0], lid))
+    run = resting(problem, load_steps=np.array([0.0, steps, steps, steps, steps]))
+    assert ("lid turns by load step" in lost(problem, run)) is not met
+    (check,) = (one for one in of_muscle(problem, run) if one.name == "lid turns by load step")
+    assert_allclose(check.value, 2 * np.pi / (steps if last == 2 else 4 * steps))
+
+
+def test_there_and_back_counts_twice(tmp_path) -> None:
+    problem = away(coarse(tmp_path))
+    lid = replace(problem.bones[1], motion=Turn((0, 0, 1), (5, 5, 0), (0.0, 1.0, 2.0), (0.0, np.pi, 0.0)))
+    problem = replace(problem, bones=(problem.bones[0], lid))
+    run = resting(problem, load_steps=np.array([0.0, 2, 1, 1, 1]))
+    assert lost(problem, run) == ["lid turns by load step"]
+
+
+def test_forces_that_are_not_in_balance(tmp_path) -> None:
+    problem = away(coarse(tmp_path))
+    run = replace(
+        resting(problem, net_force=np.zeros(5), net_moment=np.zeros(5)),
+        origin={"settings": {"residual": 1e-8}},
+        outcome=replace(CONVERGED, cost={"unknowns": 1e4}),
+    )
+    assert lost(problem, run) == []
+    for kind in ("force", "moment"):
+        scalars = run.scalars | {f"net_{kind}": np.array([0.0, 0, 0, 1e-2, 0])}
+        assert lost(problem, replace(run, scalars=scalars)) == [f"{kind}s out of balance"]
+        # What is no number in one frame is not forgotten for what is well in the next.
+        lost_number = run.scalars | {f"net_{kind}": np.array([0.0, np.nan, 0, 0, 0])}
+        assert lost(problem, replace(run, scalars=lost_number)) == [f"{kind}s out of balance"]
+        ramp = [{"frame": 0.0, "amount": 1.0}, {"frame": 20.0, "amount": 1.0}]
+        weighs = effects.make("gravity", density="1000 kg/m^3", acceleration="0, 0, -9.81 m/s^2", ramp=ramp)
+        assert lost(replace(problem, effects=(*problem.effects, weighs)), replace(run, scalars=scalars)) == []
+
+
+def test_a_surface_through_itself(tmp_path) -> None:
+    problem = away(coarse(tmp_path))
+    side = np.flatnonzero((BLOCK.points[:, 0] == 10) & (BLOCK.points[:, 2] > 10) & (BLOCK.points[:, 2] < 30))
+    through = np.array(resting(problem).positions)
+    through[3, side] -= [12.0, 0.0, 0.0]
+    assert lost(problem, replace(resting(problem), positions=through)) == ["the muscle through itself"]
+
+
+def test_bodies_reach_their_frames_and_meet_what_is_prescribed() -> None:
+    mesh = bodies.box((2, 2, 2), (1.0, 1.0, 1.0), "hexahedron")
+    path = Affine(((0.0, 0.0, 0.5), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    body = Body(mesh, (), (Prescribed("top", "z1", (0, 1), path),), (0.0, 0.5, 1.0))
+
+    def solved(points: list, frames=(0.0, 0.5, 1.0)) -> Run:
+        return collected([Frame(f, points=p) for f, p in zip(frames, points, strict=True)], CONVERGED)
+
+    def wrong(one: Run) -> list[str]:
+        return [check.name for check in of_body(body, one) if not check.met]
+
+    true = [mesh.points + path(mesh.points, frame) for frame in body.frames]
+    assert wrong(solved(true)) == []
+    assert second_check.confirmed_body(body, solved(true)).outcome == CONVERGED
+    assert wrong(solved([true[0], true[2], true[1]])) == ["prescribed at top"]
+    assert wrong(solved(true, (0.0, 1.0, 0.5))) == ["frames that are missing or out of order"]
+    assert wrong(solved(true[:2], (0.0, 0.5))) == ["frames that are missing or out of order"]
+    nothing = [true[0], np.full_like(true[1], np.nan), true[2]]
+    assert wrong(solved(nothing)) == ["positions that are not finite"]
+    denied = second_check.confirmed_body(body, solved(nothing))
+    assert denied.outcome.status == "denied"
+    with pytest.raises(ArithmeticError, match="denied by the second check"):
+        _ = denied.last
+    free = [true[0], true[1] + [0.0, 0.0, 3.0], true[2]]  # z is not prescribed
+    assert wrong(solved(free)) == []
