@@ -125,7 +125,7 @@ def _asked(
 
 
 def _foreign(options: argparse.Namespace, cases: list[str]) -> dict[str, list[Candidate]]:
-    """By the name of a case, what somebody else's solvers made of it."""
+    """Frames that somebody else's solvers made, by the name of the case."""
     found = dict[str, list[Candidate]]()
     for text in options.candidate:
         case, equals, folder = text.partition("=")

@@ -22,7 +22,17 @@ from fem_reference.effects.neo_hooke import NeoHooke
 from fem_reference.export.febio_contact import add_contact, has_contact
 from fem_reference.export.febio_differences import notes
 from fem_reference.export.febio_material import add_fibres, add_materials
-from fem_reference.export.febio_mesh import Mesh, bone_id, by_springs, exactly, leaf, quadratic, springs_id, vector
+from fem_reference.export.febio_mesh import (
+    Mesh,
+    bone_id,
+    by_springs,
+    exactly,
+    leaf,
+    leaves,
+    quadratic,
+    springs_id,
+    vector,
+)
 from fem_reference.export.open_formats import effect_name
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.motion import Rotation
@@ -93,19 +103,15 @@ def _control(root: Element, problem: MuscleProblem) -> None:
     steps = round((problem.frames[-1] - problem.frames[0]) / step)
     settings = {"analysis": "STATIC", "time_steps": steps, "step_size": step}
     settings |= {"plot_level": "PLOT_MUST_POINTS", "output_level": "OUTPUT_MUST_POINTS"}
-    for tag, value in settings.items():
-        leaf(control, tag, value)
+    leaves(control, settings)
     stepper = SubElement(control, "time_stepper", type="default")
     retries = {"max_retries": 20, "aggressiveness": 1, "cutback": 0.5}  # half the step at each
-    for tag, value in (retries | {"opt_iter": 15, "dtmin": step / 200}).items():
-        leaf(stepper, tag, value)
+    leaves(stepper, retries | {"opt_iter": 15, "dtmin": step / 200})
     leaf(stepper, "dtmax", step, lc="1")
     solver = SubElement(control, "solver", type="solid")
     if has_contact(problem):
         leaf(solver, "symmetric_stiffness", "non-symmetric")
-    leaf(solver, "max_refs", 30)
-    for tag, value in TOLERANCES.items():
-        leaf(solver, tag, value)
+    leaves(solver, {"max_refs": 30, **TOLERANCES})
     leaf(SubElement(solver, "qn_method", type="BFGS"), "max_ups", 0)
 
 
@@ -142,14 +148,11 @@ def _motions(root: Element, problem: MuscleProblem) -> None:
         fixed = (*places, *angles) if bone.motion is None else places if turns else angles
         moved = angles if turns else ("x", "y", "z")
         entry = SubElement(rigid, "rigid_bc", name=f"{bone_id(bone)}_fixed", type="rigid_fixed")
-        leaf(entry, "rb", bone_id(bone))
-        for freedom in fixed:
-            leaf(entry, f"{freedom}_dof", 1)
+        leaves(entry, {"rb": bone_id(bone)} | {f"{freedom}_dof": 1 for freedom in fixed})
         for freedom, share in zip(moved, axis(bone), strict=False):
             kind = "rigid_rotation" if turns else "rigid_displacement"
             entry = SubElement(rigid, "rigid_bc", name=f"{bone_id(bone)}_{freedom}", type=kind)
-            leaf(entry, "rb", bone_id(bone))
-            leaf(entry, "dof", freedom)
+            leaves(entry, {"rb": bone_id(bone), "dof": freedom})
             leaf(entry, "value", repr(share), lc=str(curves[bone.name]))
 
 
@@ -184,11 +187,10 @@ def _curves(root: Element, problem: MuscleProblem) -> None:
 
 def _curve(data: Element, number: int, kind: str, points: list[tuple[float, float]]) -> None:
     curve = SubElement(data, "load_controller", id=str(number), type="loadcurve")
-    leaf(curve, "interpolate", kind)
-    leaf(curve, "extend", "CONSTANT")
-    rows = SubElement(curve, "points")
+    leaves(curve, {"interpolate": kind, "extend": "CONSTANT"})
+    listed = SubElement(curve, "points")
     for time, value in points:
-        leaf(rows, "pt", vector((time, value)))
+        leaf(listed, "pt", vector((time, value)))
 
 
 def _output(root: Element) -> None:

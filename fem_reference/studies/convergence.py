@@ -60,7 +60,7 @@ def _ladders(coarse: FieldProblem, case: ScalarCase) -> Iterator[Ladder]:
 
 
 def _error(case: ScalarCase, finest: Callable[[], Floats]) -> tuple[Callable[[FieldProblem, Floats], float], str]:
-    """How far a solution is from the truth, and what that is."""
+    """The error of a solution as a function of it, and the truth that this is measured against, in words."""
     if case.exact is not None:
         exact = partial(scalar.at, case.exact)
         return (lambda built, values: l2_distance(built.mesh, values, exact)), "the exact solution (L2)"

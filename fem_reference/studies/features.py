@@ -1,4 +1,4 @@
-"""What a case is like, as numbers known before it is solved: by them cases are compared."""
+"""Features of a case, as numbers known before it is solved: by them cases are compared."""
 
 import numpy as np
 

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from fem_reference.assessment import differences, error_bars
 from fem_reference.assessment.error_bars import SAFETY, ErrorBars, Pair
 from fem_reference.effects.contact import among
 from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.records import Record
 from fem_reference.geometry.sectors import attached_area, attached_shares
 from fem_reference.metrics import context_of
 from fem_reference.runs.complete import complete
@@ -43,7 +43,7 @@ CHEAP = 0.2
 Vary = Callable[[MuscleCase], MuscleCase]
 
 
-def variations(case: MuscleCase, settings: Any, *, pressed: bool = True) -> dict[str, Vary]:
+def variations(case: MuscleCase, settings: Record, *, pressed: bool = True) -> dict[str, Vary]:
     """Changes that each halve one cause of numerical error apart from tetrahedra, by name: of contact its stiffness and smoothing,
     and how well the distances to surfaces of bones are known and how far they are rounded, unless no bone ``pressed``; load
     steps, where the reference's ``settings`` have them, with drag or viscosity only: else a state does not depend on them.
@@ -59,10 +59,11 @@ def variations(case: MuscleCase, settings: Any, *, pressed: bool = True) -> dict
     return found
 
 
-def half_steps(case: MuscleCase, settings: Any) -> Vary:
+def half_steps(case: MuscleCase, settings: Record) -> Vary:
     """Load steps of at most half the length: no step goes beyond a frame, so that ``frames.every`` bounds it as well."""
-    largest = min(case.frames.every, settings.largest_step or math.inf) / 2
-    return partial(with_reference, first_step=settings.first_step / 2, largest_step=largest)
+    own = settings.model_dump()
+    largest = min(case.frames.every, own["largest_step"] or math.inf) / 2
+    return partial(with_reference, first_step=own["first_step"] / 2, largest_step=largest)
 
 
 def obtain(bench: Bench[Case], reference: Run, *, model: bool = True) -> ErrorBars | None:
