@@ -252,7 +252,7 @@ class World:
     """A small case with runs of it, and of another, made once."""
 
     def __init__(self, folder: Path) -> None:
-        gallery._command = lambda _job, _folder: ["/nowhere/python"]  # pages are written as where nothing can draw
+        gallery.program = lambda _job, _folder: ["/nowhere/python"]  # pages are written as where nothing can draw
         self.folder, self.count = folder, 0
         self.place = small.write(folder / "bar")
         self.case = fr.load_case(self.place, {"frames.every": 10})

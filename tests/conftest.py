@@ -95,7 +95,7 @@ def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pages are written as where nothing can draw."""
     from fem_reference.report import gallery
 
-    monkeypatch.setattr(gallery, "_command", lambda _job, _folder: ["/nowhere/python"])
+    monkeypatch.setattr(gallery, "program", lambda _job, _folder: ["/nowhere/python"])
 
 
 @pytest.fixture(scope="session")

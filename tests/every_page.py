@@ -1,6 +1,5 @@
 """A page of every kind, small: written from the same stand-ins as the tests of each kind."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +8,21 @@ from fem_reference import report
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.cost_study import Study
 from fem_reference.assessment.stress import Bound, Cell, HardCase, History, Scene, Stress
-from fem_reference.report import index_page
+from fem_reference.report import (
+    against_page,
+    claims_page,
+    effects_page,
+    field_page,
+    index_page,
+    ranking_page,
+    stress_page,
+    study_page,
+    verify_page,
+)
 from tests.assessment import test_versions
-from tests.report import test_field_page, test_study_page, test_verify_page
+from tests.report import entries as made_entries
+from tests.report import examples as scalar_examples
+from tests.report import test_study_page
 from tests.studies import test_omissions as test_effects_verb
 from tests.studies import test_table_5_1
 from tests.studies import test_true_errors as test_claims
@@ -35,51 +46,36 @@ KINDS = (
 def write(folder: Path, comparison: Comparison, alone: Comparison) -> dict[str, Path]:
     """Every kind of page in ``folder``, by kind."""
     folder.mkdir(exist_ok=True)
-    examples = (test_field_page.rod(folder / "rod"), test_field_page.plate(folder / "plate", lambda base: 3 * base))
+    examples = (scalar_examples.rod(folder / "rod"), scalar_examples.plate(folder / "plate", lambda base: 3 * base))
     left_out = test_study_page.points("arap", 0.5, 9.0)
     cases = tuple(test_study_page.study(case, *left_out) for case in ("hip", "knee", "jaw"))
     results = [
         test_table_5_1.solver_result(case, *values) for case, values in (("case0", (1.0, 4.0)), ("case1", (2.0, 3.0)))
     ]
     entries = [
-        test_verify_page.made(name, 2.0 + i / 50, order=2.0, ladder=test_verify_page.LADDER)
+        made_entries.made(name, 2.0 + i / 50, order=2.0, ladder=made_entries.LADDER)
         for i, name in enumerate(("bar", "rod", "a_name_that_is_long_enough_to_wrap"))
     ]
-    written = {
-        "comparison": report.write(comparison, folder / "press", "fem-reference compare press"),
-        "reference": report.write(alone, folder / "press-reference", "fem-reference run press"),
-        "field": report.write(
-            replace(examples[0], changes=examples[0].changes | {"listing": ()}),
-            folder / "rod-page",
-            "fem-reference run rod",
-        ),
-        "examples": report.write_examples(
-            "Octave examples", examples, folder, "octave-examples", "fem-reference page octave-examples"
-        ),
-        "verify": report.write_verification(
-            test_verify_page.verification(*entries), folder, "verify", "fem-reference verify"
-        ),
-        "study": report.write_study(
-            Study(cases, {"lost": "why"}, {"machine": "this one"}),
-            folder,
-            "study",
-            "fem-reference study hip knee jaw",
-        ),
-        "ranking": report.write_ranking(
-            test_table_5_1.table(*results), folder, "table-5-1", "fem-reference page table-5-1"
-        ),
-        "claims": report.write_claims(
-            test_claims.whole("one", "other"), folder, "error-bars", "fem-reference page error-bars"
-        ),
-        "effects": report.write_effects(test_effects_verb.found(), folder, "effects", "fem-reference effects hip"),
-        "stress": report.write_stress(stress(comparison), folder, "stress", "fem-reference stress"),
+    comparisons = {"press": comparison, "press-reference": alone, "rod-page": examples[0]}
+    verified, known = made_entries.verification(*entries), test_claims.whole("one", "other")
+    pages = {
+        "octave-examples": ("page", field_page.page("Octave examples", examples)),
+        "verify": ("verify", verify_page.page(verified)),
+        "study": ("study", study_page.page(Study(cases, {"lost": "why"}, {"machine": "this one"}))),
+        "table-5-1": ("page", ranking_page.page(test_table_5_1.table(*results))),
+        "error-bars": ("page", claims_page.page(known)),
+        "effects": ("effects", effects_page.page(test_effects_verb.found())),
+        "stress": ("stress", stress_page.page(stress(comparison))),
     }
-    pair = test_versions.pair(comparison)
-    written["versions"] = report.write_versions(
-        pair, comparison.setup, folder / "quick-against_old", "against", "fem-reference compare"
-    )
+    paths = [
+        report.write(report.of_comparison(one), folder / name, report.NAME, f"fem-reference compare {name}")
+        for name, one in comparisons.items()
+    ]
+    paths += [report.write(page, folder, name, f"fem-reference {verb}") for name, (verb, page) in pages.items()]
+    against = against_page.page(test_versions.pair(comparison), comparison.setup)
+    paths.append(report.write(against, folder / "quick-against_old", "against", "fem-reference compare"))
     index_page.write(folder)
-    return written | {"index": folder / "index.html"}
+    return dict(zip(KINDS, [*paths, folder / "index.html"], strict=True))
 
 
 def stress(comparison: Comparison) -> Stress:

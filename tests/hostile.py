@@ -355,7 +355,7 @@ def _make_run(folder: Path) -> None:
     }
     writer = Writer(folder / "run", identity, AtRest(BALL, FIBRE, shapes.box((1, 1, 1), (5, 5, 5))))
     for number in NUMBERS:
-        tets = writer.mesh.points + number  # type: ignore[union-attr]
+        tets = writer.rest.mesh.points + number  # type: ignore[union-attr]
         state = NodalState(np.zeros((6, 10, 3)) + number, np.zeros((6, 4)), np.zeros((0, 0, 3)))
         writer.add(Frame(number, moved(number), FIBRE.points, tets, {"energy": 1.0 * number}, state=state))
     writer.close(Outcome("converged", "done", {"newton_iterations": 7.0}))
@@ -369,7 +369,7 @@ def read_run(folder: Path) -> None:
     found._repr_html_()
     recorded.solve(SETUP, recorded.RecordedSettings(folder=str(folder / "run"), unit="mm"), lambda _frame: None)
     mesh, fibre = states.read_rest(folder / "run")
-    known = results.Results(mesh, (), states.Stored(folder / "run", found.numbers), fibre)
+    known = results.Results(mesh, (), states.StoredStates(folder / "run", found.numbers), fibre)
     for number in found.numbers:
         known.evaluate([[1.0, 1.0, 1.0]], number)
 

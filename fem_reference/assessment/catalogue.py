@@ -156,3 +156,39 @@ def order(ladder: tuple[tuple[float, float], ...], truth: float) -> float | None
     if min(errors) == 0:
         return None
     return math.log(errors[0] / errors[1]) / math.log(coarse / fine)
+
+
+@dataclass(frozen=True, eq=False)
+class Verification:
+    """The ``results`` of entries in the order of the catalogue, the wall time in ``seconds``, and the ``versions`` of the packages
+    that they were made with.
+    """
+
+    results: tuple[Result, ...]
+    seconds: float
+    versions: dict[str, str]
+
+    @property
+    def failed(self) -> tuple[Result, ...]:
+        """The results that do not pass."""
+        return tuple(one for one in self.results if one.word != "pass")
+
+    @property
+    def word(self) -> str:
+        """Pass or fail."""
+        return "fail" if self.failed else "pass"
+
+    @property
+    def summary(self) -> str:
+        """The verdict in one line."""
+        passed, controls = len(self.results) - len(self.failed), sum(one.with_negative_control for one in self.results)
+        note = f", {controls} measured with their negative control" if controls else ""
+        return f"verdict: {self.word}, {passed} of {len(self.results)} pass{note}, {self.seconds:.0f} s"
+
+    @property
+    def groups(self) -> dict[str, list[Result]]:
+        """The results by group, in the order of the catalogue."""
+        found: dict[str, list[Result]] = {}
+        for one in self.results:
+            found.setdefault(one.entry.group, []).append(one)
+        return found

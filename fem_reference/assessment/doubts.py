@@ -23,7 +23,7 @@ def doubts(reference: Run) -> list[str]:
     outside = np.nan_to_num(reference.scalars.get("outside_law", np.zeros(0))) > 0
     if outside.any():
         where = f"in {int(outside.sum())} of {len(outside)} frames, first in {reference.numbers[int(outside.argmax())]}"
-        said.append(f"cells are outside the range that a law is meant for {where}: see Where it comes from")
+        said.append(f"cells are outside the range that a law is meant for {where}: see Provenance")
     gaps = np.nan_to_num(reference.scalars.get("energy_gap", np.zeros(0)))
     if (np.abs(gaps) > ENERGY_GAP).any():
         most = int(np.argmax(np.abs(gaps)))

@@ -3,7 +3,6 @@
 import argparse
 from pathlib import Path
 
-from fem_reference import report
 from fem_reference.assessment import baseline, versions
 from fem_reference.assessment.measured import CurrentMeasures
 from fem_reference.assessment.versions import Versions
@@ -67,4 +66,4 @@ def _written(found: Versions, bench: Bench[MuscleCase], options: argparse.Namesp
     who = candidates(bench.scene, [entry]) or (Part(("--candidate", entry.name), entry.name),)
     asked = Asked("compare", bench.scene.name, (case_part(bench.scene), *changes(options), *who, part), PAGE)
     setup = bench.setup()
-    return written(options, asked, lambda *where: report.write_versions(found, setup, *where))[1]
+    return written(options, asked, against_page.page(found, setup))[1]

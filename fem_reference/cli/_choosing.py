@@ -1,6 +1,7 @@
 """Choices of the command line: a scene, candidates of it, and the bench that they are solved on."""
 
 import argparse
+from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -26,52 +27,45 @@ def scene_of(options: argparse.Namespace) -> Case:
 
 def with_limits(scene: Case, limits: list[str]) -> Case:
     """The scene, expecting of every candidate too that statistics deviate no more than ``limits``, METRIC.STATISTIC=VALUE each."""
-    asked = []
-    for text in limits:
-        name, equals, value = text.partition("=")
-        metric, dot, statistic = name.strip().partition(".")
-        if not equals or not dot or not value.strip():
-            raise InputError("--limit", f'"{text}"', "METRIC.STATISTIC=VALUE, such as surface_deviation.max='5 mm'")
-        within = value.strip()
-        unit = within.lstrip("+-.0123456789eE ")
-        limit = _limit(name.strip(), within, bool(unit), scene)
-        table = {"of": "candidates", "metric": metric, "statistic": statistic, "truth": f"0 {unit}" if unit else 0.0}
-        table |= {"within": limit, "kind": "property", "because": "asked for by --limit"}
-        asked.append(parse(Expectation, table, "--limit"))
+    units = metrics.units(against=scene.standards("candidates"))
+    asked = (_expectation(text, units) for text in limits)
     return scene.model_copy(update={"expect": (*scene.expect, *asked)})
 
 
-def _limit(name: str, within: str, has_unit: bool, scene: Case) -> str | float:
-    """What a statistic is to be ``within``, a number where it has no unit; InputError unless cases like ``scene`` have one of this
-    ``name`` and it can be that.
-    """
-    known = metrics.units(against=scene.standards("candidates"))
-    if name not in known:
-        near = get_close_matches(name, known, n=5) or sorted(known)
+def _expectation(text: str, units: Mapping[str, str]) -> Expectation:
+    """The expectation by METRIC.STATISTIC=VALUE of every candidate; ``units`` of the statistics that there are."""
+    name, _, within = (part.strip() for part in text.partition("="))
+    metric, dot, statistic = name.partition(".")
+    if not dot or not within:
+        raise InputError("--limit", f'"{text}"', "METRIC.STATISTIC=VALUE, such as surface_deviation.max='5 mm'")
+    if name not in units:
+        near = get_close_matches(name, units, n=5) or sorted(units)
         raise InputError("--limit", f'"{name}"', f"a statistic such as {', '.join(near)}")
+    unit = within.lstrip("+-.0123456789eE ")
     try:
-        limit = within if has_unit else float(within)
-        judge.in_unit(limit, known[name])
+        limit = within if unit else float(within)
+        judge.in_unit(limit, units[name])
     except ValueError as error:
-        raise InputError("--limit", f'"{name}={within}"', f"a value in {known[name]}: {error}") from error
-    return limit
+        raise InputError("--limit", f'"{name}={within}"', f"a value in {units[name]}: {error}") from error
+    table = {"of": "candidates", "metric": metric, "statistic": statistic, "truth": f"0 {unit}" if unit else 0.0}
+    table |= {"within": limit, "kind": "property", "because": "asked for by --limit"}
+    return parse(Expectation, table, "--limit")
 
 
-def own_candidates(scene: Case) -> list[tuple[Candidate, str]]:
-    """The candidates of the scene, each with its place."""
-    return [(candidate, f"candidate[{i}]") for i, candidate in enumerate(scene.candidate)]
+def own_candidates(case: Case) -> list[tuple[Candidate, str]]:
+    """The candidates of the case, each with its place."""
+    return [(candidate, f"candidate[{i}]") for i, candidate in enumerate(case.candidate)]
 
 
-def choose(scene: Case, text: str, unit: str | None) -> tuple[Candidate, str]:
-    """The candidate of the scene with this name, else the recorded frames in this folder, else the solver of this name with the
+def choose(case: Case, text: str, unit: str | None) -> tuple[Candidate, str]:
+    """The candidate of the case with this name, else the recorded frames in this folder, else the solver of this name with the
     settings of the page table-5-1; and the place that chooses it.
     """
-    names = [candidate.name for candidate in scene.candidate]
+    names = [candidate.name for candidate in case.candidate]
     if text in names:
         if Path(text).is_dir():
-            raise InputError(
-                "--candidate", f'"{text}", a candidate of the case and a folder', f"another name, or ./{text}"
-            )
+            got = f'"{text}", a candidate of the case and a folder'
+            raise InputError("--candidate", got, f"another name, or ./{text}")
         return scene.candidate[names.index(text)], f"candidate[{names.index(text)}]"
     if text in solvers.names(scene.task) and not Path(text).exists():
         found = solver_table.choice(scene, text)[1]
@@ -90,10 +84,10 @@ def check_names(names: list[str]) -> None:
             raise InputError("--candidate", f'"{name}" twice', "folders and candidates of different names")
 
 
-def refuse_error_bar(scene: Case, options: argparse.Namespace) -> None:
+def refuse_error_bar(case: Case, options: argparse.Namespace) -> None:
     """InputError where error bars are wanted of what has none."""
     if options.error_bar:
-        casefile.muscle(scene, "--error-bar")
+        casefile.muscle(case, "--error-bar")
 
 
 def checked_bench[C: Case](scene: C, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> Bench[C]:

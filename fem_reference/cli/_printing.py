@@ -25,7 +25,7 @@ def lines(facts: dict[str, Any], indent: str = "") -> list[str]:
 
 
 def out(options: argparse.Namespace) -> Path:
-    """Where pages and stored runs go."""
+    """The folder of pages and stored runs."""
     return options.out if options.out is not None else Path("reports")
 
 

@@ -1,9 +1,7 @@
 """The verb ``effects``: what each effect of a case changes, and what it costs."""
 
 import argparse
-from functools import partial
 
-from fem_reference import report
 from fem_reference.assessment.omissions import facts
 from fem_reference.cli._pages import case_part, changes, written
 from fem_reference.cli._parser import share
@@ -29,6 +27,6 @@ def run(options: argparse.Namespace) -> int:
     scene = scene.model_copy(update={"choice": "listed"})  # what it would leave out is measured too
     found = omissions.study(scene, out(options) / "runs", Workers(options.workers))
     asked = Asked("effects", scene.name, (case_part(scene), *changes(options)), PAGE)
-    _, lines = written(options, asked, partial(report.write_effects, found))
+    _, lines = written(options, asked, effects_page.page(found))
     write_output(facts(found), "\n".join([effects_page.text(found), *lines]), options)
     return DONE if found.ablations[0].whole.status == "converged" else SOLVER_FAILED

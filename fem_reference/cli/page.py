@@ -1,7 +1,6 @@
 """The verb ``page``: a page over several cases."""
 
 import argparse
-from functools import partial
 from pathlib import Path
 
 from fem_reference import report
@@ -12,10 +11,9 @@ from fem_reference.cli._pages import case_part, written
 from fem_reference.cli._parser import share
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, out, write_output
 from fem_reference.foundations.errors import InputError
+from fem_reference.report import claims_page, field_page, ranking_page
 from fem_reference.report.asked import Asked, Part
-from fem_reference.report.claims_page import facts as claims_facts
-from fem_reference.report.overview import comparison_text, ranking_text
-from fem_reference.report.ranking_page import facts as ranking_facts
+from fem_reference.report.overview import comparison_text
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import Candidate, Case
 from fem_reference.scenes.muscle import MuscleCase
@@ -64,8 +62,9 @@ def _examples(options: argparse.Namespace) -> int:
     benches = [checked_bench(case, options, own_candidates(case)) for case in cases]
     with fenicsx.shared():
         results = tuple(_compared(bench) for bench in benches)
-        write = partial(report.write_examples, title, results)
-        path, lines = written(options, Asked("page", options.name, (Part((options.name,)),)), write)
+        path, lines = written(
+            options, Asked("page", options.name, (Part((options.name,)),)), field_page.page(title, results)
+        )
     facts = {"page": str(path), "cases": [report.summary(result) for result in results]}
     texts = [f"{result.scene.title}:\n{comparison_text(result)}" for result in results]
     write_output(facts, "\n\n".join([*texts, "\n".join(lines)]), options)
@@ -89,8 +88,8 @@ def _table(options: argparse.Namespace) -> int:
     for name in scenes if options.case else foreign:
         Bench(scenes[name], out(options)).setup()  # only what nobody asked for by name may be missing
     table = table_5_1.stand(scenes.values(), out(options) / "runs", foreign)
-    _, lines = written(options, _asked(TABLE, scenes, foreign, options), partial(report.write_ranking, table))
-    write_output(ranking_facts(table), "\n".join([ranking_text(table), *lines]), options)
+    _, lines = written(options, _asked(TABLE, scenes, foreign, options), ranking_page.page(table))
+    write_output(ranking_page.facts(table), "\n".join([ranking_page.text(table), *lines]), options)
     return DONE if all(one.reference.status == "converged" for one in table.scenarios) else SOLVER_FAILED
 
 
@@ -101,13 +100,13 @@ def _claims(options: argparse.Namespace) -> int:
     _, lines = written(
         options,
         _asked(CLAIMS, {scene.name: scene for scene in scenes}, {}, options),
-        partial(report.write_claims, found),
+        claims_page.page(found),
     )
     whole = Cover.of(found.claims)
     covered = f"{100 * whole.share:.1f} % cover the difference from a finer solution, median ratio {whole.median:.2f}"
     printed = [f"{whole.count} error bars: {covered}"]
     printed += [f"left out: {case}: {why}" for case, why in found.missing.items()]
-    write_output(claims_facts(found), "\n".join([*printed, *lines]), options)
+    write_output(claims_page.facts(found), "\n".join([*printed, *lines]), options)
     return SOLVER_FAILED if found.missing else DONE
 
 
@@ -126,7 +125,7 @@ def _asked(
 
 
 def _foreign(options: argparse.Namespace, cases: list[str]) -> dict[str, list[Candidate]]:
-    """By the name of a case, what somebody else's solvers made of it."""
+    """Frames that somebody else's solvers made, by the name of the case."""
     found = dict[str, list[Candidate]]()
     for text in options.candidate:
         case, equals, folder = text.partition("=")

@@ -1,9 +1,7 @@
 """The verb ``stress``: every solver on hard cases, and whether it stays stable."""
 
 import argparse
-from functools import partial
 
-from fem_reference import report
 from fem_reference.assessment.stress import facts
 from fem_reference.cli._pages import written
 from fem_reference.cli._parser import share
@@ -40,7 +38,7 @@ def run(options: argparse.Namespace) -> int:
     parts += [Part(("--solver", name), name) for name in options.solver]
     parts += [Part(("--steps",), "steps")] if options.steps else []
     parts += [Part(("--jitters", str(options.jitters)), "jitters")] if options.jitters else []
-    _, lines = written(options, Asked("stress", PAGE, tuple(parts)), partial(report.write_stress, found))
+    _, lines = written(options, Asked("stress", PAGE, tuple(parts)), stress_page.page(found))
     write_output(facts(found), "\n".join([stress_page.text(found), *lines]), options)
     return DONE
 

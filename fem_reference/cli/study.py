@@ -1,9 +1,8 @@
 """The verb ``study``: what accuracy costs in time on cases."""
 
 import argparse
-from functools import partial
 
-from fem_reference import report, solvers
+from fem_reference import solvers
 from fem_reference.assessment.cost_study import Study, facts
 from fem_reference.cli._pages import case_part, changes, written
 from fem_reference.cli._parser import CASE, share
@@ -53,8 +52,8 @@ def _written(found: Study, scenes: list[MuscleCase], options: argparse.Namespace
     for case in found.cases:
         asked = Asked("study", case.case, (parts[case.case], *more), PAGE)
         own = argparse.Namespace(**vars(options) | ({"page_name": None} if several else {}))
-        lines = written(own, asked, partial(report.write_study, cost.alone(found, case)))[1]
+        lines = written(own, asked, study_page.page(cost.alone(found, case)))[1]
     if several:
         named = [Part(part.words, name) for name, part in parts.items()]
-        lines = written(options, Asked("study", PAGE, (*named, *more)), partial(report.write_study, found))[1]
+        lines = written(options, Asked("study", PAGE, (*named, *more)), study_page.page(found))[1]
     return lines

@@ -2,15 +2,14 @@
 
 import argparse
 import time
-from functools import partial
 
-from fem_reference import report
+from fem_reference.assessment.catalogue import Verification
 from fem_reference.cli._pages import written
 from fem_reference.cli._parser import share
 from fem_reference.cli._printing import DONE, SOLVER_FAILED, VERDICT_FAIL, write_output
 from fem_reference.foundations.version import __version__
+from fem_reference.report import verify_page
 from fem_reference.report.asked import Asked, Part
-from fem_reference.report.verify_page import Verification, facts, text
 from fem_reference.runs.key import versions
 from fem_reference.verification import runner
 
@@ -30,11 +29,11 @@ def run(options: argparse.Namespace) -> int:
     """Measure problems whose answers are known."""
     measured = _verify(options.names, options.negative_control)
     # Measurements are printed even if the page fails.
-    write_output(facts(measured), text(measured), options)
+    write_output(verify_page.facts(measured), verify_page.text(measured), options)
     parts = [Part((name,), name) for name in options.names]
     parts += [Part(("--negative-control", name), f"negative_control={name}") for name in options.negative_control]
     print(
-        *written(options, Asked("verify", "verify", tuple(parts)), partial(report.write_verification, measured))[1],
+        *written(options, Asked("verify", "verify", tuple(parts)), verify_page.page(measured))[1],
         sep="\n",
     )
     return {"failed": SOLVER_FAILED, "fail": VERDICT_FAIL}.get(measured.word, DONE)

@@ -22,14 +22,24 @@ from fem_reference.effects.neo_hooke import NeoHooke
 from fem_reference.export.febio_contact import add_contact, has_contact
 from fem_reference.export.febio_differences import notes
 from fem_reference.export.febio_material import add_fibres, add_materials
-from fem_reference.export.febio_mesh import Mesh, bone_id, by_springs, exactly, leaf, quadratic, springs_id, vector
+from fem_reference.export.febio_mesh import (
+    Mesh,
+    bone_id,
+    by_springs,
+    exactly,
+    leaf,
+    leaves,
+    quadratic,
+    springs_id,
+    vector,
+)
 from fem_reference.export.open_formats import effect_name
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.motion import Rotation
 from fem_reference.foundations.records import join
 from fem_reference.io import files
-from fem_reference.problems.muscle import Problem
-from fem_reference.problems.setup import RigidBody
+from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.setup import Bone
 from fem_reference.scenes.muscle import MuscleCase
 
 # What FEBio has in the same form.
@@ -40,13 +50,13 @@ LONGEST_STEP = 2.0  # [frame numbers], that of the runs whose results FEBIO.md c
 TOLERANCES = {"dtol": 1e-4, "etol": 1e-5}
 
 
-def check(scene: MuscleCase) -> None:
-    """InputError where a scene has an effect that FEBio has not, or not in the same form."""
-    for i, effect in enumerate(scene.effects):
+def check(case: MuscleCase) -> None:
+    """InputError where a case has an effect that FEBio has not, or not in the same form."""
+    for i, effect in enumerate(case.effects):
         if not isinstance(effect, SAME):
             same = ", ".join(kind.__module__.rpartition(".")[2] for kind in SAME)
             raise InputError(
-                join(scene.place, f"effect[{i}]"),
+                join(case.place, f"effect[{i}]"),
                 f'"{effect_name(effect)}"',
                 f"what FEBio has in the same form: {same}",
             )
@@ -54,11 +64,11 @@ def check(scene: MuscleCase) -> None:
         ((NeoHooke, MooneyRivlin), "no matrix: neither neo_hooke nor mooney_rivlin"),
         ((Incompressible, IncompressiblePenalty), "neither incompressible nor incompressible_penalty"),
     ):
-        if not any(isinstance(effect, kinds) for effect in scene.effects):
-            raise InputError(join(scene.place, "effect"), got, "one of them, which FEBio's uncoupled materials need")
+        if not any(isinstance(effect, kinds) for effect in case.effects):
+            raise InputError(join(case.place, "effect"), got, "one of them, which FEBio's uncoupled materials need")
 
 
-def write(problem: Problem, folder: Path) -> None:
+def write(problem: MuscleProblem, folder: Path) -> None:
     """``scene.feb`` and, for whoever reads FEBio's nodes, ``tet10.csv`` into ``folder``."""
     _, tets = quadratic(problem.mesh)
     rows = "".join(",".join(map(str, row)) + "\n" for row in tets.tolist())
@@ -69,7 +79,7 @@ def write(problem: Problem, folder: Path) -> None:
     files.write_text(folder / "scene.feb", f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n')
 
 
-def model(problem: Problem) -> Element:
+def model(problem: MuscleProblem) -> Element:
     """The whole input file."""
     root = Element("febio_spec", version="4.0")
     for text in (f"mm, N, MPa; time is the frame number minus {problem.frames[0]}", *notes(problem)):
@@ -87,36 +97,32 @@ def model(problem: Problem) -> Element:
     return root
 
 
-def _control(root: Element, problem: Problem) -> None:
+def _control(root: Element, problem: MuscleProblem) -> None:
     """Steps from frame to frame, at most ``LONGEST_STEP`` long, shorter where FEBio needs it."""
     control, step = SubElement(root, "Control"), _step(problem)
     steps = round((problem.frames[-1] - problem.frames[0]) / step)
     settings = {"analysis": "STATIC", "time_steps": steps, "step_size": step}
     settings |= {"plot_level": "PLOT_MUST_POINTS", "output_level": "OUTPUT_MUST_POINTS"}
-    for tag, value in settings.items():
-        leaf(control, tag, value)
+    leaves(control, settings)
     stepper = SubElement(control, "time_stepper", type="default")
     retries = {"max_retries": 20, "aggressiveness": 1, "cutback": 0.5}  # half the step at each
-    for tag, value in (retries | {"opt_iter": 15, "dtmin": step / 200}).items():
-        leaf(stepper, tag, value)
+    leaves(stepper, retries | {"opt_iter": 15, "dtmin": step / 200})
     leaf(stepper, "dtmax", step, lc="1")
     solver = SubElement(control, "solver", type="solid")
     if has_contact(problem):
         leaf(solver, "symmetric_stiffness", "non-symmetric")
-    leaf(solver, "max_refs", 30)
-    for tag, value in TOLERANCES.items():
-        leaf(solver, tag, value)
+    leaves(solver, {"max_refs": 30, **TOLERANCES})
     leaf(SubElement(solver, "qn_method", type="BFGS"), "max_ups", 0)
 
 
-def _step(problem: Problem) -> float:
+def _step(problem: MuscleProblem) -> float:
     """The initial and longest step [frame numbers]: as many of one length as reach from a frame wanted to the next."""
     apart = problem.frames[1] - problem.frames[0]
     return apart / ceil(apart / LONGEST_STEP)
 
 
-def _domains(root: Element, problem: Problem) -> None:
-    """How FEBio computes the muscle's elements; bones, and what springs hang from, are rigid."""
+def _domains(root: Element, problem: MuscleProblem) -> None:
+    """The formulation of the muscle's elements; bones, and the areas that springs hang from, are rigid."""
     domains = SubElement(root, "MeshDomains")
     mixed = any(isinstance(effect, Incompressible) for effect in problem.effects)
     kind = "three-field-solid" if mixed else "elastic-solid"
@@ -128,7 +134,7 @@ def _domains(root: Element, problem: Problem) -> None:
         leaf(shell, "shell_thickness", "0.01")
 
 
-def _motions(root: Element, problem: Problem) -> None:
+def _motions(root: Element, problem: MuscleProblem) -> None:
     if exactly(problem):
         boundaries = SubElement(root, "Boundary")
         for attached in exactly(problem):
@@ -142,18 +148,15 @@ def _motions(root: Element, problem: Problem) -> None:
         fixed = (*places, *angles) if bone.motion is None else places if turns else angles
         moved = angles if turns else ("x", "y", "z")
         entry = SubElement(rigid, "rigid_bc", name=f"{bone_id(bone)}_fixed", type="rigid_fixed")
-        leaf(entry, "rb", bone_id(bone))
-        for freedom in fixed:
-            leaf(entry, f"{freedom}_dof", 1)
+        leaves(entry, {"rb": bone_id(bone)} | {f"{freedom}_dof": 1 for freedom in fixed})
         for freedom, share in zip(moved, axis(bone), strict=False):
             kind = "rigid_rotation" if turns else "rigid_displacement"
             entry = SubElement(rigid, "rigid_bc", name=f"{bone_id(bone)}_{freedom}", type=kind)
-            leaf(entry, "rb", bone_id(bone))
-            leaf(entry, "dof", freedom)
+            leaves(entry, {"rb": bone_id(bone), "dof": freedom})
             leaf(entry, "value", repr(share), lc=str(curves[bone.name]))
 
 
-def axis(bone: RigidBody) -> list[float]:
+def axis(bone: Bone) -> list[float]:
     """The unit vector that a bone turns about or slides along; none where it rests."""
     if bone.motion is None:
         return []
@@ -161,13 +164,13 @@ def axis(bone: RigidBody) -> list[float]:
     return [float(share) for share in along / np.linalg.norm(along)]
 
 
-def _curve_numbers(problem: Problem) -> dict[str, int]:
+def _curve_numbers(problem: MuscleProblem) -> dict[str, int]:
     """The load curve of each bone that moves: from 2, without gaps, for FEBio takes an id for a place in their list."""
     moving = [bone.name for bone in problem.bones if bone.motion is not None]
     return {name: number for number, name in enumerate(moving, start=2)}
 
 
-def _curves(root: Element, problem: Problem) -> None:
+def _curves(root: Element, problem: MuscleProblem) -> None:
     """The times that FEBio must pass, curve 1; then for each bone that moves, how far [rad, mm]."""
     data, (first, *_, last) = SubElement(root, "LoadData"), problem.frames
     _curve(data, 1, "STEP", [(frame - first, _step(problem)) for frame in problem.frames])
@@ -184,11 +187,10 @@ def _curves(root: Element, problem: Problem) -> None:
 
 def _curve(data: Element, number: int, kind: str, points: list[tuple[float, float]]) -> None:
     curve = SubElement(data, "load_controller", id=str(number), type="loadcurve")
-    leaf(curve, "interpolate", kind)
-    leaf(curve, "extend", "CONSTANT")
-    rows = SubElement(curve, "points")
+    leaves(curve, {"interpolate": kind, "extend": "CONSTANT"})
+    listed = SubElement(curve, "points")
     for time, value in points:
-        leaf(rows, "pt", vector((time, value)))
+        leaf(listed, "pt", vector((time, value)))
 
 
 def _output(root: Element) -> None:

@@ -1,7 +1,6 @@
 """The nodes, elements, node sets and surfaces of FEBio's input file."""
 
-import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
@@ -9,8 +8,8 @@ import numpy as np
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, boundary, enclosed_volume
 from fem_reference.geometry.distance import distances
-from fem_reference.problems.muscle import Problem
-from fem_reference.problems.setup import AttachedVertices, RigidBody
+from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.setup import AttachedVertices, Bone
 
 # Corners between which the last six nodes of a tet10 are; the first three pairs are those of a tri6 too.
 EDGES = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
@@ -22,27 +21,39 @@ def leaf(parent: Element, tag: str, text: object, **attributes: str) -> None:
     SubElement(parent, tag, attributes).text = str(text)
 
 
+def leaves(parent: Element, values: Mapping[str, object]) -> None:
+    """Elements with the ``values`` as their texts, by tag."""
+    for tag, value in values.items():
+        leaf(parent, tag, value)
+
+
+def rows(parent: Element, tag: str, values: Iterable[Sequence[float]], first: int = 1) -> None:
+    """Elements of one ``tag``, numbered from ``first``, with numbers in full."""
+    for number, row in enumerate(values, start=first):
+        leaf(parent, tag, ",".join(map(repr, row)), id=str(number))
+
+
 def vector(values: Iterable[float]) -> str:
     """Numbers in full, as FEBio reads them."""
     return ",".join(repr(float(value)) for value in values)
 
 
-def bone_id(bone: RigidBody) -> str:
-    """What a bone is called in the file: its material, its elements."""
+def bone_id(bone: Bone) -> str:
+    """The name of a bone in the file: of its material, of its elements."""
     return f"bone_{bone.name}"
 
 
 def springs_id(attached: AttachedVertices) -> str:
-    """What the springs of an attachment are called in the file: their shells on the bone, their surfaces."""
+    """The name of the springs of an attachment in the file: of their shells on the bone, of their surfaces."""
     return f"springs_{attached.attachment}"
 
 
-def by_springs(problem: Problem) -> list[AttachedVertices]:
+def by_springs(problem: MuscleProblem) -> list[AttachedVertices]:
     """The attachments by springs."""
     return [attached for attached in problem.attached if attached.stiffness is not None]
 
 
-def exactly(problem: Problem) -> list[AttachedVertices]:
+def exactly(problem: MuscleProblem) -> list[AttachedVertices]:
     """The attachments whose nodes move with their bone."""
     return [attached for attached in problem.attached if attached.stiffness is None]
 
@@ -55,7 +66,7 @@ def quadratic(mesh: TetMesh) -> tuple[Floats, Ints]:
     return np.vstack([mesh.points, mesh.points[edges].mean(axis=1)]), np.hstack([mesh.tets, middles])
 
 
-def obstacles(problem: Problem) -> list[RigidBody]:
+def obstacles(problem: MuscleProblem) -> list[Bone]:
     """The bones in contact with the muscle."""
     contact = problem.contact
     return [bone for bone in problem.bones if contact is not None and contact.is_by(bone.name)]
@@ -67,7 +78,7 @@ def outward(surface: Surface) -> Surface:
     return Surface(surface.points, surface.triangles[:, ::-1]) if turned else surface
 
 
-def free_facets(problem: Problem) -> Ints:
+def free_facets(problem: MuscleProblem) -> Ints:
     """The facets (m, 3) of the tets that are in contact: those not attached in whose middle contact is felt; InputError where there
     are none.
     """
@@ -87,7 +98,7 @@ def free_facets(problem: Problem) -> Ints:
 class Mesh:
     """Nodes, elements, node sets and surfaces; node numbers of FEBio begin at 1, with those of the muscle."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: MuscleProblem) -> None:
         self.problem = problem
         self.points, self.tets = quadratic(problem.mesh)
         ends = np.sort(problem.mesh.tets[:, EDGES].reshape(-1, 2), axis=1)
@@ -114,18 +125,15 @@ class Mesh:
 
     @staticmethod
     def _nodes(mesh: Element, name: str, points: Floats, before: int) -> None:
-        group = SubElement(mesh, "Nodes", name=name)
-        for i, point in enumerate(points.tolist(), start=before + 1):
-            leaf(group, "node", vector(point), id=str(i))
+        rows(SubElement(mesh, "Nodes", name=name), "node", points.tolist(), before + 1)
 
     @staticmethod
     def _elements(mesh: Element, kinds: dict[str, str], cells: dict[str, Ints]) -> None:
         """The elements of each group, numbered through from 1."""
-        numbers = itertools.count(1)
+        first = 1
         for name, kind in kinds.items():
-            group = SubElement(mesh, "Elements", name=name, type=kind)
-            for cell in (cells[name] + 1).tolist():
-                leaf(group, "elem", ",".join(map(str, cell)), id=str(next(numbers)))
+            rows(SubElement(mesh, "Elements", name=name, type=kind), "elem", (cells[name] + 1).tolist(), first)
+            first += len(cells[name])
 
     def _curved(self, facets: Ints) -> Ints:
         """Straight triangles (m, 3) of the tets with the middles of their edges, (m, 6)."""
@@ -170,12 +178,8 @@ class Mesh:
 
     @staticmethod
     def _surface(mesh: Element, name: str, kind: str, facets: Ints) -> None:
-        group = SubElement(mesh, "Surface", name=name)
-        for i, facet in enumerate((facets + 1).tolist(), start=1):
-            leaf(group, kind, ",".join(map(str, facet)), id=str(i))
+        rows(SubElement(mesh, "Surface", name=name), kind, (facets + 1).tolist())
 
     @staticmethod
     def _pair(mesh: Element, name: str, primary: str, secondary: str) -> None:
-        pair = SubElement(mesh, "SurfacePair", name=name)
-        leaf(pair, "primary", primary)
-        leaf(pair, "secondary", secondary)
+        leaves(SubElement(mesh, "SurfacePair", name=name), {"primary": primary, "secondary": secondary})

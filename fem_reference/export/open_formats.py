@@ -8,14 +8,13 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from fem_reference.effects import Effect
-from fem_reference.foundations.mesh import Floats, Polylines
+from fem_reference.foundations.mesh import Polylines
 from fem_reference.foundations.version import __version__
 from fem_reference.geometry.embedding import embed
 from fem_reference.io import files
-from fem_reference.problems.muscle import Problem
+from fem_reference.io.soup import rows
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.scenes.muscle import MuscleCase
 
 UNITS = {"length": "mm", "force": "N", "pressure": "MPa", "time": "s", "mass": "tonne", "angle": "rad"}
@@ -26,7 +25,7 @@ CONVENTIONS = {
 }
 
 
-def write(scene: MuscleCase, problem: Problem, folder: Path) -> None:
+def write(case: MuscleCase, problem: Problem, folder: Path) -> None:
     """Every file of the export of a ``problem`` but those that explain it, into ``folder``."""
     (folder / "bones").mkdir()
     files.write_surface(folder / "muscle.ply", problem.surface, problem.surface.points)
@@ -37,15 +36,15 @@ def write(scene: MuscleCase, problem: Problem, folder: Path) -> None:
         files.write_field(folder / name, problem.mesh.points, problem.mesh.tets, {}, along)
     write_lines(folder / "fibres.vtk", problem.fibres)
     _write_tables(problem, folder)
-    files.write_text(folder / "scene.json", json.dumps(facts(scene, problem), indent=1, allow_nan=False))
+    files.write_text(folder / "scene.json", json.dumps(facts(case, problem), indent=1, allow_nan=False))
 
 
-def bone_files(problem: Problem) -> list[str]:
+def bone_files(problem: MuscleProblem) -> list[str]:
     """The file of each bone: numbered, as its name may be any text."""
     return [f"bones/{i}.ply" for i in range(len(problem.bones))]
 
 
-def _write_tables(problem: Problem, folder: Path) -> None:
+def _write_tables(problem: MuscleProblem, folder: Path) -> None:
     poses = [
         (bone.name, frame, *map(repr, bone.pose(frame).ravel().tolist()))
         for bone in problem.bones
@@ -62,29 +61,27 @@ def _write_tables(problem: Problem, folder: Path) -> None:
     ]
     _write_csv(folder / "attachment_facets.csv", ("attachment", "bone", "a", "b", "c"), facets)
     within = embed(problem.mesh, problem.surface.points)
-    rows = zip(within.tets.tolist(), within.barycentric.tolist(), strict=True)
-    inside = [(vertex, tet, *map(repr, shares)) for vertex, (tet, shares) in enumerate(rows)]
+    places = zip(within.tets.tolist(), within.barycentric.tolist(), strict=True)
+    inside = [(vertex, tet, *map(repr, shares)) for vertex, (tet, shares) in enumerate(places)]
     _write_csv(folder / "surface_in_tets.csv", ("vertex", "tet", "w0", "w1", "w2", "w3"), inside)
 
 
-def _write_csv(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+def _write_csv(path: Path, columns: Sequence[str], entries: Iterable[Sequence[Any]]) -> None:
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(rows)
+    csv.writer(text, lineterminator="\n").writerows([columns, *entries])
     files.write_text(path, text.getvalue())
 
 
-def facts(scene: MuscleCase, problem: Problem) -> dict[str, Any]:
-    """What no mesh file says: units, conventions, frames, bones, attachments, effects with the unit of every parameter."""
+def facts(case: MuscleCase, problem: Problem) -> dict[str, Any]:
+    """The facts that no mesh file has: units, conventions, frames, bones, attachments, effects with the unit of every parameter."""
     bones = [
         entry.model_dump(mode="json", exclude_none=True, exclude={"surface", "unit"})
         | {"file": name, "obstacle": obstacle}
-        for entry, name, obstacle in zip(scene.bone, bone_files(problem), _are_obstacles(problem), strict=True)
+        for entry, name, obstacle in zip(case.bone, bone_files(problem), _are_obstacles(problem), strict=True)
     ]
     return {
-        "case": scene.name,
-        "title": scene.title,
+        "case": case.name,
+        "title": case.title,
         "written_by": f"fem_reference {__version__}",
         "units": UNITS,
         "conventions": CONVENTIONS,
@@ -100,13 +97,13 @@ def facts(scene: MuscleCase, problem: Problem) -> dict[str, Any]:
     }
 
 
-def _are_obstacles(problem: Problem) -> list[bool]:
+def _are_obstacles(problem: MuscleProblem) -> list[bool]:
     contact = problem.contact
     return [contact is not None and contact.is_by(bone.name) for bone in problem.bones]
 
 
 def effect_name(effect: Effect) -> str:
-    """What scene files call an effect."""
+    """The name of an effect in case files."""
     return type(effect).__module__.rpartition(".")[2]
 
 
@@ -124,10 +121,5 @@ def write_lines(path: Path, lines: Polylines) -> None:
     head = (
         f"# vtk DataFile Version 3.0\nfibres at rest, mm\nASCII\nDATASET POLYDATA\nPOINTS {len(lines.points)} double\n"
     )
-    size = len(lines.points) + len(cells)
-    files.write_text(path, f"{head}{_rows(lines.points)}LINES {len(cells)} {size}\n" + "\n".join(cells) + "\n")
-
-
-def _rows(points: Floats) -> str:
-    """One point a line, in as many digits as bring the same float back."""
-    return "".join(f"{x!r} {y!r} {z!r}\n" for x, y, z in np.asarray(points).tolist())
+    size = f"LINES {len(cells)} {len(lines.points) + len(cells)}"
+    files.write_text(path, head + "\n".join([*rows(lines.points), size, *cells, ""]))

@@ -20,9 +20,9 @@ from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.embedding import embed
 from fem_reference.io import files
-from fem_reference.io.formats.vtk import Block, Tree
+from fem_reference.io.formats.vtk import DataBlock, Tree
 from fem_reference.metrics import MeasurementContext
-from fem_reference.problems.contact import Contact
+from fem_reference.problems.contact import ContactLaw
 from fem_reference.runs import results, states
 from fem_reference.runs.results import Results
 from fem_reference.runs.store import Run
@@ -40,7 +40,7 @@ _BARS = {"error_bar": "max", "error_bar_of_surface": "hausdorff"}
 
 def write(comparison: Comparison, folder: Path) -> list[str]:
     """Write the runs of a muscle into ``folder``, whole or not at all; the names of its files. InputError where it is not free."""
-    scene = casefile.muscle(comparison.scene)
+    case = casefile.muscle(comparison.scene)
     with new_folder(folder) as part:
         frames = _Frames(comparison)
         entries = []
@@ -48,11 +48,11 @@ def write(comparison: Comparison, folder: Path) -> list[str]:
             name = f"frames/frame_{number:04d}.vtm"
             (part / "frames").mkdir(exist_ok=True)
             files.write_blocks(part / name, frames.blocks(i))
-            entries.append((number if scene.frames.interval is None else number * scene.frames.interval, name))
-            log.info("%s: frame %d written", scene.name, number)
+            entries.append((number if case.frames.interval is None else number * case.frames.interval, name))
+            log.info("%s: frame %d written", case.name, number)
         files.write_pvd(part / INDEX, entries)
-        unit = "frame numbers" if scene.frames.interval is None else "seconds"
-        files.write_text(part / "README.md", texts.paraview_readme(scene, unit, states=frames.results is not None))
+        unit = "frame numbers" if case.frames.interval is None else "seconds"
+        files.write_text(part / "README.md", texts.paraview_readme(case, unit, states=frames.results is not None))
         return sorted(str(path.relative_to(part)) for path in part.rglob("*") if path.is_file())
 
 
@@ -62,7 +62,7 @@ class _Frames:
     def __init__(self, comparison: Comparison) -> None:
         assert isinstance(comparison.context, MeasurementContext)  # of a muscle
         self.comparison, self.setup, self.context = comparison, comparison.setup, comparison.context
-        self.scene, self.reference = casefile.muscle(comparison.scene), comparison.reference
+        self.case, self.reference = casefile.muscle(comparison.scene), comparison.reference
         self.results, self.within = _states(comparison), None
         if self.results is not None:
             found = embed(self.results.mesh, self.setup.surface.points)
@@ -72,14 +72,14 @@ class _Frames:
         self.fibres = {run.name: local_fields.fibre_points(run, self.context) for run in comparison.runs}
 
     def _of_surface(self, run: Run) -> Iterator[tuple[str, Floats]]:
-        """By name, arrays (f, n) at the vertices of a run."""
+        """Arrays (f, n) at the vertices of a run, by name."""
         if not run.has_surface:
             return
         gaps = local_fields.to_bones(run, self.context)
         if gaps is not None:
             yield "distance_to_bones", gaps
         if run is self.reference:
-            if gaps is not None and among(self.scene.effects) is not None:
+            if gaps is not None and among(self.case.effects) is not None:
                 yield "contact_pressure", self._contact_pressure()
             return
         yield "distance_to_reference", local_fields.to_same_vertex(run, self.reference)
@@ -92,9 +92,9 @@ class _Frames:
 
     def _contact_pressure(self) -> Floats:
         """The sum over the bones (f, n) [MPa] of the law of contact at the vertices; 0 where these are not free."""
-        effect = among(self.scene.effects)
+        effect = among(self.case.effects)
         assert effect is not None  # the caller asked
-        law, run = Contact("free", effect.stiffness, effect.smoothing), self.reference
+        law, run = ContactLaw("free", effect.stiffness, effect.smoothing), self.reference
         bones = [bone for bone in self.setup.bones if effect.is_by(bone.name)]
         pressures = np.zeros(run.positions.shape[:2])
         for i, (number, points) in enumerate(zip(run.numbers, run.positions, strict=True)):
@@ -110,7 +110,9 @@ class _Frames:
         number, rest = self.reference.numbers[i], self.setup.surface
         moved = {bone.name: apply(bone.pose(number), bone.surface.points) for bone in self.setup.bones}
         bones = {
-            bone.name: Block(bone.surface.points, bone.surface.triangles, _moved(bone.surface.points, moved[bone.name]))
+            bone.name: DataBlock(
+                bone.surface.points, bone.surface.triangles, _moved(bone.surface.points, moved[bone.name])
+            )
             for bone in self.setup.bones
         }
         attachments = {
@@ -124,7 +126,7 @@ class _Frames:
             "attachments": attachments,
         }
 
-    def _run(self, run: Run, i: int) -> dict[str, Block]:
+    def _run(self, run: Run, i: int) -> dict[str, DataBlock]:
         """The blocks of a ``run`` at a frame."""
         blocks = {}
         known = {name: float(values[i]) for name, values in run.scalars.items() if np.isfinite(values[i])}
@@ -133,17 +135,17 @@ class _Frames:
             rest = self.setup.surface
             arrays = _moved(rest.points, run.positions[i]) | {k: v[i] for k, v in self.arrays[run.name].items()}
             arrays |= self._at_surface(run, i)
-            blocks["muscle"] = Block(rest.points, rest.triangles, arrays, numbers=numbers)
+            blocks["muscle"] = DataBlock(rest.points, rest.triangles, arrays, numbers=numbers)
         lines, points = self.context.fibres, self.fibres[run.name][i]
         stretch = {"fibre_stretch": local_fields.stretch_along(lines, points[None])[0]}
         whole = {"stretch_of_fibre": lines.lengths(points) / lines.lengths()}
-        blocks["fibres"] = Block(lines.points, lines, _moved(lines.points, points) | stretch, whole)
+        blocks["fibres"] = DataBlock(lines.points, lines, _moved(lines.points, points) | stretch, whole)
         if run is self.reference and self.results is not None and run.numbers[i] in self.results.frames:
             blocks["interior"] = interior(self.results, run.numbers[i])
         return blocks
 
     def _at_surface(self, run: Run, i: int) -> dict[str, Any]:
-        """What follows from the state of the reference, at its vertices."""
+        """Arrays at the vertices of the reference that follow from its state, by name."""
         if run is not self.reference or self.results is None or self.within is None:
             return {}
         frame, tets = run.numbers[i], self.within[0]
@@ -153,14 +155,14 @@ class _Frames:
         return self.results.evaluate_in(tets, self.within[1], frame, names)
 
 
-def interior(made: Results, frame: float) -> Block:
+def interior(made: Results, frame: float) -> DataBlock:
     """The tetrahedra of a reference; what jumps between them as it is in the middle of each, det F also at its least corner."""
     mesh, count = made.mesh, len(made.mesh.tets)
     names = [name for name in made.names(made.states[frame]) if name in _EVALUATED]
     cells = made.evaluate_in(np.arange(count), np.full((count, 4), 0.25), frame, names)
     ends = made.evaluate_in(np.repeat(np.arange(count), 4), np.tile(_CORNERS, (count, 1)), frame, ("det_F",))
     cells["det_F_at_worst_corner"] = ends["det_F"].reshape(count, 4).min(axis=1)
-    return Block(mesh.points, mesh.tets, {"displacement": _at_nodes(mesh, made.states[frame].displacement)}, cells)
+    return DataBlock(mesh.points, mesh.tets, {"displacement": _at_nodes(mesh, made.states[frame].displacement)}, cells)
 
 
 def _at_nodes(mesh: TetMesh, displacement: Floats) -> Floats:
@@ -186,8 +188,8 @@ def _moved(rest: Floats, now: Floats) -> dict[str, Floats]:
     return {"displacement": np.where(known, now - np.where(known, rest, 0.0), 0.0)}
 
 
-def _part(rest: Surface, vertices: Ints, now: Floats) -> Block:
+def _part(rest: Surface, vertices: Ints, now: Floats) -> DataBlock:
     """The triangles of a surface with all corners among ``vertices``, and these alone; there may be no triangle."""
     chosen = rest.triangles[np.isin(rest.triangles, vertices).all(axis=1)]
     own = np.unique(vertices)
-    return Block(rest.points[own], np.searchsorted(own, chosen), _moved(rest.points[own], now[own]))
+    return DataBlock(rest.points[own], np.searchsorted(own, chosen), _moved(rest.points[own], now[own]))

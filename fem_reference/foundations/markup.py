@@ -1,4 +1,4 @@
-"""Small tables in HTML, by which records show themselves in a notebook."""
+"""Small tables in HTML, by which records show themselves in a notebook, and values as text."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
@@ -25,7 +25,7 @@ def table(title: str, heads: Sequence[str], rows: Iterable[Sequence[object]]) ->
 
 
 def exact(value: object) -> str:
-    """A fact about where something comes from, with all the digits it has.
+    """A value as text with all the digits it has.
 
     >>> exact(0.123456), exact(True), exact("0.11.0"), exact(None), exact((0.0, -9810.0))
     ('0.123456', 'yes', '0.11.0', 'not set', '(0, -9810)')

@@ -15,7 +15,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, diagonal
 from fem_reference.geometry.fibres import Directions
 from fem_reference.geometry.skins import Skin
-from fem_reference.problems.contact import Contact, Obstruction
+from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.problems.problem import NOTHING, AtRest, Task
 from fem_reference.problems.resolved_paths import Moving, moving_ramp, posed, some, stops, turning
 
@@ -36,7 +36,7 @@ ELEMENTS: dict[str, tuple[Kind, int, int | None]] = {
 
 
 def is_stabilised(element: str) -> bool:
-    """Whether an element has displacement and pressure of one degree, which alone leave the pressure free to oscillate.
+    """True of an element with displacement and pressure of one degree, which alone leave the pressure free to oscillate.
 
     It has the energy ``-1 / (4 mu) integral of (p - its mean in the cell)^2`` besides, with the shear modulus mu of the cell at
     rest, the mean of the second derivatives of the energy by F_ij, i != j. This energy falls with the square of the size of cells.
@@ -95,7 +95,7 @@ def check_quadrature(element: str, degree: int | None, place: str) -> None:
 
 
 def reference_nodes(kind: Kind, degree: int) -> Floats:
-    """Where the nodes of a cell are in its reference cell (the unit tetrahedron or the unit cube), (k, 3): the order that
+    """Places of the nodes of a cell in its reference cell (the unit tetrahedron or the unit cube), (k, 3): the order that
     ``Cells.cells`` has. Corners first, in the order of (z, y, x); then for degree 2 the other nodes in the same order.
     """
     ticks = np.arange(3) / 2
@@ -189,7 +189,7 @@ class ByCell:
 @dataclass(frozen=True, eq=False)
 class Body:
     """A body of ``mesh`` with its ``effects``; at ``frames[0]`` it rests. A load acts on the facets that its ``on`` names; by
-    ``contact``, where there is one, with every obstruction. ``interval`` [s]: from a frame number to the next, None where nothing
+    ``contact``, where there is one, with every bone. ``interval`` [s]: from a frame number to the next, None where nothing
     depends on time. ``start``: at ``frames[0]`` the body is where this takes rest points (n, 3), and not at rest.
     """
 
@@ -198,8 +198,8 @@ class Body:
     prescribed: tuple[Prescribed, ...]
     frames: tuple[float, ...]
     fibre: Directions | None = None
-    contact: Contact | None = None
-    obstructions: tuple[Obstruction, ...] = ()
+    contact: ContactLaw | None = None
+    bones: tuple[ContactBone, ...] = ()
     interval: float | None = None
     start: Callable[[Floats], Floats] | None = None
 
@@ -227,7 +227,7 @@ class Body:
         be followed.
         """
         things = [_moving(entry, some(self.points_on(entry.on))) for entry in self.prescribed]
-        things += [posed(f'obstruction "{one.name}"', one.pose, self.mesh.points) for one in self.obstructions]
+        things += [posed(f'bone "{one.name}"', one.pose, self.mesh.points) for one in self.bones]
         ramps = (moving_ramp(effect, self.size) for effect in self.effects)
         return stops([*things, *(ramp for ramp in ramps if ramp)], self.frames, self.size)
 

@@ -12,7 +12,7 @@ from fem_reference.foundations.given import said
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import Body, Cells, Prescribed, boundary_facets, check_element, reference_nodes
-from fem_reference.problems.contact import Contact, Obstruction
+from fem_reference.problems.contact import ContactBone, ContactLaw
 
 SAME = 1e-6  # of the body's size, by which two regions may prescribe what is meant to be the same
 _UNIT = 1e-6  # by which a unit vector may be longer or shorter
@@ -48,15 +48,15 @@ def check(body: Body, element: str) -> None:
     _check_start(body)
 
 
-def check_box(counts: Any, size: Any, kind: Any, degree: Any) -> None:
+def check_box(counts: object, size: object, kind: object, degree: object) -> None:
     """InputError unless a box has numbers of cells, lengths, a kind of cell and a degree."""
-    many = isinstance(counts, tuple | list) and len(counts) == 3
-    if not many or not all(_is_integer(one) and one > 0 for one in counts):
+    if not isinstance(counts, tuple | list) or len(counts) != 3 or not all(_is_integer(n) and n > 0 for n in counts):
         raise InputError("counts", said(counts), "numbers of cells along x, y, z, from 1 on")
     if int(counts[0]) * int(counts[1]) * int(counts[2]) > _MOST_CELLS:
         raise InputError("counts", said(counts), f"{_MOST_CELLS} cells at most")
-    many = isinstance(size, tuple | list | np.ndarray) and getattr(size, "ndim", 1) == 1 and len(size) == 3
-    if not many or not all(_is_number(one) and one > _SHORTEST for one in size):
+    if not isinstance(size, tuple | list | np.ndarray) or getattr(size, "ndim", 1) != 1 or len(size) != 3:
+        raise InputError("size", said(size), f"lengths along x, y, z, from {_SHORTEST:g} to {_FARTHEST:g} mm")
+    if not all(_is_number(one) and one > _SHORTEST for one in size):
         raise InputError("size", said(size), f"lengths along x, y, z, from {_SHORTEST:g} to {_FARTHEST:g} mm")
     if not max(size) < _LONGEST * min(size):
         raise InputError("size", said(size), f"an edge less than {_LONGEST:g} times as long as another")
@@ -70,10 +70,11 @@ def _check_kind(place: str, kind: Any, degree: Any) -> None:
         raise InputError(f"{place}degree", said(degree), "1 or 2")
 
 
-def check_frames(frames: Any, place: str) -> None:
+def check_frames(frames: object, place: str) -> None:
     """InputError unless ``frames`` are numbers, each later than the one before."""
-    known = isinstance(frames, Sequence | np.ndarray) and not isinstance(frames, str | bytes)
-    if not known or len(frames) == 0 or not all(_is_number(one) for one in frames):
+    if isinstance(frames, str | bytes) or not isinstance(frames, Sequence | np.ndarray) or len(frames) == 0:
+        raise InputError(place, said(frames), "frame numbers, at least one")
+    if not all(_is_number(one) for one in frames):
         raise InputError(place, said(frames), "frame numbers, at least one")
     if not all(early < late for early, late in pairwise(frames)):
         raise InputError(place, said(frames), "frame numbers that are each later than the one before")
@@ -114,13 +115,13 @@ def _check_rest(body: Body) -> None:
         part = getattr(body, name)
         if part is not None and not callable(part):
             raise InputError(name, said(part), "a function, or None")
-    _check_many("obstructions", body.obstructions, Obstruction, "bones that may press")
+    _check_many("bones", body.bones, ContactBone, "bones that may press")
     if body.start is not None:
         begun = np.asarray(body.start(np.array(body.mesh.points)))
         if begun.shape != body.mesh.points.shape or not np.isfinite(begun).all():
             raise InputError("start", f"places {begun.shape}, not all finite", "finite places (n, 3) of points (n, 3)")
-    if body.contact is not None and not isinstance(body.contact, Contact):
-        raise InputError("contact", said(body.contact), "a Contact, or None")
+    if body.contact is not None and not isinstance(body.contact, ContactLaw):
+        raise InputError("contact", said(body.contact), "a ContactLaw, or None")
 
 
 def _check_cells(mesh: Any) -> None:

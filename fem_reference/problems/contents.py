@@ -10,12 +10,12 @@ from fem_reference.foundations.mesh import Surface, enclosed_volume
 from fem_reference.foundations.motion import RigidMotion, Translation
 from fem_reference.geometry.sectors import attached_area, attached_shares
 from fem_reference.problems.scalar import FieldProblem
-from fem_reference.problems.setup import AttachedVertices, RigidBody, Setup
+from fem_reference.problems.setup import AttachedVertices, Bone, Setup
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
 
 
-def of_muscle(setup: Setup, case: MuscleCase) -> dict[str, Any]:
+def of_muscle(setup: Setup, case: MuscleCase) -> dict[str, object]:
     """The muscle, its bones, attachments, effects and frames."""
     surface = setup.surface
     return {
@@ -38,7 +38,7 @@ def of_muscle(setup: Setup, case: MuscleCase) -> dict[str, Any]:
     }
 
 
-def of_field(setup: FieldProblem, case: Case) -> dict[str, Any]:
+def of_field(setup: FieldProblem, case: Case) -> dict[str, object]:
     """The domain, the element, the weak form and the effects."""
     mesh, fixed = setup.mesh, int(np.isfinite(setup.fixed).sum())
     return {
@@ -60,8 +60,8 @@ def _parameters(effect: Effect) -> dict[str, str]:
     return {name: f"{exact(value)} {unit}".rstrip() for name, value, unit in effect.parameters}
 
 
-def _shape(bone: RigidBody) -> str:
-    """How fine the surface of a bone is, or what its closed form is."""
+def _shape(bone: Bone) -> str:
+    """The fineness of the surface of a bone, or its closed form."""
     if bone.solid is None:
         return f"{len(bone.surface.triangles)} triangles"
     kind = "".join(f" {letter.lower()}" if letter.isupper() else letter for letter in type(bone.solid).__name__)

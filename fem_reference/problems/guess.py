@@ -1,7 +1,6 @@
-"""Where a muscle goes by the motion of its bones, guessed before it is solved, and its shape as a beam."""
+"""Guesses, before a muscle is solved, of its path by the motion of its bones, and of its shape as a beam."""
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -10,17 +9,18 @@ from scipy.spatial.transform import Rotation
 from fem_reference.foundations.mesh import Floats, diagonal, enclosed_volume, vertex_areas
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.signed_distance import signed_distances
-from fem_reference.problems.setup import RigidBody, Setup
+from fem_reference.problems.setup import Bone, Setup
 
 
 @dataclass(frozen=True, eq=False)
 class Guess:
-    """Where ``points`` (n, 3) go that follow ``bones`` by ``weights`` (n, b): as one over the distance to their attachments, so
-    that what is between two of them goes straight, as a muscle does that is pulled tight; to the bones, where nothing is attached.
+    """A guess where ``points`` (n, 3) go that follow ``bones`` by ``weights`` (n, b): as one over the distance to their
+    attachments, so that what is between two of them goes straight, as a muscle does that is pulled tight; to the bones, where
+    nothing is attached.
     """
 
     points: Floats
-    bones: tuple[RigidBody, ...]
+    bones: tuple[Bone, ...]
     weights: Floats
 
     @classmethod
@@ -35,17 +35,17 @@ class Guess:
         return cls(points, bones, near / near.sum(axis=1, keepdims=True))
 
     def at(self, frame: float) -> Floats:
-        """Where they are at a frame."""
+        """Places (n, 3) [mm] at a frame."""
         parts = zip(self.bones, self.weights.T, strict=True)
         return np.sum([share[:, None] * apply(bone.pose(frame), self.points) for bone, share in parts], axis=0)
 
     def some(self, count: int) -> "Guess":
-        """Of about so many of the points."""
+        """The guess of about so many of the points."""
         every = slice(None, None, max(1, len(self.points) // count))
         return replace(self, points=self.points[every], weights=self.weights[every])
 
 
-def distance(bone: RigidBody, points: Floats) -> Floats:
+def distance(bone: Bone, points: Floats) -> Floats:
     """The signed distance (n,) [mm] of ``points`` to a bone at rest."""
     return bone.solid.sample(points).distance if bone.solid else signed_distances(points, bone.surface)
 
@@ -76,9 +76,9 @@ def strain(points: Floats, moved: Floats) -> float:
     return float(min(1.0, np.linalg.norm(now - turned) / np.linalg.norm(rest)))
 
 
-def rms(vectors: Floats) -> Any:
+def rms(vectors: Floats) -> Floats:
     """The root mean square of ``vectors`` (n, 3), or (f,) of (f, n, 3), over n."""
-    return np.sqrt((vectors**2).sum(axis=-1).mean(axis=-1))
+    return np.asarray(np.sqrt((vectors**2).sum(axis=-1).mean(axis=-1)))
 
 
 def centres(rest: Setup, frame: float | None = None) -> list[Floats]:
@@ -98,7 +98,7 @@ def spans(rest: Setup, numbers: tuple[int, ...]) -> Floats:
 
 
 def described_motion(rest: Setup) -> str:
-    """What the motion of the bones does to the muscle, in a sentence; nothing where it is not attached twice."""
+    """The effect of the motion of the bones on the muscle, in a sentence; nothing where it is not attached twice."""
     lengths = spans(rest, rest.frames)
     if not len(lengths):
         return ""
@@ -118,8 +118,9 @@ def axis_of(rest: Setup) -> Floats:
 
 
 def sag(rest: Setup, frames: list[int], travel: float) -> float:
-    """How far the axis gets from the straight line between two attachments: as it does at rest in the middle third, and as it is
-    bent by bones that turn; what is only shifted sideways is off by a twentieth of that, in two waves, which are stiffer.
+    """The distance [mm] that the axis gets from the straight line between two attachments: as it does at rest in the middle
+    third, and as it is bent by bones that turn; what is only shifted sideways is off by a twentieth of that, in two waves, which
+    are stiffer.
     """
     if len(rest.attached) < 2:
         return 0.0
@@ -132,20 +133,20 @@ def sag(rest: Setup, frames: list[int], travel: float) -> float:
 
 
 def turn(rest: Setup, frame: float) -> float:
-    """By how much the first and the last of the bones that are attached have turned against each other at a frame [rad]."""
+    """The angle [rad] by which the first and the last of the bones that are attached have turned against each other at a frame."""
     first, last = (rest.attached[i].bone.pose(frame)[:3, :3] for i in (0, -1))
     return float(Rotation.from_matrix(first.T @ last).magnitude())
 
 
 def length_of(rest: Setup) -> float:
-    """From the first attachment to the last, or all of the muscle where it has not two."""
+    """The length [mm] from the first attachment to the last, or of all of the muscle where it has not two."""
     middles = centres(rest)
     extent = diagonal(rest.surface.points)
     return float(np.linalg.norm(middles[0] - middles[-1])) or extent if len(middles) > 1 else extent
 
 
 def thickness_of(rest: Setup) -> float:
-    """Of a plate of its volume and area."""
+    """The thickness [mm] of a plate of its volume and area."""
     surface = rest.surface
     return (
         2 * enclosed_volume(surface.points, surface.triangles) / vertex_areas(surface.points, surface.triangles).sum()

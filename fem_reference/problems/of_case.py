@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Callable
-from typing import Any, Protocol, overload
+from typing import Protocol, overload
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.geometry.exemption import Exemption
@@ -10,11 +10,10 @@ from fem_reference.problems import contents, muscle, scalar
 from fem_reference.problems.body import Body
 from fem_reference.problems.estimates import Decision, decisions, estimates
 from fem_reference.problems.guess import described_motion
-from fem_reference.problems.muscle import Problem
-from fem_reference.problems.problem import Meshed
-from fem_reference.problems.problem import Problem as AnyProblem
+from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.problem import Meshed, Problem
 from fem_reference.problems.scalar import FieldProblem
-from fem_reference.problems.setup import RigidBody, Setup
+from fem_reference.problems.setup import Bone, Setup
 from fem_reference.problems.watch import Watch
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
@@ -23,9 +22,9 @@ from fem_reference.scenes.scalar import ScalarCase
 log = logging.getLogger(__name__)
 
 
-class CaseSetup(AnyProblem, Protocol):
-    """What is known of a case before it is meshed, and all that judging its runs needs: the ``Setup`` of a muscle, or the whole
-    ``FieldProblem``.
+class CaseSetup(Problem, Protocol):
+    """Facts on a case that are known before it is meshed, and all that judging its runs needs: the ``Setup`` of a muscle, or the
+    whole ``FieldProblem``.
     """
 
     @property
@@ -33,7 +32,7 @@ class CaseSetup(AnyProblem, Protocol):
         """The formula of the solution, where it is known."""
 
     @property
-    def bones(self) -> tuple[RigidBody, ...]:
+    def bones(self) -> tuple[Bone, ...]:
         """The bones, of which a scalar field has none."""
 
     @property
@@ -50,16 +49,16 @@ class CaseSetup(AnyProblem, Protocol):
 
 
 class CaseProblem(CaseSetup, Meshed, Protocol):
-    """What a solver of a case is given: the ``Problem`` of a muscle, or the ``FieldProblem``."""
+    """A problem as a solver of cases is given it: the ``MuscleProblem`` of a muscle, or the ``FieldProblem``."""
 
     @property
-    def muscle(self) -> Problem | None:
+    def muscle(self) -> MuscleProblem | None:
         """The muscle, None of a scalar field."""
 
 
 def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[Decision, ...]:
-    """Of each effect of a case whether that needs it, and why, by its setup that ``rest`` gives, by default a new one; nothing of
-    a scalar field, which needs all.
+    """Decisions whether a case needs each of its effects, and why, by its setup that ``rest`` gives, by default a new one; nothing
+    of a scalar field, which needs all.
     """
     if not isinstance(case, MuscleCase):
         return ()
@@ -68,7 +67,7 @@ def explained(case: Case, rest: Callable[[], CaseSetup] | None = None) -> tuple[
     return decisions(case, known)
 
 
-def facts(case: Case, setup: CaseSetup) -> dict[str, Any]:
+def facts(case: Case, setup: CaseSetup) -> dict[str, object]:
     """Everything that a person asks of what a case is made of, as words and numbers by name."""
     if isinstance(case, MuscleCase) and isinstance(setup, Setup):
         return contents.of_muscle(setup, case)
@@ -76,8 +75,8 @@ def facts(case: Case, setup: CaseSetup) -> dict[str, Any]:
     return contents.of_field(setup, case)
 
 
-def known(case: Case, setup: CaseSetup) -> dict[str, Any]:
-    """What the motion of its bones does to a muscle, and why it needs its effects, in words; nothing of a scalar field."""
+def known(case: Case, setup: CaseSetup) -> dict[str, object]:
+    """The effect of the motion of its bones on a muscle, and why it needs its effects, in words; nothing of a scalar field."""
     if not isinstance(case, MuscleCase) or not isinstance(setup, Setup):
         return {}
     found = case.decisions or explained(case)

@@ -15,7 +15,7 @@ ONCE = ((0.0, 0.0), (1.0, 1.0))  # from rest at frame 0 to all of it at frame 1
 
 
 def amount(knots: tuple[tuple[float, float], ...], frame: float) -> float:
-    """How much is prescribed at a frame: linear between ``knots`` of (frame, amount)."""
+    """The amount that is prescribed at a frame: linear between ``knots`` of (frame, amount)."""
     frames, amounts = zip(*knots, strict=True)
     return float(np.interp(frame, frames, amounts))
 

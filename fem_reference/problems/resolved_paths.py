@@ -1,6 +1,6 @@
 """Stops of load steps between frames, so that none leaves out what happens within it, whatever the frames.
 
-Between two stops nothing that is prescribed, and no obstruction, turns by more than a right angle, from half a turn on the straight
+Between two stops nothing that is prescribed, and no bone, turns by more than a right angle, from half a turn on the straight
 line between two poses no longer shows the direction; nothing goes farther, apart from what all do alike, than the body is
 long; and nothing goes there and back, but for a fifteenth of that distance and a hundredth of the body's size.
 
@@ -45,14 +45,14 @@ class Moving:
     scale: bool = False
 
 
-def turning(path: Any, points: Floats) -> Turning | None:
+def turning(path: object, points: Floats) -> Turning | None:
     """The frames between which a ``path`` of ``points`` (p, 3) is steady, straight or about an axis, and the angle [rad] that it
     has turned by at each; None of one that says none.
     """
     owner = getattr(path, "__self__", path)  # of a method
     if not type(owner).__module__.startswith("fem_reference."):
         return None
-    motion = getattr(owner, "motion", owner)  # of a bone, which may have none
+    motion: Any = getattr(owner, "motion", owner)  # of a bone, which may have none
     known = getattr(motion, "turning", None)
     return ((), ()) if motion is None else known(points) if known else None
 

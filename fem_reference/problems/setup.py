@@ -29,7 +29,7 @@ def kept_distances() -> Path:
 
 
 @dataclass(frozen=True, eq=False)
-class RigidBody:
+class Bone:
     """A rigid bone: its ``surface`` at rest, its ``motion``, None where it rests, and how its distance shall be known, as
     ``scene.Bone`` has it [mm]; or the ``solid`` of closed form whose vertices the surface has.
     """
@@ -61,20 +61,20 @@ class AttachedVertices:
     """
 
     attachment: str
-    bone: RigidBody
+    bone: Bone
     vertices: Ints
     stiffness: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """What a surface solver needs: the muscle ``surface`` at rest, the bones, the attached vertices, and the frames wanted;
-    ``interval`` [s] from a frame number to the next where the scene says it; ``start``, where the body is at the first frame, by
-    its rest positions (n, 3), where that is not at rest.
+    """The set-up of a muscle, all that a surface solver needs: its ``surface`` at rest, the bones, the attached vertices, and the
+    frames wanted; ``interval`` [s] from a frame number to the next where the scene says it; ``start``, where the body is at the
+    first frame, by its rest positions (n, 3), where that is not at rest.
     """
 
     surface: Surface
-    bones: tuple[RigidBody, ...]
+    bones: tuple[Bone, ...]
     attached: tuple[AttachedVertices, ...]
     frames: tuple[int, ...]
     interval: float | None
@@ -95,7 +95,7 @@ class Setup:
         return None
 
     def begin(self, rest: Floats) -> Floats:
-        """Where points that are at ``rest`` (n, 3) [mm] are at the first frame; an array of the caller's own."""
+        """The places (n, 3) at the first frame of points that are at ``rest`` (n, 3) [mm]; an array of the caller's own."""
         return np.array(rest) if self.start is None else np.array(self.start(rest))
 
     @cached_property

@@ -98,12 +98,12 @@ class Watch:
         at = np.stack([self.frames[one].surface for one in numbers])
         velocities = np.diff(at, axis=0) / np.diff(numbers)[:, None, None]
         last, axis = velocities[-1], axis_of(self.rest)
-        change = rms(last - velocities[0]) if len(velocities) > 1 else rms(last)
+        change = float(rms(last - velocities[0] if len(velocities) > 1 else last))
         sudden = any(isinstance(one, Ramped) for one in self.case.effects)
         return replace(
             now,
-            speed=max(now.speed, rms(last)),
-            sideways=max(now.sideways, rms(last - np.outer(last @ axis, axis))),
+            speed=max(now.speed, float(rms(last))),
+            sideways=max(now.sideways, float(rms(last - np.outer(last @ axis, axis)))),
             jump=max(now.jump, change) if sudden else now.jump,
             acceleration=max(now.acceleration, change / (number - before[-1])) if len(before) > 1 else now.acceleration,
         )

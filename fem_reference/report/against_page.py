@@ -6,53 +6,53 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from fem_reference.assessment.baseline import SAMPLED
 from fem_reference.assessment.versions import ORDER, Change, Versions
-from fem_reference.foundations.errors import MissingSoftware
 from fem_reference.foundations.mesh import Floats
 from fem_reference.problems.setup import Setup
 from fem_reference.report import gallery
 from fem_reference.report.at_frames import label
-from fem_reference.report.curves import BAND, PALETTE, Curve, drawn
-from fem_reference.report.gallery import Shot
-from fem_reference.report.sections.pictures import picture_source, ramp, ticks
+from fem_reference.report.drawings import BAND, PALETTE, Drawing, over_frames
+from fem_reference.report.gallery import Figure, Shot, ramp, ticks
+from fem_reference.report.pages import Page
 from fem_reference.report.tables import finite
-from fem_reference.report.templates import template
-from fem_reference.report.words import number, words
+from fem_reference.report.words import number, title_of
 from fem_reference.runs.cost import seconds_per_frame
 
 MOST_CURVES = 8
 
 
-def render(versions: Versions, setup: Setup) -> str:
-    """The whole page as text."""
-    shots, missing = _pictures(versions, setup)
-    return template("against_page.html").render(
-        versions=versions,
-        current=versions.current,
-        headline=headline(versions),
-        order=ORDER,
-        sentences=[sentence(one) for word in ORDER[:3] for one in versions.of(word)[:3]],
-        curves=[_curve(one, i) for i, one in enumerate(_shown(versions))],
-        moved=_moved(versions),
-        place=place(versions),
-        shots=shots,
-        missing=missing,
-        ramp=ramp(),
-        ticks=ticks,
-        sampled=versions.before is None,
-        seconds=seconds_per_frame(versions.current.candidate),
-        title_of=title_of,
-        infinite=math.inf,
-        label=partial(label, versions.current.scene, setup),
-    )
+def page(versions: Versions, setup: Setup) -> Page:
+    """The page of two versions of a solver on a case of that ``setup``."""
+    current = versions.current
+    figures, missing = _pictures(versions, setup)
+    contents = {
+        "versions": versions,
+        "current": current,
+        "headline": headline(versions),
+        "order": ORDER,
+        "sentences": [sentence(one) for word in ORDER[:3] for one in versions.of(word)[:3]],
+        "curves": [_curve(one, i) for i, one in enumerate(_shown(versions))],
+        "moved": _moved(versions),
+        "place": place(versions),
+        "figures": figures,
+        "missing": missing,
+        "ramp": ramp(),
+        "ticks": ticks,
+        "sampled": versions.before is None,
+        "seconds": seconds_per_frame(current.candidate),
+        "title_of": title_of,
+        "infinite": math.inf,
+        "label": partial(label, current.scene, setup),
+    }
+    title = f"{current.candidate.name} against what it was: {current.scene.title}"
+    said = (("", word(versions), headline(versions)),)
+    return Page("two versions", title, said, "against_page.html", contents, facts(versions))
 
 
 def headline(versions: Versions) -> str:
-    """How many statistics came out how."""
+    """The number of statistics of each word."""
     return ", ".join(f"{versions.count(word)} {word}" for word in ORDER if versions.count(word))
 
 
@@ -61,17 +61,8 @@ def word(versions: Versions) -> str:
     return next((one for one in ORDER[:3] if versions.count(one)), "as it was")
 
 
-def title_of(name: str) -> str:
-    """A statistic in words.
-
-    >>> title_of("surface_deviation.rms")
-    'surface deviation, rms'
-    """
-    return ", ".join(map(words, name.split(".")))
-
-
 def sentence(one: Change) -> str:
-    """What became of a statistic."""
+    """The change of a statistic in words."""
     if math.isinf(one.by):
         return f"{title_of(one.name)} {'has no number any more' if one.by > 0 else 'has a number now'} in frame {one.frame}"
     then, now = number(abs(one.was[one.at])), number(abs(one.now[one.at]))
@@ -81,7 +72,7 @@ def sentence(one: Change) -> str:
 
 
 def _by(one: Change, k: int) -> str:
-    """By how much a statistic is nearer or further away in the k-th frame."""
+    """The change of a statistic in the k-th frame, nearer or further away."""
     by = float(one.further[k])
     return f"{number(abs(by))} {_unit(one)} {'further' if by > 0 else 'nearer'} in frame {one.numbers[k]}"
 
@@ -92,7 +83,7 @@ def _unit(one: Change) -> str:
 
 
 def place(versions: Versions) -> str:
-    """Where it moved most, in words; empty where it did not."""
+    """The vertex that moved most, in words; empty where none did."""
     if versions.place is None:
         return ""
     i, vertex, distance = versions.place
@@ -122,7 +113,7 @@ def facts(versions: Versions) -> dict[str, Any]:
 
 
 def text(versions: Versions) -> str:
-    """What is printed."""
+    """The changes as lines of text."""
     said = [f"{one.word}: {sentence(one)}" for kind in ORDER[:3] for one in versions.of(kind)]
     moved = place(versions)
     last = f"{versions.current.candidate.name} on {versions.current.scene.name} against {versions.was}: {headline(versions)}"
@@ -134,77 +125,59 @@ def _shown(versions: Versions) -> list[Change]:
     return [one for one in versions.changes if one.word != "no number"][:MOST_CURVES]
 
 
-def _curve(one: Change, i: int) -> Curve:
-    title = f"{title_of(one.name).capitalize()}: {one.word}"
-
-    def draw(figure: Figure, axes: Axes) -> None:
+def _curve(one: Change, i: int) -> Drawing:
+    def draw(axes: Axes) -> None:
         frames = np.array(one.numbers)
         if np.nan_to_num(one.bars).any():
             axes.fill_between(frames, 0, one.bars, color=BAND, linewidth=0, label="error bar")
         axes.plot(frames, np.abs(one.was), "--", color=PALETTE[1], linewidth=1.4, label="before")
         axes.plot(frames, np.abs(one.now), color=PALETTE[0], linewidth=1.8, label="now")
-        _finish(figure, axes, one.unit)
+        axes.set_ylim(bottom=0)
 
-    return drawn(f"change-{i}", title, (5.4, 3.0), draw)
+    return over_frames(f"change-{i}", f"{title_of(one.name).capitalize()}: {one.word}", one.unit, draw, 3.0)
 
 
-def _moved(versions: Versions) -> Curve | None:
-    """How far the vertices are from where they were; None where they are there."""
+def _moved(versions: Versions) -> Drawing | None:
+    """The distance of vertices from where they were; None where none moved."""
     if versions.place is None:
         return None
 
-    def draw(figure: Figure, axes: Axes) -> None:
+    def draw(axes: Axes) -> None:
         frames = np.array(versions.current.candidate.numbers)
-        known = np.where(np.isfinite(versions.moved), versions.moved, np.nan)
-        rows = [row[np.isfinite(row)] for row in known]
+        rows = [row[np.isfinite(row)] for row in versions.moved]
         for name, style, value in (("furthest", "-", np.max), ("rms", ":", lambda row: np.sqrt((row**2).mean()))):
             axes.plot(frames, [value(row) if len(row) else np.nan for row in rows], style, color=PALETTE[0], label=name)
-        _finish(figure, axes, "mm")
+        axes.set_ylim(bottom=0)
 
-    return drawn("moved", "Distance of vertices from where they were", (5.4, 3.0), draw)
-
-
-def _finish(figure: Figure, axes: Axes, unit: str) -> None:
-    axes.set_ylim(bottom=0)
-    axes.margins(x=0.02)
-    axes.set_xlabel("frame")
-    axes.set_ylabel(unit.replace("mm3", "mm³"))
-    axes.xaxis.set_major_locator(MaxNLocator(nbins=8, integer=True, steps=[1, 2, 5, 10]))
-    figure.legend(loc="outside upper left", ncols=3, handlelength=2.2, columnspacing=1.2)
+    return over_frames("moved", "Distance of vertices from where they were", "mm", draw, 3.0)
 
 
-def _pictures(versions: Versions, setup: Setup) -> tuple[list[tuple[Shot, list[str], float]], str]:
+def _pictures(versions: Versions, setup: Setup) -> tuple[list[Figure], str]:
     """The frame in which it moved most: then, now, and what moved, in one scale of colours; or what is missing."""
     current, found = versions.current, versions.place
     if found is None or not current.candidate.has_surface:
         return [], ""
-    wanted = _shots(versions, found[0])
-    try:
-        drawn_ = gallery.draw(setup, current.candidate.surface, wanted)
-    except MissingSoftware as error:
-        return [], str(error)
-    end = gallery.top(wanted)
-    return [(shot, [picture_source(one) for one in pair], end) for shot, pair in zip(wanted, drawn_, strict=True)], ""
+    return gallery.figures(setup, current.candidate.surface, _shots(versions, found[0]))
 
 
 def _shots(versions: Versions, i: int) -> list[Shot]:
+    """The i-th frame as it moved, before and now; without those that are not a number somewhere."""
     current = versions.current
     points, frame, truth = current.points[i], current.candidate.numbers[i], current.reference.positions[i]
-    moved = _everywhere(versions, i)
-    shots = list[Shot]()
-    if np.isfinite(points).all() and np.isfinite(moved).all():
-        outline = points if versions.before is None else versions.before[i]
-        shots.append(Shot("what moved", frame, points, moved, outline))
-    if versions.before is not None:
-        for name, shown in (("before", versions.before[i]), ("now", points)):
-            apart = np.linalg.norm(shown - truth, axis=1)
-            if np.isfinite(apart).all():
-                shots.append(Shot(name, frame, shown, apart, truth))
-    return shots
+    before = versions.before
+    wanted = [("what moved", points, _everywhere(versions, i), points if before is None else before[i])]
+    if before is not None:
+        runs = (("before", before[i]), ("now", points))
+        wanted += [(name, shown, np.linalg.norm(shown - truth, axis=1), truth) for name, shown in runs]
+    return [
+        Shot(name, frame, shown, apart, outline)
+        for name, shown, apart, outline in wanted
+        if np.isfinite(shown).all() and np.isfinite(apart).all()
+    ]
 
 
 def _everywhere(versions: Versions, i: int) -> Floats:
-    """How far every vertex (n,) [mm] is from where it was; of sampled ones, what the nearest of them is."""
+    """The distance of every vertex (n,) [mm] from where it was; of sampled ones, that of the nearest of them."""
     if versions.before is not None:
         return np.asarray(versions.moved[i])
     rest = versions.current.rest

@@ -3,11 +3,11 @@
 import hashlib
 import re
 import shlex
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from fem_reference.report import index_page, pages
+from fem_reference.report.pages import Page
 
 LONGEST = 100  # characters of the name of a page
 
@@ -54,11 +54,9 @@ def _plain(text: str) -> str:
     return re.sub(r"[^\w.=+-]+", "_", re.sub(r"[\s\[\]]+", "", text))
 
 
-def written(
-    asked: Asked, folder: Path, name: str | None, write: Callable[[Path, str, str], Path]
-) -> tuple[Path, list[str]]:
-    """Write a page by ``write(folder, name, command)`` where nothing else is lost, and the index; its path and what is printed.
-    A ``name`` that was given takes the place of the default.
+def written(asked: Asked, page: Page, folder: Path, name: str | None = None) -> tuple[Path, list[str]]:
+    """Write a page into ``folder`` where nothing else is lost, and the index; its path and what is printed. A ``name`` that was
+    given takes the place of the default.
     """
 
     def where(name: str) -> Path:
@@ -66,7 +64,7 @@ def written(
 
     name, note = pages.free(where, name or asked.name, asked.command)
     parent, file = (folder / name, asked.page) if asked.page else (folder, name)
-    path = write(parent, file, asked.command)
+    path = pages.write(page, parent, file, asked.command)
     notes = [note] if note else []
     try:
         index_page.write(folder)

@@ -1,6 +1,7 @@
 """The page ``error-bars``: error bars of references against their differences from finer solutions."""
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -8,30 +9,34 @@ from matplotlib.figure import Figure
 
 from fem_reference.assessment.claims import CLAIMED, FINER, LEAST, Claim, Claims, Cover
 from fem_reference.metrics import described
-from fem_reference.report.curves import PALETTE, Curve, drawn, logarithmic
+from fem_reference.report.drawings import PALETTE, Drawing, drawn, logarithmic
+from fem_reference.report.pages import Page
 from fem_reference.report.tables import finite
-from fem_reference.report.templates import template
 from fem_reference.report.words import words
 
 UNITS = {metric: one.unit for (metric, _), one in described("claim").items()}
 
 
-def render(claims: Claims) -> str:
-    """The whole page as text."""
-    return template("claims_page.html").render(
-        claims=claims,
-        finer=FINER,
-        whole=Cover.of(claims.claims),
-        by_case={case: Cover.of(one for one in claims.claims if one.case == case) for case in claims.sizes},
-        by_statistic={
+def page(claims: Claims) -> Page:
+    """The page of error bars beside errors."""
+    whole = Cover.of(claims.claims)
+    contents = {
+        "claims": claims,
+        "finer": FINER,
+        "whole": whole,
+        "by_case": {case: Cover.of(one for one in claims.claims if one.case == case) for case in claims.sizes},
+        "by_statistic": {
             (metric, statistic): Cover.of(
                 one for one in claims.claims if (one.metric, one.statistic) == (metric, statistic)
             )
             for metric, statistic in CLAIMED
         },
-        widest=lambda case, metric, statistic: widest(claims, case, metric, statistic),
-        drawings=[drawing(claims.claims, metric, "claims") for metric in UNITS],
-    )
+        "widest": partial(widest, claims),
+        "drawings": [drawing(claims.claims, metric, "claims") for metric in UNITS],
+    }
+    said = f"{100 * whole.share:.0f} % of {whole.count} error bars cover the difference from a finer solution"
+    title = "Error bars: claimed against true"
+    return Page("error bars", title, (("", "", said),), "claims_page.html", contents, facts(claims))
 
 
 def widest(claims: Claims, case: str, metric: str, statistic: str) -> Claim:
@@ -53,7 +58,7 @@ def facts(claims: Claims) -> dict[str, Any]:
     }
 
 
-def drawing(claims: Sequence[Claim], metric: str, name: str) -> Curve:
+def drawing(claims: Sequence[Claim], metric: str, name: str) -> Drawing:
     """Bars against errors, a colour for each case; ``name`` makes its ids those of this drawing alone."""
     title = f"{words(metric).capitalize()}: claimed against true"
 

@@ -1,11 +1,12 @@
 """The page of omissions: what each effect of a scene and each feature of a candidate changes, and what it costs."""
 
 import math
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
 
+from fem_reference.assessment import omissions
 from fem_reference.assessment.fronts import COSTS
 from fem_reference.assessment.omissions import (
     COUNTS,
@@ -18,9 +19,9 @@ from fem_reference.assessment.omissions import (
     verdict,
 )
 from fem_reference.metrics import described
-from fem_reference.report.curves import BAND, PALETTE, REFERENCE, Curve, drawn
-from fem_reference.report.templates import template
-from fem_reference.report.words import duration, listed, number, words
+from fem_reference.report.drawings import BAND, Drawing, colour_of, drawn, plain_numbers
+from fem_reference.report.pages import Page
+from fem_reference.report.words import duration, listed, number, title_of, words
 
 MAIN = "surface_deviation.rms"
 # By name the head of a column of the table.
@@ -29,36 +30,29 @@ HEADS = {".".join(key): one.label.lower() for key, one in described("main").item
 _DEPTH = 10.0
 
 
-def render(found: CaseOmissions) -> str:
-    """The whole page as text."""
-    return template("effects_page.html").render(
-        found=found,
-        measures=[name for name in MEASURES if name in found.units],
-        heads=HEADS,
-        phases=phases(found),
-        counts={name: count_title(name) for name in COUNTS},
-        predicted=any(one.predicted for ablation in found.ablations for one in ablation.omissions),
-        sentences=sentences,
-        label=label,
-        judged=lambda one: verdict(one.changes, found.bars),
-        prediction=lambda one: [f"{title_of(name)}: {number(value)}" for name, value in one.predicted.items()],
-        instead=lambda one: [f"{words(key)} = {value}" for key, value in one.instead.items()],
-        percent=percent,
-        drawing=drawing(found),
-    )
-
-
-def title_of(name: str) -> str:
-    """A change in words.
-
-    >>> title_of("fibre_length.rms_percent")
-    'fibre length, rms percent'
-    """
-    return ", ".join(map(words, name.split(".")))
+def page(found: CaseOmissions) -> Page:
+    """The page of the omissions of a case."""
+    contents = {
+        "found": found,
+        "measures": [name for name in MEASURES if name in found.units],
+        "heads": HEADS,
+        "phases": phases(found),
+        "counts": {name: count_title(name) for name in COUNTS},
+        "predicted": any(one.predicted for ablation in found.ablations for one in ablation.omissions),
+        "sentences": sentences,
+        "label": label,
+        "judged": lambda one: verdict(one.changes, found.bars),
+        "prediction": lambda one: [f"{title_of(name)}: {number(value)}" for name, value in one.predicted.items()],
+        "instead": lambda one: [f"{words(key)} = {value}" for key, value in one.instead.items()],
+        "percent": percent,
+        "drawing": drawing(found),
+    }
+    title, said = f"What each effect changes: {found.title}", sentences(found, found.ablations[0])[0]
+    return Page("effects", title, (("", "", said),), "effects_page.html", contents, omissions.facts(found))
 
 
 def count_title(name: str) -> str:
-    """What is counted, in words.
+    """The name of a count in words.
 
     >>> count_title("newton_iterations"), count_title("load_steps")
     ('Newton iterations', 'load steps')
@@ -67,7 +61,7 @@ def count_title(name: str) -> str:
 
 
 def label(ablation: Ablation, omission: Omission) -> str:
-    """What is left out, in words; one of several is not repeated where it is all of them."""
+    """The things left out, in words: "all of them" where they are."""
     if not omission.left_out:
         return "nothing"
     if len(omission.left_out) > 1 and len(omission.left_out) == len(ablation.omissions) - 1:
@@ -91,7 +85,7 @@ def phases(found: CaseOmissions) -> list[str]:
 
 
 def sentences(found: CaseOmissions, ablation: Ablation) -> list[str]:
-    """What comes of leaving things out of a run, in words."""
+    """The result of leaving things out of a run, in sentences."""
     if ablation.whole.status != "converged":
         return [f"Nothing was left out, as the whole run {ablation.whole.status}: {ablation.whole.message}"]
     if not ablation.omissions:
@@ -126,40 +120,22 @@ def _most(found: CaseOmissions, one: Omission) -> str:
     return f"the {HEADS.get(name, title_of(name))} by {number(one.changes[name])} {found.units[name]}{known}"
 
 
-def drawing(found: CaseOmissions) -> Curve | None:
+def drawing(found: CaseOmissions) -> Drawing | None:
     """The change that an omission makes against the time that it saves; None where there is none to draw."""
-    rows = [
-        (ablation, one, 100 * (1 - ablation.relative(one.seconds)), one.changes[MAIN])
-        for ablation in found.ablations
-        for one in ablation.omissions
-        if MAIN in one.changes and not math.isnan(ablation.relative(one.seconds))
-    ]
-    if not rows:
+    points = {ablation.name: _points(ablation) for ablation in found.ablations}
+    changes = [change for rows in points.values() for _, _, change in rows]
+    if not changes:
         return None
     bar = found.bars.get(MAIN, 0.0)
-    low = min((value for value in (*(row[3] for row in rows), bar) if value > 0), default=1.0)
-    floor = max(low, 1e-3 * (bar or max(row[3] for row in rows) or 1.0)) / _DEPTH
+    low = min((value for value in (*changes, bar) if value > 0), default=1.0)
+    floor = max(low, 1e-3 * (bar or max(changes) or 1.0)) / _DEPTH
 
     def draw(figure: Figure, axes: Axes) -> None:
-        for i, ablation in enumerate(found.ablations):
-            own = [row for row in rows if row[0] is ablation]
-            colour = REFERENCE if i == 0 else PALETTE[(i - 1) % len(PALETTE)]
-            heights = [max(row[3], floor) for row in own]
-            if own:
-                axes.plot([row[2] for row in own], heights, "o", color=colour, markersize=5, label=ablation.name)
-            for j, (row, height) in enumerate(zip(own, heights, strict=True)):
-                below = "" if row[3] >= floor else f" ({number(row[3])} mm)"
-                place = {
-                    "xytext": (5, -10 if j % 2 else 4),
-                    "textcoords": "offset points",
-                    "fontsize": "small",
-                    "color": colour,
-                }
-                axes.annotate(f"{label(ablation, row[1])}{below}", (row[2], height), **place)  # type: ignore[arg-type]
+        for i, (name, rows) in enumerate(points.items()):
+            _draw(axes, rows, floor, colour_of(i), name)
         axes.set_yscale("log")
-        axes.set_ylim(floor / 2, 3 * max(*(row[3] for row in rows), bar, floor))
-        axes.yaxis.set_major_formatter(lambda value, _: number(value))
-        axes.yaxis.set_minor_formatter(NullFormatter())
+        axes.set_ylim(floor / 2, 3 * max(*changes, bar, floor))
+        plain_numbers(axes.yaxis)
         axes.margins(x=0.2)
         axes.axvline(0, color="#888888", linewidth=0.8)
         if bar > 0:
@@ -169,6 +145,25 @@ def drawing(found: CaseOmissions) -> Curve | None:
         figure.legend(loc="outside lower center", ncols=4, fontsize="small")
 
     return drawn(f"omissions-{found.case}", "Error of omission against time saved", (7.2, 4.2), draw)
+
+
+def _points(ablation: Ablation) -> list[tuple[str, float, float]]:
+    """The omissions of a run that can be drawn: the name of each, the time saved [%] and the change of the surface [mm]."""
+    shares = ((one, ablation.relative(one.seconds)) for one in ablation.omissions if MAIN in one.changes)
+    return [
+        (label(ablation, one), 100 * (1 - share), one.changes[MAIN]) for one, share in shares if not math.isnan(share)
+    ]
+
+
+def _draw(axes: Axes, rows: list[tuple[str, float, float]], floor: float, colour: str, name: str) -> None:
+    """The points of a run, none below ``floor`` [mm]: a change that is smaller is written beside its point."""
+    if rows:
+        heights = [max(change, floor) for _, _, change in rows]
+        axes.plot([saved for _, saved, _ in rows], heights, "o", color=colour, markersize=5, label=name)
+    for i, (omitted, saved, change) in enumerate(rows):
+        below = "" if change >= floor else f" ({number(change)} mm)"
+        place: Any = {"xytext": (5, -10 if i % 2 else 4), "textcoords": "offset points"}
+        axes.annotate(f"{omitted}{below}", (saved, max(change, floor)), fontsize="small", color=colour, **place)
 
 
 def text(found: CaseOmissions) -> str:

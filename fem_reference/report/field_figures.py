@@ -1,7 +1,5 @@
 """Drawings of a scalar example to stand inside a page: curves as SVG, maps and views as WebP."""
 
-import base64
-import io
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -10,7 +8,6 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
@@ -23,7 +20,7 @@ from fem_reference.assessment.convergence import Ladder
 from fem_reference.foundations.mesh import Floats, normals
 from fem_reference.geometry.field_mesh import FieldMesh
 from fem_reference.problems.scalar import at
-from fem_reference.report.curves import LOOK, PALETTE, REFERENCE, inline
+from fem_reference.report.drawings import LOOK, PALETTE, REFERENCE, Drawing, drawn, webp
 from fem_reference.runs.store import Run
 
 VALUES, DIFFERENCES = "viridis", "RdBu_r"
@@ -33,15 +30,6 @@ _LISTING: Any = {"color": "blue", "linewidth": 2, "marker": "o", "markersize": 6
 _MARKERS = "xd+s^v"
 
 
-@dataclass(frozen=True)
-class Drawing:
-    """``markup`` is an ``<svg>`` or an ``<img>``, ``title`` what it shows; ``missing`` why there is none."""
-
-    title: str
-    markup: str = ""
-    missing: str = ""
-
-
 def rival(example: Comparison) -> Run | None:
     """The run to be shown beside the reference: the listing, else the first candidate."""
     listings = [run for run in example.candidates if run.solver == "listing"]
@@ -49,7 +37,7 @@ def rival(example: Comparison) -> Run | None:
 
 
 def drawings(example: Comparison) -> list[Drawing]:
-    """What shows the solutions of an example: lines over an interval, maps and views of triangles."""
+    """Drawings of the solutions of an example: lines over an interval, maps and views of triangles."""
     dimension = example.setup.mesh.points.shape[1]
     return _lines(example) if dimension == 1 else list(_panels(example, _plate if dimension == 2 else _body))
 
@@ -132,16 +120,11 @@ def _look(i: int, run: Run) -> dict[str, Any]:
 
 
 def _svg(name: str, title: str, draw: Callable[[Axes], None]) -> Drawing:
-    with mpl.rc_context(LOOK):
-        figure = Figure(figsize=(5.4, 3.6), layout="constrained")
-        FigureCanvasSVG(figure)
-        axes = figure.add_subplot()
+    def whole(figure: Figure, axes: Axes) -> None:
         draw(axes)
-        handles, labels = axes.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper left", ncols=3, handlelength=2.2, columnspacing=1.2)
-        text = io.StringIO()
-        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
-    return Drawing(title, inline(text.getvalue(), name, title))
+        figure.legend(loc="outside upper left", ncols=3, handlelength=2.2, columnspacing=1.2)
+
+    return drawn(name, title, (5.4, 3.6), whole)
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,11 +164,9 @@ def _webp(title: str, draw: Callable[[Figure], None]) -> Drawing:
         canvas: Any = FigureCanvasAgg(figure)
         draw(figure)
         canvas.draw()
-        picture, stored = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"), io.BytesIO()
-    picture.save(stored, "WEBP", quality=86, method=4)
-    source = f"data:image/webp;base64,{base64.b64encode(stored.getvalue()).decode()}"
+        picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
     width, height = picture.size
-    return Drawing(title, f'<img src="{source}" width="{width}" height="{height}" alt="">')
+    return Drawing(title, f'<img src="{webp(picture, 86)}" width="{width}" height="{height}" alt="">')
 
 
 def _plate(figure: Figure, example: Comparison, wanted: _Shown) -> None:
@@ -211,7 +192,7 @@ def _plate(figure: Figure, example: Comparison, wanted: _Shown) -> None:
 
 
 def _scale(values: Floats, colours: str) -> Normalize:
-    """From the least to the greatest value; of differences, as far below zero as above."""
+    """Colours from the least to the greatest value; of differences, as far below zero as above."""
     low, high = float(values.min()), float(values.max())
     if colours == DIFFERENCES:
         high = max(-low, high)
@@ -221,7 +202,7 @@ def _scale(values: Floats, colours: str) -> Normalize:
 
 @dataclass(frozen=True)
 class _Window:
-    """What part of a surface is shown: ``low`` and ``high`` corners (3,), and how wide the ``line`` of its triangles is."""
+    """A part of a surface: ``low`` and ``high`` corners (3,), and the width of the ``line`` around its triangles."""
 
     title: str
     low: Floats

@@ -1,7 +1,8 @@
-"""The page of the scalar examples beside the report's section 4.6. It contains everything itself, and reads without a network."""
+"""The page of scalar examples beside the report's section 4.6."""
 
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -9,28 +10,11 @@ from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.judge import overall
 from fem_reference.foundations.records import Record, parse
 from fem_reference.report import field_figures
-from fem_reference.report.templates import template
+from fem_reference.report.pages import Page
+from fem_reference.report.tables import MEASURES, as_csv, summary
 from fem_reference.report.words import number
 from fem_reference.runs.store import Run
 
-# What the report's figures show, in words: its pictures are not distributed with it. By the name of a case: figure and caption.
-FIGURES = {
-    "rod": (
-        (
-            "Figure 4.5",
-            (
-                "One-dimensional advection-diffusion problem with Dirichlet boundary condition ψ(0) = 0 and Neumann boundary "
-                "condition ψ'(1) = -1. The blue curve is calculated using FEM, the analytical function in red."
-            ),
-        ),
-    ),
-    "plate_square": (("Figure 4.6", "Tessellation of uniformly sampled 2D space with heat distribution."),),
-    "plate_spiral": (("Figure 4.7", "Tessellation of a spiral with heat distribution."),),
-    "surface_figure": (
-        ("Figure 4.8", "A heat distribution on a complex surface triangular mesh."),
-        ("Figure 4.9", "Diffusion phenomena in the belt area (detail of Fig. 4.8)."),
-    ),
-}
 AGREE = 1e-9  # of the greatest value: what only rounding differs by
 
 
@@ -43,30 +27,56 @@ class Difference(Record):
     measured: str
 
 
-def render(title: str, examples: tuple[Comparison, ...], differences: bool) -> str:
-    """The whole page as text; with ``differences`` the table of where the report's text and listings part."""
-    return template("field_page.html").render(
-        title=title,
-        examples=examples,
-        word=overall(example.word for example in examples),
-        differences=read_differences() if differences else (),
-        figures_of_report=FIGURES,
-        apart=apart,
-        bounds=bounds,
-        seconds=seconds,
-        pivot=pivot,
-        form=form,
-        zip=zip,
-        drawings=field_figures.drawings,
-        convergence=field_figures.convergence,
-    )
+class Caption(Record):
+    """The ``caption`` of a ``figure`` of the report that shows a ``case``: its pictures are not distributed with it."""
+
+    case: str
+    figure: str
+    caption: str
+
+
+def page(title: str, examples: tuple[Comparison, ...]) -> Page:
+    """The page of scalar examples with the table of differences between the report's text and listings."""
+    words = [one.word for one in examples]
+    said = (("", overall(words), f"{words.count('pass')} of {len(words)} pass"),)
+    return Page("examples", title, said, "field_page.html", _contents(examples) | {"differences": read_differences()})
+
+
+def comparison_page(example: Comparison) -> Page:
+    """The page of one scalar example."""
+    said = (("", example.word, apart(example)),)
+    numbers, title = summary(example), example.scene.title
+    contents, rows = _contents((example,)), as_csv(numbers["measures"])
+    return Page("comparison", title, said, "field_page.html", contents, numbers, rows, MEASURES)
+
+
+def _contents(examples: tuple[Comparison, ...]) -> dict[str, Any]:
+    return {
+        "examples": examples,
+        "word": overall(example.word for example in examples),
+        "differences": (),
+        "figures_of_report": _read("figure", Caption),
+        "apart": apart,
+        "bounds": bounds,
+        "seconds": seconds,
+        "pivot": pivot,
+        "form": form,
+        "zip": zip,
+        "drawings": field_figures.drawings,
+        "convergence": field_figures.convergence,
+    }
 
 
 def read_differences() -> tuple[Difference, ...]:
-    """Where the report's text and its listings part, in the order of section 4.6."""
-    path = Path(__file__).with_name("octave_differences.toml")
-    table = tomllib.loads(path.read_text(encoding="utf-8"))
-    return tuple(parse(Difference, row, f"{path}: difference[{i}]") for i, row in enumerate(table["difference"]))
+    """The differences between the report's text and its listings, in the order of section 4.6."""
+    return _read("difference", Difference)
+
+
+def _read[R: Record](table: str, record: type[R]) -> tuple[R, ...]:
+    """The rows of a ``table`` of the file about section 4.6."""
+    path = Path(__file__).with_name("octave_section.toml")
+    rows = tomllib.loads(path.read_text(encoding="utf-8"))[table]
+    return tuple(parse(record, row, f"{path}: {table}[{i}]") for i, row in enumerate(rows))
 
 
 def apart(example: Comparison) -> str:
@@ -81,7 +91,7 @@ def apart(example: Comparison) -> str:
     distance = float(np.abs(other.vertex_values[-1] - reference.vertex_values[-1]).max())
     size = float(np.abs(reference.vertex_values[-1]).max())
     if distance <= AGREE * size:
-        return f"{name} and the equation agree; at the furthest vertex they part by {number(distance)}."
+        return f"{name} and the equation agree; at the furthest vertex they differ by {number(distance)}."
     (low, high), (least, greatest) = bounds(other), bounds(reference)
     compared = (
         f"{number(distance / size)} times as far as the equation's solution gets from zero"
@@ -90,7 +100,7 @@ def apart(example: Comparison) -> str:
     )
     return (
         f"{name} gives {number(low)} to {number(high)}, the equation {number(least)} to {number(greatest)}; "
-        f"at the furthest vertex they part by {number(distance)}, {compared}."
+        f"at the furthest vertex they differ by {number(distance)}, {compared}."
     )
 
 
@@ -102,24 +112,24 @@ def bounds(run: Run) -> tuple[float, float] | tuple[None, None]:
 
 
 def _lost(run: Run) -> bool:
-    """Whether a run failed and has no values that are numbers."""
+    """True for a run that failed and has no values that are numbers."""
     return run.outcome.status != "converged" and not np.isfinite(run.vertex_values[-1]).all()
 
 
 def seconds(run: Run) -> float | None:
-    """What a run took, None where it does not say."""
+    """The time [s] that a run took, None where it does not say."""
     cost = run.outcome.cost
     parts = [value for key, value in cost.items() if key.startswith("seconds_")]
     return sum(parts) if parts else cost.get("seconds")
 
 
 def form(example: Comparison, run: Run) -> str:
-    """Which weak form was solved: what the run says, else that of the problem."""
+    """The weak form that was solved: what the run says, else that of the problem."""
     return str(run.origin.get("form", example.setup.form))
 
 
 def pivot(example: Comparison) -> dict[str, list[float | None]]:
-    """By metric, its value for every run, None where there is none of that run; nothing where the reference failed."""
+    """The values of every run by metric, None where there is none of that run; nothing where the reference failed."""
     if _lost(example.reference):
         return {}
     measured = {"reference": example.changes["reference"]} | example.deviations

@@ -1,6 +1,7 @@
 """Pictures of a comparison: the choice of frames and views, and the job of the program that draws them."""
 
 import logging
+import math
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -8,7 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.colors import to_hex
 
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations import scratch
@@ -16,14 +19,15 @@ from fem_reference.foundations.errors import MissingSoftware
 from fem_reference.foundations.mesh import Floats, Surface
 from fem_reference.foundations.subprocesses import command, environment
 from fem_reference.metrics import find
-from fem_reference.problems.setup import RigidBody, Setup
+from fem_reference.problems.setup import Bone, Setup
 from fem_reference.report import pictures
+from fem_reference.report.drawings import picture_source
 from fem_reference.runs.store import Run
 
 log = logging.getLogger(__name__)
 
 PACKAGES = "libegl1 libegl-mesa0 libgl1-mesa-dri"
-_SECONDS = 600
+SECONDS = 600  # within which it must have drawn
 # Where a surface is as wide along two axes, those of the coordinates are taken: this distinguishes them, far above round-off.
 _TIES = 1e-11
 
@@ -43,6 +47,16 @@ class Shot:
     outline: Floats | None = None
 
 
+@dataclass(frozen=True)
+class Figure:
+    """Two pictures of a run at a frame ``number``, ``top`` the greatest distance [mm] on its colour bar or None."""
+
+    name: str
+    number: int
+    sources: tuple[str, str]
+    top: float | None
+
+
 def shots(comparison: Comparison) -> list[Shot]:
     """The reference at rest and where it moved furthest, and each candidate at its worst frame that can be drawn."""
     reference = comparison.reference
@@ -53,12 +67,30 @@ def shots(comparison: Comparison) -> list[Shot]:
     return chosen + [shot for run in comparison.candidates for shot in _worst(comparison, run)]
 
 
+def figures(setup: Setup, surface: Surface, wanted: list[Shot]) -> tuple[list[Figure], str]:
+    """The figures of ``wanted``, or none and what is missing."""
+    try:
+        drawn = draw(setup, surface, wanted)
+    except MissingSoftware as error:
+        return [], str(error)
+    end = top(wanted)
+    return [
+        Figure(
+            shot.name,
+            shot.number,
+            (picture_source(first), picture_source(second)),
+            end if shot.distances is not None else None,
+        )
+        for shot, (first, second) in zip(wanted, drawn, strict=True)
+    ], ""
+
+
 def draw(setup: Setup, surface: Surface, wanted: list[Shot]) -> list[tuple[bytes, bytes]]:
     """Two WebP pictures of each shot; MissingSoftware where the program that draws them did not get to its end."""
     with scratch.folder() as folder:
         job = folder / "job.npz"
         np.savez(job, top=top(wanted), **_job(setup, surface, wanted))
-        _run(_command(job, folder))
+        _run(program(job, folder))
         names = [[folder / f"{shot}_{view}.webp" for view in (0, 1)] for shot in range(len(wanted))]
         if not all(path.is_file() for pair in names for path in pair):
             raise _missing("it left no pictures")
@@ -70,7 +102,26 @@ def top(wanted: list[Shot]) -> float:
     return max((float(shot.distances.max()) for shot in wanted if shot.distances is not None), default=0.0)
 
 
-def directions(surface: Surface, bones: tuple[RigidBody, ...]) -> Floats:
+def ticks(top: float) -> list[tuple[float, float]]:
+    """Round values from 0 to ``top`` with their share of it, and ``top`` itself.
+
+    >>> ticks(4.6)
+    [(0.0, 0.0), (0.217, 1.0), (0.435, 2.0), (0.652, 3.0), (1.0, 4.6)]
+    """
+    if not top > 0:
+        return [(0.0, 0.0)]
+    power = 10.0 ** math.floor(math.log10(top / 2))
+    step = next(power * factor for factor in (1, 2, 5, 10) if top / (power * factor) <= 6)
+    values = [k * step for k in range(int(top / step) + 1) if k * step < 0.86 * top]
+    return [(round(value / top, 3), value) for value in values] + [(1.0, top)]
+
+
+def ramp() -> str:
+    """The colour map of the pictures as the stops of a CSS gradient."""
+    return ", ".join(to_hex(colour) for colour in mpl.colormaps[pictures.COLOURS](np.linspace(0, 1, 17)))
+
+
+def directions(surface: Surface, bones: tuple[Bone, ...]) -> Floats:
     """Unit vectors (2, 3) towards the cameras: along the smallest and the middle principal axis of the surface.
 
     From the first its silhouette is largest, the second is a quarter turn about its long axis from there. Both cameras
@@ -88,8 +139,8 @@ def directions(surface: Surface, bones: tuple[RigidBody, ...]) -> Floats:
     return np.asarray(views[np.argsort(hidden, kind="stable")[:2]])
 
 
-def _hidden(points: Floats, view: Floats, bones: tuple[RigidBody, ...]) -> bool:
-    """Whether most of ``points`` (n, 3) have a bone of closed form before them within four times ``view`` (3,) to the camera."""
+def _hidden(points: Floats, view: Floats, bones: tuple[Bone, ...]) -> bool:
+    """True where most of ``points`` (n, 3) have a bone of closed form before them within four times ``view`` (3,) to the camera."""
     behind = np.zeros(len(points), bool)
     for solid in (bone.solid for bone in bones if bone.solid is not None):
         for step in np.arange(1, 17) / 4:
@@ -134,7 +185,8 @@ def _job(setup: Setup, surface: Surface, wanted: list[Shot]) -> dict[str, Any]:
     return job
 
 
-def _command(job: Path, folder: Path) -> list[str]:
+def program(job: Path, folder: Path) -> list[str]:
+    """The words that start the program which draws ``job`` into ``folder``."""
     return command(pictures.__file__, str(job), str(folder))
 
 
@@ -144,7 +196,7 @@ def _run(words: list[str]) -> None:
         settings.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     try:
         done = subprocess.run(
-            words, env=settings, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=_SECONDS, check=False
+            words, env=settings, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=SECONDS, check=False
         )
     except (OSError, subprocess.TimeoutExpired) as error:
         raise _missing(str(error)) from error

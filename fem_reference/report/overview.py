@@ -1,4 +1,4 @@
-"""The contents of a case and what came of it, in words and numbers: what ``show``, ``run`` and ``compare`` print."""
+"""A case and its results as lines of text: what ``show``, ``run`` and ``compare`` print."""
 
 import math
 from collections.abc import Iterable
@@ -9,7 +9,6 @@ from fem_reference.assessment import second_check
 from fem_reference.assessment.comparison import Alone, Comparison
 from fem_reference.assessment.error_bars import ErrorBar
 from fem_reference.assessment.judge import Verdict
-from fem_reference.assessment.solver_table import Table
 from fem_reference.metrics import Measure, described, find
 from fem_reference.problems import of_case
 from fem_reference.problems.of_case import CaseSetup
@@ -40,7 +39,7 @@ def _what(expected: Expectation) -> str:
 
 
 def comparison_text(result: Comparison, page: Path | None = None) -> str:
-    """What came of a comparison, line by line: its runs, its worst numbers, its verdicts and its ``page``, if it has one."""
+    """The result of a comparison, line by line: its runs, its worst numbers, its verdicts and its ``page``, if it has one."""
     runs = [
         f"{run.name}: {run.outcome.status}, {run.outcome.message}" for run in (result.reference, *result.candidates)
     ]
@@ -120,23 +119,6 @@ def _bar(result: Comparison, bar: ErrorBar) -> str:
 
 
 def run_text(run: Run, found: Alone) -> str:
-    """What came of a run that nothing was compared with, line by line."""
+    """The result of a run that nothing was compared with, line by line."""
     printed = [f"{run.name}: {run.outcome.status}, {run.outcome.message}", *_measured(run.name, found.measures)]
     return "\n".join([*printed, *map(_judged, found.verdicts), f"stored in {run.folder}"])
-
-
-def ranking_text(table: Table) -> str:
-    """Who stands how on which scene, a line each."""
-    lines = []
-    for one in table.results:
-        found = (one.worst("surface_deviation", "rms"), one.worst("volume", "deviation"))
-        text = [
-            f"{name} {value[0]:.3g} {unit}"
-            for name, unit, value in zip(("surface rms", "volume"), ("mm", "%"), found, strict=True)
-            if value is not None
-        ]
-        if one.seconds_per_frame:
-            text.insert(0, f"{1 / one.seconds_per_frame:.3g} frames/s")
-        known = " (its error bar)" if one.of_reference and one.measures else ""
-        lines.append(f"{one.case}: {one.kind}, {one.name}: {one.outcome.status}, {', '.join(text)}{known}")
-    return "\n".join([*lines, *(f"{case}: left out, {reason}" for case, reason in table.missing.items())])

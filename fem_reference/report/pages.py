@@ -1,17 +1,24 @@
-"""What a page says of itself in its head: the index shows it, and a page is written over only by the command that made it."""
+"""A page as a record, how one is written, and the head in which it describes itself: the index shows that, and a page is
+written over only by the command that made it.
+"""
 
 import base64
 import io
 import json
 import re
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from datetime import datetime
 from html import escape
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 from PIL import Image
+
+from fem_reference.io import files
+from fem_reference.report.drawings import webp
+from fem_reference.report.templates import template
 
 # Where the facts stand in the frame of all pages (base.html), and where the command that made it.
 _FACTS, _ASKED = "<!-- facts of the page -->", "<!-- what was asked -->"
@@ -19,45 +26,83 @@ _BEGIN, _END = '<script type="application/json" id="page-facts">', "</script>"
 _HEAD = 2**17  # bytes of a file within which they are looked for
 _SIDE = 160  # of the small picture
 _PICTURE = re.compile(r'src="data:image/webp;base64,([A-Za-z0-9+/=]+)"')
+Headlines = tuple[tuple[str, str, str], ...]
 
 
-@dataclass(frozen=True)
-class About:
-    """The ``kind`` of a page, its ``title``, and what comes of it: by name a verdict (or none) and a sentence. ``asked``: the
-    command that made it, empty for a page that a program wrote; ``made``: when; ``picture``: the source of a small one, if any.
+@dataclass(frozen=True, eq=False)
+class Page:
+    """The ``kind`` of a page, its ``title``, and its ``headlines``: by name a verdict (or none) and a sentence.
+
+    ``contents`` fill the ``template`` of the page. ``numbers`` are written beside it as JSON, and ``rows`` as CSV, where there are
+    any, under the name of the page or, where they have a name of their own, as ``numbers_name``.
     """
 
     kind: str
     title: str
-    headlines: tuple[tuple[str, str, str], ...]
+    headlines: Headlines
+    template: str
+    contents: dict[str, Any]
+    numbers: Any = None
+    rows: str = ""
+    numbers_name: str = ""
+
+    def html(self) -> str:
+        """The page as text, without its facts in its head."""
+        return template(self.template).render(self.contents | {"title": self.title})
+
+
+@dataclass(frozen=True)
+class PageHead:
+    """The facts of a page in its head: those of its ``Page``; the command that it was ``asked`` by, empty where a program wrote it;
+    when it was ``made``; and the source of a small ``picture``, if it has any.
+    """
+
+    kind: str
+    title: str
+    headlines: Headlines
     asked: str = ""
     made: str = ""
     picture: str = ""
 
 
-def stamped(text: str, about: About) -> str:
-    """A page with its facts in its head, and above its title the command that made it."""
-    about = replace(about, picture=_small(text))
-    if about.asked:
-        about = replace(about, made=datetime.now().astimezone().strftime("%Y-%m-%d %H:%M"))
-    facts = json.dumps(asdict(about)).replace("<", "\\u003c")
-    asked = f'<p class="note"><code>{escape(about.asked)}</code>, {about.made}</p>' if about.asked else ""
-    return text.replace(_FACTS, _BEGIN + facts + _END, 1).replace(_ASKED, asked, 1)
+def write(page: Page, folder: Path, name: str, asked: str = "") -> Path:
+    """Write the page ``name`` and its numbers into ``folder``; its path.
+
+    All files are made before the first is written, and each appears whole or not at all.
+    """
+    beside = page.numbers_name or name
+    texts = {} if page.numbers is None else {f"{beside}.json": json.dumps(page.numbers, indent=1, allow_nan=False)}
+    texts |= {f"{beside}.csv": page.rows} if page.rows else {}
+    texts[f"{name}.html"] = stamped(page, asked)
+    files.make_folder(folder)
+    for file, text in texts.items():
+        files.write_text(folder / file, text)
+    return folder / f"{name}.html"
 
 
-def read(path: Path) -> About | None:
-    """What the page at ``path`` says of itself; None where there is none of ours, or a damaged one."""
+def stamped(page: Page, asked: str = "") -> str:
+    """The page as text with its facts in its head, and above its title the command that made it."""
+    text = page.html()
+    made = datetime.now().astimezone().strftime("%Y-%m-%d %H:%M") if asked else ""
+    head = PageHead(page.kind, page.title, page.headlines, asked, made, small_picture(text))
+    facts = json.dumps(asdict(head)).replace("<", "\\u003c")
+    command = f'<p class="note"><code>{escape(asked)}</code>, {made}</p>' if asked else ""
+    return text.replace(_FACTS, _BEGIN + facts + _END, 1).replace(_ASKED, command, 1)
+
+
+def read(path: Path) -> PageHead | None:
+    """The head of the page at ``path``; None where there is no page of ours, or a damaged one."""
     if not path.is_file():  # a pipe would be waited for
         return None
     try:
         with path.open("rb") as file:
-            head = file.read(_HEAD).decode("utf-8", "ignore")
-        facts = json.loads(head.partition(_BEGIN)[2].partition(_END)[0])
-        found = About(**facts | {"headlines": tuple((name, word, said) for name, word, said in facts["headlines"])})
+            text = file.read(_HEAD).decode("utf-8", "ignore")
+        facts = json.loads(text.partition(_BEGIN)[2].partition(_END)[0])
+        head = PageHead(**facts | {"headlines": tuple((name, word, said) for name, word, said in facts["headlines"])})
     except (OSError, ValueError, TypeError, KeyError, RecursionError):
         return None
-    plain = (found.kind, found.title, found.asked, found.made, found.picture, *sum(found.headlines, ()))
-    return found if all(isinstance(one, str) for one in plain) else None
+    plain = (head.kind, head.title, head.asked, head.made, head.picture, *sum(head.headlines, ()))
+    return head if all(isinstance(one, str) for one in plain) else None
 
 
 def free(where: Callable[[str], Path], name: str, asked: str) -> tuple[str, str]:
@@ -69,22 +114,21 @@ def free(where: Callable[[str], Path], name: str, asked: str) -> tuple[str, str]
         path = where(numbered)
         if not path.exists():
             return numbered, "" if i == 1 else f"{where(name)} is of another command, and stays as it is"
-        about = read(path)
-        if about is not None and about.asked == asked:
-            return numbered, f"written anew: the same command made this page on {about.made}"
+        head = read(path)
+        if head is not None and head.asked == asked:
+            return numbered, f"written anew: the same command made this page on {head.made}"
     raise AssertionError("numbers do not end")
 
 
-def _small(text: str) -> str:
+def small_picture(text: str) -> str:
     """The first picture of a page in small, none where it has none that can be read."""
     found = _PICTURE.search(text)
     if found is None:
         return ""
     try:
         with Image.open(io.BytesIO(base64.b64decode(found[1]))) as picture:
-            small, stored = picture.convert("RGB"), io.BytesIO()
+            small = picture.convert("RGB")
             small.thumbnail((_SIDE, _SIDE))
-            small.save(stored, "WEBP", quality=75, method=4)
+            return webp(small, 75)
     except (OSError, ValueError):
         return ""
-    return f"data:image/webp;base64,{base64.b64encode(stored.getvalue()).decode()}"

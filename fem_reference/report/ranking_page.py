@@ -1,23 +1,19 @@
 """The page ``table-5-1``: speed and precision of solvers, which the report rates with pluses and minuses, in numbers."""
 
-import io
 import math
 from itertools import cycle
 from typing import Any
 
-import matplotlib as mpl
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import LogLocator
 
 from fem_reference.assessment import ranking
 from fem_reference.assessment.solver_table import SolverResult, Table, report_speeds
 from fem_reference.metrics import described
-from fem_reference.report.curves import LOOK, PALETTE, REFERENCE, Curve, inline
+from fem_reference.report.drawings import PALETTE, REFERENCE, Drawing, drawn, logarithmic
+from fem_reference.report.pages import Page
 from fem_reference.report.tables import finite
-from fem_reference.report.templates import template
-from fem_reference.report.words import number
 
 # What is measured: metric, statistic, words above the column, unit.
 COLUMNS = tuple((*key, one.label, one.full_unit) for key, one in described("solvers").items())
@@ -28,16 +24,18 @@ _MARKS = "osD^vPX*<>"
 _MORE = ("#882255", "#999933", "#332288", "#777777")
 
 
-def render(table: Table) -> str:
-    """The whole page as text."""
-    return template("ranking_page.html").render(
-        table=table,
-        columns=COLUMNS,
-        over_all=OVER_ALL,
-        per_second=per_second,
-        report_speeds=report_speeds(),
-        drawing=_drawing(table),
-    )
+def page(table: Table) -> Page:
+    """The page over the kinds of solvers."""
+    contents = {
+        "table": table,
+        "columns": COLUMNS,
+        "over_all": OVER_ALL,
+        "per_second": per_second,
+        "report_speeds": report_speeds(),
+        "drawing": _drawing(table),
+    }
+    said = f"{len(table.results)} results on {len(table.scenarios)} scenes"
+    return Page("ranking", "Table 5.1 in numbers", (("", "", said),), "ranking_page.html", contents, facts(table))
 
 
 def per_second(seconds: float | None) -> float | None:
@@ -67,6 +65,23 @@ def facts(table: Table) -> dict[str, Any]:
     }
 
 
+def text(table: Table) -> str:
+    """The results as lines of text, one for each scene and solver."""
+    lines = []
+    for one in table.results:
+        found = (one.worst("surface_deviation", "rms"), one.worst("volume", "deviation"))
+        text = [
+            f"{name} {value[0]:.3g} {unit}"
+            for name, unit, value in zip(("surface rms", "volume"), ("mm", "%"), found, strict=True)
+            if value is not None
+        ]
+        if one.seconds_per_frame:
+            text.insert(0, f"{1 / one.seconds_per_frame:.3g} frames/s")
+        known = " (its error bar)" if one.of_reference and one.measures else ""
+        lines.append(f"{one.case}: {one.kind}, {one.name}: {one.outcome.status}, {', '.join(text)}{known}")
+    return "\n".join([*lines, *(f"{case}: left out, {reason}" for case, reason in table.missing.items())])
+
+
 def _row(one: SolverResult) -> dict[str, Any]:
     worst = {}
     for metric, statistic, _, unit in COLUMNS:
@@ -81,24 +96,21 @@ def _row(one: SolverResult) -> dict[str, Any]:
     }
 
 
-def _drawing(table: Table) -> Curve:
+def _drawing(table: Table) -> Drawing:
     """Deviation of the surface against the time of a frame, everybody on every scene."""
-    title = "Surface deviation (rms, worst frame) against the time for a frame number"
-    with mpl.rc_context(LOOK):
-        figure = Figure(figsize=(9.6, 4.6), layout="constrained")
-        FigureCanvasSVG(figure)
-        axes = figure.add_subplot()
-        shown = [one for one in table.results if _place(one) is not None]
-        colours = _colours(table)
-        for one in shown:
-            x, y = _place(one)  # type: ignore[misc]
+
+    def draw(figure: Figure, axes: Axes) -> None:
+        shown = [(one, place) for one in table.results if (place := _place(one)) is not None]
+        colours, cases = _colours(table), [scenario.case for scenario in table.scenarios]
+        for one, (x, y) in shown:
             look: dict[str, Any] = {"markerfacecolor": "white"} if one.of_reference else {}
-            mark = _MARKS[[scenario.case for scenario in table.scenarios].index(one.case) % len(_MARKS)]
+            mark = _MARKS[cases.index(one.case) % len(_MARKS)]
             axes.plot([x], [y], mark, color=colours[_label_of(one)], markersize=7, alpha=0.85, **look)
-        _label(figure, axes, table, [name for name in colours if any(_label_of(one) == name for one in shown)])
-        text = io.StringIO()
-        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
-    return Curve(title, inline(text.getvalue(), "ranking", title))
+        _label(figure, axes, table, [name for name in colours if any(_label_of(one) == name for one, _ in shown)])
+
+    return drawn(
+        "ranking", "Surface deviation (rms, worst frame) against the time for a frame number", (9.6, 4.6), draw
+    )
 
 
 def _colours(table: Table) -> dict[str, str]:
@@ -108,7 +120,7 @@ def _colours(table: Table) -> dict[str, str]:
 
 
 def _label_of(one: SolverResult) -> str:
-    """What distinguishes a solver from all others: somebody else's may have the name of one of ours."""
+    """The name of a solver, with its kind where it is somebody else's, which may have the name of one of ours."""
     ours = one.of_reference or one.solver != "recorded"
     return one.name if ours else f"{one.name} ({one.kind.lower()})"
 
@@ -122,12 +134,9 @@ def _place(one: SolverResult) -> tuple[float, float] | None:
 
 def _label(figure: Figure, axes: Axes, table: Table, names: list[str]) -> None:
     """Axes in the words of the table; a legend of colours and one of marks."""
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    logarithmic(axes)
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.set_major_formatter(FuncFormatter(lambda value, _: number(value)))
-        axis.set_minor_formatter(NullFormatter())
     axes.set_xlabel("time for a frame number, ms")
     axes.set_ylabel("% of the greatest displacement")
     colours = _colours(table)

@@ -6,6 +6,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from fem_reference.assessment.regression import WORST_FIRST, Check, Judgement, Question
+from fem_reference.report.tables import finite
 
 # A pull request is read by people: the worst judgements, and how many there are.
 MOST_ROWS = 15
@@ -13,7 +14,7 @@ _COLUMNS = ("verdict", "question", "statistic", "frame", "was", "now", "allowed"
 
 
 def facts(check: Check) -> dict[str, Any]:
-    """What ``--json`` writes: the verdict and every judgement; a number that does not exist is None."""
+    """The verdict and every judgement as valid JSON; a number that does not exist is None."""
     return {
         "case": check.case,
         "candidate": check.candidate,
@@ -29,10 +30,10 @@ def facts(check: Check) -> dict[str, Any]:
                 "statistic": one.name,
                 "unit": one.unit,
                 "frame": one.frame,
-                "was": _null(one.was),
-                "current": _null(one.current),
-                "allowed": _null(one.allowed),
-                "known_to": _null(one.known),
+                "was": finite(one.was),
+                "current": finite(one.current),
+                "allowed": finite(one.allowed),
+                "known_to": finite(one.known),
                 "why": one.why,
             }
             for one in check.judgements
@@ -41,7 +42,7 @@ def facts(check: Check) -> dict[str, Any]:
 
 
 def text(check: Check) -> str:
-    """What is printed: the worst failures, why nothing can be said of others, and the verdict."""
+    """The worst failures as lines of text, why others are inconclusive, and the verdict."""
     lines = _most([f"fail: {_named(one)} at frame {one.frame}: {one.why}" for one in _of(check, "fail")])
     silent: dict[str, list[str]] = {}
     for one in _of(check, "inconclusive"):
@@ -81,15 +82,13 @@ def junit(check: Check, seconds: float) -> str:
     """
     counts = {"tests": len(check.judgements), "failures": check.count("fail"), "errors": 0}
     counts |= {"skipped": check.count("inconclusive")}
-    totals = {name: str(count) for name, count in counts.items()} | {"time": f"{seconds:.3f}"}
-    root = ElementTree.Element("testsuites", totals)
-    suite = ElementTree.SubElement(root, "testsuite", {"name": f"{check.case}.{check.candidate}"} | totals)
+    name = f"{check.case}.{check.candidate}"
+    root, suite = _suite(name, {key: str(count) for key, count in counts.items()} | {"time": f"{seconds:.3f}"})
     properties = ElementTree.SubElement(suite, "properties")
-    for name, value in (("verdict", check.word), *(("doubt", why) for why in check.doubts)):
-        ElementTree.SubElement(properties, "property", {"name": name, "value": value})
+    for key, value in (("verdict", check.word), *(("doubt", why) for why in check.doubts)):
+        ElementTree.SubElement(properties, "property", {"name": key, "value": value})
     for one in check.judgements:
-        case = {"classname": f"{check.case}.{check.candidate}", "name": _named(one), "time": "0"}
-        element = ElementTree.SubElement(suite, "testcase", case)
+        element = ElementTree.SubElement(suite, "testcase", {"classname": name, "name": _named(one), "time": "0"})
         if one.word != "pass":
             kind = "failure" if one.word == "fail" else "skipped"
             message = {"message": f"frame {one.frame}: {one.why}"}
@@ -98,13 +97,12 @@ def junit(check: Check, seconds: float) -> str:
             )
     if check.notes:
         ElementTree.SubElement(suite, "system-out").text = "\n".join(check.notes)
-    ElementTree.indent(root, " ")
-    return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+    return _xml(root)
 
 
 @dataclass(frozen=True)
 class Lost:
-    """What ``junit`` and ``markdown`` say where nothing could be judged."""
+    """The texts of ``junit`` and ``markdown`` where nothing could be judged."""
 
     junit: str
     markdown: str
@@ -113,14 +111,22 @@ class Lost:
 def lost(case: str, candidate: str, why: list[str]) -> Lost:
     """A suite with one error, and a headline, with ``why`` nothing could be judged: what an earlier check left would mislead."""
     name, reasons = f"{case}.{candidate}", "\n".join(why)
-    counts = {"tests": "1", "failures": "0", "errors": "1", "skipped": "0"}
-    root = ElementTree.Element("testsuites", counts)
-    suite = ElementTree.SubElement(root, "testsuite", {"name": name} | counts)
+    root, suite = _suite(name, {"tests": "1", "failures": "0", "errors": "1", "skipped": "0"})
     element = ElementTree.SubElement(suite, "testcase", {"classname": name, "name": "solvers", "time": "0"})
     ElementTree.SubElement(element, "error", {"message": why[0]}).text = reasons
-    ElementTree.indent(root, " ")
     lines = [f"### failed: {_escaped(candidate)} on {_escaped(case)}", "", *(f"- {reason}" for reason in why)]
-    return Lost(ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n", "\n".join(lines) + "\n")
+    return Lost(_xml(root), "\n".join(lines) + "\n")
+
+
+def _suite(name: str, counts: dict[str, str]) -> tuple[ElementTree.Element, ElementTree.Element]:
+    """The root of a JUnit file and the one suite in it, with ``counts`` at both."""
+    root = ElementTree.Element("testsuites", counts)
+    return root, ElementTree.SubElement(root, "testsuite", {"name": name} | counts)
+
+
+def _xml(root: ElementTree.Element) -> str:
+    ElementTree.indent(root, " ")
+    return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
 
 
 def _of(check: Check, word: str) -> list[Judgement]:
@@ -166,7 +172,3 @@ def _text(value: float, unit: str) -> str:
 
 def _escaped(cell: str) -> str:
     return cell.replace("|", "\\|")
-
-
-def _null(value: float) -> float | None:
-    return value if math.isfinite(value) else None

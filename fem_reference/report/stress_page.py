@@ -1,16 +1,15 @@
 """The page of hard cases: a matrix of cases by solvers, and what happened in each cell."""
 
-import base64
-import io
-from html import escape
+from typing import Any
 
 import numpy as np
 from PIL import Image, ImageDraw
 
+from fem_reference.assessment import stress
 from fem_reference.assessment.stress import VERDICTS, History, Scene, Stress
 from fem_reference.foundations.mesh import normals
-from fem_reference.report.templates import template
-from fem_reference.report.words import number
+from fem_reference.report.drawings import webp
+from fem_reference.report.pages import Page
 
 _MARKS = {"ok": "✓", "degraded": "~", "failed": "✗", "refused": "\N{EN DASH}", "inconclusive": "?"}
 _SIDE, _OVERSAMPLING = 220, 2
@@ -24,37 +23,38 @@ _PAPER, _LIT, _DARK, _BACK, _EDGE, _MARK = (
     (60, 30, 26),
     "#1f4fd8",
 )
-_WIDTH, _HEIGHT, _LEFT, _BELOW = 300, 150, 52, 30
+_LEFT, _RIGHT, _TOP, _FLOOR = 52, 290, 8, 120  # of the axes in a drawing of 300 by 150
 
 
-def render(stress: Stress) -> str:
-    """The whole page as text."""
-    return template("stress_page.html").render(
-        stress=stress,
-        title="Hard cases",
-        verdicts=VERDICTS,
-        marks=_MARKS,
-        summary=summary(stress),
-        picture=picture,
-        curve=curve,
-    )
+def page(found: Stress) -> Page:
+    """The page of hard cases."""
+    contents = {
+        "stress": found,
+        "verdicts": VERDICTS,
+        "marks": _MARKS,
+        "summary": summary(found),
+        "picture": picture,
+        "history": history,
+    }
+    said = (("", "", summary(found)),)
+    return Page("hard cases", "Hard cases", said, "stress_page.html", contents, stress.facts(found))
 
 
-def summary(stress: Stress) -> str:
-    """How many cells there are of each verdict, in words."""
-    counts = [sum(cell.verdict == verdict for cell in stress.cells) for verdict in VERDICTS]
+def summary(found: Stress) -> str:
+    """The number of cells of each verdict, in words."""
+    counts = [sum(cell.verdict == verdict for cell in found.cells) for verdict in VERDICTS]
     parts = ", ".join(f"{count} {verdict}" for count, verdict in zip(counts, VERDICTS, strict=True))
-    return f"{len(stress.cases)} hard cases by {len(stress.solvers)} solvers: {parts}"
+    return f"{len(found.cases)} hard cases by {len(found.solvers)} solvers: {parts}"
 
 
-def text(stress: Stress) -> str:
-    """What is printed: the matrix as lines, and a sentence for all that is not ok."""
-    width = max((len(case.name) for case in stress.cases), default=0)
-    lines = [summary(stress)]
-    for case in stress.cases:
-        found = [stress.at(case.name, solver) for solver in stress.solvers]
-        lines.append(f"{case.name:{width}}  " + "  ".join(f"{cell.solver} {cell.verdict}" for cell in found))
-        lines += [f"  {cell.solver}: {cell.sentence}" for cell in found if cell.verdict not in ("ok", "refused")]
+def text(found: Stress) -> str:
+    """The matrix as lines of text, and a sentence for all that is not ok."""
+    width = max((len(case.name) for case in found.cases), default=0)
+    lines = [summary(found)]
+    for case in found.cases:
+        cells = [found.at(case.name, solver) for solver in found.solvers]
+        lines.append(f"{case.name:{width}}  " + "  ".join(f"{cell.solver} {cell.verdict}" for cell in cells))
+        lines += [f"  {cell.solver}: {cell.sentence}" for cell in cells if cell.verdict not in ("ok", "refused")]
     return "\n".join(lines)
 
 
@@ -84,54 +84,40 @@ def picture(scene: Scene) -> str:
         x, y = (np.array([x, y]) - (low + high) / 2) * scale + side / 2
         for radius in (16, 17, 18):
             draw.ellipse((x - radius, y - radius, x + radius, y + radius), outline=_MARK)
-    out = io.BytesIO()
-    image.resize((_SIDE, _SIDE), Image.Resampling.LANCZOS).save(out, "WEBP", quality=80, method=4)
-    return f"data:image/webp;base64,{base64.b64encode(out.getvalue()).decode()}"
+    return webp(image.resize((_SIDE, _SIDE), Image.Resampling.LANCZOS), 80)
 
 
 def _colour(facing: float) -> tuple[int, int, int]:
-    """Of a triangle whose normal has this component along the view: below 0 its outer side is seen."""
+    """The colour of a triangle whose normal has this component along the view: below 0 its outer side is seen."""
     if facing > 0:
         return _BACK
     red, green, blue = (round(dark + (lit - dark) * -facing) for dark, lit in zip(_DARK, _LIT, strict=True))
     return red, green, blue
 
 
-def curve(history: History, bound: float) -> str:
-    """A quantity over frames as SVG, with what a healthy run keeps below as a broken line; logarithmic where it spans decades."""
-    values = np.asarray(history.values, float)
-    shown = np.where(np.isfinite(values), values, np.nan)
-    top = float(np.nanmax(np.append(shown, bound), initial=0.0))
-    logarithmic = top > 30 * bound > 0
-    low = bound / 30 if logarithmic else 0.0
+def history(of: History, bound: float) -> dict[str, Any]:
+    """A quantity over frames as its drawing shows it: the title, the ``points`` and the places that are ``lost``, the height of the
+    ``limit``, which a healthy run keeps below, and both ends of the axes; logarithmic where it spans decades.
+    """
+    values = np.asarray(of.values, float)
+    known = np.isfinite(values)
+    top = float(np.max(np.append(values[known], bound), initial=0.0))
+    far = top > 30 * bound > 0
+    low = bound / 30 if far else 0.0
 
     def height(value: float) -> float:
         share = value / top if top > 0 else 0.0
-        if logarithmic:
+        if far:
             share = np.log(max(value, low) / low) / np.log(top / low)
-        return 8 + (_HEIGHT - _BELOW - 8) * (1 - float(np.clip(share, 0, 1)))
+        return _TOP + (_FLOOR - _TOP) * (1 - float(np.clip(share, 0, 1)))
 
-    first, last = history.numbers[0], history.numbers[-1]
-
-    def along(frame: float) -> float:
-        return _LEFT + (_WIDTH - _LEFT - 10) * (frame - first) / max(last - first, 1)
-
-    dots = [f"{along(n):.1f},{height(v):.1f}" for n, v in zip(history.numbers, shown, strict=True) if np.isfinite(v)]
-    lost = [
-        f'<text x="{along(n):.1f}" y="20" class="lost">✗</text>'
-        for n, v in zip(history.numbers, shown, strict=True)
-        if not np.isfinite(v)
-    ]
-    limit, floor = height(bound), _HEIGHT - _BELOW
-    title = escape(f"{history.quantity.replace('_', ' ')}{', ' + history.unit if history.unit else ''}")
-    return (
-        f'<svg viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" aria-label="{title} over frames" class="history">'
-        f'<path d="M{_LEFT} 8V{floor}H{_WIDTH - 10}" class="axis"/>'
-        f'<path d="M{_LEFT} {limit:.1f}H{_WIDTH - 10}" class="limit"/>'
-        f'<polyline points="{" ".join(dots)}" class="line"/>{"".join(lost)}'
-        f'<text x="{_LEFT - 4}" y="{height(top) + 4:.1f}" class="end">{number(top)}</text>'
-        f'<text x="{_LEFT - 4}" y="{floor}" class="end">{number(low)}</text>'
-        f'<text x="{_LEFT}" y="{_HEIGHT - 16}">{first}</text>'
-        f'<text x="{_WIDTH - 10}" y="{_HEIGHT - 16}" class="end">{last}</text>'
-        f'<text x="{(_LEFT + _WIDTH) / 2}" y="{_HEIGHT - 4}" class="middle">{title} over frames</text></svg>'
-    )
+    first, last = of.numbers[0], of.numbers[-1]
+    along = [_LEFT + (_RIGHT - _LEFT) * (frame - first) / max(last - first, 1) for frame in of.numbers]
+    return {
+        "title": f"{of.quantity.replace('_', ' ')}{', ' + of.unit if of.unit else ''}",
+        "points": [(x, height(value)) for x, value in zip(along, values, strict=True) if np.isfinite(value)],
+        "lost": [x for x, one in zip(along, known, strict=True) if not one],
+        "limit": height(bound),
+        "frames": (first, last),
+        "ends": ((low, _FLOOR), (top, height(top) + 4)),
+    }

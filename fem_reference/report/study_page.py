@@ -8,6 +8,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from fem_reference.assessment import cost_study
 from fem_reference.assessment.claims import Cover
 from fem_reference.assessment.cost_study import CaseStudy, Study
 from fem_reference.assessment.fronts import (
@@ -26,9 +27,10 @@ from fem_reference.assessment.transfer import transfers
 from fem_reference.metrics import described
 from fem_reference.report.claims_page import UNITS as CLAIMED_UNITS
 from fem_reference.report.claims_page import drawing as claims_drawing
-from fem_reference.report.curves import BAND, PALETTE, Curve, drawn, logarithmic
-from fem_reference.report.templates import template
-from fem_reference.report.words import duration, listed, number, words
+from fem_reference.report.drawings import BAND, PALETTE, Drawing, drawn, logarithmic
+from fem_reference.report.pages import Page
+from fem_reference.report.words import duration, listed, number
+from fem_reference.report.words import title_of as in_words
 
 REFERENCE = "fenicsx"
 TIME = "seconds_per_frame"
@@ -39,34 +41,32 @@ MATCHED = (TIME, "peak_memory_mb", "unknowns")
 _COLOURS = ("#222222", *PALETTE, "#7f7f7f", "#8c564b", "#17becf")
 
 
-def render(study: Study) -> str:
-    """The whole page as text."""
+def page(study: Study) -> Page:
+    """The page of what accuracy costs."""
     moved = transfers(study.cases, MAIN) if len(study.cases) > 1 else ()
-    return template("study_page.html").render(
-        study=study,
-        title=title(study),
-        shown=SHOWN,
-        main=MAIN,
-        time=TIME,
-        costs=COSTS,
-        solvers=solvers,
-        fronts=fronts,
-        sentences=sentences,
-        matched=matched,
-        left_out=left_out,
-        title_of=title_of,
-        as_measured=as_measured,
-        data=json.dumps(_data(study)).replace("<", "\\u003c"),
-        cover=lambda case: Cover.of(case.claims),
-        claims=lambda case: [claims_drawing(case.claims, metric, case.case) for metric in CLAIMED_UNITS],
-        transfers=moved,
-        losses=sorted(one.loss for one in moved),
-    )
-
-
-def title(study: Study) -> str:
-    """The title of the page."""
-    return "What accuracy costs" + (f": {study.cases[0].title}" if len(study.cases) == 1 else "")
+    cases = [cost_study.facts(case, study.origin) for case in study.cases]
+    contents = {
+        "study": study,
+        "shown": SHOWN,
+        "main": MAIN,
+        "costs": COSTS,
+        "solvers": solvers,
+        "fronts": fronts,
+        "sentences": sentences,
+        "matched": matched,
+        "left_out": left_out,
+        "title_of": title_of,
+        "as_measured": as_measured,
+        "data": json.dumps(_data(study)).replace("<", "\\u003c"),
+        "cover": lambda case: Cover.of(case.claims),
+        "claims": lambda case: [claims_drawing(case.claims, metric, case.case) for metric in CLAIMED_UNITS],
+        "transfers": moved,
+        "losses": sorted(one.loss for one in moved),
+    }
+    one = cases[0] if len(cases) == 1 else None
+    said = tuple(("" if one else case.case, "", text) for case in study.cases for text in sentences(case)[-1:])
+    title = "What accuracy costs" + (f": {study.cases[0].title}" if one else "")
+    return Page("study", title, said, "study_page.html", contents, one or cases)
 
 
 def title_of(name: str) -> str:
@@ -75,11 +75,11 @@ def title_of(name: str) -> str:
     >>> title_of("surface_deviation.rms"), title_of("seconds_per_frame")
     ('surface deviation, rms', 'time of a frame')
     """
-    return COSTS[name][0] if name in COSTS else ", ".join(map(words, name.split(".")))
+    return COSTS[name][0] if name in COSTS else in_words(name)
 
 
 def sentences(case: CaseStudy, error: str = MAIN) -> list[str]:
-    """What a case says about the price of accuracy."""
+    """The price of accuracy on a case, in sentences."""
     unit, points = case.units[error], case.counted
     prices = {solver: found for solver in solvers(points) if (found := price(points, solver, error, TIME))}
     said = [_sentence(one, unit, case.bars.get(error, 0.0)) for one in prices.values()]
@@ -126,17 +126,17 @@ def left_out(case: CaseStudy) -> list[Point]:
     return [point for point in case.points if point.status != "converged"]
 
 
-def fronts(case: CaseStudy) -> list[Curve]:
+def fronts(case: CaseStudy) -> list[Drawing]:
     """Error against time, a drawing for each of the statistics shown."""
     return [_front(case, error) for error in SHOWN]
 
 
-def _front(case: CaseStudy, error: str) -> Curve:
+def _front(case: CaseStudy, error: str) -> Drawing:
     title = title_of(error).capitalize()
 
     def draw(figure: Figure, axes: Axes) -> None:
         for i, solver in enumerate(solvers(case.points)):
-            pairs = [pair for pair in _shown(case) if pair[0].solver == solver]
+            pairs = [pair for pair in shown_points(case) if pair[0].solver == solver]
             _draw(axes, pairs, error, solver, _COLOURS[i % len(_COLOURS)])
         logarithmic(axes)
         if (bar := case.bars.get(error, 0.0)) > 0:
@@ -150,7 +150,7 @@ def _front(case: CaseStudy, error: str) -> Curve:
     return drawn(f"front-{case.case}-{error.replace('.', '-')}", title, (4.9, 4.2), draw)
 
 
-def _shown(case: CaseStudy) -> list[tuple[Point, Point]]:
+def shown_points(case: CaseStudy) -> list[tuple[Point, Point]]:
     """The points as drawings show them, below the truth's bar too where they were measured there, and as they count."""
     return [
         (replace(point, errors=point.errors or counted.errors), counted)
@@ -158,49 +158,36 @@ def _shown(case: CaseStudy) -> list[tuple[Point, Point]]:
     ]
 
 
-def _draw(axes: Any, points: Sequence[tuple[Point, Point]], error: str, solver: str, colour: str) -> None:
+def _draw(axes: Axes, points: Sequence[tuple[Point, Point]], error: str, solver: str, colour: str) -> None:
     """The points of a solver as they are shown, its front as they count as a line, its default settings as rings."""
     pairs = [(point, pair) for point, _ in points if (pair := point.at(error, TIME))]
     if not pairs:
         return
-    axes.plot(
-        [pair[1] for _, pair in pairs], [pair[0] for _, pair in pairs], ".", color=colour, markersize=5, label=solver
-    )
     best = pareto((counted for _, counted in points), error, TIME)
-    front = [pair for point in best if (pair := point.at(error, TIME))]
-    axes.plot([pair[1] for pair in front], [pair[0] for pair in front], "-", color=colour, linewidth=1.2)
+    _plot(axes, [pair for _, pair in pairs], ".", color=colour, markersize=5, label=solver)
+    _plot(axes, [pair for point in best if (pair := point.at(error, TIME))], "-", color=colour, linewidth=1.2)
     rings = [pair for point, pair in pairs if point.is_default]
-    axes.plot(
-        [pair[1] for pair in rings], [pair[0] for pair in rings], "o", color=colour, markersize=9, fillstyle="none"
-    )
+    _plot(axes, rings, "o", color=colour, markersize=9, fillstyle="none")
+
+
+def _plot(axes: Axes, pairs: list[tuple[float, float]], *style: str, **look: Any) -> None:
+    """Pairs of an error and a cost, the cost along the axis."""
+    axes.plot([cost for _, cost in pairs], [error for error, _ in pairs], *style, **look)
 
 
 def _data(study: Study) -> dict[str, Any]:
-    """What the drawing with free axes draws."""
-    return {
-        "costs": COSTS,
-        "reference": REFERENCE,
-        "colours": _COLOURS,
-        "cases": [
-            {
-                "case": case.case,
-                "units": case.units,
-                "bars": case.bars,
-                "points": [
-                    {
-                        "solver": one.solver,
-                        "label": one.label,
-                        "default": one.is_default,
-                        "errors": one.errors,
-                        "costs": one.costs,
-                    }
-                    for one, _ in _shown(case)
-                    if one.status == "converged"
-                ],
-            }
-            for case in study.cases
-        ],
-    }
+    """The contents of the drawing with free axes."""
+
+    def facts(one: Point) -> dict[str, Any]:
+        named = {name: getattr(one, name) for name in ("solver", "label", "errors", "costs")}
+        return named | {"default": one.is_default}
+
+    cases = [
+        {"case": case.case, "units": case.units, "bars": case.bars}
+        | {"points": [facts(one) for one, _ in shown_points(case) if one.status == "converged"]}
+        for case in study.cases
+    ]
+    return {"costs": COSTS, "reference": REFERENCE, "colours": _COLOURS, "cases": cases}
 
 
 def text(study: Study) -> str:

@@ -15,6 +15,7 @@ from fem_reference.metrics import Measure, described
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Case
 
+MEASURES = "measures"  # the name of the files
 COLUMNS = ("candidate", "metric", "statistic", "frame", "value", "unit")
 # The columns of the first table: metric, statistic, the words above a group and above the column, unit.
 DEVIATIONS = tuple((*key, one.title, one.part, one.unit) for key, one in described("table").items())
@@ -30,7 +31,7 @@ def summary(comparison: Comparison) -> dict[str, Any]:
     """
     reference = comparison.reference
     deviations = [row for run in comparison.candidates for row in rows(run, comparison.deviations[run.name])]
-    from_rest = {run.name: rows(run, comparison.changes[run.name]) for run in runs(comparison)}
+    from_rest = {run.name: rows(run, comparison.changes[run.name]) for run in comparison.runs}
     facts = {
         "case": comparison.scene.name,
         "solver": reference.solver,
@@ -39,7 +40,7 @@ def summary(comparison: Comparison) -> dict[str, Any]:
         "verdict": comparison.word,
         "doubts": comparison.doubts,
         "second_check": reference.origin.get(second_check.RECORD, {}),
-        "cost": {run.name: {key: finite(value) for key, value in run.outcome.cost.items()} for run in runs(comparison)},
+        "cost": {run.name: {key: finite(value) for key, value in run.outcome.cost.items()} for run in comparison.runs},
         "measures": from_rest[reference.name] + rows(reference, inversion(reference)) + deviations,
         "from_rest": [row for rows in from_rest.values() for row in rows],
         "verdicts": [_verdict(verdict) for verdict in comparison.verdicts],
@@ -50,7 +51,7 @@ def summary(comparison: Comparison) -> dict[str, Any]:
 
 
 def of_run(case: Case, run: Run, found: Alone) -> dict[str, Any]:
-    """What came of a ``run`` that nothing was compared with, in the words of :func:`summary`."""
+    """The result of a ``run`` that nothing was compared with, in the words of :func:`summary`."""
     return {
         "case": case.name,
         "solver": run.solver,
@@ -71,11 +72,6 @@ def as_csv(rows: Iterable[dict[str, Any]]) -> str:
     writer.writeheader()
     writer.writerows(rows)
     return text.getvalue()
-
-
-def runs(comparison: Comparison) -> tuple[Run, ...]:
-    """The reference and its candidates."""
-    return comparison.runs
 
 
 def finite(value: float) -> float | None:

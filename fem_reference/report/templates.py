@@ -16,7 +16,7 @@ def template(name: str) -> jinja2.Template:
 
 @cache
 def _environment() -> jinja2.Environment:
-    """Where a template is compiled when it is first asked for."""
+    """The environment of the templates, each of which is compiled when it is first asked for."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent),
         autoescape=True,

@@ -1,21 +1,17 @@
 """Drawings of the verification catalogue as SVG to stand inside its page."""
 
-import io
 import math
-from collections.abc import Callable
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, LogLocator, NullFormatter, NullLocator
 
 from fem_reference.assessment.catalogue import Result
 from fem_reference.foundations.mesh import Floats
-from fem_reference.report.curves import LOOK, PALETTE, Curve, inline
+from fem_reference.report.drawings import PALETTE, Drawing, drawn
 from fem_reference.report.words import number, words
 
 PASS, FAIL = "#14713a", "#b3261e"
@@ -30,14 +26,14 @@ def share(one: Result) -> float:
     return one.error * math.inf if one.error else 0.0
 
 
-def overview(groups: dict[str, list[Result]]) -> Curve:
+def overview(groups: dict[str, list[Result]]) -> Drawing:
     """The error of every result as a share of its tolerance, group by group."""
     results = [one for group in groups.values() for one in group]
     shown = [share(one) for one in results if LEAST <= share(one) <= GREATEST]
     low = 10.0 ** math.floor(math.log10(min([0.1, *shown]))) / 3
     high = 10.0 ** math.ceil(math.log10(max([3.0, *shown])))
 
-    def draw(axes: Axes) -> None:
+    def draw(figure: Figure, axes: Axes) -> None:
         row = 0
         for group, members in groups.items():
             axes.text(
@@ -52,11 +48,11 @@ def overview(groups: dict[str, list[Result]]) -> Curve:
                 _dot(axes, place, one, (low, high))
             row += len(members) + 1
         axes.set_ylim(row - 0.3, -0.7)
-        _style_overview(axes, (low, high))
+        _style_overview(figure, axes, (low, high))
 
     rows = len(results) + len(groups)
     title = "Error as a share of what is allowed"
-    return _drawing("verify-overview", title, (9.6, 0.9 + _ROW * rows), draw)
+    return drawn("verify-overview", title, (9.6, 0.9 + _ROW * rows), draw)
 
 
 def _dot(axes: Axes, row: int, one: Result, limits: tuple[float, float]) -> None:
@@ -72,7 +68,7 @@ def _dot(axes: Axes, row: int, one: Result, limits: tuple[float, float]) -> None
         axes.plot([min(max(value, low), high)], [row], "<" if value <= low else ">", markerfacecolor="white", **look)
 
 
-def _style_overview(axes: Axes, limits: tuple[float, float]) -> None:
+def _style_overview(figure: Figure, axes: Axes, limits: tuple[float, float]) -> None:
     axes.axvspan(1.0, limits[1], color=FAIL, alpha=0.05, linewidth=0)
     axes.axvline(1.0, color=FAIL, linewidth=1.4)
     axes.set_xscale("log")
@@ -95,22 +91,20 @@ def _style_overview(axes: Axes, limits: tuple[float, float]) -> None:
         Line2D([], [], linestyle="", marker=mark, color=colour, markerfacecolor=inner, label=label, markersize=5.5)
         for label, (mark, colour, inner) in marks.items()
     ]
-    figure = axes.get_figure()
-    assert isinstance(figure, Figure)
     figure.legend(handles=handles, loc="outside upper left", ncols=6, handlelength=1, columnspacing=1.4)
 
 
 def drawable(one: Result) -> bool:
-    """Whether there are two meshes or more whose errors can stand on a logarithmic axis."""
+    """True with two meshes or more whose errors can stand on a logarithmic axis."""
     return len(_errors(one)[0]) > 1
 
 
-def convergence(one: Result) -> Curve:
+def convergence(one: Result) -> Drawing:
     """Error over mesh size on logarithmic axes, beside the whole power that is nearest to its order."""
     sizes, errors = _errors(one)
     order = one.finding.order
 
-    def draw(axes: Axes) -> None:
+    def draw(_: Figure, axes: Axes) -> None:
         known = order is not None and math.isfinite(order)
         axes.loglog(sizes, errors, "o-", color=PALETTE[0], label=f"order {number(order)}" if known else "no order")
         if known and order is not None and round(order) > 0:
@@ -124,7 +118,7 @@ def convergence(one: Result) -> Curve:
         axes.set_ylabel(f"error [{one.entry.unit}]")
         axes.legend(handlelength=2)
 
-    return _drawing(f"ladder-{one.entry.name}", one.entry.name, (3.7, 2.7), draw)
+    return drawn(f"ladder-{one.entry.name}", one.entry.name, (3.7, 2.7), draw)
 
 
 def _errors(one: Result) -> tuple[Floats, Floats]:
@@ -133,13 +127,3 @@ def _errors(one: Result) -> tuple[Floats, Floats]:
     errors = np.abs(values - one.truth)
     kept = np.isfinite(errors) & (errors > 0)
     return sizes[kept], errors[kept]
-
-
-def _drawing(name: str, title: str, size: tuple[float, float], draw: Callable[[Axes], None]) -> Curve:
-    with mpl.rc_context(LOOK):
-        figure = Figure(figsize=size, layout="constrained")
-        FigureCanvasSVG(figure)
-        draw(figure.add_subplot())
-        text = io.StringIO()
-        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
-    return Curve(title, inline(text.getvalue(), name, title))

@@ -1,67 +1,34 @@
-"""The page of the verification catalogue. It contains everything itself, and reads without a network."""
+"""The page of the verification catalogue."""
 
 import math
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any
 
-from fem_reference.assessment.catalogue import Result
+from fem_reference.assessment.catalogue import Result, Verification
 from fem_reference.report import verify_figures
+from fem_reference.report.pages import Page
 from fem_reference.report.tables import finite
-from fem_reference.report.templates import template
 from fem_reference.report.words import duration
 
 _HEADS = ("entry", "value", "truth", "unit", "error", "within", "order", "seconds", "verdict")
 
 
-@dataclass(frozen=True, eq=False)
-class Verification:
-    """What came of entries of the catalogue: ``results`` in its order, the wall time in ``seconds``, and ``versions`` of what
-    they were made with.
-    """
-
-    results: tuple[Result, ...]
-    seconds: float
-    versions: dict[str, str]
-
-    @property
-    def failed(self) -> tuple[Result, ...]:
-        """The results that do not pass."""
-        return tuple(one for one in self.results if one.word != "pass")
-
-    @property
-    def word(self) -> str:
-        """Pass or fail."""
-        return "fail" if self.failed else "pass"
-
-    @property
-    def summary(self) -> str:
-        """The verdict in one line."""
-        passed, controls = len(self.results) - len(self.failed), sum(one.with_negative_control for one in self.results)
-        note = f", {controls} measured with their negative control" if controls else ""
-        return f"verdict: {self.word}, {passed} of {len(self.results)} pass{note}, {self.seconds:.0f} s"
-
-    @property
-    def groups(self) -> dict[str, list[Result]]:
-        """The results by group, in the order of the catalogue."""
-        found: dict[str, list[Result]] = {}
-        for one in self.results:
-            found.setdefault(one.entry.group, []).append(one)
-        return found
-
-
-def render(verification: Verification) -> str:
-    """The whole page as text."""
+def page(verification: Verification) -> Page:
+    """The page of the results of entries."""
     results = verification.results
-    return template("verify_page.html").render(
-        verification=verification,
-        kinds=Counter(one.entry.kind for one in results),
-        share=verify_figures.share,
-        spent=duration(math.fsum(one.seconds for one in results)),
-        overview=verify_figures.overview(verification.groups),
-        ladders=[verify_figures.convergence(one) for one in results if verify_figures.drawable(one)],
-    )
+    passed = f"{len(results) - len(verification.failed)} of {len(results)} pass"
+    contents = {
+        "verification": verification,
+        "kinds": Counter(one.entry.kind for one in results),
+        "share": verify_figures.share,
+        "spent": duration(math.fsum(one.seconds for one in results)),
+        "overview": verify_figures.overview(verification.groups),
+        "ladders": [verify_figures.convergence(one) for one in results if verify_figures.drawable(one)],
+    }
+    said = (("", verification.word, passed),)
+    title = "Verification: problems whose answers are known"
+    return Page("verification", title, said, "verify_page.html", contents, facts(verification))
 
 
 def text(verification: Verification) -> str:

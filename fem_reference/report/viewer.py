@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.thinning import thin
-from fem_reference.problems.setup import RigidBody
+from fem_reference.problems.setup import Bone
 from fem_reference.report import gallery, pictures
 from fem_reference.report.viewer_fields import Fields, joints
 from fem_reference.runs.store import Run
@@ -47,7 +47,7 @@ _LEVELS = 65535
 
 @dataclass(frozen=True)
 class Viewer:
-    """What the template needs: the ``data`` for the script, the names of the ``candidates`` drawn and of the ``quantities`` to
+    """The contents of its template: the ``data`` for the script, the names of the ``candidates`` drawn and of the ``quantities`` to
     colour by, the frame numbers, one frame in how many is drawn, the greatest error of a coordinate [mm], the colours of
     fibres, where on their scale [%] which stretches are, and the library's version and licence.
     """
@@ -66,7 +66,7 @@ class Viewer:
 
 @dataclass(frozen=True, eq=False)
 class _Box:
-    """What coordinates are rounded in: from ``low`` (3,) [mm] in steps of ``step`` [mm]."""
+    """A box in which coordinates are rounded, from ``low`` (3,) [mm] in steps of ``step`` [mm]."""
 
     low: Floats
     step: float
@@ -125,7 +125,7 @@ def view(comparison: Comparison, budget: int = BUDGET) -> Viewer:
 
 
 def _ends(fibres: dict[str, Any]) -> tuple[tuple[float, float], ...]:
-    """Where on a scale [%] its ends are, and rest where it is not near one of them."""
+    """The places on a scale [%] of its ends, and of rest where it is not near one of them."""
     low, high = fibres["low"], fibres["high"]
     rest = 100 * (1 - low) / ((high - low) or 1.0)
     middle = ((rest, 1.0),) if 12 < rest < 88 else ()
@@ -201,7 +201,7 @@ def _positions(frames: Floats, box: _Box) -> str:
     return _packed((zigzag & 255).astype(np.uint8).tobytes() + (zigzag >> 8).astype(np.uint8).tobytes())
 
 
-def _bone(bone: RigidBody, numbers: tuple[int, ...]) -> dict[str, Any]:
+def _bone(bone: Bone, numbers: tuple[int, ...]) -> dict[str, Any]:
     surface = thin(bone.surface, BONE_TRIANGLES)
     box = _Box.around(surface.points.min(axis=0), surface.points.max(axis=0))
     return {
@@ -214,7 +214,7 @@ def _bone(bone: RigidBody, numbers: tuple[int, ...]) -> dict[str, Any]:
 
 
 def _camera(comparison: Comparison, frames: Floats) -> dict[str, Any]:
-    """Where the pictures are taken from, wide enough for the reference in all ``frames`` (f, n, 3)."""
+    """The camera of the pictures, wide enough for the reference in all ``frames`` (f, n, 3)."""
     low, high = _bounds(frames)
     middle = (low + high) / 2
     return {
@@ -240,5 +240,5 @@ def _packed(values: bytes) -> str:
 
 
 def _json(data: dict[str, Any]) -> str:
-    """As text that may stand in a page's script: no name in it can end that."""
+    """The ``data`` as text that may stand in a page's script: no name in it can end that."""
     return json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")

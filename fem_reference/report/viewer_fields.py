@@ -1,9 +1,9 @@
-"""What the 3D view is coloured by beside the distance to the same vertex, packed into few bytes: of surfaces and of fibres.
+"""Colours of surfaces and of fibres in the 3D view, beside the distance to the same vertex, packed into few bytes.
 
 quantities  name, signed, and the top [mm] of the greatest magnitude: value = sign * top * (level / 127)^2
 runs        levels by quantity: (f, n) of one byte, as differences from the frame before; most, by quantity and frame the greatest
             magnitude; points: of the fibres, as positions
-bars        by quantity and frame, how far [mm] the reference may be from the truth; null where nobody knows, nothing without any
+bars        by quantity and frame, how far [mm] the reference may be from the truth; null where it is not known, nothing without any
 fibres      lines (k,): how many points each has; rest: the length [mm] of each piece, line by line; low, high: of all stretches
 joints      of each bone that moves its name, unit, and by frame the angle or the distance
 """
@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 from fem_reference.assessment import local_fields
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.mesh import Floats, Polylines
-from fem_reference.foundations.motion import Rotation
 from fem_reference.metrics import MeasurementContext
-from fem_reference.problems.setup import RigidBody
+from fem_reference.problems.setup import Bone
+from fem_reference.report.at_frames import motions
+from fem_reference.report.tables import finite
 from fem_reference.runs.store import Run
 
 FIBRES, POINTS = 30, 12  # the most that are drawn: fibres, and points of each
@@ -41,7 +42,7 @@ class Fields:
 
     @property
     def context(self) -> MeasurementContext:
-        """What all runs are measured with."""
+        """The context that all runs are measured in."""
         assert isinstance(self.comparison.context, MeasurementContext)  # of a muscle
         return self.comparison.context
 
@@ -57,14 +58,14 @@ class Fields:
 
     @np.errstate(over="ignore", invalid="ignore")
     def points(self, run: Run) -> Floats:
-        """Where the fibre points drawn are (f, m, 3) [mm] in a run, NaN in a frame that is not known."""
+        """Positions (f, m, 3) [mm] of the fibre points drawn in a run, NaN in a frame that is not known."""
         found = np.array(local_fields.fibre_points(run, self.context)[:, self.lines[1]])
         found[~(np.abs(found) < _FAR).all(axis=(1, 2))] = np.nan
         return self._at_numbers(run, found)
 
     @cached_property
     def surfaces(self) -> dict[str, dict[str, Floats]]:
-        """By quantity and name of the run, values (f, n) [mm]."""
+        """Values (f, n) [mm] by quantity and name of the run."""
         reference = self.runs[0]
         found: dict[str, dict[str, Floats]] = {"surface": {}, "depth": {}}
         for run in self.runs:
@@ -80,14 +81,14 @@ class Fields:
         return np.stack([rows.get(number, lost) for number in self.numbers])
 
     def quantities(self) -> list[dict[str, Any]]:
-        """What can be chosen, without what only the positions say."""
+        """The quantities that can be chosen, beside the distance, which the positions give."""
         return [
             {"name": name, "signed": name == "surface", "top": _top(list(values.values()))}
             for name, values in self.surfaces.items()
         ]
 
     def levels(self, run: Run) -> dict[str, bytes]:
-        """By quantity, the bytes of a run; 0 where it is not known."""
+        """The bytes of a run by quantity; 0 where it is not known."""
         found = {}
         for name, values in self.surfaces.items():
             if run.name in values:
@@ -99,12 +100,12 @@ class Fields:
         return found
 
     def most(self, run: Run) -> dict[str, list[float]]:
-        """By quantity, the greatest magnitude [mm] in each frame of a run."""
+        """The greatest magnitude [mm] in each frame of a run, by quantity."""
         own = {name: values[run.name] for name, values in self.surfaces.items() if run.name in values}
         return {name: [float(f"{_top([frame]):.4g}") for frame in values] for name, values in own.items()}
 
     def bars(self) -> dict[str, list[float | None]]:
-        """By distance and frame, the error bar of the greatest one; nothing without any."""
+        """The error bar of the greatest distance by quantity and frame; nothing without any."""
         known = self.comparison.error_bars
         found: dict[str, list[float | None]] = {}
         if known is None:
@@ -113,7 +114,7 @@ class Fields:
             bar = known.find("deviation", "surface_deviation", statistic)
             if bar is not None:
                 values = dict(zip(known.numbers, bar.values.tolist(), strict=True))
-                found[name] = [_finite(values.get(number, math.nan)) for number in self.numbers]
+                found[name] = [finite(values.get(number, math.nan)) for number in self.numbers]
         return found
 
     def fibres(self, points: list[Floats]) -> dict[str, Any]:
@@ -138,17 +139,16 @@ class Fields:
         }
 
 
-def joints(bones: tuple[RigidBody, ...], numbers: tuple[int, ...]) -> list[dict[str, Any]]:
-    """How far each bone that moves has moved: the angle [degrees] or the distance [mm]."""
-    found = []
-    for bone in bones:
-        if bone.motion is None:
-            continue
-        turns = isinstance(bone.motion, Rotation)
-        along = np.degrees(bone.motion.angles) if isinstance(bone.motion, Rotation) else np.array(bone.motion.distances)
-        values = np.interp(numbers, bone.motion.frames, along)
-        found.append({"name": bone.name, "unit": "°" if turns else " mm", "values": np.round(values, 2).tolist()})
-    return found
+def joints(bones: tuple[Bone, ...], numbers: tuple[int, ...]) -> list[dict[str, Any]]:
+    """The angle [degrees] or the distance [mm] of each bone that moves, by frame."""
+    return [
+        {
+            "name": one.name,
+            "unit": "°" if one.unit == "°" else f" {one.unit}",
+            "values": [round(one.at(number), 2) for number in numbers],
+        }
+        for one in motions(bones)
+    ]
 
 
 def _spread(first: int, end: int) -> NDArray[np.int64]:
@@ -160,7 +160,3 @@ def _spread(first: int, end: int) -> NDArray[np.int64]:
 def _top(values: list[Floats]) -> float:
     """The greatest magnitude that is finite."""
     return max((float(np.abs(one[np.isfinite(one)]).max(initial=0.0)) for one in values), default=0.0)
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

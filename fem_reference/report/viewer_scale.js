@@ -27,7 +27,7 @@ function values(run, { name, top }) {
   return found;
 }
 
-// Below this [mm] nothing is known of a distance to the reference.
+// The error bar [mm] of the distance to the reference, below which a distance says nothing.
 function unknown({ name }) {
   return data.bars[name]?.[view.frame] ?? 0;
 }
@@ -76,7 +76,7 @@ function legend() {
   const inside = shown.reduce((sum, run) => sum + run.bins.reduce((one, other) => one + other, 0), 0) / (shown.length || 1);
   const notes = { depth: `${number(100 * inside)} % of the vertices are in bones; the others have the muscle's own colour.` };
   const without = data.bars[chosen.name] ? "No error bar is known for this frame." : "The reference has no error bars.";
-  part("known").textContent = notes[chosen.name] ?? (bar > 0 ? `Grey: below the reference's error bar of ${number(bar)} mm nothing is known.` : without);
+  part("known").textContent = notes[chosen.name] ?? (bar > 0 ? `Grey: below the reference's error bar of ${number(bar)} mm.` : without);
 }
 
 // Bars over a scale: the mean of the shares in each bin.

@@ -1,10 +1,10 @@
 """Runs over all frames of a case: those that they did not reach are not a number."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
+from fem_reference.foundations.mesh import Floats
 from fem_reference.runs.store import Run
 
 
@@ -14,9 +14,7 @@ def complete(run: Run, numbers: tuple[int, ...]) -> Run:
         return run
     rows = [run.numbers.index(number) if number in run.numbers else None for number in numbers]
 
-    def pick(values: Any) -> Any:
-        if values is None:
-            return None
+    def pick(values: Floats) -> Floats:
         blank = np.full(values.shape[1:], np.nan)
         return np.stack([blank if row is None else values[row] for row in rows])
 
@@ -24,7 +22,7 @@ def complete(run: Run, numbers: tuple[int, ...]) -> Run:
         run,
         numbers=numbers,
         positions=pick(run.positions),
-        fibre_positions=pick(run.fibre_positions),
+        fibre_positions=None if run.fibre_positions is None else pick(run.fibre_positions),
         scalars={name: pick(values) for name, values in run.scalars.items()},
         fields={name: pick(values) for name, values in run.fields.items()},
     )

@@ -1,4 +1,4 @@
-"""What run.json holds, as a record: read strictly, so that a damaged one is refused and not half believed."""
+"""The contents of run.json as a record: read strictly, so that a damaged one is refused and not half believed."""
 
 import json
 from itertools import pairwise
@@ -25,10 +25,12 @@ Status = Literal[
     "stopped",
 ]
 FORMAT = 1
+# The contents of run.json while a run is made.
+RunJson = dict[str, Any]
 
 
 class Origin(Record):
-    """Where a run comes from, as far as anything depends on it."""
+    """Provenance of a run, as far as anything depends on it."""
 
     model_config = ConfigDict(frozen=True, strict=True, extra="allow")
     versions: dict[str, str] = Field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""What a run cost: time of a frame, frames that were reached."""
+"""The cost of a run: time of a frame, frames that were reached."""
 
 import numpy as np
 
@@ -23,6 +23,6 @@ def seconds_per_frame(run: Run) -> float | None:
 
 
 def reached(run: Run) -> int:
-    """How many frames have positions, of the fibres where there is no surface."""
+    """The number of frames that have positions, of the fibres where there is no surface."""
     positions = run.positions if run.has_surface or run.fibre_positions is None else run.fibre_positions
     return int(np.isfinite(positions).all(axis=(1, 2)).sum())

@@ -6,13 +6,12 @@ import tempfile
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.records import parse
 from fem_reference.io import files, texts
-from fem_reference.runs.contents import Contents
+from fem_reference.runs.contents import Contents, RunJson
 
 FOLDER = "restart"
 # Killed with the process that stores it, or alone: for want of memory or room, say.
@@ -21,7 +20,7 @@ ENDED_EARLY = ("running", "crashed")
 
 @dataclass(frozen=True)
 class CutOff:
-    """What there is of a run: the ``numbers`` of its stored frames, none of one that begins, and the ``folder`` that its solver may
+    """The kept part of a run: the ``numbers`` of its stored frames, none of one that begins, and the ``folder`` that its solver may
     use until it ends.
     """
 
@@ -29,8 +28,8 @@ class CutOff:
     numbers: tuple[int, ...]
 
 
-def stored(folder: Path, identity: dict[str, Any]) -> dict[str, Any] | None:
-    """What run.json says of a run in ``folder`` that was cut off and can go on as the one of ``identity``, if there is one."""
+def stored(folder: Path, identity: RunJson) -> RunJson | None:
+    """The run.json of a run in ``folder`` that was cut off and can go on as the one of ``identity``, if there is one."""
     place = folder / "run.json"
     with suppress(InputError):
         state = texts.read_json(place, "a run")
@@ -50,7 +49,7 @@ def stored(folder: Path, identity: dict[str, Any]) -> dict[str, Any] | None:
     return None
 
 
-def truncate(state: dict[str, Any], number: float) -> None:
+def truncate(state: RunJson, number: float) -> None:
     """Take the frames from ``number`` on, which are solved again, out of a ``state`` as run.json has it."""
     kept = sum(stored < number for stored in state["numbers"])
     state["numbers"], state["residuals"] = state["numbers"][:kept], state.get("residuals", [])[:kept]

@@ -9,7 +9,6 @@ import platform
 from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 from fem_reference.foundations.version import __version__
 
@@ -29,7 +28,7 @@ _MADE_WITH = (
 )
 
 
-def key(scene: str, solver: str, settings: Mapping[str, Any]) -> str:
+def key(scene: str, solver: str, settings: Mapping[str, object]) -> str:
     """A hash of 16 digits over all that determines a run: the key of its ``scene``, the ``solver`` with the ``settings`` that its
     answer depends on, and :func:`code_hash`.
     """
@@ -102,7 +101,7 @@ def _module(package: Path, parts: list[str]) -> set[Path]:
 
 @cache
 def _imported(path: Path, package: Path) -> tuple[str, ...]:
-    """What the file at ``path`` imports of ``package``, anywhere in it: modules and what may be modules, without its name."""
+    """Names that the file at ``path`` imports of ``package``, anywhere in it: modules and what may be modules, without its name."""
     return tuple(_names(ast.parse(path.read_bytes()), path, package))
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fem_reference.effects import Effect, State
 from fem_reference.foundations.errors import InputError
@@ -56,7 +57,7 @@ class Results:
         """The frame numbers that there are."""
         return tuple(self.states)
 
-    def evaluate(self, points: Any, frame: float, names: Sequence[str] | None = None) -> dict[str, Floats]:
+    def evaluate(self, points: ArrayLike, frame: float, names: Sequence[str] | None = None) -> dict[str, Floats]:
         """Results at points inside the muscle.
 
         Parameters
@@ -96,7 +97,7 @@ class Results:
     def evaluate_in(
         self, tets: Ints, barycentric: Floats, frame: float, names: Sequence[str] | None = None
     ) -> dict[str, Floats]:
-        """As :meth:`evaluate`, at points inside given tetrahedra.
+        """Results as of :meth:`evaluate`, at points inside given tetrahedra.
 
         Parameters
         ----------
@@ -120,7 +121,7 @@ class Results:
         return {name: np.concatenate([part[name] for part in parts]) for name in wanted}
 
     def names(self, state: NodalState) -> tuple[str, ...]:
-        """What can be evaluated of a state."""
+        """Names of what can be evaluated of a state."""
         lacking = {"pressure"} if state.pressure.shape[1] == 0 else set()
         lacking |= {"fibre_stretch", "fibre_stress"} if self.fibre is None else set()
         return tuple(name for name in NAMES if name not in lacking)
@@ -168,7 +169,7 @@ def of_run(folder: Path | str, case: str | Path | Case) -> Results:
     scene = read_muscle(case) if isinstance(case, str | Path) else muscle(case)
     if run.origin.get("scene") != scene.key:
         raise InputError(folder, f"a run of another scene than {scene.place}", "the scene that was solved")
-    return Results(mesh, scene.effects, states.Stored(folder, run.numbers), fibre)
+    return Results(mesh, scene.effects, states.StoredStates(folder, run.numbers), fibre)
 
 
 class _Places:
@@ -197,7 +198,7 @@ class _Places:
         return inside[:, 0] if inside.shape[1] == 1 else np.asarray((inside * self.corners).sum(axis=1))
 
     def values(self, names: Sequence[str], acting: Sequence[tuple[Effect, float]]) -> dict[str, Floats]:
-        """By name, what ``Results.evaluate`` gives."""
+        """The arrays by name that ``Results.evaluate`` gives."""
         values: dict[str, Any] = {
             "displacement": self.displacement,
             "deformation_gradient": self.F,
@@ -286,7 +287,7 @@ def lagrange(barycentric: Floats, gradients: Floats, count: int) -> tuple[Floats
 
 
 def _ends() -> Iterator[tuple[int, int]]:
-    """Of each of the ten nodes, the two corners that it is halfway between; of a corner, twice itself."""
+    """The two corners that each of the ten nodes is halfway between; of a corner, twice itself."""
     nodes = reference_nodes("tetrahedron", 2)
     for weights in np.column_stack([1 - nodes.sum(axis=1), nodes]):
         near = np.flatnonzero(weights)

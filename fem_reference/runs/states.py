@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, TetMesh
@@ -19,6 +20,8 @@ from fem_reference.io.files import whole
 FOLDER = "state"
 # The most memory [bytes] that the arrays of a file may take: a state of a million tetrahedra.
 MOST_BYTES = 2**30
+# Arrays by name.
+Arrays = dict[str, NDArray[Any]]
 _ARRAYS = ("displacement", "pressure", "before", "rate")
 
 
@@ -38,12 +41,12 @@ class NodalState:
     rate: float = 0.0
 
     @property
-    def arrays(self) -> dict[str, Any]:
-        """What is written of it, by name."""
+    def arrays(self) -> Arrays:
+        """Arrays that are written, by name."""
         return {name: getattr(self, name) for name in _ARRAYS}
 
     @classmethod
-    def of(cls, arrays: Mapping[str, Any]) -> "NodalState":
+    def of(cls, arrays: Mapping[str, ArrayLike]) -> "NodalState":
         """The state of ``arrays`` by name; KeyError where one is missing."""
         displacement, pressure, before, rate = (np.asarray(arrays[name], float) for name in _ARRAYS)
         return cls(displacement, pressure, before, float(rate))
@@ -92,7 +95,7 @@ def read_rest(folder: Path) -> tuple[TetMesh, Floats | None]:
     return TetMesh(arrays["points"], arrays["tets"]), arrays["fibre"] if len(arrays["fibre"]) else None
 
 
-class Stored(Mapping[float, NodalState]):
+class StoredStates(Mapping[float, NodalState]):
     """The states of the run in ``folder`` by frame number, read as they are asked for; the last one is kept."""
 
     def __init__(self, folder: Path, frames: tuple[int, ...]) -> None:
@@ -122,7 +125,7 @@ def _place(folder: Path, frame: float) -> Path:
     return folder / FOLDER / f"frame_{frame:04.0f}.npz"
 
 
-def write_arrays(path: Path, arrays: dict[str, Any]) -> None:
+def write_arrays(path: Path, arrays: Arrays) -> None:
     """Write arrays by name into an .npz file."""
     path.parent.mkdir(exist_ok=True)
     with whole(path) as part:
@@ -138,7 +141,7 @@ def _check_size(file: BinaryIO) -> None:
         raise ValueError(f"{size / 2**20:.0f} MB of arrays, more than {MOST_BYTES / 2**20:.0f}")
 
 
-def read_arrays(path: Path, names: tuple[str, ...] = ()) -> dict[str, Any]:
+def read_arrays(path: Path, names: tuple[str, ...] = ()) -> Arrays:
     """The arrays of an .npz file by name: those of ``names``, by default all; InputError where it is damaged."""
     try:
         with path.open("rb") as file:

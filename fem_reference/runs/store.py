@@ -82,7 +82,7 @@ Sink = Callable[[Frame], None]
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a solve ended: a status, a sentence for people, and what it cost (seconds by phase ``seconds_...``, counts)."""
+    """The end of a solve: a status, a sentence for people, and what it cost (seconds by phase ``seconds_...``, counts)."""
 
     status: Status
     message: str
@@ -129,7 +129,7 @@ class Run:
 
     @property
     def carries(self) -> frozenset[Part]:
-        """What can be measured of it."""
+        """Parts that can be measured."""
         if self.mesh is not None:
             return frozenset({"field"})
         if self.has_surface:
@@ -152,7 +152,7 @@ class Run:
         return self.values[:, : len(self.points)]
 
     def _repr_html_(self) -> str:
-        """What notebooks show."""
+        """The run as notebooks show it."""
         known = ("seconds", "newton_iterations", "unknowns")
         cost = {name: value for name, value in self.outcome.cost.items() if name in known}
         facts = {
@@ -244,7 +244,7 @@ def _check_same(folder: Path, names: list[str], frames: list[Floats], rest: Floa
 
 
 def status(folder: Path) -> str:
-    """What ``run.json`` in ``folder`` says of the run: a status, ``"running"`` where it was cut off, or ``"damaged"``."""
+    """The status in the ``run.json`` of a run in ``folder``: a status, ``"running"`` where it was cut off, or ``"damaged"``."""
     try:
         return str(texts.read_json(folder / "run.json", "a run")["status"])
     except (InputError, KeyError, TypeError):

@@ -53,7 +53,7 @@ class Writer:
 
     @property
     def cut_off(self) -> CutOff:
-        """What is stored so far, for a solver that can go on."""
+        """The part that is stored so far, for a solver that can go on."""
         return CutOff(self.folder / cut_off.FOLDER, self.frames)
 
     @property

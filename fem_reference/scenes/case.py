@@ -34,7 +34,7 @@ Part = Literal["surface", "lines", "field"]
 
 
 def home(package: Path) -> Path:
-    """Where cases/ and meshes/ are: inside an installed package, beside it in a checkout."""
+    """The folder of cases/ and meshes/: inside an installed package, beside it in a checkout."""
     return package if (package / "cases").is_dir() else package.parent
 
 
@@ -129,16 +129,16 @@ class Case(Record):
         raise NotImplementedError(f"{type(self).__name__} has no frames")
 
     def standards(self, of: str) -> frozenset[Standard]:  # noqa: ARG002
-        """What a run is measured against, ``of`` a candidate or the ``"reference"``."""
+        """Standards that a run is measured against, ``of`` a candidate or the ``"reference"``."""
         return frozenset({"reference", "itself"})
 
     @property
     def facts(self) -> dict[str, str]:
-        """What the case is made of, in words, by name."""
+        """The contents of the case in words, by name."""
         raise NotImplementedError(f"{type(self).__name__} has no facts")
 
     def _repr_html_(self) -> str:
-        """What notebooks show."""
+        """The case as notebooks show it."""
         facts = self.facts | {
             "effects": ", ".join(self.acting),
             "reference": self.reference.solver,
@@ -218,7 +218,7 @@ class Case(Record):
 
 
 def _exists(path: Path) -> bool:
-    """Whether there is such a file or folder; what is no path at all is none."""
+    """True where there is such a file or folder; what is no path at all is none."""
     try:
         return path.exists()
     except (OSError, ValueError):  # a name that is too long, or with a null character
@@ -226,7 +226,7 @@ def _exists(path: Path) -> bool:
 
 
 def is_inside(path: Path, folders: Iterable[Path]) -> bool:
-    """Whether ``path``, links followed, is in one of the ``folders``."""
+    """True where ``path``, links followed, is in one of the ``folders``."""
     return any(path.resolve().is_relative_to(folder.resolve()) for folder in folders)
 
 

@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 from fem_reference.effects import Effect
 from fem_reference.foundations.records import Name, Record
 from fem_reference.foundations.units import AreaStiffness, LengthUnit, PositiveLength, Time
-from fem_reference.scenes.bones import Bone
+from fem_reference.scenes.bones import CaseBone
 from fem_reference.scenes.case import Case
 
 MOST_FRAMES = 100_000
@@ -44,8 +44,8 @@ class Outline(Record):
 
 
 class Attachment(Record):
-    """Which part of the muscle surface is attached to a bone: exactly one of ``vertices``, ``within`` (of the bone), ``outline``;
-    and how: by springs of a ``stiffness`` over its area, without it exactly.
+    """The part of the muscle surface that is attached to a bone: exactly one of ``vertices``, ``within`` (of the bone),
+    ``outline``; and how: by springs of a ``stiffness`` over its area, without it exactly.
     """
 
     name: Name
@@ -124,7 +124,7 @@ class MuscleCase(Case):
 
     choice: Literal["listed", "auto"] = Field(default="listed", alias="effects")
     muscle: Muscle
-    bone: tuple[Bone, ...] = Field(min_length=1)
+    bone: tuple[CaseBone, ...] = Field(min_length=1)
     attachment: tuple[Attachment, ...] = ()
     fibres: Fibres
     frames: Frames
@@ -151,7 +151,7 @@ class MuscleCase(Case):
 
     @property
     def facts(self) -> dict[str, str]:
-        """What the case is made of, in words, by name."""
+        """The contents of the case in words, by name."""
         return {
             "muscle": f"{self.muscle.surface}, tetrahedra of {self.muscle.tet_size / 2**self.muscle.refinements:g} mm",
             "bones": ", ".join(bone.name for bone in self.bone),

@@ -45,7 +45,7 @@ class SurfaceFile(Record):
 
 
 class Domain(Record):
-    """Where the field lives: exactly one of ``interval``, ``nodes`` (given, increasing), ``mesh`` and ``surface``."""
+    """The domain of the field: exactly one of ``interval``, ``nodes`` (given, increasing), ``mesh`` and ``surface``."""
 
     interval: Interval | None = None
     nodes: tuple[float, ...] | None = Field(default=None, min_length=2)
@@ -125,7 +125,7 @@ class ScalarCase(Case):
         return (0,)
 
     def standards(self, of: str) -> frozenset[Standard]:
-        """What a run is measured against, ``of`` a candidate or the ``"reference"``: a field has no rest state."""
+        """Standards that a run is measured against, ``of`` a candidate or the ``"reference"``: a field has no rest state."""
         found: set[Standard] = {"itself"}
         if self.exact is not None:
             found.add("exact")
@@ -135,7 +135,7 @@ class ScalarCase(Case):
 
     @property
     def facts(self) -> dict[str, str]:
-        """What the case is made of, in words, by name."""
+        """The contents of the case in words, by name."""
         (kind,) = (name for name, given in self.domain if given is not None)
         return {
             "domain": kind,

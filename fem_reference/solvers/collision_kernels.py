@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.signed_distance import FAR, Grid
-from fem_reference.problems.setup import RigidBody
+from fem_reference.problems.setup import Bone
 from fem_reference.solvers.compiled_kernels import compiled
 from fem_reference.solvers.pbd_kernels import Vector
 
@@ -122,7 +122,7 @@ class CollidingBone:
     jumps at the first step. Vertices that are not ``free`` (n,) are never asked.
     """
 
-    def __init__(self, bone: RigidBody, rest: Floats, free: NDArray[np.bool_], gap: float) -> None:
+    def __init__(self, bone: Bone, rest: Floats, free: NDArray[np.bool_], gap: float) -> None:
         self.bone, shape = bone, bone.shape
         self.grid = shape if isinstance(shape, Grid) else None
         self.coefficients = np.array(shape.coefficients) if isinstance(shape, Grid) else np.zeros((0, 0, 0))

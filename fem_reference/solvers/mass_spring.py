@@ -19,7 +19,7 @@ from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import AccelerationVector, Density, Stiffness, Time, positive
 from fem_reference.geometry.embedding import Locator
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers.collision_kernels import CollidingBone, move_out
 from fem_reference.solvers.common.frame_loop import carry, follow, other_clock, refused, tetrahedron
@@ -120,7 +120,7 @@ class MassSpringModel:
     bones that others collide with; masses are at ``points`` (n, 3) [mm], and were at ``previous`` a step before.
     """
 
-    def __init__(self, problem: Problem, settings: MassSpringSettings, seconds_compile: float = 0.0) -> None:
+    def __init__(self, problem: MuscleProblem, settings: MassSpringSettings, seconds_compile: float = 0.0) -> None:
         mesh, collision, locator = problem.mesh, settings.collision, Locator(problem.mesh)
         self.problem, self.settings, self.network = problem, settings, network_of(mesh, settings)
         self.attached = [np.unique(mesh.facets[entry.attachment]) for entry in problem.attached]
@@ -199,7 +199,7 @@ class MassSpringModel:
         return Outcome("converged", done + note + other_clock(self.problem, self.settings.frame_time))
 
 
-def _colliding_bones(problem: Problem, fixed: Ints, gap: float) -> list[CollidingBone]:
+def _colliding_bones(problem: MuscleProblem, fixed: Ints, gap: float) -> list[CollidingBone]:
     """All bones, which the free masses of the surface collide with."""
     loose = np.zeros(len(problem.mesh.points), bool)
     loose[boundary(problem.mesh.tets)[0]] = True
@@ -207,7 +207,7 @@ def _colliding_bones(problem: Problem, fixed: Ints, gap: float) -> list[Collidin
     return [CollidingBone(bone, problem.mesh.points, loose, gap) for bone in problem.bones]
 
 
-def solve(problem: Problem, settings: MassSpringSettings, sink: Sink) -> Outcome:
+def solve(problem: MuscleProblem, settings: MassSpringSettings, sink: Sink) -> Outcome:
     """Step from rest at the first of ``problem.frames`` to the last of them; each frame wanted goes into ``sink``."""
     model = MassSpringModel(problem, settings, _compile(settings))
     if model.wanted > _MOST_STEPS:

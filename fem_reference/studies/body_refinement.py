@@ -1,7 +1,6 @@
 """The sharper solution that the error bars of a body are made of."""
 
 import logging
-from typing import Any
 
 import numpy as np
 
@@ -19,14 +18,14 @@ _QUADRATIC = {"P1": "P2", "P1/P1": "P2/P1", "Q1": "Q2", "Q1/P0": "Q2/Q1"}
 
 
 def obtain(solved: Run) -> BodyBars | None:
-    """The error bars of what :func:`solve_body` made of a body; None where that did not converge."""
+    """The error bars of a run by :func:`solve_body`; None where that did not converge."""
     if solved.outcome.status != "converged":
         log.info("error bars: none, of a body that did not converge")
         return None
     settings, body = solved.settings, solved.body
     assert isinstance(settings, fenicsx.BodySettings)  # what solved the body
     assert body is not None
-    other, shared, changes, sharper = _sharper(body, settings)
+    other, shared, changes, sharper = sharper_problem(body, settings)
     log.info("error bars: solving with %s", sharper)
     found = fenicsx.solve_body(other, settings.model_copy(update=changes))
     if found.outcome.status != "converged":
@@ -36,9 +35,11 @@ def obtain(solved: Run) -> BodyBars | None:
     return bars
 
 
-def _sharper(body: Body, settings: fenicsx.BodySettings) -> tuple[Body, Ints, dict[str, Any], str]:
-    """A sharper problem: the body, which of its points those of ``body`` are, what changes of the settings, and that in words."""
-    changes: dict[str, Any] = {"store_state": False}
+def sharper_problem(
+    body: Body, settings: fenicsx.BodySettings
+) -> tuple[Body, Ints, dict[str, float | str | None], str]:
+    """A sharper problem: the body, indices of the points of ``body`` among its own, changes of the settings, and these in words."""
+    changes: dict[str, float | str | None] = {"store_state": False}
     said = ""
     if any("interval" in effect.needs for effect in body.effects):  # else a state does not depend on load steps
         largest = min(settings.largest_step or np.inf, float(np.diff(body.frames).max(initial=settings.first_step)))

@@ -18,7 +18,7 @@ from fem_reference.foundations.usage import forget_peak_memory, peak_memory
 from fem_reference.foundations.version import __version__
 from fem_reference.problems import of_case
 from fem_reference.problems.estimates import Decision
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.of_case import CaseProblem, CaseSetup
 from fem_reference.problems.setup import Setup
 from fem_reference.problems.watch import Watch
@@ -30,7 +30,7 @@ from fem_reference.scenes import casefile
 from fem_reference.scenes.case import MACHINE_ONLY, Case, SolverChoice
 from fem_reference.scenes.muscle import MuscleCase
 from fem_reference.solvers import recorded
-from fem_reference.solvers.common.protocol import Solver
+from fem_reference.solvers.common.protocol import AnySolver
 from fem_reference.studies import expected_cost, run_folders, watched
 
 log = logging.getLogger(__name__)
@@ -43,7 +43,7 @@ class Wanted:
     name: str
     choice: SolverChoice
     place: str
-    offer: Solver[Any, Any]
+    offer: AnySolver
     settings: Record
     folder: Path
 
@@ -71,11 +71,11 @@ class Bench[C: Case]:
     @overload
     def setup(self) -> CaseSetup: ...
     def setup(self) -> CaseSetup:
-        """What is known of the case before it is meshed."""
+        """The set-up of the case, before it is meshed."""
         return self._setup()
 
     @overload
-    def problem(self: "Bench[MuscleCase]") -> Problem: ...
+    def problem(self: "Bench[MuscleCase]") -> MuscleProblem: ...
     @overload
     def problem(self) -> CaseProblem: ...
     def problem(self) -> CaseProblem:
@@ -198,8 +198,8 @@ class Bench[C: Case]:
         _write(Writer(wanted.folder, identity, given.rest), wanted, given, self._watched(wanted.choice.solver))
         return store.load(wanted.folder)
 
-    def given(self, offer: Solver[Any, Any], settings: Record) -> CaseSetup:
-        """What a solver is given: the problem, or the setup of a muscle that it does not need filled."""
+    def given(self, offer: AnySolver, settings: Record) -> CaseSetup:
+        """The thing that a solver is given: the problem, or the setup of a muscle that it does not need filled."""
         return self._problem() if offer.fills(settings) else self._setup()
 
     def read(self, name: str, choice: SolverChoice, place: str) -> Run:
@@ -212,7 +212,7 @@ class Bench[C: Case]:
         return replace(run, name=name, solver=choice.solver, origin=origin, states=())
 
     def folder(self, choice: SolverChoice, place: str) -> Path:
-        """Where the run of a solver of our own is stored, once there is one."""
+        """The folder in which the run of a solver of our own is stored, once there is one."""
         return self.store / f"{choice.solver}-{self.key(choice.solver, self.settings(choice, place))}"
 
     def key(self, solver: str, settings: Record) -> str:
@@ -220,8 +220,8 @@ class Bench[C: Case]:
         numerics = {name: value for name, value in settings.model_dump(mode="json").items() if name not in MACHINE_ONLY}
         return key(self.scene.key, solver, numerics)
 
-    def origin(self, solver: str, settings: Record) -> dict[str, Any]:
-        """Where a run comes from, for people and for doubt."""
+    def origin(self, solver: str, settings: Record) -> dict[str, object]:
+        """Provenance of a run, for people and for doubt."""
         acting = self.scene.acting if self.scene.task != "solve" or solvers.takes_effects(solver) else {}
         return {
             "case": self.scene.name,
@@ -271,7 +271,7 @@ def _write(writer: Writer, wanted: Wanted, given: CaseSetup, watch: Watch | None
 
 
 def _contact(state: dict[str, Any]) -> dict[str, str]:
-    """Where contact was in the equations, of a run whose ``state`` says it."""
+    """A note where contact was in the equations, of a run whose ``state`` says it."""
     counts = state["scalars"].get("contact_points")
     if counts is None:
         return {}

@@ -16,8 +16,8 @@ from fem_reference.runs.store import Run
 from fem_reference.scenes.muscle import Attachment, MuscleCase, VertexList
 
 
-def resample(scene: MuscleCase, setup: Setup, power: int, folder: Path) -> MuscleCase:
-    """The scene on a surface of ``4**power`` times as many triangles; its files go into ``folder``, named by what they contain.
+def resample(case: MuscleCase, setup: Setup, power: int, folder: Path) -> MuscleCase:
+    """The case on a surface of ``4**power`` times as many triangles; its files go into ``folder``, named by what they contain.
 
     A vertex is attached where the nearest of the original surface is.
     """
@@ -26,14 +26,14 @@ def resample(scene: MuscleCase, setup: Setup, power: int, folder: Path) -> Muscl
     place = (folder / named).absolute()
     place.mkdir(parents=True, exist_ok=True)
     files.write_surface(place / "surface.vtp", surface, surface.points)
-    nearest = _nearest(setup.surface, surface.points)
+    nearest = nearest_vertices(setup.surface, surface.points)
     attached = {entry.attachment: np.flatnonzero(np.isin(nearest, entry.vertices)) for entry in setup.attached}
     for name, vertices in attached.items():
         files.write_text(place / f"{name}.csv", "".join(f"{vertex}\n" for vertex in vertices))
-    muscle = scene.muscle.model_copy(update={"surface": str(place / "surface.vtp"), "unit": 1.0})
-    attachments = tuple(_listed(entry, place) for entry in scene.attachment)
+    muscle = case.muscle.model_copy(update={"surface": str(place / "surface.vtp"), "unit": 1.0})
+    attachments = tuple(_listed(entry, place) for entry in case.attachment)
     # No file names these surfaces, so that they may be where they are.
-    return scene.model_copy(update={"muscle": muscle, "attachment": attachments, "from_file": False})
+    return case.model_copy(update={"muscle": muscle, "attachment": attachments, "from_file": False})
 
 
 def _listed(entry: Attachment, place: Path) -> Attachment:
@@ -41,15 +41,15 @@ def _listed(entry: Attachment, place: Path) -> Attachment:
     return entry.model_copy(update={"vertices": listed, "within": None, "outline": None})
 
 
-def _nearest(surface: Surface, points: Floats) -> Floats:
-    """Of each of ``points`` (n, 3) the nearest vertex of the triangle that is nearest to it (n,)."""
+def nearest_vertices(surface: Surface, points: Floats) -> Floats:
+    """The nearest vertex of the nearest triangle to each of ``points`` (n, 3), (n,)."""
     found = distances(points, surface)
     corners = surface.triangles[found.triangle]
     return np.asarray(np.take_along_axis(corners, found.barycentric.argmax(axis=1)[:, None], axis=1)[:, 0])
 
 
 def carried(run: Run, surface: Surface) -> Run:
-    """What a ``run`` on another surface makes of ``surface``, whose vertices follow by the extension that fibres follow by."""
+    """A ``run`` on another surface, carried to ``surface``, whose vertices follow by the extension that fibres follow by."""
     if len(run.surface.points) == len(surface.points) and np.allclose(run.surface.points, surface.points):
         return run
     extension = Extension.to(surface.points, run.surface)

@@ -25,7 +25,7 @@ from fem_reference.studies.execution import Bench
 STORE = Path("reports/runs")
 
 
-def load_case(case: str | Path, changes: Mapping[str, Any] | None = None) -> Case:
+def load_case(case: str | Path, changes: Mapping[str, object] | None = None) -> Case:
     """Read a case.
 
     Parameters
@@ -247,7 +247,7 @@ def export_runs(comparison: Comparison, folder: str | Path) -> list[str]:
 def write_report(comparison: Comparison, folder: str | Path) -> Path:
     """Write ``report.html``, ``measures.json`` and ``measures.csv`` into ``folder``; the path of the page."""
     arguments.check_comparison(comparison)
-    return report.write(comparison, arguments.free_folder(folder, "folder"))
+    return report.write(report.of_comparison(comparison), arguments.free_folder(folder, "folder"), report.NAME)
 
 
 def solve_body(body: Body, *, progress: Progress | None = None, **settings: Any) -> Run:

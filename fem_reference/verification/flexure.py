@@ -1,7 +1,9 @@
 """A block that is bent into a sector of a tube."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +19,9 @@ rivlin = find("rivlin")
 MU, BULK = 0.01, 1e4  # [MPa]; the truth is of incompressible material
 THICKNESS, LENGTH, WIDTH = 10.0, 20.0, 2.5  # [mm]
 ANGLE = 1.0  # [rad], between the ends: the faces are at 15.7 and 25.4 mm
+
+
+Reading = Callable[[Floats, Frame], float]
 
 
 @dataclass(frozen=True)
@@ -35,26 +40,16 @@ class Flexed:
         return moves
 
 
-def bent(lab: Lab, n: int, element: str, mu: float, faces: tuple[str, ...]) -> tuple[Floats, Frame]:
-    """The half y >= 0 of the block in 2n by 2n by 1 cells: its nodes at rest (n, 3) [mm], and bent; its lateral ``faces`` stay in
-    their planes, ``mu`` [MPa].
+def bent(
+    lab: Lab, n: int, reading: str, element: str = "Q2/Q1", mu: float = MU, faces: tuple[str, ...] = ("z0", "z1")
+) -> float:
+    """A reading of the half y >= 0 of the block in 2n by 2n by 1 cells, whose lateral ``faces`` stay in their planes; ``mu``
+    [MPa].
     """
     mesh = shapes.box((2 * n, 2 * n, 1), (THICKNESS, LENGTH / 2, WIDTH), ELEMENTS[element][0], 2)
     end = Prescribed("y1", "y1", (0, 1, 2), Flexed(THICKNESS, LENGTH, ANGLE))
     body = Body(mesh, neo_hooke(mu, BULK), (*sliding("y0"), end, *sliding(*faces)), (0.0, 1.0))
-    return mesh.points, lab.solve(body, element, first_step=0.5, residual=1e-9).last
-
-
-def moment(lab: Lab, n: int, element: str, mu: float = MU, faces: tuple[str, ...] = ("z0", "z1")) -> float:
-    """Per width, on the end [N]."""
-    _, state = bent(lab, n, element, mu, faces)
-    return float(state.moments["y1"][2] / WIDTH)
-
-
-def inner_radius(lab: Lab, n: int, faces: tuple[str, ...]) -> float:
-    """The radius of the circle nearest to the nodes of the inner face [mm]."""
-    rest, state = bent(lab, n, "Q2/Q1", MU, faces)
-    return circle(state.points[rest[:, 0] == 0, :2])
+    return READINGS[reading](mesh.points, lab.solve(body, element, first_step=0.5, residual=1e-9).last)
 
 
 def circle(points: Floats) -> float:
@@ -68,32 +63,35 @@ def circle(points: Floats) -> float:
     return float(np.sqrt(c + a**2 + b**2))
 
 
-def thickness(lab: Lab, n: int, faces: tuple[str, ...]) -> float:
-    """The distance [mm] between the curved faces, halfway between the ends."""
-    rest, state = bent(lab, n, "Q2/Q1", MU, faces)
-    return float(np.ptp(state.points[rest[:, 1] == 0, 0]))
-
-
+# What is read from nodes at rest (n, 3) [mm] and the state: the moment on the end per width [N], the radius of the circle nearest
+# to the nodes of the inner face [mm], and the distance between the curved faces, halfway between the ends [mm].
+READINGS: dict[str, Reading] = {
+    "moment": lambda _, state: float(state.moments["y1"][2] / WIDTH),
+    "inner radius": lambda rest, state: circle(state.points[rest[:, 0] == 0, :2]),
+    "thickness": lambda rest, state: float(np.ptp(state.points[rest[:, 1] == 0, 0])),
+}
 TRUE = rivlin.Flexure(MU, THICKNESS, LENGTH, ANGLE)
 BLOCK = partial(
     Entry,
     group="flexure",
+    measure=bent,
     relative=True,
     kind="closed form",
     source="Rivlin 1949, doi 10.1098/rspa.1949.0004; validation/rivlin.py Flexure",
     refinement=Refinement((1, 2, 3), THICKNESS / 2, order=4),
 )
-FREE = "one lateral face is free, so that the block may change its width"
+FREE: dict[str, Any] = {
+    "negative_control": "one lateral face is free, so that the block may change its width",
+    "wrong": {"faces": ("z0",)},
+}
 
 ENTRIES: tuple[Entry, ...] = (
     BLOCK(
         name="flexure_moment_tetrahedra",
         title="Bending a block, half as thick as long, by one radian: the moment, by tetrahedra (P2/P1)",
         unit="N",
-        measure=moment,
-        given={"element": "P2/P1"},
-        negative_control=FREE,
-        wrong={"faces": ("z0",)},
+        given={"reading": "moment", "element": "P2/P1"},
+        **FREE,
         truth=TRUE.moment,
         within=5e-5,
         because="discretisation of order 4, 1e-5 with 8 cells through the thickness; the material's K/mu of 1e6 adds 1e-6",
@@ -103,8 +101,7 @@ ENTRIES: tuple[Entry, ...] = (
         name="flexure_moment_hexahedra",
         title="Bending a block, half as thick as long, by one radian: the moment, by hexahedra (Q2/Q1)",
         unit="N",
-        measure=moment,
-        given={"element": "Q2/Q1"},
+        given={"reading": "moment"},
         negative_control="the shear modulus is 1 % too large",
         wrong={"mu": 1.01 * MU},
         truth=TRUE.moment,
@@ -115,10 +112,8 @@ ENTRIES: tuple[Entry, ...] = (
         name="flexure_inner_radius",
         title="Bending a block, half as thick as long, by one radian: the radius of its inner face",
         unit="mm",
-        measure=inner_radius,
-        given={"faces": ("z0", "z1")},
-        negative_control=FREE,
-        wrong={"faces": ("z0",)},
+        given={"reading": "inner radius"},
+        **FREE,
         truth=lambda: TRUE.radii()[0],
         within=1e-4,
         because="discretisation, 3e-5 with 6 cells through the thickness (Q2/Q1)",
@@ -130,10 +125,8 @@ ENTRIES: tuple[Entry, ...] = (
         name="flexure_thickness",
         title="Bending a block, half as thick as long, by one radian: how thick it is halfway between its ends",
         unit="mm",
-        measure=thickness,
-        given={"faces": ("z0", "z1")},
-        negative_control=FREE,
-        wrong={"faces": ("z0",)},
+        given={"reading": "thickness"},
+        **FREE,
         truth=lambda: np.diff(TRUE.radii())[0],
         within=3e-5,
         because="discretisation of order 4 or more, 7e-6 with 6 cells through the thickness (Q2/Q1)",

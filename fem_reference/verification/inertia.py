@@ -1,16 +1,16 @@
 """Inertia: a fall, a bar that vibrates, a block that swings far, and the limit of slow motion."""
 
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from fem_reference.assessment.catalogue import Entry, Finding, Lab, Refinement, order
 from fem_reference.effects import Effect, make
-from fem_reference.foundations.mesh import Floats
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body, Prescribed
-from fem_reference.verification.parts import clamped, frames, neo_hooke, sliding
+from fem_reference.problems.paths import Affine
+from fem_reference.verification.parts import NO_GRADIENT, clamped, frames, neo_hooke, sliding
 from fem_reference.verification.truths import find
 
 inertia = find("inertia")
@@ -83,33 +83,17 @@ def departure(lab: Lab, spectral_radius: float) -> Finding:
     return Finding(float(np.abs(total).max() / kinetic.max()), note=note)
 
 
-@dataclass(frozen=True)
-class Smooth:
-    """A displacement along x of ``distance`` [mm] times ``10 s^3 - 15 s^4 + 6 s^5``, s being the share of ``frames``."""
-
-    distance: float
-    frames: float
-
-    def __call__(self, points: Floats, frame: float) -> Floats:
-        """The displacement (n, 3) of rest points (n, 3)."""
-        s = frame / self.frames
-        moved = np.zeros_like(points)
-        moved[:, 0] = self.distance * (10 * s**3 - 15 * s**4 + 6 * s**5)
-        return moved
-
-    def acceleration(self, s: float, seconds: float) -> float:
-        """[mm/s^2] at the share s of so many ``seconds``."""
-        return float(self.distance * (60 * s - 180 * s**2 + 120 * s**3) / seconds**2)
-
-
-PULL = Smooth(1e-4 * LENGTH, 64.0)
+# A smooth pull along x: ``10 s^3 - 15 s^4 + 6 s^5`` of a way [mm], s being the share of so many frames.
+FRAMES, WAY = 64, 1e-4 * LENGTH
+SMOOTH = Polynomial((0, 0, 0, 10, -15, 6))
+PULL = Affine(NO_GRADIENT, (WAY, 0.0, 0.0), tuple((float(i), float(SMOOTH(i / FRAMES))) for i in range(FRAMES + 1)))
 
 
 def more(lab: Lab, periods: float, factor: float) -> float:
     """The force [N] that inertia adds at a quarter of a pull of so many ``periods`` of the first mode, of 1e-4 of the length."""
     forces = []
     for acting in ((), (mass(factor),)):
-        body = bar(acting, (Prescribed("x1", "x1", (0,), PULL),), 64, periods * PERIOD)
+        body = bar(acting, (Prescribed("x1", "x1", (0,), PULL),), FRAMES, periods * PERIOD)
         forces.append(float(lab.solve(body, "P2", **STEP, residual=1e-14).states[16].forces["x1"][0]))
     return forces[1] - forces[0]
 
@@ -117,7 +101,8 @@ def more(lab: Lab, periods: float, factor: float) -> float:
 def slow(lab: Lab, factor: float) -> Finding:
     """The force of inertia over what it is in the limit, by pulls that take twice as long: it is of order 2 in the speed."""
     ladder = tuple((1 / periods, more(lab, periods, factor)) for periods in (4.0, 8.0, 16.0))
-    known = inertia.pull_of_inertia(DENSITY, LENGTH, 1.0, PULL.acceleration(0.25, 16.0 * PERIOD))
+    acceleration = WAY * float(SMOOTH.deriv(2)(0.25)) / (16.0 * PERIOD) ** 2
+    known = inertia.pull_of_inertia(DENSITY, LENGTH, 1.0, acceleration)
     return Finding(ladder[-1][1] / known, order(ladder, 0.0), ladder, "sizes are pulls a period of the first mode")
 
 

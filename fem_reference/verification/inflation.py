@@ -6,6 +6,7 @@ what the energy grows by. The energy is a polynomial through those of a few stre
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import Chebyshev
@@ -80,7 +81,7 @@ def pressed(lab: Lab, n: int, mu: float) -> float:
     return float(np.linalg.norm(state.points[inside], axis=1).mean() / INNER)
 
 
-def tube(lab: Lab, n: int, element: str, ends: tuple[str, ...], degree: int) -> Run:
+def tube(lab: Lab, n: int, element: str, ends: tuple[str, ...] = ("bottom", "top"), degree: int = 2) -> Run:
     """A quarter of the tube, whose inner face is moved out to STRETCH, and whose ``ends`` stay in their planes."""
     mesh = shapes.tube_quarter(INNER, OUTER, LENGTH, (2 * n, 2 * n, 1), ELEMENTS[element][0], degree)
     grown = Prescribed("inner", "inner", (0, 1), Radial(1.0, (1.0, 1.0, 0.0), ((1.0, 0.0), (2.0, 1.0))))
@@ -89,14 +90,14 @@ def tube(lab: Lab, n: int, element: str, ends: tuple[str, ...], degree: int) -> 
     return lab.solve(body, element, first_step=0.2, residual=RESIDUAL)
 
 
-def tube_pressure(lab: Lab, n: int, ends: tuple[str, ...]) -> float:
+def tube_pressure(lab: Lab, n: int, **given: Any) -> float:
     """The pressure in the tube at STRETCH [MPa]: the quarter encloses ``pi a^2 L / 4``."""
-    return float(slope(tube(lab, n, "Q2/Q1", ends, 2))(STRETCH) / (np.pi / 2 * INNER**2 * STRETCH * LENGTH))
+    return float(slope(tube(lab, n, **given))(STRETCH) / (np.pi / 2 * INNER**2 * STRETCH * LENGTH))
 
 
-def tube_force(lab: Lab, n: int, degree: int) -> float:
+def tube_force(lab: Lab, n: int, **given: Any) -> float:
     """The force on an end of the whole tube at STRETCH [N]."""
-    return float(4 * tube(lab, n, "P2/P1", ("bottom", "top"), degree).last.forces["top"][2])
+    return float(4 * tube(lab, n, **given).last.forces["top"][2])
 
 
 laws, radial = find("laws"), find("radial")
@@ -126,8 +127,14 @@ def true_tube(which: int) -> float:
 
 NEO_HOOKE, MOONEY_RIVLIN = neo_hooke(MU, BULK), mooney_rivlin(C1, C2, BULK)
 NEARLY_INCOMPRESSIBLE = neo_hooke(MU, NEARLY)
-STRAIGHT = "straight cells, whose surfaces have flat facets"
-RISING = "Mooney-Rivlin material of the same shear modulus, whose pressure goes on rising"
+STRAIGHT: dict[str, Any] = {
+    "negative_control": "straight cells, whose surfaces have flat facets",
+    "wrong": {"degree": 1},
+}
+RISING: dict[str, Any] = {
+    "negative_control": "Mooney-Rivlin material of the same shear modulus, whose pressure goes on rising",
+    "wrong": {"material": MOONEY_RIVLIN},
+}
 FINITE = partial(
     Entry,
     group="inflation",
@@ -151,34 +158,25 @@ LIMIT = partial(
 )
 
 ENTRIES: tuple[Entry, ...] = (
-    FINITE(
-        name="inflation_sphere_pressure_tetrahedra",
-        title="A thick sphere blown up to 1.5 times its inner radius: its pressure, by curved tetrahedra (P2/P1)",
-        unit="MPa",
-        measure=blown,
-        given={"reading": AT_STRETCH, "element": "P2/P1", "material": NEO_HOOKE},
-        negative_control=STRAIGHT,
-        wrong={"degree": 1},
-        truth=lambda: true_pressure(laws.neo_hooke(MU)),
-        within=2e-4,
-        because="discretisation of order 4, 5e-5 with 6 cells through the wall; the polynomial of the energy adds 1e-6",
-        refinement=Refinement((1, 2, 3), INNER / 2, order=4),
-        slow=True,
-        slow_negative_control=True,
-    ),
-    FINITE(
-        name="inflation_sphere_pressure_hexahedra",
-        title="A thick sphere blown up to 1.5 times its inner radius: its pressure, by curved hexahedra (Q2/Q1)",
-        unit="MPa",
-        measure=blown,
-        given={"reading": AT_STRETCH, "element": "Q2/Q1", "material": NEO_HOOKE},
-        negative_control=STRAIGHT,
-        wrong={"degree": 1},
-        truth=lambda: true_pressure(laws.neo_hooke(MU)),
-        within=4e-4,
-        because="discretisation of order 4, 1.1e-4 with 4 cells through the wall; the polynomial of the energy adds 1e-6",
-        refinement=Refinement((1, 2), INNER / 2, order=4),
-        slow=True,
+    *(
+        FINITE(
+            name=f"inflation_sphere_pressure_{cells}",
+            title=f"A thick sphere blown up to 1.5 times its inner radius: its pressure, by curved {cells} ({element})",
+            unit="MPa",
+            measure=blown,
+            given={"reading": AT_STRETCH, "element": element, "material": NEO_HOOKE},
+            **STRAIGHT,
+            truth=lambda: true_pressure(laws.neo_hooke(MU)),
+            within=within,
+            because=f"discretisation of order 4, {left} cells through the wall; the polynomial of the energy adds 1e-6",
+            refinement=Refinement(counts, INNER / 2, order=4),
+            slow=True,
+            slow_negative_control=element == "P2/P1",
+        )
+        for cells, element, within, left, counts in (
+            ("tetrahedra", "P2/P1", 2e-4, "5e-5 with 6", (1, 2, 3)),
+            ("hexahedra", "Q2/Q1", 4e-4, "1.1e-4 with 4", (1, 2)),
+        )
     ),
     FINITE(
         name="inflation_sphere_pressure_mooney_rivlin",
@@ -212,8 +210,7 @@ ENTRIES: tuple[Entry, ...] = (
         title="A thick sphere blown up without end: the largest pressure that it bears",
         unit="MPa",
         given={**CELLS, "reading": LARGEST},
-        negative_control=STRAIGHT,
-        wrong={"degree": 1},
+        **STRAIGHT,
         truth=lambda: TRUE_SPHERE.limit_point()[1],
         within=4e-4,
         because="discretisation of order 4, 1e-4 with 4 cells through the wall (Q2/Q1); the polynomial adds 1e-6",
@@ -224,8 +221,7 @@ ENTRIES: tuple[Entry, ...] = (
         title="A thick sphere blown up without end: the stretch of its inner radius where it bears the most pressure",
         unit="1",
         given={**CELLS, "reading": WHERE_LARGEST},
-        negative_control=RISING,
-        wrong={"material": MOONEY_RIVLIN},
+        **RISING,
         truth=lambda: TRUE_SPHERE.limit_point()[0],
         within=1e-4,
         because="discretisation of order 4, 2e-5 with 4 cells through the wall (Q2/Q1)",
@@ -237,8 +233,7 @@ ENTRIES: tuple[Entry, ...] = (
         title="A thick sphere blown up to 2.2 times its inner radius: how far its pressure has fallen from the largest",
         unit="MPa",
         given={**CELLS, "reading": FALL},
-        negative_control=RISING,
-        wrong={"material": MOONEY_RIVLIN},
+        **RISING,
         truth=true_fall,
         within=2e-3,
         because="4 % of a pressure that is found to 1e-4: of its error 2e-4 is left (Q2/Q1, 4 cells through the wall)",
@@ -249,7 +244,7 @@ ENTRIES: tuple[Entry, ...] = (
         title="A thick tube of constant length blown up to 1.5 times its inner radius: its pressure",
         unit="MPa",
         measure=tube_pressure,
-        given={"ends": ("bottom", "top")},
+        given={"element": "Q2/Q1"},
         negative_control="one end of the tube is free to move along it",
         wrong={"ends": ("bottom",)},
         truth=lambda: true_tube(0),
@@ -263,9 +258,8 @@ ENTRIES: tuple[Entry, ...] = (
         title="A thick tube of constant length blown up to 1.5 times its inner radius: the force along its axis",
         unit="N",
         measure=tube_force,
-        given={"degree": 2},
-        negative_control=STRAIGHT,
-        wrong={"degree": 1},
+        given={"element": "P2/P1"},
+        **STRAIGHT,
         truth=lambda: true_tube(1),
         within=5e-5,
         because="discretisation of order 4, 1e-5 with 6 cells through the wall (P2/P1)",

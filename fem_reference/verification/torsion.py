@@ -44,6 +44,7 @@ def square_bar(lab: Lab, cells: int, element: str, turned: tuple[int, ...]) -> f
 
 
 rivlin = find("rivlin")
+TWISTED, TWISTED_MOONEY_RIVLIN = (rivlin.Torsion(*moduli, RADIUS, TWIST) for moduli in ((MU / 2, 0.0), (C1, C2)))
 NEO_HOOKE, MOONEY_RIVLIN = neo_hooke(MU, BULK), mooney_rivlin(C1, C2, BULK)
 CYLINDER = partial(
     Entry,
@@ -68,33 +69,25 @@ SQUARE = partial(
 )
 
 ENTRIES: tuple[Entry, ...] = (
-    CYLINDER(
-        name="torsion_moment_tetrahedra",
-        title="Twisting a cylinder by half a radian: the moment, by curved tetrahedra (P2/P1)",
-        unit="N mm",
-        given={"end": "moments", "element": "P2/P1", "material": NEO_HOOKE},
-        negative_control="straight cells, whose surface has flat facets",
-        wrong={"degree": 1},
-        truth=lambda: rivlin.Torsion(MU / 2, 0.0, RADIUS, TWIST).moment(),
-        within=5e-4,
-        because="discretisation of order 4, 8e-5 with 8 cells along the radius; the material's K/mu of 1e6 adds 1e-6",
-        refinement=Refinement((1, 2, 4), RADIUS / 2, order=4),
-        slow=True,
-        slow_negative_control=True,
-    ),
-    CYLINDER(
-        name="torsion_moment_hexahedra",
-        title="Twisting a cylinder by half a radian: the moment, by curved hexahedra (Q2/Q1)",
-        unit="N mm",
-        given={"end": "moments", "element": "Q2/Q1", "material": NEO_HOOKE},
-        negative_control="straight cells, whose surface has flat facets",
-        wrong={"degree": 1},
-        truth=lambda: rivlin.Torsion(MU / 2, 0.0, RADIUS, TWIST).moment(),
-        within=1e-4,
-        because="discretisation of order 4, 1.6e-5 with 6 cells along the radius; the material's K/mu of 1e6 adds 1e-6",
-        refinement=Refinement((1, 2, 3), RADIUS / 2, order=4),
-        slow=True,
-        slow_negative_control=True,
+    *(
+        CYLINDER(
+            name=f"torsion_moment_{cells}",
+            title=f"Twisting a cylinder by half a radian: the moment, by curved {cells} ({element})",
+            unit="N mm",
+            given={"end": "moments", "element": element, "material": NEO_HOOKE},
+            negative_control="straight cells, whose surface has flat facets",
+            wrong={"degree": 1},
+            truth=TWISTED.moment,
+            within=within,
+            because=f"discretisation of order 4, {left} cells along the radius; the material's K/mu of 1e6 adds 1e-6",
+            refinement=Refinement(counts, RADIUS / 2, order=4),
+            slow=True,
+            slow_negative_control=True,
+        )
+        for cells, element, within, left, counts in (
+            ("tetrahedra", "P2/P1", 5e-4, "8e-5 with 8", (1, 2, 4)),
+            ("hexahedra", "Q2/Q1", 1e-4, "1.6e-5 with 6", (1, 2, 3)),
+        )
     ),
     CYLINDER(
         name="torsion_axial_force",
@@ -103,7 +96,7 @@ ENTRIES: tuple[Entry, ...] = (
         given={"end": "forces", "element": "Q2/Q1", "material": NEO_HOOKE},
         negative_control="Mooney-Rivlin material of the same shear modulus, which turns with the same moment",
         wrong={"material": MOONEY_RIVLIN},
-        truth=lambda: rivlin.Torsion(MU / 2, 0.0, RADIUS, TWIST).axial_force(),
+        truth=TWISTED.axial_force,
         within=1e-3,
         because="discretisation of order 4, 1.7e-4 with 6 cells along the radius: a force of second order in the twist",
         refinement=Refinement((1, 2, 3), RADIUS / 2, order=4),
@@ -117,7 +110,7 @@ ENTRIES: tuple[Entry, ...] = (
         given={"end": "moments", "rings": 2, "element": "Q2/Q1", "material": MOONEY_RIVLIN},
         negative_control="c2 is 1 % too large",
         wrong={"material": mooney_rivlin(C1, 1.01 * C2, BULK)},
-        truth=lambda: rivlin.Torsion(C1, C2, RADIUS, TWIST).moment(),
+        truth=TWISTED_MOONEY_RIVLIN.moment,
         within=5e-4,
         because="discretisation of order 4, 8e-5 with 4 cells along the radius (Q2/Q1)",
     ),
@@ -128,22 +121,21 @@ ENTRIES: tuple[Entry, ...] = (
         given={"end": "forces", "rings": 2, "element": "Q2/Q1", "material": MOONEY_RIVLIN},
         negative_control="neo-Hookean material of the same shear modulus, which turns with the same moment",
         wrong={"material": NEO_HOOKE},
-        truth=lambda: rivlin.Torsion(C1, C2, RADIUS, TWIST).axial_force(),
+        truth=TWISTED_MOONEY_RIVLIN.axial_force,
         within=2e-3,
         because="discretisation of order 4, 4e-4 with 4 cells along the radius (Q2/Q1)",
     ),
-    SQUARE(
-        name="torsion_square_bar_tetrahedra",
-        title="Twisting a square bar a little, free to warp: the torsional stiffness, by tetrahedra (P2/P1)",
-        given={"element": "P2/P1", "turned": (0, 1)},
-        within=1e-4,
-        because="discretisation of order 3.7, 1.9e-5 with 16 cells across; the finite twist adds 1e-6",
-    ),
-    SQUARE(
-        name="torsion_square_bar_hexahedra",
-        title="Twisting a square bar a little, free to warp: the torsional stiffness, by hexahedra (Q2/Q1)",
-        given={"element": "Q2/Q1", "turned": (0, 1)},
-        within=5e-5,
-        because="discretisation of order 3.7, 7e-6 with 16 cells across; the finite twist adds 1e-6",
+    *(
+        SQUARE(
+            name=f"torsion_square_bar_{cells}",
+            title=f"Twisting a square bar a little, free to warp: the torsional stiffness, by {cells} ({element})",
+            given={"element": element, "turned": (0, 1)},
+            within=within,
+            because=f"discretisation of order 3.7, {left} with 16 cells across; the finite twist adds 1e-6",
+        )
+        for cells, element, within, left in (
+            ("tetrahedra", "P2/P1", 1e-4, "1.9e-5"),
+            ("hexahedra", "Q2/Q1", 5e-5, "7e-6"),
+        )
     ),
 )

@@ -122,13 +122,13 @@ def test_a_solution_of_something_else_is_refused() -> None:
 def test_load_steps_are_halved_where_time_matters() -> None:
     body = square_bar("Q2/Q1", 1)
     settings = fenicsx.BodySettings(element="Q2/Q1", first_step=0.5, store_state=True)
-    assert body_refinement._sharper(body, settings)[2] == {"store_state": False}
+    assert body_refinement.sharper_problem(body, settings)[2] == {"store_state": False}
     timed = replace(body, effects=(*body.effects, fr.make_effect("viscosity", eta=1.0)), interval=1.0)
-    *_, changes, said = body_refinement._sharper(timed, settings)
+    *_, changes, said = body_refinement.sharper_problem(timed, settings)
     assert changes == {"store_state": False, "first_step": 0.25, "largest_step": 0.5}
     assert said == "Q2/Q1 on cells of half the size and load steps of half the length"
     coarse = settings.model_copy(update={"element": "P1/P1", "quadrature_degree": 2})
-    assert body_refinement._sharper(timed, coarse)[2] | changes == {
+    assert body_refinement.sharper_problem(timed, coarse)[2] | changes == {
         **changes,
         "element": "P2/P1",
         "quadrature_degree": None,

@@ -9,20 +9,25 @@ import pytest
 import small
 import stand_ins
 
-from fem_reference import cli, report
+from fem_reference import cli
 from fem_reference.assessment import versions
-from fem_reference.assessment.error_bars import ErrorBar, ErrorBars
+from fem_reference.assessment.comparison import Comparison
+from fem_reference.assessment.error_bars import ErrorBars
 from fem_reference.assessment.measured import CurrentMeasures
 from fem_reference.assessment.versions import Change, Versions
 from fem_reference.foundations.errors import InputError
 from fem_reference.report import against_page
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import fenicsx, pbd
-from tests.report import test_headline
-from tests.report import test_page as test_report
+from tests.report import comparisons, test_headline
 
 NAN = float("nan")
-comparison = test_report.comparison
+
+
+@pytest.fixture
+def comparison(tmp_path, monkeypatch) -> Comparison:
+    """The small comparison of the tests of pages."""
+    return comparisons.small_comparison(tmp_path, monkeypatch)
 
 
 def change(was, now, bars=(NAN, NAN), unit="mm") -> Change:
@@ -66,7 +71,7 @@ def of(comparison, shift: float, bars: ErrorBars | None = None) -> CurrentMeasur
     """The candidate ``quick`` of the small comparison, ``shift`` times as far away."""
     truth = comparison.reference.positions
     run = replace(comparison.candidates[0], positions=truth + shift * (comparison.candidates[0].positions - truth))
-    measures = test_report.measured(run, truth)
+    measures = comparisons.measured(run, truth)
     return CurrentMeasures(comparison.scene, run, comparison.reference, measures, bars)
 
 
@@ -86,20 +91,6 @@ def test_two_runs_are_compared_statistic_by_statistic_and_vertex_by_vertex(compa
     fewer = replace(wrong.candidate, positions=wrong.candidate.positions[:, 1:])
     with pytest.raises(InputError, match=r"--against: got 65 vertices, want 66"):
         versions.of_runs(wrong, replace(wrong, candidate=fewer), "cut")
-
-
-def test_the_page_has_its_table_curves_and_place(comparison, tmp_path) -> None:
-    bars = (ErrorBar("deviation", "surface_deviation", "rms", "mm", np.full(5, 5.0), {}),)
-    found = pair(comparison, ErrorBars(test_report.NUMBERS, (1.0, 2.0), 2.0, bars))
-    path = report.write_versions(found, comparison.setup, tmp_path, "against", "fem-reference compare")
-    text = path.read_text(encoding="utf-8")
-    assert '<span class="badge within">within the error bar</span>' in text
-    assert "2 mm from where it was, in frame 40: vertex 0, at rest at (30, 0, 0) mm" in text
-    assert "No pictures: the program that draws them" in text
-    assert text.count("<svg ") == 1 + against_page.MOST_CURVES
-    facts = json.loads((tmp_path / "against.json").read_text())
-    assert facts["counts"]["within the error bar"] == 1
-    assert sum(facts["counts"].values()) == len(facts["changes"]) == 8
 
 
 def shift(by: float):
@@ -136,7 +127,7 @@ def test_the_verb_compares_with_a_baseline_and_with_a_stored_run(tmp_path: Path,
         assert f"page: {out / name / 'against.html'}" in printed
         assert json.loads(facts.read_text())["counts"]["worse"] > 3
     html = next(out.glob(f"*against_{old.name}/against.html")).read_text()
-    assert "What is different in how they were made" in html
+    assert "Differences in how they were made" in html
     for words, want in (
         (["--against", str(past), "--candidate", "pbd", "--solver", "xpbd"], "--against: got 2 candidates"),
         (["--against", str(tmp_path / "nowhere"), "--solver", "pbd"], "nowhere"),

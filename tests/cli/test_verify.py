@@ -7,8 +7,9 @@ from types import ModuleType
 
 import pytest
 
-from fem_reference import cli, report
+from fem_reference import cli
 from fem_reference.foundations.errors import MissingSoftware
+from fem_reference.report import pages
 from fem_reference.verification import runner
 from tests.verification.stand_ins import Labs, catalogue, entry
 
@@ -89,7 +90,7 @@ def test_a_page_that_cannot_be_written_leaves_what_was_measured_reported(verify,
         raise OSError("no space left")
 
     target = verify.folder / "facts.json"
-    monkeypatch.setattr(report, "write_verification", full)
+    monkeypatch.setattr(pages, "write", full)
     status, printed, _ = verify("bars", "--json", str(target))
     assert status == cli.BAD_INPUT
     assert "no space left" in printed.err

@@ -24,6 +24,7 @@ from fem_reference.export.folders import new_folder
 from fem_reference.foundations import subprocesses
 from fem_reference.io import files
 from fem_reference.problems.problem import AtRest
+from fem_reference.report import stress_page
 from fem_reference.runs import cut_off, store
 from fem_reference.runs.states import write_arrays
 from fem_reference.runs.store import Frame, Outcome, Run
@@ -248,7 +249,7 @@ def test_a_run_whose_folder_cannot_be_written_into_any_more_keeps_what_it_has(tm
 
 def write_both(folder: Path, word: str) -> None:
     """A page with its numbers, and an export."""
-    report.write_stress(Stress((), (), (), 0.0, {"said": 1000 * word}), folder, "page", "")
+    report.write(stress_page.page(Stress((), (), (), 0.0, {"said": 1000 * word})), folder, "page")
     with new_folder(folder / "exported") as part:
         files.write_text(part / "README.md", 1000 * word)
 

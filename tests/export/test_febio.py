@@ -14,7 +14,6 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import acting
-import feb_file
 import meshio
 import numpy as np
 import pytest
@@ -26,23 +25,10 @@ from fem_reference import export
 from fem_reference.effects import total_energy
 from fem_reference.export import febio, febio_material
 from fem_reference.foundations.errors import InputError
-from fem_reference.foundations.mesh import boundary, tet_volumes, triangle_areas
 from fem_reference.foundations.motion import apply
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
-
-
-@pytest.fixture(scope="module")
-def bar() -> Problem:
-    return feb_file.bar()
-
-
-@pytest.fixture(scope="module")
-def feb(bar: Problem, tmp_path_factory: pytest.TempPathFactory) -> Element:
-    folder = tmp_path_factory.mktemp("febio")
-    febio.write(bar, folder)
-    return ElementTree.parse(folder / "scene.feb").getroot()
 
 
 def test_the_sections_are_those_of_the_format(feb: Element) -> None:
@@ -51,7 +37,7 @@ def test_the_sections_are_those_of_the_format(feb: Element) -> None:
     assert [section.tag for section in feb] == sections.split()
 
 
-def test_what_is_empty_is_written_short(bar: Problem, tmp_path: Path) -> None:
+def test_what_is_empty_is_written_short(bar: MuscleProblem, tmp_path: Path) -> None:
     """FEBio takes ``<Module type="solid"></Module>`` for the beginning of a list (FEBioModuleSection.cpp)."""
     febio.write(bar, tmp_path)
     text = (tmp_path / "scene.feb").read_text()
@@ -96,83 +82,6 @@ def test_every_name_that_is_used_is_there(feb: Element) -> None:
     assert len(materials) == len({entry.attrib["id"] for entry in feb.iterfind("Material/material")})
 
 
-def shapes_of_febio(r: np.ndarray) -> np.ndarray:
-    """FEBio's ten shape functions at points (n, 3) of its reference tet, (n, 10)."""
-    a, (b, c, d) = 1 - r.sum(axis=1), r.T
-    corners = [x * (2 * x - 1) for x in (a, b, c, d)]
-    return np.stack([*corners, 4 * a * b, 4 * b * c, 4 * c * a, 4 * a * d, 4 * b * d, 4 * c * d], axis=1)
-
-
-def test_elements_are_straight_tets_of_positive_volume_in_febios_order(feb: Element, bar: Problem) -> None:
-    """In that order alone its shape functions carry its reference tet linearly to where the corners are (rounding at 30 mm)."""
-    at = nodes(feb)[cells(feb, "muscle")]
-    r = np.random.default_rng(1).dirichlet(np.ones(4), size=20)
-    linear = np.einsum("pk,ekx->epx", r, at[:, :4])
-    assert np.allclose(np.einsum("pk,ekx->epx", shapes_of_febio(r[:, 1:]), at), linear, rtol=0, atol=1e-12)
-    volumes = tet_volumes(at.reshape(-1, 3), 10 * np.arange(len(at))[:, None] + np.arange(4))
-    assert volumes.min() > 0
-    assert volumes.sum() == pytest.approx(3000, rel=1e-12)  # 10 x 10 x 30
-    assert len(at) == len(bar.mesh.tets)
-
-
-def test_attached_nodes_are_all_of_an_end(feb: Element) -> None:
-    """5 x 5 nodes of the 2 x 2 cells in a face: corners, and middles of edges and diagonals."""
-    points = nodes(feb)
-    for name, height in (("bottom", 0.0), ("top", 30.0)):
-        attached = [int(text) for text in feb.find(f"Mesh/NodeSet[@name='attached_{name}']").text.split(",")]
-        assert set(attached) == set(np.flatnonzero(np.isclose(points[: 1 + cells(feb, "muscle").max(), 2], height)))
-        assert len(attached) == 25
-        assert feb.find(f"Boundary/bc[@node_set='attached_{name}']/rb").text == f"bone_{name}"
-
-
-def test_a_node_goes_with_one_bone(bar: Problem) -> None:
-    """Attachments that share an edge: what the first has, the second has not."""
-    facets = bar.mesh.facets["bottom"]
-    split = replace(bar.mesh, facets={"bottom": facets[:4], "top": facets[4:]})
-    feb = febio.model(replace(bar, mesh=split))
-    one, other = (set(entry.text.split(",")) for entry in feb.iterfind("Mesh/NodeSet"))
-    assert not one & other
-    assert len(one | other) == 25
-
-
-def test_the_contact_surfaces(feb: Element) -> None:
-    """All of the sides 10 x 30, up to the attached ends: the reference feels contact from 0.4 mm off them, less than the size of a
-    facet; they face outwards, as FEBio's surfaces must.
-    """
-    points, free = nodes(feb), cells(feb, "muscle_free", "Surface")
-    assert triangle_areas(points, free[:, :3]).sum() == pytest.approx(4 * 10 * 30, rel=1e-12)
-    for middle, (a, b) in zip(free[:, 3:].T, ((0, 1), (1, 2), (2, 0)), strict=True):
-        assert np.allclose(points[middle], (points[free[:, a]] + points[free[:, b]]) / 2, rtol=0, atol=1e-12)
-    a, b, c = (points[free[:, k]] for k in range(3))
-    assert (np.einsum("ij,ij->i", np.cross(b - a, c - a), a - [5, 5, 15]) > 0).all()
-    (contact,) = feb.iterfind("Contact/contact")  # of the bone that the effect names
-    assert contact.find("penalty").text == "0.5"  # 500 kPa/mm
-    assert contact.find("auto_penalty").text == "0"
-    pair = feb.find("Mesh/SurfacePair")
-    assert [surface.text for surface in pair] == ["muscle_free", "bone_top_surface"]
-    ball = cells(feb, "bone_top_surface", "Surface")
-    a, b, c = (points[ball[:, k]] for k in range(3))
-    assert (np.einsum("ij,ij->i", np.cross(b - a, c - a), a) > 0).all()
-    assert np.array_equal(ball, cells(feb, "bone_top"))
-
-
-def test_a_contact_surface_without_facets_is_refused(bar: Problem) -> None:
-    """All sides attached: no facet is left, where FEBio would run without contact and say nothing."""
-    outer = boundary(bar.mesh.tets)[0]
-    nowhere = replace(bar, mesh=replace(bar.mesh, facets={"bottom": outer, "top": outer[:1]}))
-    with pytest.raises(
-        InputError, match=r"contact: got no facet of the tetrahedra farther than 0\.41 mm from what is att"
-    ):
-        febio.model(nowhere)
-
-
-def test_a_bone_whose_triangles_face_inwards_is_turned(bar: Problem) -> None:
-    ball = bar.bones[0].surface
-    inwards = replace(bar.bones[0], surface=replace(ball, triangles=ball.triangles[:, ::-1]))
-    upright, turned = (febio.model(replace(bar, bones=(bone,), attached=())) for bone in (bar.bones[0], inwards))
-    assert np.array_equal(cells(upright, "bone_bottom"), cells(turned, "bone_bottom"))
-
-
 def pose(feb: Element, name: str, time: float) -> np.ndarray:
     """Where FEBio has a rigid body: turned about its centre of mass by a rotation vector, then displaced; each component a value
     times its load curve.
@@ -195,14 +104,14 @@ def pose(feb: Element, name: str, time: float) -> np.ndarray:
     return matrix
 
 
-def test_load_curves_are_the_poses(feb: Element, bar: Problem) -> None:
+def test_load_curves_are_the_poses(feb: Element, bar: MuscleProblem) -> None:
     """At frames, between them and at keyframes beside them."""
     for bone in bar.bones:
         for frame in (*FRAMES, 11.3, 12.5, 18.0, 22.2):
             assert np.allclose(pose(feb, f"bone_{bone.name}", frame - 10), bone.pose(frame), rtol=0, atol=1e-13)
 
 
-def test_every_freedom_of_a_bone_is_fixed_or_moved(feb: Element, bar: Problem) -> None:
+def test_every_freedom_of_a_bone_is_fixed_or_moved(feb: Element, bar: MuscleProblem) -> None:
     for bone in bar.bones:
         mine = [entry for entry in feb.iterfind("Rigid/rigid_bc") if entry.find("rb").text == f"bone_{bone.name}"]
         fixed = [
@@ -230,7 +139,7 @@ def test_febio_passes_every_frame_wanted(feb: Element) -> None:
     ("frames", "step", "count"), [((0, 10, 20), 2, 10), ((0, 1, 2), 1, 2), ((10, 15, 20), 5 / 3, 6), ((3, 7), 2, 2)]
 )
 def test_steps_are_two_frames_or_what_is_shorter_and_goes_up_evenly(
-    bar: Problem, frames: tuple[int, ...], step: float, count: int
+    bar: MuscleProblem, frames: tuple[int, ...], step: float, count: int
 ) -> None:
     feb = febio.model(replace(bar, frames=frames))
     control = feb.find("Control")
@@ -247,16 +156,8 @@ def test_what_febio_does_where_a_step_fails_and_when_it_stops(feb: Element) -> N
     assert {key: float(solver.find(key).text) for key in ("dtol", "etol")} == {"dtol": 1e-4, "etol": 1e-5}
 
 
-def test_contact_has_its_whole_tangent(bar: Problem, feb: Element) -> None:
-    """That of sliding is not symmetric; without contact FEBio's solver is left as it is."""
-    assert feb.find("Contact/contact/symmetric_stiffness").text == "0"
-    assert feb.find("Control/solver/symmetric_stiffness").text == "non-symmetric"
-    plain = febio.model(replace(bar, effects=bar.effects[:3]))
-    assert plain.find("Control/solver/symmetric_stiffness") is None
-
-
 @pytest.mark.parametrize("moving", [("bottom",), ("top",), ("bottom", "top"), ()])
-def test_load_controllers_are_numbered_without_gaps(bar: Problem, moving: tuple[str, ...]) -> None:
+def test_load_controllers_are_numbered_without_gaps(bar: MuscleProblem, moving: tuple[str, ...]) -> None:
     """FEBio refuses an id that its list has no place for: here as well where the first bone rests."""
     bones = tuple(bone if bone.name in moving else replace(bone, motion=None) for bone in bar.bones)
     attached = tuple(replace(attached, bone=bones[i]) for i, attached in enumerate(bar.attached))
@@ -268,7 +169,7 @@ def test_load_controllers_are_numbered_without_gaps(bar: Problem, moving: tuple[
             assert np.allclose(pose(feb, f"bone_{bone.name}", frame - 10), bone.pose(frame), rtol=0, atol=1e-13)
 
 
-def test_fibres_are_the_first_axis_of_each_element(feb: Element, bar: Problem) -> None:
+def test_fibres_are_the_first_axis_of_each_element(feb: Element, bar: MuscleProblem) -> None:
     axes = list(feb.iterfind("MeshData/ElementData[@type='mat_axis'][@elem_set='muscle']/e"))
     assert [int(entry.attrib["lid"]) for entry in axes] == list(range(1, len(bar.mesh.tets) + 1))
     along, across = (np.array([numbers(entry.find(axis)) for entry in axes]) for axis in "ad")
@@ -297,7 +198,7 @@ def test_the_law_is_the_same(matrix: tuple[str, ...]) -> None:
         assert energy == pytest.approx(ours, rel=1e-9)
 
 
-def test_constants_of_fibres_and_kind_of_element(feb: Element, bar: Problem) -> None:
+def test_constants_of_fibres_and_kind_of_element(feb: Element, bar: MuscleProblem) -> None:
     muscle = feb.find("Material/material[@name='muscle']")
     assert muscle.attrib["type"] == "trans iso Mooney-Rivlin"
     found = {entry.tag: float(entry.text) for entry in muscle if entry.tag != "fiber"}
@@ -336,7 +237,7 @@ def test_what_febio_has_not_is_refused_before_any_work(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_frames_come_back_from_febios_log(folder: Path, bar: Problem, tmp_path: Path) -> None:
+def test_frames_come_back_from_febios_log(folder: Path, bar: MuscleProblem, tmp_path: Path) -> None:
     """Its quadratic elements show a quadratic motion exactly; so does every vertex of the surface, wherever in a tet it lies."""
     scene = casefile.read(folder)
     assert isinstance(scene, MuscleCase)

@@ -7,22 +7,20 @@ from xml.etree import ElementTree
 import feb_file
 import numpy as np
 import pytest
-import shapes
 import small
 
 import fem_reference as fr
 from fem_reference import cli
 from fem_reference.export import febio, febio_differences
-from fem_reference.export.febio_contact import overlaps
 from fem_reference.foundations.mesh import Surface
 from fem_reference.geometry.skins import attached_skin
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 
 STIFFNESS = 0.1  # MPa/mm
 
 
 @pytest.fixture(scope="module")
-def springs() -> Problem:
+def springs() -> MuscleProblem:
     """A bar whose top of 10 x 10 mm, all of it facets of the tets, is attached on 10 x 8 mm of the muscle's own surface; the bones
     are far from its sides.
     """
@@ -35,7 +33,7 @@ def springs() -> Problem:
     return replace(bar, attached=(bar.attached[0], top), attached_skins={"top": skin})
 
 
-def test_springs_of_another_spread_are_said_with_how_stiff_they_are(springs: Problem) -> None:
+def test_springs_of_another_spread_are_said_with_how_stiff_they_are(springs: MuscleProblem) -> None:
     """0.1 MPa/mm over 100 and 80 mm2, whose middles are 5 and 4 mm from the edge; about that of the 80, second moments of area are
     ``10^3 10 / 12`` and ``10^3 10 / 12 + 100`` for ``10^3 8 / 12`` and ``8^3 10 / 12``, about z their sums.
     """
@@ -48,7 +46,7 @@ def test_springs_of_another_spread_are_said_with_how_stiff_they_are(springs: Pro
     assert "5.3 and 8.8 % of the force" in measured
 
 
-def test_nothing_is_said_where_nothing_differs(springs: Problem) -> None:
+def test_nothing_is_said_where_nothing_differs(springs: MuscleProblem) -> None:
     """Exact attachments; springs that the reference has over facets too."""
     exact = replace(springs, attached=tuple(replace(one, stiffness=None) for one in springs.attached))
     assert febio_differences.notes(exact) == []
@@ -56,14 +54,14 @@ def test_nothing_is_said_where_nothing_differs(springs: Problem) -> None:
     assert len(list(comments(exact))) == 1  # units
 
 
-def comments(problem: Problem) -> list[str]:
+def comments(problem: MuscleProblem) -> list[str]:
     """Those of the file, as a reader of it sees them."""
     kept = ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True))
     root = ElementTree.fromstring(ElementTree.tostring(febio.model(problem)), kept)
     return [str(entry.text) for entry in root if entry.tag is ElementTree.Comment]
 
 
-def test_the_file_says_it_whatever_the_name(springs: Problem) -> None:
+def test_the_file_says_it_whatever_the_name(springs: MuscleProblem) -> None:
     """Two hyphens would end a comment of XML."""
     top = replace(springs.attached[1], attachment="a--b -->")
     mesh = replace(
@@ -71,39 +69,6 @@ def test_the_file_says_it_whatever_the_name(springs: Problem) -> None:
     )
     named = replace(springs, attached=(top,), mesh=mesh, attached_skins={"a--b -->": springs.attached_skins["top"]})
     assert any("a- -b - ->" in text and "10 N/mm in all for 8" in text for text in comments(named))
-
-
-def overlapping(deep: float, name: str = "top") -> Problem:
-    """The bar, and a bone of this name that is ``deep`` [mm] in one of its sides between its ends."""
-    bar = feb_file.bar()
-    plate = shapes.skin(shapes.box((1, 1, 1), (10, 30, 6)))
-    plate = plate.moved_to(plate.points + [deep - 10, -10, 12])
-    far = plate.moved_to(plate.points - [100, 0, 0])
-    bones = tuple(replace(bone, surface=plate if bone.name == name else far) for bone in bar.bones)
-    return replace(bar, bones=bones)
-
-
-def radius(problem: Problem) -> float:
-    (contact,) = febio.model(problem).iterfind("Contact/contact[@type='sliding-elastic']")
-    return float(contact.find("search_radius").text)
-
-
-@pytest.mark.parametrize(("deep", "wanted"), [(0.0, 5.0), (0.15, 5.0), (0.19, 5.0), (0.21, 0.2), (0.5, 0.2)])
-def test_an_overlap_at_rest_presses_with_no_more_than_the_matrix_bears(deep: float, wanted: float) -> None:
-    """Ten shear moduli of 10 kPa press 0.2 mm deep where the stiffness is 500 kPa/mm."""
-    problem = overlapping(deep)
-    assert overlaps(problem) == {"top": pytest.approx(deep, abs=1e-12)}
-    assert radius(problem) == pytest.approx(wanted, rel=1e-12)
-    said = febio_differences.notes(problem)
-    assert len(said) == (deep > 0)
-    assert all(f"{deep:.2g} mm inside" in text and f"search_radius is {wanted:.2g} mm" in text for text in said)
-
-
-def test_a_bone_that_is_no_obstacle_may_overlap() -> None:
-    """The contact of the bar is by the bone "top" alone."""
-    problem = overlapping(0.5, "rests & <waits>")
-    assert overlaps(problem) == {"top": 0.0}
-    assert radius(problem) == 5.0
 
 
 def test_the_terminal_and_the_page_beside_the_file_say_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,10 +9,10 @@ import every_page
 import pytest
 from browser import PROGRAM, Browser
 
-from tests.report import test_page as test_report
+from tests.report import comparisons
 
 pytestmark = pytest.mark.slow
-comparison = test_report.comparison
+
 PHONE, DESK, SHEET = 390, 1280, 1032  # widths in pixels, the last of A4 on its side within margins
 
 CHECKS = (Path(__file__).parents[1] / "page_checks.js").read_text(encoding="utf-8")
@@ -31,8 +31,8 @@ def written(tmp_path_factory) -> dict[str, Path]:
     """The path of a page of each kind."""
     with pytest.MonkeyPatch.context() as patch:
         folder = tmp_path_factory.mktemp("pages")
-        found = test_report.small_comparison(folder, patch)
-        return every_page.write(folder / "reports", found, test_report.alone(found))
+        found = comparisons.small_comparison(folder, patch)
+        return every_page.write(folder / "reports", found, comparisons.alone(found))
 
 
 def show(browser: Browser, path: Path, width: int, **media: Any) -> None:

@@ -99,7 +99,7 @@ def test_stored_runs_are_judged_without_fenicsx_and_meshers(job) -> None:
         "    sys.modules[name] = None\n"
         "from fem_reference import cli\n"
         "from fem_reference.report import gallery\n"
-        "gallery._command = lambda _job, _folder: ['/nowhere/python']\n"
+        "gallery.program = lambda _job, _folder: ['/nowhere/python']\n"
         f"sys.exit(cli.main(['compare', {str(job.case)!r}, '--out', {str(job.out)!r}, '--quiet']))"
     )
     done = subprocess.run([sys.executable, "-c", block], capture_output=True, text=True, check=False)

@@ -9,21 +9,13 @@ import stand_ins
 
 from fem_reference import cli
 from fem_reference.cli import demo
-from fem_reference.report import index_page, pages
+from fem_reference.report import index_page
 from fem_reference.report.asked import LONGEST, Asked, Part, written
-from fem_reference.report.pages import About
-from fem_reference.report.templates import template
+from fem_reference.report.pages import Page
 from fem_reference.solvers import fenicsx, pbd
 from tests.report import test_headline
 
-TEXT = template("index_page.html").render(entries=[], others=[])
-
-
-def put(folder: Path, name: str, command: str) -> Path:
-    """A page as a verb writes it."""
-    path = folder / f"{name}.html"
-    path.write_text(pages.stamped(TEXT, About("study", "A title", (), command)), encoding="utf-8")
-    return path
+EMPTY = Page("study", "A title", (), "index_page.html", {"entries": (), "others": ()})
 
 
 def test_the_name_holds_what_makes_the_page_different_and_ends_somewhere() -> None:
@@ -45,16 +37,16 @@ def test_where_the_index_cannot_be_written_the_page_is(tmp_path: Path, monkeypat
         raise OSError("no room")
 
     monkeypatch.setattr(index_page, "write", refuse)
-    path, lines = written(Asked("study", "study"), tmp_path, None, put)
+    path, lines = written(Asked("study", "study"), EMPTY, tmp_path)
     assert path.is_file()
     assert lines == [f"page: {path}", "  no index: no room"]
 
 
 def test_the_command_that_made_a_page_makes_it_anew(tmp_path: Path) -> None:
     asked = Asked("study", "study", ())
-    assert written(asked, tmp_path, None, put) == (tmp_path / "study.html", [f"page: {tmp_path / 'study.html'}"])
-    assert len(written(asked, tmp_path, None, put)[1]) == 2
-    assert written(asked, tmp_path, "mine", put)[0] == tmp_path / "mine.html"
+    assert written(asked, EMPTY, tmp_path) == (tmp_path / "study.html", [f"page: {tmp_path / 'study.html'}"])
+    assert len(written(asked, EMPTY, tmp_path)[1]) == 2
+    assert written(asked, EMPTY, tmp_path, "mine")[0] == tmp_path / "mine.html"
 
 
 @pytest.mark.slow

@@ -1,26 +1,16 @@
-"""Pages have names that hold what makes them different, none is lost to another, and the index knows them all."""
+"""Pages have names that hold what makes them different, and none is lost to another."""
 
+import json
 import os
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from jinja2 import UndefinedError
 
 from fem_reference.report import index_page, pages
-from fem_reference.report.pages import About
-from fem_reference.report.templates import template
-
-TEXT = template("index_page.html").render(entries=[], others=[])
-
-
-def about(asked: str = "", **more) -> About:
-    return About(**{"kind": "study", "title": "A <title>", "headlines": (("", "pass", "well"),)} | more, asked=asked)
-
-
-def put(path: Path, asked: str = "", **more) -> Path:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(pages.stamped(TEXT, about(asked, **more)), encoding="utf-8")
-    return path
+from tests.report.stamped import put
 
 
 def test_a_page_says_of_itself_what_it_was_given(tmp_path: Path) -> None:
@@ -77,34 +67,30 @@ def test_a_page_is_written_over_by_the_same_command_alone(tmp_path: Path) -> Non
     assert pages.free(where, "a", "third")[0] == "a-3"
 
 
-def test_the_index_has_every_page_and_no_other_folder(tmp_path: Path) -> None:
-    put(tmp_path / "verify.html", "verify", kind="verification", title="Verified")
-    put(tmp_path / "a b" / "report.html", "compare", headlines=(("mine", "fail", "off <b>"), ("reference", "pass", "")))
-    put(tmp_path / "runs" / "deep" / "report.html", "no")
-    (tmp_path / "docs").mkdir()
-    for name in ("index", "api"):
-        (tmp_path / "docs" / f"{name}.html").write_text("docs")
-    index_page.write(tmp_path)
-    index_page.write(tmp_path)  # it does not list itself
-    text = (tmp_path / "index.html").read_text()
-    body = text[text.index("<tbody>") :]
-    assert re.findall(r'<a href="([^"]*)">', body) == ["verify.html", "a%20b/report.html", "docs/index.html"]
-    assert '<span class="badge fail">fail</span> <b>mine</b>: off &lt;b&gt;' in body
-    assert "2 pages" in pages.read(tmp_path / "index.html").headlines[0][2]
-
-
-def test_an_index_of_somebody_else_stays(tmp_path: Path) -> None:
-    (tmp_path / "index.html").write_text("my own site")
-    put(tmp_path / "a.html", "a")
-    index_page.write(tmp_path)
-    assert (tmp_path / "index.html").read_text() == "my own site"
-
-
 def test_a_pipe_is_no_page(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "a.html")
     assert pages.read(tmp_path / "a.html") is None
 
 
-def test_a_picture_that_cannot_be_read_is_none(tmp_path: Path) -> None:
-    (tmp_path / "a.html").write_text(pages.stamped(TEXT + '<img src="data:image/webp;base64,AAAA">', about()), "utf-8")
-    assert pages.read(tmp_path / "a.html").picture == ""
+def test_the_small_picture_is_the_first_that_can_be_read() -> None:
+    assert pages.small_picture('<img src="data:image/webp;base64,AAAA">') == ""
+
+
+def test_nothing_is_written_when_the_page_cannot_be_made(tmp_path: Path) -> None:
+    empty = pages.Page("index", "Pages", (), "index_page.html", {}, numbers=[1], rows="a,b")
+    with pytest.raises(UndefinedError):
+        pages.write(empty, tmp_path / "out", "page")
+    with pytest.raises(ValueError, match="JSON"):
+        pages.write(
+            replace(empty, contents={"entries": (), "others": ()}, numbers=float("nan")), tmp_path / "out", "page"
+        )
+    assert not (tmp_path / "out").exists()
+
+
+def test_numbers_stand_beside_the_page_under_its_name_or_their_own(tmp_path: Path) -> None:
+    made = pages.Page("index", "Pages", (), "index_page.html", {"entries": (), "others": ()}, numbers=[1], rows="a,b")
+    assert pages.write(made, tmp_path / "one", "page") == tmp_path / "one" / "page.html"
+    pages.write(replace(made, numbers_name="measures"), tmp_path / "two", "page")
+    names = [sorted(path.name for path in (tmp_path / name).iterdir()) for name in ("one", "two")]
+    assert names == [["page.csv", "page.html", "page.json"], ["measures.csv", "measures.json", "page.html"]]
+    assert json.loads((tmp_path / "two" / "measures.json").read_text()) == [1]

@@ -8,10 +8,11 @@ from dataclasses import replace
 
 import pytest
 
+from fem_reference import report
 from fem_reference.assessment.cost_study import CaseStudy, Study
 from fem_reference.assessment.fronts import Point
 from fem_reference.assessment.recommendation import recommend
-from fem_reference.report import study_page, write_study
+from fem_reference.report import study_page
 from tests.assessment.test_recommendation import RMS, TIME, features, own_study
 
 UNITS = {"surface_deviation.rms": "mm", "fibre_length.rms_percent": "%", "volume.deviation": "%"}
@@ -69,9 +70,11 @@ def test_each_drawing_has_the_front_of_its_own_statistic() -> None:
 
     case = replace(study(), points=(made("fast", 1.0, 5.0, 1.0), made("slow", 2.0, 1.0, 2.0)), bars={})
     lengths = {
-        curve.title: max(path.count("L") for path in re.findall(r'<path d="([^"]*)"[^>]*stroke-width: 1.2', curve.svg))
+        curve.title: max(
+            path.count("L") for path in re.findall(r'<path d="([^"]*)"[^>]*stroke-width: 1.2', curve.markup)
+        )
         for curve in study_page.fronts(case)
-        if "stroke-width: 1.2" in curve.svg
+        if "stroke-width: 1.2" in curve.markup
     }
     assert lengths == {"Surface deviation, rms": 0, "Fibre length, rms percent": 1, "Volume, deviation": 0}
 
@@ -108,8 +111,10 @@ def test_a_solver_that_time_does_not_help_is_said_to_be_so() -> None:
 
 def test_the_page_shows_what_was_left_out_and_why(tmp_path) -> None:
     failed = Point("hip", "xpbd", "xpbd", "sweeps", "<b>1</b>", {}, "diverged", "frame 3: & lost")
-    path = write_study(
-        Study((study("hip", failed),), {"far": "data is missing"}, {"machine": "here"}), tmp_path, "study"
+    path = report.write(
+        study_page.page(Study((study("hip", failed),), {"far": "data is missing"}, {"machine": "here"})),
+        tmp_path,
+        "study",
     )
     text = path.read_text(encoding="utf-8")
     assert "diverged: frame 3: &amp; lost" in text
@@ -128,7 +133,7 @@ def test_an_error_below_the_truths_bar_counts_as_the_bar_and_so_does_the_truth()
     assert all(row.at >= 0.2 for row in tables["surface_deviation.rms"])
     # At the bar the cheapest is taken, and not the one that happens to be nearest.
     assert tables["unknowns"][-1].best["fenicsx"].costs["seconds_per_frame"] == 0.04
-    shown = [point for point, _ in study_page._shown(case)]
+    shown = [point for point, _ in study_page.shown_points(case)]
     assert shown[3].errors["surface_deviation.rms"] == 0.1
     assert shown[-1].errors == {"surface_deviation.rms": 0.2}
 
@@ -136,7 +141,9 @@ def test_an_error_below_the_truths_bar_counts_as_the_bar_and_so_does_the_truth()
 def test_a_study_in_which_nothing_reached_its_end_has_a_page(tmp_path) -> None:
     failed = Point("hip", "xpbd", "xpbd", "sweeps", "1", {}, "diverged", "frame 3")
     case = CaseStudy("hip", "The hip", "its reference", (failed,), UNITS, {}, (), 1000, 100.0)
-    assert "diverged: frame 3" in write_study(Study((case,)), tmp_path, "study").read_text(encoding="utf-8")
+    assert "diverged: frame 3" in report.write(study_page.page(Study((case,))), tmp_path, "study").read_text(
+        encoding="utf-8"
+    )
 
 
 def test_tables_compare_at_the_same_cost_and_never_at_the_same_settings() -> None:
@@ -147,7 +154,7 @@ def test_tables_compare_at_the_same_cost_and_never_at_the_same_settings() -> Non
 
 
 def test_columns_of_all_tables_have_one_order_and_the_best_of_a_row_is_marked(tmp_path) -> None:
-    text = write_study(Study((study(),)), tmp_path, "study").read_text(encoding="utf-8")
+    text = report.write(study_page.page(Study((study(),))), tmp_path, "study").read_text(encoding="utf-8")
     heads = re.findall(r"at most</small></th>(.*?)</tr>", text)
     assert len(heads) == 4
     assert all(re.findall("<th>(.*?)</th>", head) == ["fenicsx", "pbd"] for head in heads)
@@ -159,7 +166,7 @@ def test_columns_of_all_tables_have_one_order_and_the_best_of_a_row_is_marked(tm
 
 
 def test_numbers_of_the_page_are_valid_json_with_every_point(tmp_path) -> None:
-    write_study(Study((study(),), {}, {"machine": "here"}), tmp_path, "study")
+    report.write(study_page.page(Study((study(),), {}, {"machine": "here"})), tmp_path, "study")
     found = json.loads(
         (tmp_path / "study.json").read_text(encoding="utf-8"), parse_constant=lambda name: pytest.fail(name)
     )
@@ -171,8 +178,8 @@ def test_numbers_of_the_page_are_valid_json_with_every_point(tmp_path) -> None:
 
 def test_settings_are_tried_on_cases_that_they_were_not_chosen_on(tmp_path) -> None:
     whole = Study(tuple(study(case) for case in ("hip", "knee", "jaw")), {}, {"machine": "here"})
-    text = write_study(whole, tmp_path, "study").read_text(encoding="utf-8")
-    assert "Are settings that are good on some cases good on another?" in text
+    text = report.write(study_page.page(whole), tmp_path, "study").read_text(encoding="utf-8")
+    assert "Do good settings carry over to other cases?" in text
     plain = re.sub(r"<[^>]+>|&#8239;", "", text)
     assert "with the best of the same settings: 0% in the median, 0% at most" in plain
     assert math.isclose(max(one.loss for one in study_page.transfers(whole.cases, "surface_deviation.rms")), 0.0)
@@ -202,7 +209,7 @@ def test_at_most_means_the_same_on_the_page_of_the_study(own_bar: float) -> None
 def test_the_page_says_that_the_bar_is_in_its_table() -> None:
     case = own_study(features(50), bar=2.0)
     case = replace(case, units=case.units | dict.fromkeys(study_page.SHOWN, "mm"))
-    text = study_page.render(Study((case,)))
+    text = study_page.page(Study((case,))).html()
     table = text[text.index("The same surface deviation, rms: time of a frame") :]
     plain = html.unescape(re.sub(r"<[^>]+>", "", table)).replace("\N{NARROW NO-BREAK SPACE}", " ")
     assert "with the error bar of the truth, 2 mm, at most" in plain

@@ -7,6 +7,7 @@ import pytest
 
 from fem_reference.report import words
 from fem_reference.report.sections import reference
+from fem_reference.report.words import duration, number
 from fem_reference.runs.store import Outcome, Run
 
 RUN = Run("reference", "fenicsx", Outcome("converged", "", {}), (0, 1, 2, 3))
@@ -34,3 +35,11 @@ def test_the_energy_gap_is_that_which_is_farthest_from_0_in_per_cent(values: lis
 )
 def test_a_time_reads_as_people_say_it(seconds: float | None, text: str) -> None:
     assert words.duration(seconds) == text
+
+
+def test_numbers_as_people_read_them():
+    minus, times, dash, thin = "\N{MINUS SIGN}", "\N{MULTIPLICATION SIGN}", "\N{EN DASH}", "\N{NARROW NO-BREAK SPACE}"
+    assert number(-12.3456) == f"{minus}12.3"
+    assert number(65021) == f"65{thin}021"
+    assert number(-1.5e-14) == f"{minus}1.50 {times} 10\N{SUPERSCRIPT MINUS}\N{SUPERSCRIPT ONE}\N{SUPERSCRIPT FOUR}"
+    assert [number(float("-inf")), number(None), duration(None)] == [f"{minus}infinite", dash, dash]

@@ -12,7 +12,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Surface, enclosed_volume
 from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
-from fem_reference.problems.setup import AttachedVertices, RigidBody, Setup
+from fem_reference.problems.setup import AttachedVertices, Bone, Setup
 from fem_reference.solvers import arap
 
 USUAL = {
@@ -46,7 +46,7 @@ def attached_setup(low, high, surface=None, last=1, pose=None):
     ends = np.flatnonzero(z < -24), np.flatnonzero(z > 24)
     if pose is not None:
         surface = surface.moved_to(apply(pose, surface.points))
-    bones = tuple(RigidBody(name, surface, motion) for name, motion in (("low", low), ("high", high)))
+    bones = tuple(Bone(name, surface, motion) for name, motion in (("low", low), ("high", high)))
     attached = tuple(AttachedVertices(bone.name, bone, vertices) for bone, vertices in zip(bones, ends, strict=True))
     return Setup(surface, bones, attached, tuple(range(last + 1)), interval=None)
 
@@ -118,48 +118,6 @@ def test_weights_without_geometry():
     np.testing.assert_array_equal(tutte.weights, 1 / np.repeat(degrees, degrees))
     kept = arap.VertexCells.of(muscle(noise=1.0), "cotangent").weights
     np.testing.assert_array_equal(clamped.weights, np.maximum(kept, 0))
-
-
-@pytest.mark.parametrize("weights", WEIGHTS)
-def test_rotations_are_those_of_singular_values(weights):
-    # Noise as wide as a cell turns some inside out: there singular values alone give a reflection.
-    surface = muscle(noise=1.0)
-    cells = arap.VertexCells.of(surface, weights)
-    points = apply(TURN, surface.points) + np.random.default_rng(1).normal(scale=6.0, size=surface.points.shape)
-    found = cells.rotations(points)
-    np.testing.assert_allclose(found, by_singular_values(surface.points, points, cells), atol=1e-10)
-    np.testing.assert_allclose(np.linalg.det(found), 1, rtol=1e-13)
-
-
-def test_a_mirrored_body_is_fitted_by_rotations():
-    surface = muscle()
-    found = arap.VertexCells.of(surface, "cotangent").rotations(surface.points * [1, 1, -1])
-    np.testing.assert_allclose(np.linalg.det(found), 1, rtol=1e-13)
-
-
-def test_cells_in_a_plane_and_without_size_have_a_rotation():
-    # The corners of a cube are attached by three faces, its other vertices lie in a plane: least singular value 0.
-    surface = shapes.skin(shapes.box((3, 3, 3), (3, 3, 3)))
-    cells = arap.VertexCells.of(surface, "kirchhoff")
-    found = cells.rotations(apply(TURN, surface.points))
-    np.testing.assert_allclose(found, np.broadcast_to(TURN[:3, :3], found.shape), atol=1e-12)
-    nothing = cells.rotations(np.zeros(surface.points.shape))
-    np.testing.assert_array_equal(nothing, np.broadcast_to(np.eye(3), nothing.shape))
-
-
-@pytest.mark.parametrize("weights", ["cotangent", "kirchhoff"])
-def test_the_equations_are_the_slope_of_the_energy(weights):
-    # Quadratic in positions: central differences of step 1 mm have no error but rounding, of energies of about 1e4.
-    surface, random = muscle(noise=1.0), np.random.default_rng(2)
-    cells = arap.VertexCells.of(surface, weights)
-    points = surface.points + random.normal(size=surface.points.shape)
-    rotations = cells.rotations(points)
-    slope = 4 * (cells.laplacian() @ points - cells.right_side(rotations))
-    for i, axis in zip(random.integers(0, len(points), 20), itertools.cycle(range(3)), strict=False):
-        step = np.zeros(points.shape)
-        step[i, axis] = 1
-        difference = (cells.energy(points + step, rotations) - cells.energy(points - step, rotations)) / 2
-        assert difference == pytest.approx(slope[i, axis], abs=1e-9)
 
 
 @pytest.mark.parametrize("weights", WEIGHTS)

@@ -2,18 +2,15 @@
 
 import json
 import math
-import re
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import small
 import stand_ins
 
-from fem_reference import cli, report
+from fem_reference import cli
 from fem_reference.assessment.omissions import PHASES, Ablation, CaseOmissions, Omission, verdict
 from fem_reference.effects import make
-from fem_reference.report import effects_page
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import SolverChoice
@@ -132,9 +129,6 @@ def test_a_phase_is_its_share_of_the_processor_time_of_solving() -> None:
     assert {name: one.phase(name) for name in PHASES} == {"assembly": 2.0, "contact": 4.0, "linear systems": 14.0}
 
 
-# The page
-
-
 def omission(*left_out: str, rms: float = 1.0, seconds: float = 4.0, **more) -> Omission:
     changes = {
         "volume.deviation": 0.0,
@@ -168,51 +162,6 @@ def test_time_is_without_compilation_and_phases_are_shares_of_it() -> None:
     assert (one.seconds, one.phase("contact")) == (4.0, 1.0)  # a quarter of the time of solving
     assert math.isnan(one.phase("linear systems"))
     assert found().ablations[0].relative(one.seconds) == pytest.approx(0.4)
-
-
-def test_the_page_says_what_each_changes_and_what_it_saves() -> None:
-    contact, gravity, kept = effects_page.sentences(found(), found().ablations[0])
-    assert contact == (
-        "Leaving out contact changes the surface, rms by 3 mm, known to 0.300 mm, and saves 60 % of the time. It matters."
-    )
-    assert gravity.endswith("by 0.0100 mm, known to 0.300 mm, and saves 10 % of the time. It does not matter.")
-    assert kept == "Never left out is the material itself: neo hooke."
-
-
-def test_a_prediction_stands_beside_what_was_measured_where_there_is_one(tmp_path) -> None:
-    page = report.write_effects(found(), tmp_path, "effects")
-    assert "surface deviation, rms: 2.50" in page.read_text(encoding="utf-8")
-    whole = found().ablations[0]
-    bare = replace(whole, omissions=tuple(replace(one, predicted={}) for one in whole.omissions))
-    assert "predicted" not in effects_page.render(replace(found(), ablations=(bare,)))
-    table = json.loads((tmp_path / "effects.json").read_text(encoding="utf-8"))
-    assert [row["verdict"] for row in table["ablations"][0]["omissions"]] == ["matters", "does not matter"]
-
-
-def test_a_failure_is_a_row_with_its_cause_and_a_change_of_nothing_is_drawn(tmp_path) -> None:
-    failed = Omission(("contact", "gravity"), "diverged", "frame 3: <b>lost</b>", instead={"element": "P2"})
-    whole = found(failed)
-    text = report.write_effects(whole, tmp_path, "effects").read_text(encoding="utf-8")
-    assert "frame 3: &lt;b&gt;lost" in text
-    assert "<b>" not in text
-    assert "element = P2" in text
-    assert not re.search(r'(?:src|href)="https?:', text)
-    assert "contact (0 mm)" in effects_page.render(changed(whole, 0.0))
-    assert effects_page.drawing(replace(whole, ablations=())) is None
-
-
-def changed(given: CaseOmissions, rms: float) -> CaseOmissions:
-    """With this change of the surface without contact."""
-    (whole,) = given.ablations
-    rows = (omission("contact", rms=rms), *whole.omissions[1:])
-    return replace(given, ablations=(replace(whole, omissions=rows),))
-
-
-def test_without_error_bars_nothing_is_said_to_matter() -> None:
-    blind = replace(found(), bars={}, unknown="the tetrahedra are the same")
-    assert "Whether it matters is not known." in effects_page.text(blind)
-    assert "the tetrahedra are the same" in effects_page.text(blind)
-    assert "the tetrahedra are the same" in effects_page.render(blind)
 
 
 # The verb

@@ -14,7 +14,7 @@ from fem_reference import cli, metrics, report
 from fem_reference.assessment import error_bars
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import vertex_areas
-from fem_reference.report import gallery
+from fem_reference.report import gallery, pages
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
@@ -29,7 +29,7 @@ pytestmark = pytest.mark.slow
 CONTACT = '\n[[effect]]\nname = "contact"\nstiffness = "100 kPa/mm"\nsmoothing = "0.2 mm"\n'
 VISCOSITY = '\n[[effect]]\nname = "viscosity"\neta = "1 kPa s"\n'
 CONTACT_GIVES = 1e-5
-WRITE = report.write
+WRITE, PAGE = pages.write, report.of_comparison
 
 
 def growth(tets: float) -> float:
@@ -51,7 +51,8 @@ def case(tmp_path, monkeypatch) -> Path:
     """The small scene, solved by ``swell``, without its page."""
     stand_ins.solve_by(monkeypatch, fenicsx, swell)
     stand_ins.unchecked(monkeypatch)
-    monkeypatch.setattr(report, "write", lambda _, folder, __: folder)
+    monkeypatch.setattr(report, "of_comparison", lambda _: None)
+    monkeypatch.setattr(pages, "write", lambda _, folder, *__: folder)
     return small.write(tmp_path / "bar")
 
 
@@ -77,7 +78,8 @@ def scene_of(case: Path, more: str = "") -> MuscleCase:
 
 
 def test_the_bar_covers_an_error_that_is_known(case, capsys, monkeypatch) -> None:
-    monkeypatch.setattr(report, "write", WRITE)
+    monkeypatch.setattr(report, "of_comparison", PAGE)
+    monkeypatch.setattr(pages, "write", WRITE)
     monkeypatch.setattr(gallery, "_command", lambda _job, _folder: ["/nowhere/python"])
     path = case / "case.toml"
     path.write_text(path.read_text() + CONTACT)

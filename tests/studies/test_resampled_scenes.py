@@ -9,7 +9,7 @@ import small
 from fem_reference.problems import muscle
 from fem_reference.scenes import casefile
 from fem_reference.studies.execution import Bench
-from fem_reference.studies.resampled_scenes import _nearest, resample
+from fem_reference.studies.resampled_scenes import nearest_vertices, resample
 
 
 def test_it_can_be_set_up_from_a_folder_outside_the_case(tmp_path: Path) -> None:
@@ -24,7 +24,7 @@ def test_a_vertex_is_attached_where_the_nearest_is() -> None:
     """Points beside the vertices of a ball, each nearer to one of them than to any other."""
     ball = shapes.sphere(1, 10.0)
     beside = ball.points * 1.02 + np.random.default_rng(5).uniform(-0.3, 0.3, ball.points.shape)
-    assert np.array_equal(_nearest(ball, beside), np.arange(len(ball.points)))
+    assert np.array_equal(nearest_vertices(ball, beside), np.arange(len(ball.points)))
 
 
 def test_a_resampled_scene_has_one_key_wherever_its_study_is(tmp_path: Path) -> None:

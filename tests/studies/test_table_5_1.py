@@ -2,19 +2,17 @@
 
 import json
 import math
-import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
 import small
 import stand_ins
 
-from fem_reference import cli, report
+from fem_reference import cli
 from fem_reference.assessment import solver_table
 from fem_reference.assessment.solver_table import Overall, Scenario, SolverKind, SolverResult, Table
 from fem_reference.metrics import Measure
-from fem_reference.report import overview, ranking_page
+from fem_reference.report import ranking_page
 from fem_reference.runs import store
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
@@ -122,8 +120,8 @@ def test_a_scene_that_is_not_there_is_left_out_and_reported(case, capsys) -> Non
     made = table_5_1.stand([casefile.read_muscle(case)], case.parent, {})
     assert (made.scenarios, made.results) == ((), ())
     assert "bar.vtp" in made.missing["bar"]
-    assert "Left out" in ranking_page.render(made)
-    assert "bar: left out" in overview.ranking_text(made)
+    assert "Left out" in ranking_page.page(made).html()
+    assert "bar: left out" in ranking_page.text(made)
     # One that was asked for by name is an error.
     assert cli.main(["page", "table-5-1", "--case", str(case), "--quiet"]) == cli.BAD_INPUT
     assert "bar.vtp" in capsys.readouterr().err
@@ -178,42 +176,9 @@ def test_what_is_worst_over_frames_and_scenes() -> None:
     lost = table(solver_result("case0", 1.0, math.nan), solver_result("case1", 99.0))
     overall = lost.over("PBD", "pbd", "surface_deviation", "rms_percent")
     assert overall == Overall(99.0, 99.0, "case1", 1, ("case0",))
-    assert "failed on case0" in ranking_page.render(lost)
+    assert "failed on case0" in ranking_page.page(lost).html()
     nowhere = table(solver_result("case0", math.nan)).over("PBD", "pbd", "surface_deviation", "rms_percent")
     assert (nowhere.count, nowhere.lost) == (0, ("case0",))
-
-
-def test_what_is_not_a_number_stands_on_the_page_and_not_in_the_drawing() -> None:
-    lost = replace(solver_result("case0", math.nan), outcome=Outcome("diverged", "lost at <frame> 3"))
-    made = table(lost, solver_result("case1", 5.0, seconds=None))
-    html = ranking_page.render(made)
-    assert "not a number" in html
-    assert "lost at &lt;frame&gt; 3" in html
-    json.dumps(ranking_page.facts(made), allow_nan=False)
-
-
-def test_times_are_drawn_in_the_unit_that_their_axis_names() -> None:
-    made = table(solver_result("case0", 3.0, seconds=0.02), solver_result("case1", 4.0, seconds=0.05))
-    drawing = re.search("<svg.*?</svg>", ranking_page.render(made), re.DOTALL)
-    assert drawing is not None
-    texts = re.findall(r"<text[^>]*>([^<]*)<", drawing[0])
-    assert texts[:3] == ["20", "50", "time for a frame number, ms"]  # 0.02 and 0.05 s
-    assert ranking_page.per_second(0.02) == pytest.approx(50)
-
-
-def test_of_a_reference_that_failed_one_sentence_stands_there_and_no_table() -> None:
-    made = table(solver_result("case0", math.nan), solver_result("case1", 2.0))
-    lost = replace(made.scenarios[0], reference=Outcome("diverged", "No equilibrium; try smaller steps."))
-    html = ranking_page.render(replace(made, scenarios=(lost, made.scenarios[1])))
-    part = html[html.index('<h2 id="case0">') : html.index('<h2 id="case1">')]
-    assert "<b>The reference: diverged.</b> No equilibrium; try smaller steps. Nothing could be measured" in part
-    assert "<table" not in part
-    assert "<table" in html[html.index('<h2 id="case1">') :]
-
-
-def test_the_page_is_whole_or_not_there(tmp_path) -> None:
-    path = report.write_ranking(table(solver_result("case0", 1.0)), tmp_path / "new", "table-5-1")
-    assert sorted(file.name for file in path.parent.iterdir()) == ["table-5-1.html", "table-5-1.json"]
 
 
 def test_bad_input_is_not_an_empty_table(capsys) -> None:

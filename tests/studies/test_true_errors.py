@@ -12,7 +12,6 @@ from fem_reference import cli
 from fem_reference.assessment.claims import CLAIMED, Claim, Claims, Cover, claimed
 from fem_reference.assessment.error_bars import ErrorBar, ErrorBars
 from fem_reference.metrics import Measure
-from fem_reference.report import claims_page, write_claims
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes import casefile
 from fem_reference.solvers import fenicsx
@@ -59,17 +58,6 @@ def whole(*cases: str) -> Claims:
         for frame in (0, 10, 20)
     ]
     return Claims(tuple(rows), dict.fromkeys(cases, (6.0, 4.8)), {"lost": "why it was"})
-
-
-def test_the_page_and_its_numbers(tmp_path) -> None:
-    path = write_claims(whole("one", "other"), tmp_path / "new", "error-bars")
-    text, numbers = path.read_text(), json.loads((path.parent / "error-bars.json").read_text())
-    assert (numbers["claims"], numbers["covered"], numbers["missing"]) == (56, 1.0, {"lost": "why it was"})
-    assert numbers["median_ratio"] == pytest.approx(2.25)  # 3 and 1.5, each half of them
-    assert text.count("<svg") == 3
-    assert "why it was" in text
-    widest = claims_page.widest(whole("one"), "one", "volume", "deviation")
-    assert (widest.of, widest.bar) == ("deviation", 0.3)
 
 
 def test_it_is_asked_for_by_the_command_line(tmp_path, monkeypatch) -> None:

@@ -20,7 +20,7 @@ _WRITERS = {".vtk": "PolyDataWriter", ".vtp": "XMLPolyDataWriter", ".vtu": "XMLU
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class DataBlock:
     """``cells`` between ``points`` (n, 3) [mm]: triangles (m, 3), tetrahedra (m, 4) or lines; by name arrays ``of_points``
     (n, ...), ``of_cells`` (m, ...), and ``numbers`` that are one for all of it.
     """
@@ -32,7 +32,7 @@ class Block:
     numbers: dict[str, float] = field(default_factory=dict)
 
 
-type Tree = Mapping[str, "Block | Tree"]
+type Tree = Mapping[str, "DataBlock | Tree"]
 
 
 def _read(path: Path) -> Soup:
@@ -74,18 +74,18 @@ def _data(path: Path) -> DataSet:
 
 def _write(path: Path, surface: Surface, displacement: Floats) -> None:
     """The surface with point data ``displacement`` [mm], float64; as an unstructured grid in VTU."""
-    data = _data_set(Block(surface.points, surface.triangles))
+    data = _data_set(DataBlock(surface.points, surface.triangles))
     _save(path, data.cast_to_unstructured_grid() if path.suffix.lower() == ".vtu" else data, displacement)
 
 
 def _write_lines(path: Path, lines: Polylines, displacement: Floats) -> None:
     """The lines with point data ``displacement`` [mm], float64."""
-    _save(path, _data_set(Block(lines.points, lines)), displacement)
+    _save(path, _data_set(DataBlock(lines.points, lines)), displacement)
 
 
 def write_tets(path: Path, mesh: TetMesh, displacement: Floats) -> None:
     """VTU of the tets with point data ``displacement`` [mm], float64."""
-    _save(path, _data_set(Block(mesh.points, mesh.tets)), displacement)
+    _save(path, _data_set(DataBlock(mesh.points, mesh.tets)), displacement)
 
 
 def _save(path: Path, data: Any, displacement: Floats) -> None:
@@ -118,11 +118,11 @@ def write_blocks(path: Path, blocks: Tree) -> None:
 def _collection(blocks: Tree) -> Any:
     import pyvista
 
-    made = {name: _data_set(one) if isinstance(one, Block) else _collection(one) for name, one in blocks.items()}
+    made = {name: _data_set(one) if isinstance(one, DataBlock) else _collection(one) for name, one in blocks.items()}
     return pyvista.MultiBlock(made)
 
 
-def _data_set(block: Block) -> Any:
+def _data_set(block: DataBlock) -> Any:
     """The points and cells of a block as VTK has them, with its arrays."""
     import pyvista
 

@@ -1,43 +1,59 @@
-"""Sections of the page of a comparison: one file each, found by their folder, with its template beside it.
+"""Sections of the page of a comparison: a template each, found by their folder.
 
-A file has one ``SECTION``, and the template of its name ends in a ``<section>`` of HTML. Contract (tests/report/test_page.py): it
-is shown where its numbers exist and absent where they do not, and repeats no id.
+A template begins with a comment that holds its ``Section`` as TOML, and ends in a ``<section>`` of HTML. A module beside it with
+the same name, where it needs one, has the ``facts`` of a comparison that fill it besides those that all templates share
+(``comparison_page``). Contract (tests/report/test_sections.py): it is shown where its numbers exist and absent where they do not,
+and repeats no id.
 """
 
 import importlib
-import pkgutil
-from collections.abc import Callable
-from dataclasses import dataclass
+import re
+import tomllib
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 from fem_reference.assessment.comparison import Comparison
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.records import Record, parse
+
+FOLDER = Path(__file__).parent
+_HEAD = re.compile(r"\{# (.*?) #\}\n")
 
 
-@dataclass(frozen=True)
-class Section:
+class Section(Record):
     """A section of the page, the smaller its ``order`` the higher it stands.
 
-    ``facts`` of a comparison are what its template is filled with, beside what all templates are filled with (``page``).
-    ``needs``: those of the comparison's attributes without which it has nothing to show. ``of_reference``: whether it shows numbers
-    of the reference or against it, which are none where that reached no frame.
+    ``needs``: those of the comparison's attributes without which it has nothing to show. ``of_reference``: it shows numbers of the
+    reference or against it, which are none where that reached no frame.
     """
 
     order: int
-    facts: Callable[[Comparison], dict[str, Any]]
     needs: tuple[str, ...] = ()
     of_reference: bool = True
 
     def has_numbers(self, comparison: Comparison) -> bool:
-        """Whether there is something to show."""
+        """True where there is something to show."""
         return all(getattr(comparison, name) for name in self.needs)
 
 
-def sections() -> dict[str, Section]:
-    """The sections there are by their names, from top to bottom; TypeError where a file has none."""
-    found = dict[str, Section]()
-    for name in (module.name for module in pkgutil.iter_modules(__path__)):
-        section = vars(importlib.import_module(f"{__name__}.{name}")).get("SECTION")
-        if not isinstance(section, Section):
-            raise TypeError(f"report/sections/{name}: SECTION is {section!r}, want a Section")
-        found[name] = section
+def sections(folder: Path = FOLDER) -> dict[str, Section]:
+    """The sections in a ``folder`` by their names, from top to bottom; InputError where a template does not say what it is."""
+    found = {path.stem: _section(path) for path in folder.glob("*.html")}
     return dict(sorted(found.items(), key=lambda item: (item[1].order, item[0])))
+
+
+def facts_of(name: str, comparison: Comparison) -> dict[str, Any]:
+    """The contents of a section's template that its own module has, where there is one."""
+    module = f"{__name__}.{name}"
+    return dict(importlib.import_module(module).facts(comparison)) if find_spec(module) else {}
+
+
+def _section(path: Path) -> Section:
+    head = _HEAD.match(path.read_text(encoding="utf-8"))
+    try:
+        return parse(Section, tomllib.loads(f"section = {{ {head[1]} }}")["section"] if head else {}, str(path))
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(
+            str(path), str(error), "a section's order, needs and of_reference in its first line"
+        ) from error

@@ -1,4 +1,4 @@
-"""What every run cost, and the reference frame by frame."""
+"""Costs of every run, and of the reference frame by frame."""
 
 from typing import Any
 
@@ -7,13 +7,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fem_reference.assessment.comparison import Comparison
-from fem_reference.report.curves import REFERENCE, Curve, drawn
-from fem_reference.report.sections import Section
-from fem_reference.report.tables import runs
+from fem_reference.report.drawings import REFERENCE, Drawing, drawn
 from fem_reference.report.words import words
 from fem_reference.runs.store import Run
 
-# Scalars of a run that say what a frame took.
+# Scalars of a run that a frame took, and their words.
 _BY_FRAME = {
     "seconds_processor": "processor time [s]",
     "newton_iterations": "Newton iterations",
@@ -23,14 +21,14 @@ _BY_FRAME = {
 }
 
 
-def _facts(comparison: Comparison) -> dict[str, Any]:
+def facts(comparison: Comparison) -> dict[str, Any]:
     """The kinds of cost, and what each frame of the reference took."""
     reference = comparison.reference
     by_frame = {title: reference.scalars[name] for name, title in _BY_FRAME.items() if name in reference.scalars}
     return {"costs": _costs(comparison), "by_frame": by_frame, "frame_costs": _drawn(reference)}
 
 
-def _drawn(reference: Run) -> Curve | None:
+def _drawn(reference: Run) -> Drawing | None:
     """The processor time of each frame as bars, None where it is not known."""
     seconds = reference.scalars.get("seconds_processor")
     if seconds is None:
@@ -45,12 +43,9 @@ def _drawn(reference: Run) -> Curve | None:
 
 
 def _costs(comparison: Comparison) -> list[tuple[str, str, list[float | None]]]:
-    """What each kind of cost was for every run: name, unit, values; times first."""
-    keys = dict.fromkeys(key for run in runs(comparison) for key in run.outcome.cost)
+    """Each kind of cost, times first: its name, its unit, and its value for every run."""
+    keys = dict.fromkeys(key for run in comparison.runs for key in run.outcome.cost)
     times = [key for key in keys if key.startswith("seconds")]
     rows = [("in all" if key == "seconds" else words(key.removeprefix("seconds_")), "s", key) for key in times]
     rows += [(words(key), "", key) for key in keys if key not in times]
-    return [(name, unit, [run.outcome.cost.get(key) for run in runs(comparison)]) for name, unit, key in rows]
-
-
-SECTION = Section(80, _facts, of_reference=False)
+    return [(name, unit, [run.outcome.cost.get(key) for run in comparison.runs]) for name, unit, key in rows]

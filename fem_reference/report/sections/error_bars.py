@@ -1,4 +1,4 @@
-"""How far the reference may be from the truth, and how that is known."""
+"""Error bars of the reference, and the variations that they come from."""
 
 from typing import Any
 
@@ -6,13 +6,12 @@ import numpy as np
 
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.assessment.error_bars import ErrorBar
-from fem_reference.report.sections import Section
 from fem_reference.report.tables import known
 from fem_reference.report.words import listed
 
 
-def _facts(comparison: Comparison) -> dict[str, Any]:
-    """What was varied for the bars, tetrahedra first."""
+def facts(comparison: Comparison) -> dict[str, Any]:
+    """The variations of the reference for its error bars, tetrahedra first."""
     parts = list(dict.fromkeys(name for bar in known(comparison) for name in bar.parts))
     return {
         "parts": parts,
@@ -26,6 +25,3 @@ def _model_change(bar: ErrorBar) -> float | None:
     """The greatest change by another model over the frames that it reached, None without any."""
     reached = np.zeros(0) if bar.model is None else bar.model[np.isfinite(bar.model)]
     return float(reached.max()) if len(reached) else None
-
-
-SECTION = Section(70, _facts)

@@ -9,13 +9,12 @@ from fem_reference.assessment import second_check
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.limits import ENERGY_GAP
 from fem_reference.metrics import Measure
-from fem_reference.report.sections import Section
 from fem_reference.report.tables import inversion
 from fem_reference.runs.store import Run
 
 
-def _facts(_: Comparison) -> dict[str, Any]:
-    """What its alarms are made of."""
+def facts(_: Comparison) -> dict[str, Any]:
+    """The functions that its tiles and alarms are made of."""
     found = {"inversion": inversion, "least": least, "greatest": greatest, "gap": gap}
     return found | {"energy_gap_limit": ENERGY_GAP, "second_check": second_check.texts_of}
 
@@ -36,6 +35,3 @@ def least(measure: Measure) -> float:
     """The smallest value of a measure over the frames where it is a number, NaN where it nowhere is."""
     known = measure.values[np.isfinite(measure.values)]
     return float(known.min()) if len(known) else math.nan
-
-
-SECTION = Section(30, _facts)

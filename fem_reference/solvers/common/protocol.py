@@ -1,4 +1,4 @@
-"""What a solver is: the calls it answers, and the records with which its file offers them."""
+"""Solvers: the calls that they answer, and the records with which their files offer these."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal, Protocol
 from fem_reference.effects import Effect
 from fem_reference.foundations.records import Record
 from fem_reference.problems.body import Body
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.problem import Task
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs.cut_off import CutOff
@@ -29,8 +29,8 @@ class GoOn[P, S: Record](Protocol):
     """Solves problems from where a run was cut off."""
 
     def __call__(self, problem: P, settings: S, sink: Sink, cut_off: CutOff, /) -> Outcome:
-        """As ``Solve``, from the last stored frame that the solver kept enough of, which need not be the last of all, else from
-        the first; it ends as the run would have ended.
+        """Solve as ``Solve`` does, from the last stored frame that the solver kept enough of, which need not be the last of all,
+        else from the first; it ends as the run would have ended.
         """
 
 
@@ -59,7 +59,7 @@ def _none(_: Record) -> bool:
 
 @dataclass(frozen=True, kw_only=True)
 class Solver[P, S: Record]:
-    """What a solver's file offers for one task: ``solve``.
+    """An offer of a solver's file for one task: ``solve``.
 
     ``settings``: the record of its own settings. ``example``: some of them, as scene files write them, which contract tests solve
     with. ``require``: MissingSoftware where what it needs under such settings is not installed. ``check_problem`` of one whose
@@ -88,7 +88,7 @@ class Solver[P, S: Record]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class MuscleSolver[S: Record](Solver[Problem, S]):
+class MuscleSolver[S: Record](Solver[MuscleProblem, S]):
     """A solver of muscles; ``moves``: what carries its unknowns, whose mesh its accuracy and cost depend on;
     ``check_effects`` of one that simulates the effects of a scene, None of one that does not; ``fibres``: whether one of surfaces
     needs the fibres under such settings: without them it is given a ``Setup``, as the muscle is not filled for it.
@@ -120,6 +120,9 @@ class BodySolver[S: Record](Solver[Body, S]):
 
     task = "solve_body"
     solves = "finite element bodies"
+
+
+AnySolver = Solver[Any, Any]
 
 
 def solved[P, S: Record](solve: Solve[P, S], problem: P, settings: S) -> Run:

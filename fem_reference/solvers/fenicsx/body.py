@@ -108,7 +108,7 @@ class AssembledBody:
             points = contact_points.on_facets(space, parents, body.mesh, facets, form.degree)
         else:
             points = contact_points.on_skin(space, parents, law.on, self.local)
-        return ContactForces(law, body.obstructions, points, self.unknowns, body.frames[0], self.spent)
+        return ContactForces(law, body.bones, points, self.unknowns, body.frames[0], self.spent)
 
     def start(self, moved: Callable[[Floats], Floats]) -> None:
         """Begin with the nodes where ``moved`` takes rest points (n, 3) [mm]."""
@@ -200,7 +200,7 @@ class AssembledBody:
     def _acting(self, frame: float) -> Floats:
         """All numbers that determine the state at ``frame``, beside the body itself."""
         amounts = [effect.amount(frame) for effect in self.effects]
-        poses = [entry.pose(frame).ravel() for entry in self.contact.obstructions] if self.contact else []
+        poses = [entry.pose(frame).ravel() for entry in self.contact.bones] if self.contact else []
         allowed = [self.contact.law.allowance(frame)] if self.contact else []
         values = [one.prescribed for one in self.conditions]
         return np.concatenate([amounts, allowed, *poses, *values])

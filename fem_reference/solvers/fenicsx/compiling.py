@@ -58,7 +58,8 @@ OPTIONS: dict[str, Any] = {
 }
 
 
-def _lock(folder: Path, number: int) -> FileLock:
+def lock(folder: Path, number: int) -> FileLock:
+    """The lock of that ``number``, of those that forms share, in the ``folder`` of what is compiled."""
     return FileLock(folder / f".fem_reference_{number}.lock")
 
 
@@ -71,7 +72,7 @@ def _alone[R](compiled: Callable[..., R]) -> Callable[..., R]:
     def waiting(objects: list[Any], *given: Any, **options: Any) -> R:
         folder = Path(str(options["cache_dir"]))
         folder.mkdir(parents=True, exist_ok=True)
-        with _lock(folder, int(naming.compute_signature(objects, "")[:8], 16) % _LOCKS):
+        with lock(folder, int(naming.compute_signature(objects, "")[:8], 16) % _LOCKS):
             try:
                 return compiled(objects, *given, **options)
             except (FileExistsError, ModuleNotFoundError, TimeoutError):

@@ -25,7 +25,7 @@ _SETTINGS = {
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
     "OMPI_MCA_rmaps_base_oversubscribe": "1",
 }
-_PATIENCE = 5.0  # [s] until a process that was asked to end is killed
+PATIENCE = 5.0  # [s] until a process that was asked to end is killed
 # Times a limit of processor time, and what starting takes, that the clock may show: longer than that a machine is too busy to say
 # anything.
 CLOCK, _START = 20, 3.0  # [s]
@@ -126,7 +126,7 @@ class Process:
         """End it: ask again and again, as mpiexec ignores a signal that comes before its own processes; at last kill it."""
         asked = time.monotonic()
         while self.process.poll() is None:
-            patient = time.monotonic() - asked < _PATIENCE
+            patient = time.monotonic() - asked < PATIENCE
             self.process.send_signal(signal.SIGTERM if patient else signal.SIGKILL)
             with suppress(subprocess.TimeoutExpired):
                 self.process.wait(timeout=0.5)

@@ -99,7 +99,7 @@ class Validity:
                 np.arange(len(self.cells), dtype=np.int32),
             )
             self.values["fibre stretch"] = lambda: np.asarray(stretch.eval(self.mesh, mine))
-        self.volumes, self.centres = _volumes(self.mesh, len(self.cells), form.rule)
+        self.volumes, self.centres = volumes_and_centres(self.mesh, len(self.cells), form.rule)
 
     def volume_ratio(self) -> float:
         """The volume of the body over that at rest."""
@@ -161,7 +161,7 @@ class Validity:
         return min(everywhere, key=lambda one: sign * one.value)
 
 
-def _volumes(msh: mesh.Mesh, count: int, rule: Rule) -> tuple[Floats, Floats]:
+def volumes_and_centres(msh: mesh.Mesh, count: int, rule: Rule) -> tuple[Floats, Floats]:
     """The volumes (n, q) [mm3] that the points of a ``rule`` stand for in the first ``count`` cells at rest, and the centres
     (n, 3) [mm].
     """

@@ -91,7 +91,7 @@ def assemble(problem: FieldProblem) -> tuple[Any, Floats]:
 
     matrix = skfem.BilinearForm(lambda u, v, _: residual(state(u), state(v)) - residual(nothing, state(v)))
     vector = skfem.LinearForm(lambda v, _: -residual(nothing, state(v)) + 0 * np.asarray(v))
-    order = _order(problem, basis)
+    order = order_of(problem, basis)
     A, b = matrix.assemble(basis)[order][:, order], vector.assemble(basis)[order]
     return A, b + _fluxes(problem)
 
@@ -155,7 +155,7 @@ def _slope_weights(basis: Any) -> Floats:
     return np.asarray(np.linalg.pinv(at_points - at_points.mean(axis=2, keepdims=True)).transpose(0, 2, 1))
 
 
-def _order(problem: FieldProblem, basis: Any) -> Any:
+def order_of(problem: FieldProblem, basis: Any) -> Any:
     """The unknown of scikit-fem that stands at each node of the problem."""
     vertices = basis.nodal_dofs[0]
     if problem.order == 1:

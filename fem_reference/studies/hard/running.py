@@ -12,30 +12,27 @@ from functools import cached_property
 import numpy as np
 
 from fem_reference import solvers
-from fem_reference.assessment import health, second_check, stress
+from fem_reference.assessment import health, stress
 from fem_reference.assessment.health import Followed
-from fem_reference.assessment.stress import Cell, HardCase, Scene, Stress
+from fem_reference.assessment.stress import Cell, HardCase, Scene, Stress, Verdict
 from fem_reference.foundations.errors import InputError, MissingSoftware
 from fem_reference.foundations.mesh import Floats
-from fem_reference.geometry.embedding import Locator
 from fem_reference.problems import of_case
-from fem_reference.problems.muscle import Problem
 from fem_reference.problems.of_case import CaseProblem
-from fem_reference.problems.problem import NO_SURFACE
 from fem_reference.runs.key import made_with
-from fem_reference.runs.store import Frame, Outcome
+from fem_reference.runs.store import Outcome
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx.processes import CLOCK
 from fem_reference.studies.hard import blocks, jitters, steps
 from fem_reference.studies.hard.choosing import LIMIT, REFERENCE, SECOND, choices
+from fem_reference.studies.hard.following import follow
 from fem_reference.studies.hard.records import Hard
-from fem_reference.studies.hard.steps import StalledError
+from fem_reference.studies.hard.steps import SameEnd, StalledError
 
 log = logging.getLogger(__name__)
 
 LONGER = 600.0  # [s] of processor time of all runs of a case, in several numbers of load steps or on several meshes
-_MOST_FOR_SECOND = 200  # tetrahedra, for which it takes seconds
 # How messages name a place at rest [mm].
 _PLACE = re.compile(r"cell \d+ at \((-?[\d.]+), (-?[\d.]+), (-?[\d.]+)\) mm")
 
@@ -64,18 +61,9 @@ class Posed:
         case = shipped.read()
         return of_case.problem(case, of_case.setup(case))
 
-    @cached_property
-    def range(self) -> tuple[float, float]:
-        """The range of the constant boundary values of a scalar case."""
-        assert self.hard.shipped is not None  # asked of no other
-        case = of_case.scalar_case(self.hard.shipped.read())
-        values = [float(entry.value) for entry in case.boundary if entry.value is not None]
-        return min(values), max(values)
-
-    @property
-    def row(self) -> HardCase:
-        """What pages say of it."""
-        return HardCase(self.hard.name, self.hard.title, self.hard.healthy, self.hard.bound)
+    def is_reference(self, solver: str) -> bool:
+        """True of the solver whose runs of a muscle others are measured against."""
+        return solver == REFERENCE and self.problem.muscle is not None
 
 
 def run(hard: Sequence[Hard], only: Sequence[str] = (), *, in_steps: bool = False, jitters: int = 0) -> Stress:
@@ -86,19 +74,17 @@ def run(hard: Sequence[Hard], only: Sequence[str] = (), *, in_steps: bool = Fals
     chosen = {name: choice for name, choice in choices().items() if not only or name in only}
     with fenicsx.shared():
         for i, one in enumerate(hard):
-            posed = Posed(one, in_steps=in_steps, jitters=jitters)
+            posed, place = Posed(one, in_steps=in_steps, jitters=jitters), f"case {i + 1} of {len(hard)}: {one.name}"
             for name, choice in chosen.items():
-                cells.append(cell(posed, one.choice(choice)))
-                found = cells[-1]
-                log.info(
-                    "case %d of %d: %s, %s: %s: %s", i + 1, len(hard), one.name, name, found.verdict, found.sentence
-                )
-    rows = tuple(Posed(one).row for one in hard)
+                found = cell(posed, one.choice(choice))
+                log.info("%s, %s: %s: %s", place, name, found.verdict, found.sentence)
+                cells.append(found)
+    rows = tuple(HardCase(one.name, one.title, one.healthy, one.bound) for one in hard)
     return Stress(rows, tuple(chosen), tuple(cells), time.perf_counter() - begin, made_with())
 
 
 def cell(posed: Posed, choice: SolverChoice) -> Cell:
-    """What becomes of a case by a solver: never an exception."""
+    """The cell of a case by a solver: never an exception."""
     begin = time.perf_counter()
     hard, solver = posed.hard, choice.solver
     try:
@@ -152,131 +138,46 @@ def _limited(seconds: float) -> Iterator[None]:
 
 def _solved(posed: Posed, choice: SolverChoice) -> Cell:
     """The cell of a solver that is asked for the case."""
-    hard, muscle = posed.hard, posed.problem.muscle
-    of_reference = choice.solver == REFERENCE
-    if muscle is None:
-        outcome, followed = _field(posed, choice)
-    elif choice.solver == SECOND:
-        outcome, followed = _second(muscle, choice)
-    else:
-        outcome, followed = _muscle(muscle, choice)
-    blank = Cell(hard.name, choice.solver, "ok", "", outcome.status)
-    if of_reference and muscle is not None and outcome.status == "converged":
+    hard, solver = posed.hard, choice.solver
+    if posed.problem.field is not None:  # settings for bodies do not matter there
+        choice = SolverChoice(**{"solver": solver, **hard.settings.get(solver, {})})
+    outcome, followed = follow(posed.problem, choice)
+    if posed.is_reference(solver) and outcome.status == "converged":
         posed.truth = followed.positions, followed.numbers
     if posed.truth is not None and posed.truth[1][: len(followed.numbers)] == followed.numbers:
         followed = replace(followed, truth=posed.truth[0][: len(followed.numbers)])
-    known = [bound for bound in hard.bound if bound.quantity != "from_reference" or followed.truth is not None]
-    histories = [(bound, health.history(followed, bound.quantity)) for bound in known]
-    begins = followed.least_determinant
-    if hard.start is not None and begins is not None and not begins[0] > 0:
-        said = f"it begins with det F down to {begins[0]:.2g}, where it needs more than 0: {outcome.status}"
-        found = replace(blank, verdict="refused", sentence=said)
-    elif outcome.status != "converged":
-        found = stress.unfinished(blank, outcome.message, histories, hard.no_solution)
-    else:
-        found = stress.judge(blank, histories, hard.contrast)
-    wanted = hard.steps or (steps.farthest(followed) if posed.in_steps and hard.start is None else None)
-    if of_reference and muscle is not None and wanted is not None:
-        ends = steps.compare(muscle, choice, wanted)
-        found = replace(found, sentence=f"{found.sentence}; {ends.sentence}")
-        found = found if ends.same else replace(found, verdict="failed")
-    if of_reference and muscle is not None and posed.jitters:
-        others = jitters.compare(
-            hard, (outcome, followed), posed.jitters, lambda one: _muscle(_muscle_problem(one), choice)
-        )
-        found = replace(found, sentence=f"{found.sentence}; {others.sentence}")
-        found = found if others.same else replace(found, verdict="failed")
+    found = _judged(hard, Cell(hard.name, solver, "ok", "", outcome.status), outcome.message, followed)
+    for ends in _repeated(posed, choice, outcome, followed):
+        verdict: Verdict = found.verdict if ends.same else "failed"
+        found = replace(found, sentence=f"{found.sentence}; {ends.sentence}", verdict=verdict)
     found = stress.doubted(found, health.unstable(followed), hard.no_solution)
     return replace(found, scene=_scene(found, followed))
 
 
-def _muscle_problem(hard: Hard) -> Problem:
-    built = Posed(hard).problem.muscle
-    assert built is not None  # as that of the case is
-    return built
+def _judged(hard: Hard, blank: Cell, message: str, followed: Followed) -> Cell:
+    """The cell of a run by the quantities that the case bounds."""
+    known = [bound for bound in hard.bound if bound.quantity != "from_reference" or followed.truth is not None]
+    histories = [(bound, health.history(followed, bound.quantity)) for bound in known]
+    begins = followed.least_determinant
+    if hard.start is not None and begins is not None and not begins[0] > 0:
+        said = f"it begins with det F down to {begins[0]:.2g}, where it needs more than 0: {blank.status}"
+        return replace(blank, verdict="refused", sentence=said)
+    if blank.status != "converged":
+        return stress.unfinished(blank, message, histories, hard.no_solution)
+    return stress.judge(blank, histories, hard.contrast)
 
 
-def _muscle(built: Problem, choice: SolverChoice) -> tuple[Outcome, Followed]:
-    offer = solvers.find(choice.solver, choice.solver)
-    if offer.moves not in ("surface", "tetrahedra"):
-        raise InputError(
-            choice.solver, f"a solver that moves {offer.moves}", "one that moves a surface, which health is of"
-        )
-    settings = solvers.settings(choice, choice.solver)
-    solvers.check(choice.solver, settings, built.effects, choice.solver)
-    solvers.require(choice.solver, settings, choice.solver)
-    frames = list[Frame]()
-    outcome = offer.solve(built, settings, frames.append)
-    steps.check_not_stalled(outcome)
-    if not frames:
-        frames.append(Frame(built.frames[0], np.array(built.surface.points)))
-    if solvers.takes_effects(choice.solver):
-        outcome = second_check.confirmed_frames(built, frames, outcome, settings)
-    return outcome, _followed(built, frames)
-
-
-def _followed(built: Problem, frames: list[Frame]) -> Followed:
-    tets = [frame.points for frame in frames if len(frame.points)]
-    whole = len(tets) == len(frames)
-    return Followed(
-        tuple(int(frame.number) for frame in frames),
-        built.surface,
-        np.array([frame.surface for frame in frames if frame.surface is not None]),
-        built.mesh if whole else None,
-        np.array(tets) if whole else None,
-        built.bones,
-        built.free,
-        integrated=_all(frames, "volume_ratio"),
-        negative_modes=_all(frames, "negative_modes"),
-        material_modes=_all(frames, "material_modes"),
-        least_determinant=_least(frames),
-    )
-
-
-def _least(frames: list[Frame]) -> Floats | None:
-    """The least det F at any point that a solver looks at (f,), None where it does not say."""
-    found = [_all(frames, f"min_det_F_{where}") for where in ("quadrature", "vertices")]
-    known = [one for one in found if one is not None]
-    return np.min(known, axis=0) if known else None
-
-
-def _all(frames: list[Frame], scalar: str) -> Floats | None:
-    """A scalar of all frames (f,), None where not all have it."""
-    found = [frame.scalars[scalar] for frame in frames if scalar in frame.scalars]
-    return np.array(found) if len(found) == len(frames) else None
-
-
-def _second(built: Problem, choice: SolverChoice) -> tuple[Outcome, Followed]:
-    """By a solver of bodies of any shape; the surface goes along with the tetrahedra."""
-    if len(built.mesh.tets) > _MOST_FOR_SECOND:
-        want = f"at most {_MOST_FOR_SECOND}: it is written in Python, to be right and not fast"
-        raise InputError(choice.solver, f"{len(built.mesh.tets)} tetrahedra", want)
-    offer = solvers.find(choice.solver, choice.solver, "solve_body")
-    solved = offer.run(built.body, solvers.settings(choice, choice.solver, "solve_body"))
-    where = Locator(built.mesh).embed(built.surface.points)
-    frames = [
-        Frame(
-            state.number,
-            built.surface.points + where.interpolate(built.mesh, state.points - built.mesh.points),
-            points=state.points,
-            scalars=state.scalars,
-        )
-        for state in solved.states
-    ]
-    return solved.outcome, _followed(built, frames)
-
-
-def _field(posed: Posed, choice: SolverChoice) -> tuple[Outcome, Followed]:
-    """By a solver of scalar fields, whose settings for bodies do not matter there."""
-    offer = solvers.find(choice.solver, choice.solver, "solve_field")
-    changes = posed.hard.settings.get(choice.solver, {})
-    settings = solvers.settings(SolverChoice(solver=choice.solver, **changes), choice.solver, "solve_field")
-    field = posed.problem.field
-    assert field is not None  # what is no muscle
-    solution = offer.run(field, settings)
-    steps.check_not_stalled(solution.outcome)
-    nothing = np.zeros((1, 0, 3))
-    return solution.outcome, Followed((0,), NO_SURFACE, nothing, values=solution.values, range=posed.range)
+def _repeated(posed: Posed, choice: SolverChoice, outcome: Outcome, followed: Followed) -> Iterator[SameEnd]:
+    """Comparisons of the reference's run with others: in other numbers of load steps, and on other meshes."""
+    hard, muscle = posed.hard, posed.problem.muscle
+    if muscle is None or not posed.is_reference(choice.solver):
+        return
+    wanted = hard.steps or (steps.farthest(followed) if posed.in_steps and hard.start is None else None)
+    if wanted is not None:
+        yield steps.compare(muscle, choice, wanted)
+    if posed.jitters:
+        first = outcome, followed
+        yield jitters.compare(hard, first, posed.jitters, lambda one: follow(Posed(one).problem, choice))
 
 
 def _scene(found: Cell, followed: Followed) -> Scene | None:

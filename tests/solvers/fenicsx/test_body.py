@@ -2,8 +2,6 @@
 
 import importlib.util
 import itertools
-import os
-import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -11,16 +9,14 @@ import pytest
 
 from fem_reference import effects
 from fem_reference.effects import Effect
-from fem_reference.foundations.errors import InputError, MissingSoftware
+from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import parse
-from fem_reference.geometry.skins import Skin
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed, boundary_facets
 from fem_reference.problems.checks import check
 from fem_reference.problems.paths import Affine, Rest, Turn
 from fem_reference.solvers import fenicsx, scikit_fem
 from fem_reference.solvers.fenicsx import BodySettings
-from fem_reference.solvers.fenicsx.jobs import Job
 
 pytestmark = pytest.mark.slow
 
@@ -93,69 +89,6 @@ def test_a_stabilised_pressure_needs_quadrature_that_sees_it(session) -> None:
         fenicsx.check_effects(fenicsx.Settings(**given), FLESH, "case.toml: reference")
 
 
-def test_a_session_checks_the_element(session) -> None:
-    with pytest.raises(InputError, match="want one for tetrahedron cells"):
-        session.solve(Body(box("P1"), FLESH, (), (0.0, 1.0)), settings("Q1/P0"))
-
-
-@BOTH
-def test_a_block_on_springs_moves_by_the_load_over_their_stiffness(element, session) -> None:
-    stiffness, load = 0.05, 0.004  # [MPa/mm], [MPa]
-    acting = (*FLESH, effect("traction", on="z1", force=f"0, 0, -{load} MPa", ramp=ONCE))
-    springs = Prescribed("springs", "z0", (2,), Rest(), stiffness)
-    fixed = (Prescribed("x0", "x0", (0,), Rest()), Prescribed("y0", "y0", (1,), Rest()), springs)
-    mesh = box(element, size=(2.0, 1.0, 1.0))
-    state = session.solve(Body(mesh, acting, fixed, (0.0, 1.0)), settings(element)).last
-    # Homogeneous, so that every element has it; Newton's residual of 1e-12 N over 0.05 N/mm.
-    assert state.points[mesh.points[:, 2] == 0, 2] == pytest.approx(-load / stiffness, abs=1e-10)
-    assert state.forces["springs"] == pytest.approx([0, 0, load * 2.0], abs=1e-11)
-    assert state.forces["x0"] == pytest.approx(np.zeros(3), abs=1e-11)
-
-
-@pytest.mark.parametrize("element", ["P2/P1", "P2/P0"])
-def test_springs_at_points_beside_the_cells_take_the_load_and_its_moment(element, session) -> None:
-    # Points 0.05 mm below the face that springs attach, of uneven areas; the pull is off their middle: the block turns on them.
-    stiffness, load = 1e-4, 1e-7  # so soft that the block is rigid, and turns by a thousandth
-    acting = (*FLESH, effect("traction", on="x1", force=f"0, 0, -{load} MPa", ramp=ONCE))
-    mesh = box(element, (2, 2, 2), (1.0, 1.0, 1.0))
-    at = np.array([[0.2, 0.3, -0.05], [0.7, 0.2, -0.05], [0.3, 0.8, -0.05], [0.9, 0.9, -0.05]])
-    middles = mesh.points[mesh.cells].mean(axis=1)
-    cells = np.array([np.argmin(np.linalg.norm(middles - point, axis=1)) for point in at])
-    skin = Skin(cells, at, np.array([0.2, 0.3, 0.25, 0.25]))
-    springs = Prescribed("springs", skin, (0, 1, 2), Rest(), stiffness)
-    state = session.solve(Body(mesh, acting, (springs,), (0.0, 1.0)), settings(element)).last
-    assert state.forces["springs"] == pytest.approx([0, 0, load], abs=1e-11)
-    # The load acts at x = 1, y = z = 1/2: about the origin its moment is (-1/2, 1, 0) load, to the first order of its turning.
-    assert state.moments["springs"] == pytest.approx([load / 2, -load, 0], abs=0.01 * load)
-    # Where the points go with the block, the springs' areas make up the load.
-    rigid, *_ = np.linalg.lstsq(np.column_stack([mesh.points, np.ones(len(mesh.points))]), state.points - mesh.points)
-    moved = np.column_stack([at, np.ones(4)]) @ rigid
-    assert stiffness * skin.areas @ moved == pytest.approx([0, 0, -load], abs=0.01 * load)
-
-
-@BOTH
-def test_stiff_springs_come_near_to_what_they_stand_for(element, session) -> None:
-    stretch, forces = Affine(((0.0, 0.0, 0.0),) * 3, (0.0, 0.0, 0.2)), []
-    fixed = tuple(Prescribed(face, face, (axis,), Rest()) for axis, face in enumerate(("x0", "y0", "z0")))
-    for stiffness in (None, 1e2, 1e3):
-        pulled = Prescribed("top", "z1", (2,), stretch, stiffness)
-        state = session.solve(Body(box(element), FLESH, (*fixed, pulled), (0.0, 1.0)), settings(element)).last
-        forces.append(state.forces["top"][2])
-    # Ten times stiffer, ten times nearer, up to what the body's 0.03 N/mm are of the springs' 100 N/mm.
-    assert (forces[1] - forces[0]) / (forces[2] - forces[0]) == pytest.approx(10, rel=1e-3)
-
-
-@BOTH
-def test_forces_and_moments_of_a_turned_bar_are_in_balance(element, session) -> None:
-    turn = Turn((1.0, 0.0, 2.0), 0.5, (0.5, 0.5, 2.0))
-    state = session.solve(turned(box(element, (2, 2, 4), (1.0, 1.0, 2.0)), turn), settings(element)).last
-    assert np.linalg.norm(state.forces["top"]) > 1e-4
-    assert np.linalg.norm(state.moments["top"]) > 1e-4
-    # Rigid velocities are in the space, so that both sums are the work of 1e-12 N out of balance along them.
-    assert sum(state.forces.values()) == pytest.approx(np.zeros(3), abs=1e-11)
-    assert sum(state.moments.values()) == pytest.approx(np.zeros(3), abs=1e-11)
-
-
 @BOTH
 def test_both_ends_turned_alike_is_a_rigid_motion(element, session) -> None:
     mesh, turn = box(element, (2, 2, 4), (1.0, 1.0, 2.0)), Turn((1.0, 2.0, 3.0), 1.0, (3.0, 0.0, 1.0))
@@ -173,22 +106,6 @@ def test_a_body_that_is_prescribed_everywhere_is_where_it_is_prescribed(session)
     body = replace(turned(mesh, shift), effects=PENALTY)
     state = session.solve(body, settings("Q1")).last
     assert state.points - mesh.points == pytest.approx(np.where(mesh.points[:, 2:] == 1, [0, 0.2, 0.1], 0.0), abs=1e-14)
-
-
-@BOTH
-def test_the_order_of_nodes_and_cells_does_not_matter(element, session) -> None:
-    mesh, random = box(element, (1, 2, 2)), np.random.default_rng(4)
-    new = random.permutation(len(mesh.points))  # where each node goes
-    points = np.empty_like(mesh.points)
-    points[new] = mesh.points
-    cells = new[mesh.cells][random.permutation(len(mesh.cells))]
-    facets = {name: new[region] for name, region in mesh.facets.items()}
-    other = Cells(points, cells, mesh.kind, mesh.degree, facets)
-    turn = Turn((1.0, 0.0, 2.0), 0.5, (0.5, 0.5, 1.0))
-    first, second = (session.solve(turned(one, turn), settings(element)).last for one in (mesh, other))
-    # Both end within Newton's residual of 1e-12 N, over a stiffness of 1e-3 N/mm.
-    assert second.points[new] == pytest.approx(first.points, abs=1e-9)
-    assert second.forces["top"] == pytest.approx(first.forces["top"], abs=1e-10)
 
 
 def test_what_was_reached_is_kept_where_a_body_inverts(session) -> None:
@@ -213,41 +130,6 @@ def test_no_load_step_of_a_solve_is_above_the_largest(largest, steps, session) -
     assert solved.outcome.status == "converged"
     assert solved.outcome.cost["cut_backs"] == 0
     assert solved.outcome.cost["load_steps"] == steps
-
-
-def test_a_session_outlives_its_process(session) -> None:
-    body = turned(box("Q1/P0"), Turn((0.0, 0.0, 1.0), 0.3))
-    before = session.solve(body, settings("Q1/P0")).last
-    session.process.process.kill()
-    dead = session.solve(body, settings("Q1/P0"))
-    assert (dead.outcome.status, dead.states) == ("crashed", ())
-    assert "the FEniCSx process ended with exit status -9" in dead.outcome.message
-    with pytest.raises(ArithmeticError, match="crashed: the FEniCSx process ended"):
-        _ = dead.last
-    assert session.solve(body, settings("Q1/P0")).last.points == pytest.approx(before.points, abs=1e-12)
-
-
-def test_a_process_that_fails_says_why(session) -> None:
-    body = turned(box("Q1/P0"), Rest())
-    here = os.getpid()  # elsewhere it divides by zero
-    wrong = Prescribed("x0", "x0", (0,), lambda points, _: 0 * points * (1 // int(os.getpid() == here)))
-    lost = session.solve(replace(body, prescribed=(wrong,)), settings("Q1/P0"))
-    assert lost.outcome.status == "crashed"
-    assert "ZeroDivisionError" in lost.outcome.message
-    assert session.solve(body, settings("Q1/P0")).outcome.status == "converged"
-
-
-def test_a_closed_session_raises(session) -> None:  # noqa: ARG001 - it skips where there is no FEniCSx
-    with fenicsx.session() as short:
-        pass
-    with pytest.raises(RuntimeError, match="the session is closed"):
-        short.solve(turned(box("Q1/P0"), Rest()), settings("Q1/P0"))
-
-
-def test_without_fenicsx_there_is_no_session(monkeypatch) -> None:
-    monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
-    with pytest.raises(MissingSoftware, match="FEniCSx is not installed"), fenicsx.session():
-        pass
 
 
 def test_regions_and_fibres_that_a_body_lacks_are_named() -> None:
@@ -305,39 +187,3 @@ def test_regions_are_on_the_boundary_of_the_cells(element) -> None:
         checked([lost], (*acting, pressed), ())
     with pytest.raises(InputError, match=r"facets\.lid: got none, want facets of one cell each"):
         checked(every[:0])
-
-
-def test_a_time_limit_ends_one_body_and_not_the_session(session) -> None:  # noqa: ARG001 - it skips without FEniCSx
-    body = turned(box("Q1/P0"), Rest())
-    with fenicsx.session() as fresh:
-        # To start the process alone takes longer.
-        late = fresh.solve(body, settings("Q1/P0", time_limit="0.05 s"))
-        assert (late.outcome.status, late.states) == ("timed out", ())
-        assert "0 states are kept" in late.outcome.message
-        with pytest.raises(ArithmeticError, match="timed out: stopped after"):
-            _ = late.last
-        assert fresh.solve(body, settings("Q1/P0", time_limit="60 s")).outcome.status == "converged"
-        process = fresh.process
-        assert fresh.solve(body, settings("Q1/P0")).outcome.status == "converged"
-        assert fresh.process is process
-
-
-def test_what_attachments_share_counts_once(session, tmp_path) -> None:
-    # Two regions meet in an edge and both prescribe it. Of a muscle, which has points to be followed, all forces are in balance.
-    fixed = (
-        Prescribed("bottom", "z0", ALL, Rest()),
-        Prescribed("side", "x0", ALL, Affine(((0.0, 0.0, 0.0), (0.0, 0.0, 0.1), (0.0, 0.0, -0.2)))),
-        Prescribed("top", "z1", ALL, Affine(((0.0, 0.0, 0.0),) * 3, (0.0, 0.1, -0.2))),
-    )
-    body = Body(box("P2/P1"), FLESH, fixed, (0.0, 1.0))
-    centre = body.mesh.points[body.mesh.cells[0]].mean(axis=0)
-    job, found = tmp_path / "job.pickle", []
-    job.write_bytes(pickle.dumps(Job(body, settings("P2/P1"), {"surface": (np.array([0]), centre[None])})))
-    outcome = session.run(job, None, lambda event: found.append(dict(np.load(event["file"]))), "frames")
-    assert outcome.status == "converged"
-    forces = [found[-1][f"force {entry.name}"] for entry in fixed]
-    assert np.abs(forces[1]).max() > 1e-4
-    assert np.abs(sum(forces)).max() < 1e-10
-    # Of a body of the catalogue each region has all of what its unknowns take.
-    whole = session.solve(body, settings("P2/P1")).last.forces
-    assert np.abs(sum(whole.values())).max() > 1e-4

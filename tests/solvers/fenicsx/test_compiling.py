@@ -33,7 +33,7 @@ def test_what_looks_half_done_stays_while_something_is_compiled(tmp_path, monkey
     monkeypatch.setattr(compiling.signal, "signal", lambda *_: None)
     (tmp_path / "slow.c").write_text("")
     os.utime(tmp_path / "slow.c", (1.0, 1.0))
-    with compiling._lock(tmp_path, 3):
+    with compiling.lock(tmp_path, 3):
         compiling.prepare()
         assert (tmp_path / "slow.c").exists()
     compiling.prepare()

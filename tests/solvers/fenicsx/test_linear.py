@@ -1,7 +1,5 @@
 """Matrices and paths at the edge: single precision that does not resolve the softest direction, limit points that are not near."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -9,19 +7,10 @@ pytest.importorskip("fem_reference.solvers.fenicsx.dolfinx_door", reason="FEniCS
 
 from petsc4py import PETSc
 
-from fem_reference.geometry.skins import Skin
-from fem_reference.problems import shapes
-from fem_reference.problems.body import Body, Prescribed
-from fem_reference.problems.paths import Affine, Rest
-from fem_reference.solvers.fenicsx import BodySettings, limit_points
-from fem_reference.solvers.fenicsx.body import AssembledBody
 from fem_reference.solvers.fenicsx.linear import Factorised
 from fem_reference.solvers.fenicsx.spent import Spent
-from fem_reference.verification import parts
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore:(cmap|dofmap) is deprecated")]
-
-STILL = ((0.0, 0.0, 0.0),) * 3
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -37,26 +26,3 @@ def test_signs_that_single_precision_cannot_tell_are_told_by_double(softest: flo
     linear = Factorised(matrix, symmetric=True, lagged=True, precision="single", spent=Spent())
     assert linear.negative_pivots() == negative
     assert linear.precision == ("double" if abs(softest) < 6e-8 else "single")
-
-
-def test_a_limit_point_is_claimed_within_four_of_the_smallest_steps_only() -> None:
-    """A shallow arch that a soft spring pulls down, solved up to 0.02 of a frame before the one that is foreseen."""
-    straight = shapes.box((8, 1, 1), (20.0, 1.0, 1.0), "tetrahedron")
-    rise = 2.5 * (1 - np.abs(straight.points[:, [0]] - 10) / 10)
-    mesh = replace(straight, points=straight.points + rise * [0, 0, 1])
-    top = np.array([[9.9, 0.45, 3.4]])
-    cell = np.argmin(np.linalg.norm(mesh.points[mesh.cells].mean(axis=1) - top, axis=1))
-    spring = Prescribed("pull", Skin(np.array([cell]), top, np.ones(1)), (2,), Affine(STILL, (0.0, 0.0, -8.0)), 5e-5)
-    ends = tuple(Prescribed(end, end, (0, 1, 2), Rest()) for end in ("x0", "x1"))
-    body = Body(mesh, parts.neo_hooke(0.01, 10.0), (*ends, spring), (0.0, 1.0))
-    built = AssembledBody(body, BodySettings(element="P2/P1", first_step=0.1, residual=1e-10))
-    for frame in (0.1, 0.2, 0.24):
-        assert built.attempt(frame).converged
-    far = limit_points.ahead(built, 0.05)
-    assert far is not None
-    left = far.frame - built.at
-    assert 0 < left < 0.05
-    near = limit_points.ahead(built, left / 3.5)
-    assert near is not None
-    assert near.frame - built.at == pytest.approx(left, rel=0.05)  # its slope is taken over a shorter way
-    assert limit_points.ahead(built, left / 5) is None

@@ -99,23 +99,6 @@ def test_what_the_energy_grows_by_is_the_work_of_the_forces(element, session) ->
     assert gaps[0] / gaps[1] > 4
 
 
-def test_a_column_leaves_the_straight_state_where_it_is_unstable(session) -> None:  # noqa: F811
-    body = column("Q2/Q1", (1, 1, 10), [0.97 * critical(THIN), 1.1 * critical(THIN)])
-    straight, bent = (
-        session.solve(body, BodySettings(element="Q2/Q1", first_step=100.0, follow=follow))
-        for follow in ("equilibrium", "stable")
-    )
-    assert [state.scalars["negative_modes"] for state in straight.states] == [0, 0, 1]
-    assert [state.scalars["negative_modes"] for state in bent.states] == [0, 0, 0]
-    assert bent.last.scalars["energy"] < straight.last.scalars["energy"]
-    aside = [np.ptp(solved.last.points[:, 0]) for solved in (straight, bent)]
-    assert aside[1] > 1.2 * aside[0]
-    assert (
-        "in 1 of them an unstable equilibrium was left along its lowest mode, first at frame 2" in bent.outcome.message
-    )
-    assert "unstable" in straight.outcome.message
-
-
 class Springs:
     """What ``path.Path`` asks of a system, with an ``energy`` of its unknowns."""
 

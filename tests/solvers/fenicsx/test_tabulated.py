@@ -22,7 +22,7 @@ def test_the_volumes_of_all_points_are_that_of_the_body(kind, element, degree) -
     msh = meshes.distribute(MPI.COMM_SELF, shapes.box((3, 2, 1), SIZE, kind))
     count = msh.topology.index_map(3).size_local
     rule = quadrature.rule(element, degree)
-    volumes, centres = validity._volumes(msh, count, rule)
+    volumes, centres = validity.volumes_and_centres(msh, count, rule)
     places, slopes = tabulated.geometry(msh, rule[0], slice(count))
     assert volumes.sum() == pytest.approx(np.prod(SIZE), rel=1e-12)
     assert_allclose(volumes.sum(axis=1) @ centres / volumes.sum(), np.array(SIZE) / 2, atol=1e-12)

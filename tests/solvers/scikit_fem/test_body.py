@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from fem_reference import effects, solvers
+from fem_reference import effects
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.records import parse
 from fem_reference.problems import shapes
@@ -12,7 +12,6 @@ from fem_reference.problems.body import ELEMENTS, Body, Cells, Prescribed, refer
 from fem_reference.runs.store import Run
 from fem_reference.solvers.scikit_fem import ScikitBodySettings, solve_body
 from fem_reference.solvers.scikit_fem.body import March
-from fem_reference.solvers.scikit_fem.equations import Equations
 from fem_reference.solvers.scikit_fem.spaces import Space
 
 MU, BULK = 0.5, 20.0
@@ -64,10 +63,6 @@ def solved(body: Body, element: str, **settings) -> Run:
 
 def box(element: str, count: int = 1, degree: int = 1) -> Cells:
     return shapes.box((count, count, count), (2.0, 3.0, 4.0), ELEMENTS[element][0], degree)
-
-
-def test_it_is_a_solver_of_bodies() -> None:
-    assert "scikit_fem" in solvers.names("solve_body")
 
 
 @pytest.mark.parametrize("element", ELEMENTS)
@@ -188,31 +183,6 @@ def loaded(element: str) -> Body:
     return Body(box(element), acting, fixed, (0.0, 1.0), fibre)
 
 
-@pytest.mark.parametrize("element", ["P1", "P2/P1", "Q1/P0"])
-def test_the_tangent_is_the_slope_of_the_forces(element) -> None:
-    equations = Equations(loaded(element), element, None)
-    random = np.random.default_rng(1)
-    here, direction = 0.05 * random.normal(size=(2, equations.space.size))
-    step = 1e-5
-    late, early = (equations.assembled(here + sign * step * direction, 1.0)[0] for sign in (1, -1))
-    _, tangent = equations.assembled(here, 1.0)
-    # Central differences: step squared times third derivatives of about 1e3, and rounding of forces of about 10 N over the step.
-    assert tangent @ direction == pytest.approx((late - early) / (2 * step), abs=1e-7)
-
-
-@pytest.mark.parametrize("element", ["P2", "P2/P0", "Q2/Q1"])
-def test_forces_are_the_slope_of_the_energy(element) -> None:
-    given = loaded(element)
-    equations = Equations(Body(given.mesh, given.effects[:-1], (), (0.0, 1.0), given.fibre), element, None)
-    random = np.random.default_rng(2)
-    here, direction = 0.03 * random.normal(size=(2, equations.space.size))
-    step = 1e-5
-    slope = (equations.energy(here + step * direction, 1.0) - equations.energy(here - step * direction, 1.0)) / (
-        2 * step
-    )
-    assert equations.assembled(here, 1.0)[0] @ direction == pytest.approx(slope, abs=1e-7)
-
-
 def test_newton_converges_quadratically() -> None:
     found = March(loaded("P2/P1"), ScikitBodySettings(newton_iterations=20)).attempt(1.0)
     assert found.converged
@@ -248,32 +218,6 @@ def test_equations_without_a_solution_are_a_status() -> None:
     solution = solve_body(given, ScikitBodySettings(element="P1"))
     assert solution.outcome.status == "diverged"
     assert len(solution.states) == 1
-
-
-@pytest.mark.parametrize(("element", "degree"), [("P2", 2), ("Q2", 2), ("Q1", 1), ("P1", 1)])
-def test_normals_and_weights_satisfy_the_divergence_theorem(element, degree) -> None:
-    def bent(unit):
-        return unit * [2.0, 3.0, 4.0] + 0.4 * np.roll(unit, 1, axis=1) ** 2
-
-    kind, faces = ELEMENTS[element][0], {face: face for face in FACES}
-    space = Space(shapes.mapped([shapes.Block(bent, (2, 1, 2), faces)], kind, degree), element, 8)
-    # The map of a cell is of degree 6 at most in all, along each axis of degree 2 at most: 8 is exact.
-    closed, flux = np.zeros(3), 0.0
-    for face in FACES:
-        points = space.surface(face)
-        closed += (points.weights[..., None] * points.normals).sum(axis=(0, 1))
-        flux += (points.weights * (points.places * points.normals).sum(axis=2)).sum()
-    assert closed == pytest.approx(np.zeros(3), abs=1e-11)
-    assert flux == pytest.approx(3 * space.inside.weights.sum(), rel=1e-12)
-
-
-@pytest.mark.parametrize("element", ELEMENTS)
-def test_nodes_of_the_displacement_are_those_of_the_mesh(element) -> None:
-    kind, degree, _ = ELEMENTS[element]
-    mesh = shapes.warped_box((1, 2, 1), (2.0, 3.0, 4.0), kind, degree)
-    space = Space(mesh, element, 2)
-    assert space.rest[space.nodes] == pytest.approx(mesh.points, abs=1e-12)
-    assert sorted(space.nodes_on("y1")) == sorted(space.nodes[np.isclose(mesh.points[:, 1], 3)])
 
 
 def test_what_cannot_be_solved_is_named() -> None:

@@ -126,7 +126,7 @@ def energy_norm(problem, values) -> float:
     """The L2 norm of the error's gradient, by the library's own quadrature; the gradient of EXACT by hand."""
     basis, _ = scikit_fem.space(problem)
     inside = np.empty(len(values))
-    inside[scikit_fem.field._order(problem, basis)] = values
+    inside[scikit_fem.field.order_of(problem, basis)] = values
     x, y = np.pi * np.asarray(basis.global_coordinates())
     gradient = np.pi * np.stack([np.cos(x) * np.cos(y), -np.sin(x) * np.sin(y)])
     return float(np.sqrt((((basis.interpolate(inside).grad - gradient) ** 2).sum(axis=0) * basis.dx).sum()))

@@ -1,14 +1,14 @@
-"""A comparison over the frames that its reference reached: of the others nothing can be said."""
+"""A comparison over the frames that its reference reached."""
 
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.mesh import Ints
 from fem_reference.metrics import Measure
+from fem_reference.runs.complete import complete
 from fem_reference.runs.store import Run
 
 
@@ -22,34 +22,22 @@ def cut(comparison: Comparison) -> Comparison:
     kept = frames(comparison.reference)
     if comparison.reference.outcome.status == "converged" or len(kept) in (0, len(comparison.reference.numbers)):
         return comparison
-    pick, measures = partial(_pick, kept), partial(_measures, kept)
+    numbers, measures = tuple(comparison.reference.numbers[i] for i in kept), partial(_measures, kept)
     error, bars = comparison.extension_error, comparison.error_bars
     if bars is not None:
-        shorter = tuple(replace(bar, values=bar.values[kept], model=pick(bar.model)) for bar in bars.bars)
-        bars = replace(bars, numbers=tuple(np.array(bars.numbers)[kept].tolist()), bars=shorter)
+        shorter = tuple(
+            replace(bar, values=bar.values[kept], model=None if bar.model is None else bar.model[kept])
+            for bar in bars.bars
+        )
+        bars = replace(bars, numbers=numbers, bars=shorter)
     return replace(
         comparison,
-        reference=_run(kept, comparison.reference),
-        candidates=tuple(_run(kept, run) for run in comparison.candidates),
+        reference=complete(comparison.reference, numbers),
+        candidates=tuple(complete(run, numbers) for run in comparison.candidates),
         deviations={name: measures(found) for name, found in comparison.deviations.items()},
         changes={name: measures(found) for name, found in comparison.changes.items()},
         extension_error=None if error is None else measures((error,))[0],
         error_bars=bars,
-    )
-
-
-def _pick(kept: Ints, values: Any) -> Any:
-    return None if values is None else values[kept]
-
-
-def _run(kept: Ints, run: Run) -> Run:
-    return replace(
-        run,
-        numbers=tuple(run.numbers[i] for i in kept),
-        positions=run.positions[kept],
-        fibre_positions=_pick(kept, run.fibre_positions),
-        scalars={name: values[kept] for name, values in run.scalars.items()},
-        fields={name: values[kept] for name, values in run.fields.items()},
     )
 
 
@@ -60,7 +48,7 @@ def _measures(kept: Ints, measures: tuple[Measure, ...]) -> tuple[Measure, ...]:
             values=one.values[kept],
             where=tuple(one.where[i] for i in kept) if one.where else (),
             numbers=tuple(one.numbers[i] for i in kept) if one.numbers else (),
-            error_bars=_pick(kept, one.error_bars),
+            error_bars=None if one.error_bars is None else one.error_bars[kept],
         )
         for one in measures
     )

@@ -1,17 +1,20 @@
-"""The page of a comparison. It contains everything itself, and reads without a network."""
+"""The page of a comparison."""
 
+from collections import Counter
 from functools import partial
 from typing import Any
 
+from fem_reference.assessment import reached
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.metrics import described, find
-from fem_reference.report import reached
+from fem_reference.report import gallery
 from fem_reference.report.at_frames import columns, label
-from fem_reference.report.curves import colour_of, label_of
-from fem_reference.report.sections import sections
+from fem_reference.report.curves import curves, label_of
+from fem_reference.report.drawings import colour_of
+from fem_reference.report.pages import Headlines, Page
+from fem_reference.report.sections import facts_of, sections
 from fem_reference.report.sections.origin import changes
-from fem_reference.report.sections.pictures import ramp
-from fem_reference.report.tables import DEVIATIONS, known, runs
+from fem_reference.report.tables import DEVIATIONS, MEASURES, as_csv, known, summary
 from fem_reference.report.templates import template
 from fem_reference.report.viewer import view
 from fem_reference.report.words import listed, number, ratio
@@ -19,24 +22,30 @@ from fem_reference.runs.cost import seconds_per_frame
 from fem_reference.runs.store import Run
 
 
-def render(comparison: Comparison) -> str:
-    """The whole page as text; of a reference that failed, over the frames that it reached."""
-    nothing = not len(reached.frames(comparison.reference))
-    failed, comparison = _failed(comparison), reached.cut(comparison)
-    shared = _shared(comparison)
+def page(comparison: Comparison) -> Page:
+    """The page of a comparison; of a reference that failed, over the frames that it reached."""
+    numbers, failed = summary(comparison), _failed(comparison)
+    nothing, comparison = not len(reached.frames(comparison.reference)), reached.cut(comparison)
+    shared, said = _shared(comparison), headlines(comparison)
     shown = [
-        template(f"sections/{name}.html").render(shared | section.facts(comparison))
+        template(f"sections/{name}.html").render(shared | facts_of(name, comparison))
         for name, section in sections().items()
         if section.has_numbers(comparison) and not (nothing and section.of_reference)
     ]
-    head = {"sentence": _sentence(comparison), "headlines": headlines(comparison), "failed": failed}
-    return template("page.html").render(
-        shared | head | {"key": _key(comparison), "sections": shown, "nothing": nothing}
-    )
+    contents = shared | {
+        "sentence": _sentence(comparison),
+        "headlines": said,
+        "failed": failed,
+        "key": _key(comparison),
+        "sections": shown,
+        "nothing": nothing,
+    }
+    name, rows = "comparison_page.html", as_csv(numbers["measures"])
+    return Page("comparison", comparison.scene.title, said, name, contents, numbers, rows, MEASURES)
 
 
 def _failed(comparison: Comparison) -> str:
-    """Why the reference did not reach all frames, and what the page shows then; empty where it did."""
+    """The reason why the reference did not reach all frames, and what the page shows then; empty where it did."""
     reference, wanted = comparison.reference, len(comparison.reference.numbers)
     if reference.outcome.status == "converged":
         return ""
@@ -51,7 +60,7 @@ def _failed(comparison: Comparison) -> str:
 
 
 def _key(comparison: Comparison) -> dict[str, Any]:
-    """How to read the page: colours of the curves, frames, and what was set otherwise than in the file of the case."""
+    """The key to the page: colours of the curves, and the frames at both ends."""
     names = [run.name for run in comparison.runs]
     numbers = comparison.reference.numbers
     ends = [label(comparison.scene, comparison.setup, number) for number in (numbers[0], numbers[-1])]
@@ -59,17 +68,20 @@ def _key(comparison: Comparison) -> dict[str, Any]:
 
 
 def _shared(comparison: Comparison) -> dict[str, Any]:
-    """What every template of the page is filled with."""
+    """The contents that all templates of the page share."""
+    error = comparison.extension_error
     return {
         "comparison": comparison,
         "scene": comparison.scene,
         "reference": comparison.reference,
-        "runs": runs(comparison),
+        "runs": comparison.runs,
         "columns": DEVIATIONS,
+        "groups": Counter(group for _, _, group, _, _ in DEVIATIONS),
+        "curves": curves,
         "bars": known(comparison),
-        "error": comparison.extension_error and comparison.extension_error.worst,
+        "error": error and error.worst,
         "viewer": view(comparison),
-        "colours": ramp(),
+        "colours": gallery.ramp(),
         "find": find,
         "ratio": ratio,
         "label_of": label_of,
@@ -80,8 +92,8 @@ def _shared(comparison: Comparison) -> dict[str, Any]:
     }
 
 
-def headlines(comparison: Comparison) -> list[tuple[str, str, str]]:
-    """What was asked: by candidate its verdict, "not judged" where nothing is expected of it, and its greatest deviations; then the
+def headlines(comparison: Comparison) -> Headlines:
+    """The verdict on each candidate, "not judged" where nothing is expected of it, with its greatest deviations; then the
     reference's own checks, and what makes it doubtful.
     """
     found = list[tuple[str, str, str]]()
@@ -91,7 +103,7 @@ def headlines(comparison: Comparison) -> list[tuple[str, str, str]]:
     words = [one.word for one in comparison.verdicts if one.expectation.of == "reference"]
     checks = f"{words.count('pass')} of {len(words)} of its own checks met" if words else "nothing is expected of it"
     found.append(("reference", comparison.word_of("reference"), "; ".join([checks, *comparison.doubts])))
-    return found
+    return tuple(found)
 
 
 def _greatest(comparison: Comparison, run: Run) -> str:

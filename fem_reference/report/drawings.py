@@ -1,0 +1,154 @@
+"""Drawings that stand inside a page: SVG whose text stays text and whose ids no two drawings share, and pictures as WebP."""
+
+import base64
+import io
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator, NullFormatter
+from PIL import Image
+
+from fem_reference.report.words import number
+
+REFERENCE = "#222222"
+# Okabe and Ito's palette for all kinds of colour vision, without its black and yellow.
+PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
+NOT_A_NUMBER = "not a number"
+BAND = "#01010120"  # a black that the drawing names: pure black is left out of SVG
+LOOK: Any = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "fem_reference",
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial", "sans-serif"],
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#888888",
+    "axes.grid": True,
+    "grid.color": "#e8e8e8",
+    "xtick.color": "#444444",
+    "ytick.color": "#444444",
+    "legend.frameon": False,
+}
+# Colours that a page in dark colours draws otherwise, by the names that style.css gives them.
+_NAMED = {
+    "#e8e8e8": "grid",
+    "#888888": "axis",
+    "#444444": "soft",
+    "#dddddd": "line",
+    "#bbbbbb": "axis",
+    "#555555": "soft",
+    "#1d1d1f": "ink",
+    "#010101": "band",
+    "#ffffff": "paper",
+    "#14713a": "good",
+    "#b3261e": "bad",
+}
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A drawing: its ``title`` and its ``markup``, an ``<svg>`` or an ``<img>``; or the reason why it is ``missing``."""
+
+    title: str
+    markup: str = ""
+    missing: str = ""
+
+
+def colour_of(i: int) -> str:
+    """The colour of the i-th run, the reference first.
+
+    >>> colour_of(0), colour_of(1)
+    ('#222222', '#0072b2')
+    """
+    return REFERENCE if i == 0 else PALETTE[(i - 1) % len(PALETTE)]
+
+
+def drawn(name: str, title: str, size: tuple[float, float], draw: Callable[[Figure, Axes], None]) -> Drawing:
+    """A drawing of ``size`` [in] made by ``draw``, as SVG whose ids begin with ``name``."""
+    with mpl.rc_context(LOOK):
+        figure = Figure(figsize=size, layout="constrained")
+        FigureCanvasSVG(figure)
+        draw(figure, figure.add_subplot())
+        text = io.StringIO()
+        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
+    return Drawing(title, inline(text.getvalue(), name, title))
+
+
+def over_frames(name: str, title: str, unit: str, draw: Callable[[Axes], None], height: float = 3.1) -> Drawing:
+    """A drawing of curves over frame numbers, with a legend above."""
+
+    def whole(figure: Figure, axes: Axes) -> None:
+        draw(axes)
+        axes.margins(x=0.02)
+        axes.set_xlabel("frame")
+        axes.set_ylabel(unit.replace("mm3", "mm³"))
+        axes.xaxis.set_major_locator(MaxNLocator(nbins=8, integer=True, steps=[1, 2, 5, 10]))
+        _legend(figure, axes)
+
+    return drawn(name, title, (5.4, height), whole)
+
+
+def _legend(figure: Figure, axes: Axes) -> None:
+    """A legend above, in as many columns as its texts leave room for, the mark of what is not a number last."""
+    entries = sorted(zip(*axes.get_legend_handles_labels(), strict=True), key=lambda entry: entry[1] == NOT_A_NUMBER)
+    handles, labels = [entry[0] for entry in entries], [entry[1] for entry in entries]
+    lengths = [len(label) + 7 for label in labels]
+    columns = len(labels) if sum(lengths) < 75 else max(1, 75 // max(lengths))
+    figure.legend(handles, labels, loc="outside upper left", ncols=columns, handlelength=2.2, columnspacing=1.2)
+
+
+def logarithmic(axes: Axes) -> None:
+    """Both axes in powers of ten, their numbers as people read them and not as formulas."""
+    axes.set(xscale="log", yscale="log")
+    plain_numbers(axes.xaxis)
+    plain_numbers(axes.yaxis)
+
+
+def plain_numbers(axis: Any) -> None:
+    """Label the major ticks of a logarithmic axis as people read numbers, the minor ones not at all."""
+    axis.set_major_formatter(lambda value, _: number(value))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def inline(svg: str, name: str, title: str) -> str:
+    """The ``<svg>`` alone, as wide as its place, with ``name`` before every id, which has letters and digits only, and colours that
+    the page may set by their names.
+    """
+    name = re.sub(r"[^\w.-]", "_", name)
+    svg = re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)
+    svg = re.sub(r' xmlns(:\w+)?="[^"]*"', "", svg).replace("xlink:href", "href")
+    svg = re.sub(r'(id="|href="#|url\(#)', rf"\g<1>{name}-", svg)
+    svg = re.sub(r"(?<=: )#[0-9a-f]{6}\b", lambda found: _named(found[0]), svg)
+    box = re.search(r'viewBox="[^"]*"', svg)
+    assert box is not None  # matplotlib writes one in every drawing
+    wide = f' style="--wide: {float(box[0].split()[2]):.0f}px"'
+    return f'<svg {box[0]}{wide} role="img" aria-label="{escape(title)}">{svg[svg.index(">") + 1 :]}'
+
+
+def _named(colour: str) -> str:
+    """A colour as a page may change it, which stays what it is where the page says nothing.
+
+    >>> _named("#e8e8e8"), _named("#d55e00")
+    ('var(--grid, #e8e8e8)', 'var(--c-d55e00, #d55e00)')
+    """
+    return f"var(--{_NAMED.get(colour, f'c-{colour[1:]}')}, {colour})"
+
+
+def webp(picture: Image.Image, quality: int) -> str:
+    """A picture as what stands in ``src``, compressed with ``quality`` of at most 100."""
+    stored = io.BytesIO()
+    picture.save(stored, "WEBP", quality=quality, method=4)
+    return picture_source(stored.getvalue())
+
+
+def picture_source(stored: bytes) -> str:
+    """A stored WebP picture as what stands in ``src``."""
+    return f"data:image/webp;base64,{base64.b64encode(stored).decode()}"

@@ -1,0 +1,102 @@
+"""Runs of hard cases, followed frame by frame as their health is measured."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from fem_reference import solvers
+from fem_reference.assessment import second_check
+from fem_reference.assessment.health import Followed
+from fem_reference.foundations.errors import InputError
+from fem_reference.foundations.mesh import Floats
+from fem_reference.geometry.embedding import Locator
+from fem_reference.problems.body import Body
+from fem_reference.problems.muscle import Problem
+from fem_reference.problems.of_case import CaseProblem
+from fem_reference.problems.problem import NO_SURFACE
+from fem_reference.problems.scalar import FieldProblem
+from fem_reference.runs.fields import VALUES
+from fem_reference.runs.store import Frame, Outcome
+from fem_reference.scenes.case import SolverChoice
+from fem_reference.solvers.common.protocol import MuscleSolver
+from fem_reference.studies.hard.choosing import task_of
+from fem_reference.studies.hard.steps import check_not_stalled
+
+_MOST_FOR_SECOND = 200  # tetrahedra, for which it takes seconds
+
+
+def follow(built: CaseProblem, choice: SolverChoice) -> tuple[Outcome, Followed]:
+    """Solve a problem by a solver; InputError where that is not for it, StalledError where the machine was too busy."""
+    solver, task, muscle = choice.solver, task_of(choice.solver, built.task), built.muscle
+    offer = solvers.find(solver, solver, task)
+    if isinstance(offer, MuscleSolver) and offer.moves not in ("surface", "tetrahedra"):
+        want = "one that moves a surface, which health is of"
+        raise InputError(solver, f"a solver that moves {offer.moves}", want)
+    given = _small_body(muscle, solver) if muscle and task == "solve_body" else built
+    settings = solvers.settings(choice, solver, task)
+    solvers.check(solver, settings, muscle.effects if muscle else (), solver, task)
+    solvers.require(solver, settings, solver, task)
+    frames = list[Frame]()
+    outcome = offer.solve(given, settings, frames.append)
+    check_not_stalled(outcome)
+    if built.field is not None:
+        return outcome, _of_field(built.field, frames)
+    assert muscle is not None  # what is no field
+    if task == "solve_body":
+        frames = _with_surface(muscle, frames)
+    if solvers.takes_effects(solver):
+        outcome = second_check.confirmed_frames(muscle, frames, outcome, settings)
+    return outcome, _of_muscle(muscle, frames or [Frame(muscle.frames[0], np.array(muscle.surface.points))])
+
+
+def _small_body(muscle: Problem, solver: str) -> Body:
+    """The body of a muscle, for a solver that is written in Python, to be right and not fast."""
+    if len(muscle.mesh.tets) > _MOST_FOR_SECOND:
+        want = f"at most {_MOST_FOR_SECOND}: it is written in Python, to be right and not fast"
+        raise InputError(solver, f"{len(muscle.mesh.tets)} tetrahedra", want)
+    return muscle.body
+
+
+def _with_surface(muscle: Problem, frames: list[Frame]) -> list[Frame]:
+    """The frames of a body with the surface, which goes along with the tetrahedra."""
+    rest, mesh = muscle.surface.points, muscle.mesh
+    inside = Locator(mesh).embed(rest)
+    return [replace(one, surface=rest + inside.interpolate(mesh, one.points - mesh.points)) for one in frames]
+
+
+def _of_field(field: FieldProblem, frames: list[Frame]) -> Followed:
+    """The values of a scalar field, and the range of those on its boundary."""
+    values = np.array([frame.field.arrays[VALUES] for frame in frames if frame.field])
+    boundary = field.fixed[np.isfinite(field.fixed)]
+    return Followed((0,), NO_SURFACE, np.zeros((1, 0, 3)), values=values, range=(boundary.min(), boundary.max()))
+
+
+def _of_muscle(built: Problem, frames: list[Frame]) -> Followed:
+    tets = [frame.points for frame in frames if len(frame.points)]
+    whole = len(tets) == len(frames)
+    return Followed(
+        tuple(int(frame.number) for frame in frames),
+        built.surface,
+        np.array([frame.surface for frame in frames if frame.surface is not None]),
+        built.mesh if whole else None,
+        np.array(tets) if whole else None,
+        built.bones,
+        built.free,
+        integrated=_all(frames, "volume_ratio"),
+        negative_modes=_all(frames, "negative_modes"),
+        material_modes=_all(frames, "material_modes"),
+        least_determinant=_least(frames),
+    )
+
+
+def _least(frames: list[Frame]) -> Floats | None:
+    """The least det F at any point that a solver looks at (f,), None where it does not say."""
+    found = [_all(frames, f"min_det_F_{where}") for where in ("quadrature", "vertices")]
+    known = [one for one in found if one is not None]
+    return np.min(known, axis=0) if known else None
+
+
+def _all(frames: list[Frame], scalar: str) -> Floats | None:
+    """A scalar of all frames (f,), None where not all have it."""
+    found = [frame.scalars[scalar] for frame in frames if scalar in frame.scalars]
+    return np.array(found) if len(found) == len(frames) else None

@@ -1,0 +1,55 @@
+"""Drawings inside a page: ids of their own, colours that a dark page may change, numbers as people read them."""
+
+import base64
+import io
+import re
+
+from PIL import Image
+
+from fem_reference.report import drawings
+
+
+def line(_figure, axes) -> None:
+    axes.plot([1, 10], [1, 1000], color=drawings.PALETTE[0])
+    drawings.logarithmic(axes)
+
+
+def test_no_two_drawings_share_an_id_and_each_refers_to_its_own() -> None:
+    one, other = (drawings.drawn(name, "A <title>", (3, 2), line).markup for name in ("one", "an other"))
+    ids = [set(re.findall(r'\bid="([^"]*)"', text)) for text in (one, other)]
+    assert ids[0]
+    assert not ids[0] & ids[1]
+    for own, text in zip(ids, (one, other), strict=True):
+        assert set(re.findall(r'(?:href="|url\()#([^")]*)', text)) <= own
+    assert all(each.startswith("an_other-") for each in ids[1])
+    assert 'aria-label="A &lt;title&gt;"' in one
+
+
+def test_colours_are_those_of_the_page_and_stay_what_they_are_where_it_says_nothing() -> None:
+    text = drawings.drawn("one", "One", (3, 2), line).markup
+    assert "var(--c-0072b2, #0072b2)" in text
+    assert "var(--grid, #e8e8e8)" in text
+    assert "xmlns" not in text
+    assert "metadata" not in text
+
+
+def test_powers_of_ten_are_written_as_numbers() -> None:
+    text = drawings.drawn("one", "One", (3, 2), line).markup
+    assert {"1", "10", "100", "1\N{NARROW NO-BREAK SPACE}000"} <= set(re.findall(r">([^<>]+)</text>", text))
+
+
+def test_a_drawing_over_frames_has_its_unit_and_a_legend_whose_last_entry_is_what_is_not_a_number() -> None:
+    def curves(axes) -> None:
+        axes.plot([0, 10], [0, 1], "x", label=drawings.NOT_A_NUMBER)
+        axes.plot([0, 10], [0, 1], label="a run")
+
+    texts = re.findall(r">([^<>]+)</text>", drawings.over_frames("v", "Volume", "mm3", curves).markup)
+    assert {"frame", "mm³"} <= set(texts)
+    assert texts.index("a run") < texts.index(drawings.NOT_A_NUMBER)
+
+
+def test_a_picture_is_what_stands_in_a_source() -> None:
+    source = drawings.webp(Image.new("RGB", (4, 3), "#ff0000"), 80)
+    kind, stored = source.split(",")
+    assert kind == "data:image/webp;base64"
+    assert Image.open(io.BytesIO(base64.b64decode(stored))).size == (4, 3)

@@ -1,0 +1,77 @@
+"""Numbers of a comparison as JSON and CSV: all of them, and what is not finite is null."""
+
+import csv
+import io
+import json
+from dataclasses import replace
+
+import pytest
+
+from fem_reference import report
+from fem_reference.report.tables import COLUMNS
+
+
+def test_summary_has_the_documented_keys_and_survives_json(comparison):
+    printed = report.summary(comparison)
+    assert json.loads(json.dumps(printed, allow_nan=False)) == printed
+    keys = [
+        "case",
+        "solver",
+        "status",
+        "message",
+        "verdict",
+        "doubts",
+        "second_check",
+        "cost",
+        "measures",
+        "from_rest",
+        "verdicts",
+        "error_bars",
+        "rankings",
+    ]
+    assert list(printed) == keys
+    assert printed["error_bars"] == []
+    assert (printed["case"], printed["solver"], printed["status"], printed["verdict"]) == (
+        "press",
+        "fenicsx",
+        "converged",
+        "pass",
+    )
+    assert printed["cost"]["quick"] == {"seconds": 12.0, "seconds_solve": 8.0, "iterations": 40.0}
+    assert {row["candidate"] for row in printed["from_rest"]} == {"reference", "quick", "torn"}
+    assert printed["verdicts"][0]["because"] == "It is <nearly> incompressible & closed."
+
+
+def value(rows, candidate, metric, statistic, frame):
+    (found,) = (
+        row["value"]
+        for row in rows
+        if (row["candidate"], row["metric"], row["statistic"], row["frame"]) == (candidate, metric, statistic, frame)
+    )
+    return found
+
+
+def test_summary_values_are_the_measures(comparison):
+    printed = report.summary(comparison)
+    # quick is 1 mm a step from the reference, and sqrt(1 + 2^2) mm a step from rest; rounding is 1e-15.
+    assert value(printed["measures"], "quick", "surface_deviation", "max", 30) == pytest.approx(3, abs=1e-12)
+    assert value(printed["from_rest"], "quick", "surface_deviation", "max", 30) == pytest.approx(3 * 5**0.5, abs=1e-12)
+    assert value(printed["measures"], "reference", "surface_deviation", "max", 30) == pytest.approx(6, abs=1e-12)
+    assert value(printed["measures"], "reference", "inversion", "min_det_F_points", 40) == 0.5
+
+
+def test_what_is_not_finite_is_null(comparison):
+    printed = report.summary(comparison)
+    assert value(printed["measures"], "torn", "surface_deviation", "rms", 40) is None
+    assert value(printed["measures"], "torn", "surface_deviation", "rms", 30) == pytest.approx(1.5, abs=1e-12)
+    damaged = replace(comparison.verdicts[0], word="fail", value=float("inf"))
+    assert report.summary(replace(comparison, verdicts=(damaged,)))["verdicts"][0]["value"] is None
+
+
+def test_csv_has_the_same_numbers(comparison, tmp_path):
+    report.write(report.of_comparison(comparison), tmp_path / "out", report.NAME)
+    rows = list(csv.DictReader(io.StringIO((tmp_path / "out" / "measures.csv").read_text())))
+    printed = json.loads((tmp_path / "out" / "measures.json").read_text())["measures"]
+    assert tuple(rows[0]) == COLUMNS
+    read = [row | {"frame": int(row["frame"]), "value": float(row["value"]) if row["value"] else None} for row in rows]
+    assert read == printed

@@ -1,0 +1,33 @@
+"""The equations of the second opinion: forces are slopes of the energy, the tangent that of the forces."""
+
+import numpy as np
+import pytest
+
+from fem_reference.problems.body import Body
+from fem_reference.solvers.scikit_fem.equations import Equations
+from tests.solvers.scikit_fem.test_body import loaded
+
+
+@pytest.mark.parametrize("element", ["P1", "P2/P1", "Q1/P0"])
+def test_the_tangent_is_the_slope_of_the_forces(element) -> None:
+    equations = Equations(loaded(element), element, None)
+    random = np.random.default_rng(1)
+    here, direction = 0.05 * random.normal(size=(2, equations.space.size))
+    step = 1e-5
+    late, early = (equations.assembled(here + sign * step * direction, 1.0)[0] for sign in (1, -1))
+    _, tangent = equations.assembled(here, 1.0)
+    # Central differences: step squared times third derivatives of about 1e3, and rounding of forces of about 10 N over the step.
+    assert tangent @ direction == pytest.approx((late - early) / (2 * step), abs=1e-7)
+
+
+@pytest.mark.parametrize("element", ["P2", "P2/P0", "Q2/Q1"])
+def test_forces_are_the_slope_of_the_energy(element) -> None:
+    given = loaded(element)
+    equations = Equations(Body(given.mesh, given.effects[:-1], (), (0.0, 1.0), given.fibre), element, None)
+    random = np.random.default_rng(2)
+    here, direction = 0.03 * random.normal(size=(2, equations.space.size))
+    step = 1e-5
+    slope = (equations.energy(here + step * direction, 1.0) - equations.energy(here - step * direction, 1.0)) / (
+        2 * step
+    )
+    assert equations.assembled(here, 1.0)[0] @ direction == pytest.approx(slope, abs=1e-7)
