@@ -66,9 +66,9 @@ def choose(case: Case, text: str, unit: str | None) -> tuple[Candidate, str]:
         if Path(text).is_dir():
             got = f'"{text}", a candidate of the case and a folder'
             raise InputError("--candidate", got, f"another name, or ./{text}")
-        return scene.candidate[names.index(text)], f"candidate[{names.index(text)}]"
-    if text in solvers.names(scene.task) and not Path(text).exists():
-        found = solver_table.choice(scene, text)[1]
+        return case.candidate[names.index(text)], f"candidate[{names.index(text)}]"
+    if text in solvers.names(case.task) and not Path(text).exists():
+        found = solver_table.choice(case, text)[1]
         return Candidate(name=text, solver=text, **found.settings), "--candidate"
     if not text or not Path(text).exists():
         raise InputError("--candidate", f'"{text}"', f"a folder of frames, a solver, or one of {', '.join(names)}")

@@ -25,7 +25,7 @@ CONVENTIONS = {
 }
 
 
-def write(case: MuscleCase, problem: Problem, folder: Path) -> None:
+def write(case: MuscleCase, problem: MuscleProblem, folder: Path) -> None:
     """Every file of the export of a ``problem`` but those that explain it, into ``folder``."""
     (folder / "bones").mkdir()
     files.write_surface(folder / "muscle.ply", problem.surface, problem.surface.points)
@@ -72,7 +72,7 @@ def _write_csv(path: Path, columns: Sequence[str], entries: Iterable[Sequence[An
     files.write_text(path, text.getvalue())
 
 
-def facts(case: MuscleCase, problem: Problem) -> dict[str, Any]:
+def facts(case: MuscleCase, problem: MuscleProblem) -> dict[str, Any]:
     """The facts that no mesh file has: units, conventions, frames, bones, attachments, effects with the unit of every parameter."""
     bones = [
         entry.model_dump(mode="json", exclude_none=True, exclude={"surface", "unit"})

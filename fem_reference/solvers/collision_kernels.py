@@ -161,6 +161,13 @@ class CollidingBone:
         return distance if self.grid is None else np.minimum(distance, self.grid.margin)
 
 
+def colliding_bones(bones: Sequence[Bone], rest: Floats, attached: Ints, gap: float) -> list[CollidingBone]:
+    """The ``bones`` that points, at ``rest`` (n, 3) [mm], collide with, but for those ``attached`` (k,)."""
+    free = np.ones(len(rest), bool)
+    free[attached] = False
+    return [CollidingBone(bone, rest, free, gap) for bone in bones]
+
+
 def move_out(points: Floats, bones: Sequence[CollidingBone], stiffness: float) -> None:
     """Move ``points`` (n, 3) [mm] out of all bones in place, each by the sum of the displacements out of every bone that it is in.
 

@@ -43,7 +43,7 @@ CHEAP = 0.2
 Vary = Callable[[MuscleCase], MuscleCase]
 
 
-def variations(scene: MuscleCase, settings: Record, *, pressed: bool = True) -> dict[str, Vary]:
+def variations(case: MuscleCase, settings: Record, *, pressed: bool = True) -> dict[str, Vary]:
     """Changes that each halve one cause of numerical error apart from tetrahedra, by name: of contact its stiffness and smoothing,
     and how well the distances to surfaces of bones are known and how far they are rounded, unless no bone ``pressed``; load
     steps, where the reference's ``settings`` have them, with drag or viscosity only: else a state does not depend on them.

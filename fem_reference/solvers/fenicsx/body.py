@@ -27,7 +27,6 @@ from fem_reference.solvers.fenicsx.multigrid import Multigrid
 from fem_reference.solvers.fenicsx.newton import Newton
 from fem_reference.solvers.fenicsx.nodal import Nodal
 from fem_reference.solvers.fenicsx.path import Path, settle
-from fem_reference.solvers.fenicsx.reactions import Reactions
 from fem_reference.solvers.fenicsx.resources import SMALL
 from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.spent import Spent
@@ -82,7 +81,6 @@ class AssembledBody:
         self.path = Path(self.system, self.determinants)
         inside: tuple[StateCheck, ...] = self.determinants, self.validity, self.path, FiniteEnergy(self.energy)
         self.checks: tuple[StateCheck, ...] = inside if self.contact is None else (self.contact, *inside)
-        self.reactions = Reactions(self.system, self.conditions, self.contact)
         self.known = Known(self.comm)
         self.recalled: KnownState | None = None
         self.modes: float | None = None  # of the state that was examined last

@@ -171,16 +171,12 @@ class ContactForces:
 
     def deepest(self) -> str:
         """The depth of the deepest point, the bone that it is in, and its place."""
-        mine = [
-            (float(-one.gap.min()), entry.name, self._places(self.moved, one.near[[np.argmin(one.gap)]])[0].tolist())
-            for entry, one in zip(self.bones, self.now, strict=True)
-            if len(one.near)
-        ]
-        found = [one for rank in self.comm.allgather(mine) for one in rank]
-        if not found:
-            return "nowhere"
-        depth, name, at = max(found)
-        return f'{max(depth, 0.0):.2f} mm in "{name}" at {place_of(at)}'
+        mine = []
+        for entry, one in zip(self.bones, self.now, strict=True):
+            if len(one.near):
+                depth, (at,) = float(-one.gap.min()), self._places(self.moved, one.near[[np.argmin(one.gap)]])
+                mine.append((depth, f'{max(depth, 0.0):.2f} mm in "{entry.name}" at {place_of(at)}'))
+        return self._worst(mine) or "nowhere"
 
     def settle(self) -> None:
         """Take the present state as the one that the next step starts from."""
@@ -206,14 +202,17 @@ class ContactForces:
             half = entry.shape.half_thickness
             said = f'contact gives way: the surface is {depth:.2g} mm deep in "{entry.name}", whose middle is at {half:.2g} mm'
             mine += [(depth / half, said)] if depth > _GIVEN_WAY * half else []
-        found = [one for rank in self.comm.allgather(mine) for one in rank]
-        return max(found)[1] if found else None
+        return self._worst(mine)
 
     def tunnelled(self) -> str | None:
         """The point that went through a bone since the last settled state: on its straight path through the bone's frame it was
         inside, deeper than at both ends, and it left on the other side. None where none did.
         """
         mine = [one for i in range(len(self.bones)) if (one := self._through(i))]
+        return self._worst(mine)
+
+    def _worst(self, mine: list[tuple[float, str]]) -> str | None:
+        """The sentence with the greatest number, of any rank; None without."""
         found: list[tuple[float, str]] = [one for rank in self.comm.allgather(mine) for one in rank]
         return max(found)[1] if found else None
 
