@@ -18,7 +18,7 @@ Format = Literal["open", "febio"]
 FORMATS: tuple[Format, ...] = get_args(Format)
 
 
-def export(scene: MuscleCase, build: Callable[[], Problem], folder: Path, form: Format) -> list[str]:
+def export(case: MuscleCase, build: Callable[[], Problem], folder: Path, form: Format) -> list[str]:
     """Write the problem that ``build`` makes of a ``scene`` into ``folder``, whole or not at all; the names of its files.
 
     ``"febio"`` adds FEBio's own file to the open ones, and warns of what is another model there. InputError where the folder is
@@ -28,21 +28,21 @@ def export(scene: MuscleCase, build: Callable[[], Problem], folder: Path, form: 
         raise InputError("form", repr(form), f"one of {', '.join(FORMATS)}")
     check(folder)
     if form == "febio":
-        febio.check(scene)
+        febio.check(case)
     with new_folder(folder) as part:  # whether it can be written shows before a problem is built
-        _write(scene, build(), part, form)
+        _write(case, build(), part, form)
         written = sorted(str(path.relative_to(part)) for path in part.rglob("*") if path.is_file())
-    log.info("%s: %d files in %s", scene.name, len(written), folder)
+    log.info("%s: %d files in %s", case.name, len(written), folder)
     return written
 
 
-def _write(scene: MuscleCase, problem: Problem, folder: Path, form: Format) -> None:
-    open_formats.write(scene, problem, folder)
+def _write(case: MuscleCase, problem: Problem, folder: Path, form: Format) -> None:
+    open_formats.write(case, problem, folder)
     files.write_text(folder / "candidate.toml", texts.candidate())
     if form == "febio":
         differences = febio_differences.notes(problem)
         for difference in differences:
             log.warning("another model in FEBio: %s", difference)
         febio.write(problem, folder)
-        files.write_text(folder / "FEBIO.md", texts.febio_readme(scene, differences))
-    files.write_text(folder / "README.md", texts.readme(scene, febio=form == "febio"))
+        files.write_text(folder / "FEBIO.md", texts.febio_readme(case, differences))
+    files.write_text(folder / "README.md", texts.readme(case, febio=form == "febio"))

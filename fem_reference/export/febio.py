@@ -22,7 +22,17 @@ from fem_reference.effects.neo_hooke import NeoHooke
 from fem_reference.export.febio_contact import add_contact, has_contact
 from fem_reference.export.febio_differences import notes
 from fem_reference.export.febio_material import add_fibres, add_materials
-from fem_reference.export.febio_mesh import Mesh, bone_id, by_springs, exactly, leaf, quadratic, springs_id, vector
+from fem_reference.export.febio_mesh import (
+    Mesh,
+    bone_id,
+    by_springs,
+    exactly,
+    leaf,
+    leaves,
+    quadratic,
+    springs_id,
+    vector,
+)
 from fem_reference.export.open_formats import effect_name
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.motion import Rotation
@@ -40,13 +50,13 @@ LONGEST_STEP = 2.0  # [frame numbers], that of the runs whose results FEBIO.md c
 TOLERANCES = {"dtol": 1e-4, "etol": 1e-5}
 
 
-def check(scene: MuscleCase) -> None:
-    """InputError where a scene has an effect that FEBio has not, or not in the same form."""
-    for i, effect in enumerate(scene.effects):
+def check(case: MuscleCase) -> None:
+    """InputError where a case has an effect that FEBio has not, or not in the same form."""
+    for i, effect in enumerate(case.effects):
         if not isinstance(effect, SAME):
             same = ", ".join(kind.__module__.rpartition(".")[2] for kind in SAME)
             raise InputError(
-                join(scene.place, f"effect[{i}]"),
+                join(case.place, f"effect[{i}]"),
                 f'"{effect_name(effect)}"',
                 f"what FEBio has in the same form: {same}",
             )
@@ -54,8 +64,8 @@ def check(scene: MuscleCase) -> None:
         ((NeoHooke, MooneyRivlin), "no matrix: neither neo_hooke nor mooney_rivlin"),
         ((Incompressible, IncompressiblePenalty), "neither incompressible nor incompressible_penalty"),
     ):
-        if not any(isinstance(effect, kinds) for effect in scene.effects):
-            raise InputError(join(scene.place, "effect"), got, "one of them, which FEBio's uncoupled materials need")
+        if not any(isinstance(effect, kinds) for effect in case.effects):
+            raise InputError(join(case.place, "effect"), got, "one of them, which FEBio's uncoupled materials need")
 
 
 def write(problem: Problem, folder: Path) -> None:
@@ -93,19 +103,15 @@ def _control(root: Element, problem: Problem) -> None:
     steps = round((problem.frames[-1] - problem.frames[0]) / step)
     settings = {"analysis": "STATIC", "time_steps": steps, "step_size": step}
     settings |= {"plot_level": "PLOT_MUST_POINTS", "output_level": "OUTPUT_MUST_POINTS"}
-    for tag, value in settings.items():
-        leaf(control, tag, value)
+    leaves(control, settings)
     stepper = SubElement(control, "time_stepper", type="default")
     retries = {"max_retries": 20, "aggressiveness": 1, "cutback": 0.5}  # half the step at each
-    for tag, value in (retries | {"opt_iter": 15, "dtmin": step / 200}).items():
-        leaf(stepper, tag, value)
+    leaves(stepper, retries | {"opt_iter": 15, "dtmin": step / 200})
     leaf(stepper, "dtmax", step, lc="1")
     solver = SubElement(control, "solver", type="solid")
     if has_contact(problem):
         leaf(solver, "symmetric_stiffness", "non-symmetric")
-    leaf(solver, "max_refs", 30)
-    for tag, value in TOLERANCES.items():
-        leaf(solver, tag, value)
+    leaves(solver, {"max_refs": 30, **TOLERANCES})
     leaf(SubElement(solver, "qn_method", type="BFGS"), "max_ups", 0)
 
 
@@ -142,14 +148,11 @@ def _motions(root: Element, problem: Problem) -> None:
         fixed = (*places, *angles) if bone.motion is None else places if turns else angles
         moved = angles if turns else ("x", "y", "z")
         entry = SubElement(rigid, "rigid_bc", name=f"{bone_id(bone)}_fixed", type="rigid_fixed")
-        leaf(entry, "rb", bone_id(bone))
-        for freedom in fixed:
-            leaf(entry, f"{freedom}_dof", 1)
+        leaves(entry, {"rb": bone_id(bone)} | {f"{freedom}_dof": 1 for freedom in fixed})
         for freedom, share in zip(moved, axis(bone), strict=False):
             kind = "rigid_rotation" if turns else "rigid_displacement"
             entry = SubElement(rigid, "rigid_bc", name=f"{bone_id(bone)}_{freedom}", type=kind)
-            leaf(entry, "rb", bone_id(bone))
-            leaf(entry, "dof", freedom)
+            leaves(entry, {"rb": bone_id(bone), "dof": freedom})
             leaf(entry, "value", repr(share), lc=str(curves[bone.name]))
 
 
@@ -184,11 +187,10 @@ def _curves(root: Element, problem: Problem) -> None:
 
 def _curve(data: Element, number: int, kind: str, points: list[tuple[float, float]]) -> None:
     curve = SubElement(data, "load_controller", id=str(number), type="loadcurve")
-    leaf(curve, "interpolate", kind)
-    leaf(curve, "extend", "CONSTANT")
-    rows = SubElement(curve, "points")
+    leaves(curve, {"interpolate": kind, "extend": "CONSTANT"})
+    listed = SubElement(curve, "points")
     for time, value in points:
-        leaf(rows, "pt", vector((time, value)))
+        leaf(listed, "pt", vector((time, value)))
 
 
 def _output(root: Element) -> None:

@@ -15,7 +15,7 @@ from fem_reference.export.febio_mesh import (
     bone_id,
     by_springs,
     free_facets,
-    leaf,
+    leaves,
     obstacles,
     outward,
     springs_id,
@@ -56,8 +56,7 @@ def add_contact(root: Element, problem: Problem) -> None:
 def _pair(contacts: Element, kind: str, name: str, settings: dict[str, float | None]) -> None:
     """A contact of a ``kind`` between the surfaces of the pair of this name."""
     entry = SubElement(contacts, "contact", name=f"{name}_contact", type=kind, surface_pair=f"{name}_pair")
-    for tag, value in (PENALTY | settings).items():
-        leaf(entry, tag, value)
+    leaves(entry, {**PENALTY, **settings})
 
 
 def overlaps(problem: Problem) -> dict[str, float]:

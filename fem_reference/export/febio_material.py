@@ -12,7 +12,7 @@ from fem_reference.effects.incompressible import Incompressible
 from fem_reference.effects.incompressible_penalty import IncompressiblePenalty
 from fem_reference.effects.mooney_rivlin import MooneyRivlin
 from fem_reference.effects.neo_hooke import NeoHooke
-from fem_reference.export.febio_mesh import bone_id, leaf, vector
+from fem_reference.export.febio_mesh import bone_id, leaf, leaves, vector
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.motion import Rotation
 from fem_reference.problems.muscle import Problem
@@ -27,8 +27,7 @@ def add_materials(root: Element, problem: Problem) -> None:
     _muscle(materials, problem.effects)
     for number, bone in enumerate(problem.bones, start=2):
         rigid = SubElement(materials, "material", id=str(number), name=bone_id(bone), type="rigid body")
-        leaf(rigid, "density", 1e-9)
-        leaf(rigid, "center_of_mass", vector(_centre(bone)))
+        leaves(rigid, {"density": 1e-9, "center_of_mass": vector(_centre(bone))})
 
 
 def _muscle(materials: Element, effects: Sequence[Effect]) -> None:
@@ -48,8 +47,7 @@ def _muscle(materials: Element, effects: Sequence[Effect]) -> None:
 
 def _leaves(parent: Element, constants: dict[str, float]) -> None:
     """The constants of a material; of one with fibres (``lam_max``) also their direction: the first axis of each element."""
-    for tag, value in constants.items():
-        leaf(parent, tag, value)
+    leaves(parent, constants)
     if "lam_max" in constants:
         leaf(SubElement(parent, "fiber", type="vector"), "vector", "1,0,0")
 

@@ -1,7 +1,6 @@
 """The nodes, elements, node sets and surfaces of FEBio's input file."""
 
-import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
@@ -20,6 +19,18 @@ FACING = [0, 2, 1, 5, 4, 3]  # the nodes of a tri6 whose normal is turned round
 def leaf(parent: Element, tag: str, text: object, **attributes: str) -> None:
     """An element with a text and nothing below it."""
     SubElement(parent, tag, attributes).text = str(text)
+
+
+def leaves(parent: Element, values: Mapping[str, object]) -> None:
+    """Elements with the ``values`` as their texts, by tag."""
+    for tag, value in values.items():
+        leaf(parent, tag, value)
+
+
+def rows(parent: Element, tag: str, values: Iterable[Sequence[float]], first: int = 1) -> None:
+    """Elements of one ``tag``, numbered from ``first``, with numbers in full."""
+    for number, row in enumerate(values, start=first):
+        leaf(parent, tag, ",".join(map(repr, row)), id=str(number))
 
 
 def vector(values: Iterable[float]) -> str:
@@ -114,18 +125,15 @@ class Mesh:
 
     @staticmethod
     def _nodes(mesh: Element, name: str, points: Floats, before: int) -> None:
-        group = SubElement(mesh, "Nodes", name=name)
-        for i, point in enumerate(points.tolist(), start=before + 1):
-            leaf(group, "node", vector(point), id=str(i))
+        rows(SubElement(mesh, "Nodes", name=name), "node", points.tolist(), before + 1)
 
     @staticmethod
     def _elements(mesh: Element, kinds: dict[str, str], cells: dict[str, Ints]) -> None:
         """The elements of each group, numbered through from 1."""
-        numbers = itertools.count(1)
+        first = 1
         for name, kind in kinds.items():
-            group = SubElement(mesh, "Elements", name=name, type=kind)
-            for cell in (cells[name] + 1).tolist():
-                leaf(group, "elem", ",".join(map(str, cell)), id=str(next(numbers)))
+            rows(SubElement(mesh, "Elements", name=name, type=kind), "elem", (cells[name] + 1).tolist(), first)
+            first += len(cells[name])
 
     def _curved(self, facets: Ints) -> Ints:
         """Straight triangles (m, 3) of the tets with the middles of their edges, (m, 6)."""
@@ -170,12 +178,8 @@ class Mesh:
 
     @staticmethod
     def _surface(mesh: Element, name: str, kind: str, facets: Ints) -> None:
-        group = SubElement(mesh, "Surface", name=name)
-        for i, facet in enumerate((facets + 1).tolist(), start=1):
-            leaf(group, kind, ",".join(map(str, facet)), id=str(i))
+        rows(SubElement(mesh, "Surface", name=name), kind, (facets + 1).tolist())
 
     @staticmethod
     def _pair(mesh: Element, name: str, primary: str, secondary: str) -> None:
-        pair = SubElement(mesh, "SurfacePair", name=name)
-        leaf(pair, "primary", primary)
-        leaf(pair, "secondary", secondary)
+        leaves(SubElement(mesh, "SurfacePair", name=name), {"primary": primary, "secondary": secondary})

@@ -25,7 +25,7 @@ CONVENTIONS = {
 }
 
 
-def write(scene: MuscleCase, problem: Problem, folder: Path) -> None:
+def write(case: MuscleCase, problem: Problem, folder: Path) -> None:
     """Every file of the export of a ``problem`` but those that explain it, into ``folder``."""
     (folder / "bones").mkdir()
     files.write_surface(folder / "muscle.ply", problem.surface, problem.surface.points)
@@ -36,7 +36,7 @@ def write(scene: MuscleCase, problem: Problem, folder: Path) -> None:
         files.write_field(folder / name, problem.mesh.points, problem.mesh.tets, {}, along)
     write_lines(folder / "fibres.vtk", problem.fibres)
     _write_tables(problem, folder)
-    files.write_text(folder / "scene.json", json.dumps(facts(scene, problem), indent=1, allow_nan=False))
+    files.write_text(folder / "scene.json", json.dumps(facts(case, problem), indent=1, allow_nan=False))
 
 
 def bone_files(problem: Problem) -> list[str]:
@@ -72,16 +72,16 @@ def _write_csv(path: Path, columns: Sequence[str], entries: Iterable[Sequence[An
     files.write_text(path, text.getvalue())
 
 
-def facts(scene: MuscleCase, problem: Problem) -> dict[str, Any]:
+def facts(case: MuscleCase, problem: Problem) -> dict[str, Any]:
     """The facts that no mesh file has: units, conventions, frames, bones, attachments, effects with the unit of every parameter."""
     bones = [
         entry.model_dump(mode="json", exclude_none=True, exclude={"surface", "unit"})
         | {"file": name, "obstacle": obstacle}
-        for entry, name, obstacle in zip(scene.bone, bone_files(problem), _are_obstacles(problem), strict=True)
+        for entry, name, obstacle in zip(case.bone, bone_files(problem), _are_obstacles(problem), strict=True)
     ]
     return {
-        "case": scene.name,
-        "title": scene.title,
+        "case": case.name,
+        "title": case.title,
         "written_by": f"fem_reference {__version__}",
         "units": UNITS,
         "conventions": CONVENTIONS,

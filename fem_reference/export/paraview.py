@@ -40,7 +40,7 @@ _BARS = {"error_bar": "max", "error_bar_of_surface": "hausdorff"}
 
 def write(comparison: Comparison, folder: Path) -> list[str]:
     """Write the runs of a muscle into ``folder``, whole or not at all; the names of its files. InputError where it is not free."""
-    scene = casefile.muscle(comparison.scene)
+    case = casefile.muscle(comparison.scene)
     with new_folder(folder) as part:
         frames = _Frames(comparison)
         entries = []
@@ -48,11 +48,11 @@ def write(comparison: Comparison, folder: Path) -> list[str]:
             name = f"frames/frame_{number:04d}.vtm"
             (part / "frames").mkdir(exist_ok=True)
             files.write_blocks(part / name, frames.blocks(i))
-            entries.append((number if scene.frames.interval is None else number * scene.frames.interval, name))
-            log.info("%s: frame %d written", scene.name, number)
+            entries.append((number if case.frames.interval is None else number * case.frames.interval, name))
+            log.info("%s: frame %d written", case.name, number)
         files.write_pvd(part / INDEX, entries)
-        unit = "frame numbers" if scene.frames.interval is None else "seconds"
-        files.write_text(part / "README.md", texts.paraview_readme(scene, unit, states=frames.results is not None))
+        unit = "frame numbers" if case.frames.interval is None else "seconds"
+        files.write_text(part / "README.md", texts.paraview_readme(case, unit, states=frames.results is not None))
         return sorted(str(path.relative_to(part)) for path in part.rglob("*") if path.is_file())
 
 
@@ -62,7 +62,7 @@ class _Frames:
     def __init__(self, comparison: Comparison) -> None:
         assert isinstance(comparison.context, MeasurementContext)  # of a muscle
         self.comparison, self.setup, self.context = comparison, comparison.setup, comparison.context
-        self.scene, self.reference = casefile.muscle(comparison.scene), comparison.reference
+        self.case, self.reference = casefile.muscle(comparison.scene), comparison.reference
         self.results, self.within = _states(comparison), None
         if self.results is not None:
             found = embed(self.results.mesh, self.setup.surface.points)
@@ -79,7 +79,7 @@ class _Frames:
         if gaps is not None:
             yield "distance_to_bones", gaps
         if run is self.reference:
-            if gaps is not None and among(self.scene.effects) is not None:
+            if gaps is not None and among(self.case.effects) is not None:
                 yield "contact_pressure", self._contact_pressure()
             return
         yield "distance_to_reference", local_fields.to_same_vertex(run, self.reference)
@@ -92,7 +92,7 @@ class _Frames:
 
     def _contact_pressure(self) -> Floats:
         """The sum over the bones (f, n) [MPa] of the law of contact at the vertices; 0 where these are not free."""
-        effect = among(self.scene.effects)
+        effect = among(self.case.effects)
         assert effect is not None  # the caller asked
         law, run = Contact("free", effect.stiffness, effect.smoothing), self.reference
         bones = [bone for bone in self.setup.bones if effect.is_by(bone.name)]

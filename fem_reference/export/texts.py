@@ -16,25 +16,25 @@ The reference was solved without `reference.store_state = true`: the arrays that
 """
 
 
-def readme(scene: MuscleCase, *, febio: bool) -> str:
+def readme(case: MuscleCase, *, febio: bool) -> str:
     """Instructions for the files of an export; with FEBio's among them or without."""
     more = _FEBIO_FILES if febio else ""
-    return _filled("README.md", title=scene.title, name=scene.name, version=__version__, more=more)
+    return _filled("README.md", title=case.title, name=case.name, version=__version__, more=more)
 
 
-def febio_readme(scene: MuscleCase, notes: Sequence[str]) -> str:
-    """Text on what of a scene is the same in FEBio and what is not, with the ``notes`` on this one."""
+def febio_readme(case: MuscleCase, notes: Sequence[str]) -> str:
+    """Text on what of a case is the same in FEBio and what is not, with the ``notes`` on this one."""
     here = (
         "".join(f"- {note}\n" for note in notes)
         or "- no springs at points of the surface, no bone that overlaps the muscle at rest\n"
     )
-    return _filled("FEBIO.md", title=scene.title, first=str(scene.frames.first), here=here)
+    return _filled("FEBIO.md", title=case.title, first=str(case.frames.first), here=here)
 
 
-def paraview_readme(scene: MuscleCase, unit: str, *, states: bool) -> str:
+def paraview_readme(case: MuscleCase, unit: str, *, states: bool) -> str:
     """The content of a collection for ParaView, whose times are in ``unit``; with ``states`` of the reference or without."""
     lacking = "" if states else _NO_STATES
-    return _filled("PARAVIEW.md", title=scene.title, name=scene.name, version=__version__, unit=unit, lacking=lacking)
+    return _filled("PARAVIEW.md", title=case.title, name=case.name, version=__version__, unit=unit, lacking=lacking)
 
 
 def candidate() -> str:

@@ -199,7 +199,7 @@ def _twins(triangles: Ints) -> tuple[Ints, Ints]:
     return pairs[:, 0], pairs[:, 1]
 
 
-def _parts(first: Ints, second: Ints, count: int) -> Ints:
+def connected_parts(first: Ints, second: Ints, count: int) -> Ints:
     """The number (count,) of the connected part that each of ``count`` things is in, ``first`` (e,) linked to ``second``."""
     links = coo_array((np.ones(len(first), bool), (first, second)), shape=(count, count))
     return np.asarray(connected_components(links, directed=False)[1], np.int64)
@@ -212,14 +212,14 @@ def _check_parts(surface: Surface) -> None:
     one, other = _twins(surface.triangles)
     after_one, after_other = (side - side % 3 + (side + 1) % 3 for side in (one, other))
     corners = surface.triangles.ravel()
-    fan = _parts(np.concatenate([one, after_one]), np.concatenate([after_other, other]), len(corners))
+    fan = connected_parts(np.concatenate([one, after_one]), np.concatenate([after_other, other]), len(corners))
     _, corner = np.unique(fan, return_index=True)
     wrong = np.flatnonzero(np.bincount(corners[corner]) > 1)
     if len(wrong):
         first = f"vertex {wrong[0]} at {place_of(surface.points[wrong[0]])}"
         got = f"{len(wrong)} vertices where parts touch, the first {first}"
         raise InputError(surface.place, got, "a manifold surface")
-    part = _parts(one // 3, other // 3, len(surface.triangles))
+    part = connected_parts(one // 3, other // 3, len(surface.triangles))
     areas = np.bincount(part, weights=triangle_areas(surface.points, surface.triangles))
     if len(areas) > 1:
         middle = surface.points[surface.triangles[part == areas.argmin()]].mean(axis=(0, 1))

@@ -1,4 +1,4 @@
-"""One fixed linear extension of a surface's displacement to points inside it, the same for every run of a scene.
+"""One fixed linear extension of a surface's displacement to points inside it, the same for every run of a case.
 
 Mean value coordinates for closed triangle meshes: Ju, Schaefer, Warren 2005, doi 10.1145/1073204.1073229.
 """

@@ -3,12 +3,13 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-import igl
 import numpy as np
 from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Surface
+from fem_reference.geometry.distance import distances
 from fem_reference.geometry.pieces import edge_lengths, quartered
+from fem_reference.geometry.windings import inside
 
 # The first cubes are at most this long [mm], and one in so many of the longest extent of the surface.
 _FIRST_EDGE, _FIRST_CUBES = 10.0, 20
@@ -68,7 +69,7 @@ def _within(surface: Surface, body: Floats) -> NDArray[np.bool_]:
     """Mask of the points (k, 3) of a body that are inside; none where their middle is not in the surface's box."""
     middle, low, high = body.sum(axis=0) / max(1, len(body)), surface.points.min(axis=0), surface.points.max(axis=0)
     boxed = len(body) > 0 and bool(((middle > low) & (middle < high)).all())
-    return _inside(surface, body) if boxed else np.zeros(len(body), bool)
+    return inside(surface, body) if boxed else np.zeros(len(body), bool)
 
 
 def _touches(surface: Surface, counts: NDArray[np.bool_], distance: Distance) -> bool:
@@ -85,27 +86,23 @@ def _touches(surface: Surface, counts: NDArray[np.bool_], distance: Distance) ->
 
 
 class _Sides:
-    """The triangles of a surface that count and those that do not, ready to be asked for distances."""
+    """The triangles of a surface that count and those that do not, asked for distances."""
 
     def __init__(self, surface: Surface, counts: NDArray[np.bool_]) -> None:
-        self.surface, self.trees = surface, []
-        for triangles in (surface.triangles[counts], surface.triangles[~counts]):
-            tree = igl.AABB()
-            if len(triangles):
-                tree.init(surface.points, triangles)
-            self.trees.append((tree, triangles))
+        self.surface = surface
+        self.parts = [Surface(surface.points, surface.triangles[some]) for some in (counts, ~counts)]
 
     def may_count(self, centres: Floats, reach: float) -> NDArray[np.bool_]:
         """Mask (n,) of the balls of radius ``reach`` about ``centres`` (n, 3) that may contain something that counts."""
         counting, other = self._distances(centres)
         found = counting - other <= 2 * reach
         deep = found & (np.minimum(counting, other) > reach)
-        found[deep] = _inside(self.surface, centres[deep])
+        found[deep] = inside(self.surface, centres[deep])
         return np.asarray(found)
 
     def count(self, points: Floats) -> NDArray[np.bool_]:
         """Mask (n,) of the ``points`` (n, 3) that are inside and nearest to a triangle that counts."""
-        found = _inside(self.surface, points)
+        found = inside(self.surface, points)
         counting, other = self._distances(points[found])
         found[found] = counting <= other
         return found
@@ -113,17 +110,9 @@ class _Sides:
     def _distances(self, points: Floats) -> list[Floats]:
         """Distance (n,) [mm] of ``points`` (n, 3) to the triangles that count, and to the others; infinite where there are none."""
         return [
-            np.sqrt(tree.squared_distance(self.surface.points, triangles, points)[0])
-            if len(triangles) and len(points)
-            else np.full(len(points), np.inf)
-            for tree, triangles in self.trees
+            distances(points, part).distance if len(part.triangles) else np.full(len(points), np.inf)
+            for part in self.parts
         ]
-
-
-def _inside(surface: Surface, points: Floats) -> NDArray[np.bool_]:
-    if len(points) == 0:
-        return np.zeros(0, bool)
-    return np.asarray(igl.fast_winding_number(surface.points, surface.triangles, points) > 0.5)
 
 
 def _first_cubes(points: Floats) -> tuple[Floats, float]:

@@ -189,7 +189,7 @@ class Cylinder(Exact):
         return Sampled(distance, np.einsum("na,nai->ni", slope, frame), curvature)
 
 
-# By the names that scene files give them.
+# By the names that case files give them.
 CLOSED_FORMS: dict[str, type[HalfSpace | Box | Sphere | Capsule | Cylinder]] = {
     "half_space": HalfSpace,
     "box": Box,

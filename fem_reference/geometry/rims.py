@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, diags_array
-from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface, enclosed_volume, triangle_areas
+from fem_reference.foundations.mesh import Floats, Ints, Surface, connected_parts, enclosed_volume, triangle_areas
 from fem_reference.geometry.coarsening import flip_edges, free_part
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.parts import Parts, between, relaxed, widened
@@ -120,9 +119,8 @@ def _islands(fine: Surface, shares: Floats) -> Ints:
     attached[fine.triangles[shares > 1 / 2]] = True
     ends = fine.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     ends = ends[attached[ends].all(axis=1)]
-    links = coo_array((np.ones(len(ends), bool), tuple(ends.T)), shape=(len(attached), len(attached)))
-    part = connected_components(links, directed=False)[1][fine.triangles]
-    return np.where(shares > 1 / 2, part, -1)
+    part = connected_parts(ends[:, 0], ends[:, 1], len(attached))
+    return np.where(shares > 1 / 2, part[fine.triangles], -1)
 
 
 def _best(parts: Parts, fine: Surface, shares: Floats, label: int, area: float) -> Parts:
@@ -189,17 +187,16 @@ class _Edges:
             part = before / np.where(crossed, before - after, 1.0)
             fractions.append(np.where(crossed, (step + part) / (_SAMPLES - 1), np.nan))
         signs = np.where(self.at_points > level, 1, -1)
-        return _Crossings(self.ends, self.of_triangles, np.column_stack(fractions), signs, self.at_middles > level)
+        return _Crossings(self, np.column_stack(fractions), signs, self.at_middles > level)
 
 
 @dataclass(frozen=True, eq=False)
 class _Crossings:
-    """The places at which edges first and last cross a level: at ``fractions`` (e, 2) of their length, NaN where they do not;
+    """The places at which ``edges`` first and last cross a level: at ``fractions`` (e, 2) of their length, NaN where they do not;
     ``signs`` (n,) of the points, and whether the middles of triangles are ``within`` (m,).
     """
 
-    ends: Ints
-    of_triangles: Ints
+    edges: _Edges
     fractions: Floats
     signs: Ints
     within: Bools
@@ -208,12 +205,12 @@ class _Crossings:
 def _cut(parts: Parts, fine: Surface, crossings: _Crossings, label: int) -> Parts:
     """The parts with triangles cut along the crossings; those inside that were free get the ``label``."""
     points, signs = _snapped(parts, fine, crossings)
-    ends = crossings.ends
+    ends = crossings.edges.ends
     split = np.flatnonzero(signs[ends[:, 0]] * signs[ends[:, 1]] < 0)
     at = crossings.fractions[split, :1]
     a, b = (points[ends[split, i]] for i in (0, 1))
     parts = replace(parts, points=points)
-    points, triangles, parent = _split(parts, fine, crossings, split, a * (1 - at) + b * at)
+    points, triangles, parent = _split(parts, fine, crossings.edges, split, a * (1 - at) + b * at)
     signs = np.concatenate([signs, np.zeros(len(split), np.int64)])
     total = signs[triangles].sum(axis=1)
     within = np.where(total == 0, crossings.within[parent], total > 0)
@@ -226,7 +223,7 @@ def _snapped(parts: Parts, fine: Surface, crossings: _Crossings) -> tuple[Floats
     rim.
     """
     across = ~np.isnan(crossings.fractions[:, 0])
-    ends, fractions = crossings.ends[across], crossings.fractions[across]
+    ends, fractions = crossings.edges.ends[across], crossings.fractions[across]
     point = np.concatenate([ends[:, 0], ends[:, 1]])
     share = np.concatenate([fractions[:, 0], 1 - fractions[:, 1]])
     direction = parts.points[ends[:, 1]] - parts.points[ends[:, 0]]
@@ -245,9 +242,7 @@ def _snapped(parts: Parts, fine: Surface, crossings: _Crossings) -> tuple[Floats
     return points, signs
 
 
-def _split(
-    parts: Parts, fine: Surface, edges: "_Edges | _Crossings", chosen: Ints, middles: Floats
-) -> tuple[Floats, Ints, Ints]:
+def _split(parts: Parts, fine: Surface, edges: _Edges, chosen: Ints, middles: Floats) -> tuple[Floats, Ints, Ints]:
     """Points and triangles after the ``chosen`` edges (k,) are cut at points of ``fine`` nearest to ``middles`` (k, 3), and the
     triangle that each is part of.
     """

@@ -1,10 +1,8 @@
 """Smooth sectors around the vertices of a surface, and the shares to which triangles are attached."""
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface, triangle_areas, unit_normals
+from fem_reference.foundations.mesh import Floats, Ints, Surface, connected_parts, triangle_areas, unit_normals
 from fem_reference.geometry.distance import distances
 
 # Two triangles meet in a sharp edge where their normals are more than this apart.
@@ -23,9 +21,8 @@ def sectors(surface: Surface) -> Ints:
     smooth = np.einsum("ij,ij->i", normals[one // 3], normals[other // 3]) > _SHARP
     one, other = one[smooth], other[smooth]
     after_one, after_other = (side - side % 3 + (side + 1) % 3 for side in (one, other))
-    ends = np.concatenate([one, after_one]), np.concatenate([after_other, other])
-    links = coo_array((np.ones(len(ends[0]), bool), ends), shape=(triangles.size, triangles.size))
-    return np.asarray(connected_components(links, directed=False)[1], np.int64).reshape(-1, 3)
+    first, second = np.concatenate([one, after_one]), np.concatenate([after_other, other])
+    return connected_parts(first, second, triangles.size).reshape(-1, 3)
 
 
 def attached_shares(surface: Surface, vertices: Ints) -> Floats:

@@ -27,6 +27,7 @@ from fem_reference.geometry.clearance import Clearance, of_spline
 from fem_reference.geometry.distance import distances
 from fem_reference.geometry.kept_arrays import kept
 from fem_reference.geometry.rigid_bodies import Sampled, Vector
+from fem_reference.geometry.windings import inside
 
 # The distance [mm] to what lies outside a grid: far away from everything, and yet a number to calculate with.
 FAR = 1e6
@@ -197,8 +198,7 @@ def _extent(surface: Surface, spacing: float, margin: float) -> tuple[Floats, tu
 def signed_distances(points: Floats, surface: Surface) -> Floats:
     """Exact distance (n,) [mm] of ``points`` (n, 3) to a closed ``surface``, negative where it winds round them."""
     found = [
-        np.where(igl.fast_winding_number(surface.points, surface.triangles, chunk) > 0.5, -1.0, 1.0)
-        * distances(chunk, surface).distance
+        np.where(inside(surface, chunk), -1.0, 1.0) * distances(chunk, surface).distance
         for chunk in np.array_split(np.ascontiguousarray(points), 1 + len(points) // _CHUNK)
     ]
     return np.concatenate(found)

@@ -13,8 +13,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from fem_reference.foundations import scratch, subprocesses
 from fem_reference.foundations.errors import NO_ROOM, InputError
@@ -24,6 +22,7 @@ from fem_reference.foundations.mesh import (
     Ints,
     Surface,
     TetMesh,
+    connected_parts,
     enclosed_volume,
     tet_volumes,
     triangle_areas,
@@ -233,9 +232,8 @@ def _largest_part(tets: Ints, place: str) -> Ints:
     _, face, sides = np.unique(faces, axis=0, return_inverse=True, return_counts=True)
     if sides.max() > 2:
         raise InputError(place, f"a triangle between {sides.max()} tetrahedra from the mesher", "a cleaner surface")
-    tet, count = np.repeat(np.arange(len(tets)), 4), len(tets) + len(sides)
-    links = coo_array((np.ones(len(tet)), (tet, len(tets) + face.ravel())), shape=(count, count))
-    part = connected_components(links, directed=False)[1][: len(tets)]
+    tet = np.repeat(np.arange(len(tets)), 4)
+    part = connected_parts(tet, len(tets) + face.ravel(), len(tets) + len(sides))[: len(tets)]
     return np.asarray(tets[part == np.bincount(part).argmax()])
 
 

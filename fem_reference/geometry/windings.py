@@ -1,12 +1,20 @@
-"""Winding numbers just outside each triangle of a closed surface: outside the body, inside it again, or inside out."""
+"""Winding numbers of closed surfaces: of points, and just outside each triangle (sound, inside another part, or inside out)."""
 
 import igl
 import numpy as np
+from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Surface, diagonal, normals
 
 # How far outside a triangle is looked, as a share of the surface's diagonal.
 _STEP = 1e-5
+
+
+def inside(surface: Surface, points: Floats) -> NDArray[np.bool_]:
+    """Mask (n,) of the ``points`` (n, 3) that a closed ``surface`` winds round."""
+    if len(points) == 0:
+        return np.zeros(0, bool)
+    return np.asarray(igl.fast_winding_number(surface.points, surface.triangles, points) > 0.5)
 
 
 @np.errstate(over="ignore", invalid="ignore")

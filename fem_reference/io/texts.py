@@ -12,10 +12,10 @@ from xml.etree import ElementTree
 
 from fem_reference.foundations.errors import InputError
 
-# How large files may be [bytes]. A scene has some kB, a baseline 1.3 kB a frame; what is read takes up to thirty times as much.
+# How large files may be [bytes]. A case file has some kB, a baseline 1.3 kB a frame; what is read takes up to thirty times as much.
 MOST_TOML = 2**21
 MOST_JSON = 2**25
-# How deep tables and lists may be nested; scenes go to 6.
+# How deep tables and lists may be nested; case files go to 6.
 DEEPEST = 32
 # A mesh file defines no entities: they can multiply a text a billion times, or stand for other files.
 _FORBIDDEN = (b"<!DOCTYPE", b"<!ENTITY")

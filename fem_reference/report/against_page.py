@@ -17,7 +17,7 @@ from fem_reference.report.drawings import BAND, PALETTE, Drawing, over_frames
 from fem_reference.report.gallery import Figure, Shot, ramp, ticks
 from fem_reference.report.pages import Page
 from fem_reference.report.tables import finite
-from fem_reference.report.words import number, words
+from fem_reference.report.words import number, title_of
 from fem_reference.runs.cost import seconds_per_frame
 
 MOST_CURVES = 8
@@ -59,15 +59,6 @@ def headline(versions: Versions) -> str:
 def word(versions: Versions) -> str:
     """The verdict of the headline: worse where anything is, else mixed, else better."""
     return next((one for one in ORDER[:3] if versions.count(one)), "as it was")
-
-
-def title_of(name: str) -> str:
-    """A statistic in words.
-
-    >>> title_of("surface_deviation.rms")
-    'surface deviation, rms'
-    """
-    return ", ".join(map(words, name.split(".")))
 
 
 def sentence(one: Change) -> str:

@@ -21,7 +21,7 @@ from fem_reference.assessment.omissions import (
 from fem_reference.metrics import described
 from fem_reference.report.drawings import BAND, Drawing, colour_of, drawn, plain_numbers
 from fem_reference.report.pages import Page
-from fem_reference.report.words import duration, listed, number, words
+from fem_reference.report.words import duration, listed, number, title_of, words
 
 MAIN = "surface_deviation.rms"
 # By name the head of a column of the table.
@@ -49,15 +49,6 @@ def page(found: CaseOmissions) -> Page:
     }
     title, said = f"What each effect changes: {found.title}", sentences(found, found.ablations[0])[0]
     return Page("effects", title, (("", "", said),), "effects_page.html", contents, omissions.facts(found))
-
-
-def title_of(name: str) -> str:
-    """A change in words.
-
-    >>> title_of("fibre_length.rms_percent")
-    'fibre length, rms percent'
-    """
-    return ", ".join(map(words, name.split(".")))
 
 
 def count_title(name: str) -> str:

@@ -15,24 +15,6 @@ from fem_reference.report.tables import MEASURES, as_csv, summary
 from fem_reference.report.words import number
 from fem_reference.runs.store import Run
 
-# The report's figures by the name of a case, with their captions: its pictures are not distributed with it.
-FIGURES = {
-    "rod": (
-        (
-            "Figure 4.5",
-            (
-                "One-dimensional advection-diffusion problem with Dirichlet boundary condition ψ(0) = 0 and Neumann boundary "
-                "condition ψ'(1) = -1. The blue curve is calculated using FEM, the analytical function in red."
-            ),
-        ),
-    ),
-    "plate_square": (("Figure 4.6", "Tessellation of uniformly sampled 2D space with heat distribution."),),
-    "plate_spiral": (("Figure 4.7", "Tessellation of a spiral with heat distribution."),),
-    "surface_figure": (
-        ("Figure 4.8", "A heat distribution on a complex surface triangular mesh."),
-        ("Figure 4.9", "Diffusion phenomena in the belt area (detail of Fig. 4.8)."),
-    ),
-}
 AGREE = 1e-9  # of the greatest value: what only rounding differs by
 
 
@@ -43,6 +25,14 @@ class Difference(Record):
     text: str
     listing: str
     measured: str
+
+
+class Caption(Record):
+    """The ``caption`` of a ``figure`` of the report that shows a ``case``: its pictures are not distributed with it."""
+
+    case: str
+    figure: str
+    caption: str
 
 
 def page(title: str, examples: tuple[Comparison, ...]) -> Page:
@@ -65,7 +55,7 @@ def _contents(examples: tuple[Comparison, ...]) -> dict[str, Any]:
         "examples": examples,
         "word": overall(example.word for example in examples),
         "differences": (),
-        "figures_of_report": FIGURES,
+        "figures_of_report": _read("figure", Caption),
         "apart": apart,
         "bounds": bounds,
         "seconds": seconds,
@@ -79,9 +69,14 @@ def _contents(examples: tuple[Comparison, ...]) -> dict[str, Any]:
 
 def read_differences() -> tuple[Difference, ...]:
     """The differences between the report's text and its listings, in the order of section 4.6."""
-    path = Path(__file__).with_name("octave_differences.toml")
-    table = tomllib.loads(path.read_text(encoding="utf-8"))
-    return tuple(parse(Difference, row, f"{path}: difference[{i}]") for i, row in enumerate(table["difference"]))
+    return _read("difference", Difference)
+
+
+def _read[R: Record](table: str, record: type[R]) -> tuple[R, ...]:
+    """The rows of a ``table`` of the file about section 4.6."""
+    path = Path(__file__).with_name("octave_section.toml")
+    rows = tomllib.loads(path.read_text(encoding="utf-8"))[table]
+    return tuple(parse(record, row, f"{path}: {table}[{i}]") for i, row in enumerate(rows))
 
 
 def apart(example: Comparison) -> str:

@@ -29,7 +29,8 @@ from fem_reference.report.claims_page import UNITS as CLAIMED_UNITS
 from fem_reference.report.claims_page import drawing as claims_drawing
 from fem_reference.report.drawings import BAND, PALETTE, Drawing, drawn, logarithmic
 from fem_reference.report.pages import Page
-from fem_reference.report.words import duration, listed, number, words
+from fem_reference.report.words import duration, listed, number
+from fem_reference.report.words import title_of as in_words
 
 REFERENCE = "fenicsx"
 TIME = "seconds_per_frame"
@@ -74,7 +75,7 @@ def title_of(name: str) -> str:
     >>> title_of("surface_deviation.rms"), title_of("seconds_per_frame")
     ('surface deviation, rms', 'time of a frame')
     """
-    return COSTS[name][0] if name in COSTS else ", ".join(map(words, name.split(".")))
+    return COSTS[name][0] if name in COSTS else in_words(name)
 
 
 def sentences(case: CaseStudy, error: str = MAIN) -> list[str]:

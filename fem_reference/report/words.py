@@ -66,3 +66,12 @@ def listed(names: list[str]) -> str:
     ('pbd', 'pbd, arap and ours')
     """
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def title_of(name: str) -> str:
+    """A statistic of a metric, or anything else by its name, in words.
+
+    >>> title_of("surface_deviation.rms"), title_of("unknowns")
+    ('surface deviation, rms', 'unknowns')
+    """
+    return ", ".join(map(words, name.split(".")))

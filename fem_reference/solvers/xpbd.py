@@ -20,7 +20,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from fem_reference.foundations.mesh import Floats, Ints, Surface, enclosed_volume, triangle_areas
+from fem_reference.foundations.mesh import Floats, Ints, Surface, enclosed_volume, triangle_areas, vertex_areas
 from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import (
     AreaStiffness,
@@ -133,15 +133,9 @@ class XpbdStep:
     acceleration: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
-def vertex_areas(surface: Surface) -> Floats:
-    """A third (n,) [mm2] of the triangles at each vertex."""
-    areas = triangle_areas(surface.points, surface.triangles)
-    return np.bincount(surface.triangles.ravel(), weights=np.repeat(areas / 3, 3), minlength=len(surface.points))
-
-
 def inverse_masses(surface: Surface, attached: Ints, density: float) -> Floats:
     """Inverse masses (n,) [1/t] of vertices that share the mass of the body as they share its surface; 0 where attached."""
-    areas = vertex_areas(surface)
+    areas = vertex_areas(surface.points, surface.triangles)
     mass = density * enclosed_volume(surface.points, surface.triangles) * areas / areas.sum()
     found = 1 / mass
     found[attached] = 0
@@ -230,7 +224,7 @@ def _contacts(setup: Setup, settings: XpbdSettings) -> list[BoneContact]:
     """One of each bone, where there is contact."""
     if settings.collision is None:
         return []
-    softness = 1 / (settings.collision.stiffness * vertex_areas(setup.surface))
+    softness = 1 / (settings.collision.stiffness * vertex_areas(setup.surface.points, setup.surface.triangles))
     return [BoneContact(bone, softness) for bone in colliding_bones(setup, settings.collision.gap)]
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import shapes
 
 from fem_reference.foundations.mesh import Surface
-from fem_reference.geometry.windings import outer_windings
+from fem_reference.geometry.windings import inside, outer_windings
 
 BALL = shapes.sphere(2, 10.0)
 COUNT = len(BALL.triangles)
@@ -15,6 +15,12 @@ def together(*surfaces: Surface) -> Surface:
     before = np.cumsum([0, *(len(one.points) for one in surfaces)])
     triangles = [one.triangles + first for one, first in zip(surfaces, before, strict=False)]
     return Surface(np.concatenate([one.points for one in surfaces]), np.concatenate(triangles))
+
+
+def test_points_are_inside_where_the_surface_winds_round_them() -> None:
+    points = np.array([[0.0, 0, 0], [9, 0, 0], [11, 0, 0]])
+    assert inside(BALL, points).tolist() == [True, True, False]
+    assert inside(BALL, points[:0]).tolist() == []
 
 
 def test_nothing_winds_round_the_outside_of_a_sound_body() -> None:

@@ -4,13 +4,14 @@ import json
 
 import fields
 import numpy as np
+import octave_points
 import pytest
 
 from fem_reference import cli
 from fem_reference.foundations.errors import InputError
 from fem_reference.problems.scalar import build
 from fem_reference.scenes import casefile
-from fem_reference.solvers import listing, listing_kernels
+from fem_reference.solvers import listing
 
 DIFFUSION = {"name": "diffusion", "coefficient": 1.0}
 REACTION = {"name": "reaction", "rate": 1.0}
@@ -60,13 +61,13 @@ def test_nodes_at_random_are_those_of_the_seed(tmp_path) -> None:
 
 def test_the_shipped_plates_are_the_report_s() -> None:
     # Listing 4.3 on the square of listing 4.5, and eq. 4.11; Octave's linspace and cosine round otherwise in the last place.
-    square, bounds = listing_kernels.square()
+    square, bounds = octave_points.square()
     problem = build(casefile.read("plate_square"))
     assert problem.mesh.points == pytest.approx(square, abs=1e-15)
     assert np.flatnonzero(~np.isnan(problem.fixed)).tolist() == sorted(bounds[0].astype(int).tolist())
     problem = build(casefile.read("plate_spiral"))
-    assert problem.mesh.points == pytest.approx(listing_kernels.spiral(400), abs=1e-13)
-    assert np.flatnonzero(~np.isnan(problem.fixed)).tolist() == listing_kernels.rim(problem.mesh.cells).tolist()
+    assert problem.mesh.points == pytest.approx(octave_points.spiral(400), abs=1e-13)
+    assert np.flatnonzero(~np.isnan(problem.fixed)).tolist() == octave_points.rim(problem.mesh.cells).tolist()
 
 
 @pytest.mark.parametrize(

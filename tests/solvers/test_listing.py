@@ -1,31 +1,37 @@
-"""The listings as a solver: what they have no place for is refused, and the rest is theirs whatever the case says."""
+"""The listings as a solver: conditions that they have no place for are refused, and all else is theirs whatever the case says."""
 
-from types import SimpleNamespace
-
+import fields
 import numpy as np
 import pytest
 
 from fem_reference.foundations.errors import InputError
+from fem_reference.problems.scalar import FieldProblem, build
 from fem_reference.solvers import listing, listing_kernels
 
-NODES = np.array([0.0, 0.3, 0.4, 1.0])
+ENDS = ({"on": "left", "value": 0}, {"on": "right", "slope": "-1"})
 
 
-def rod(**changes) -> SimpleNamespace:
-    """The rod of listing 4.1, as far as the solver looks at a problem."""
-    cells = np.column_stack([np.arange(3), np.arange(1, 4)])
-    mesh = SimpleNamespace(points=NODES[:, None], cells=cells, edges=cells)
-    flux = SimpleNamespace(slope="-1", facets=np.array([[3]]))
-    given = {"mesh": mesh, "order": 1, "fixed": np.array([0.0, np.nan, np.nan, np.nan]), "fluxes": (flux,)}
-    return SimpleNamespace(**given | changes)
+def rod(folder, *boundary) -> FieldProblem:
+    """A rod with the conditions of listing 4.1, or with others."""
+    return build(
+        fields.scene(
+            folder,
+            domain={"interval": {"start": 0.0, "end": 1.0, "count": 7, "seed": 1}},
+            effect=[{"name": "diffusion", "coefficient": 0.7}],
+            boundary=list(boundary or ENDS),
+        )
+    )
 
 
 @pytest.mark.parametrize("peclet", [None, 2.0])
-def test_the_rod_is_that_of_the_listing(peclet) -> None:
-    found = listing.solve_field(rod(), listing.ListingSettings(peclet=peclet))
-    assert np.array_equal(found.values, listing_kernels.fem1d(NODES, peclet or 1.0))
+def test_the_rod_is_that_of_the_listing(tmp_path, peclet) -> None:
+    given, (offer,) = rod(tmp_path), listing.SOLVES
+    found = offer.run(given, listing.ListingSettings(peclet=peclet))
+    assert np.array_equal(found.values[0], listing_kernels.fem1d(given.mesh.points[:, 0], peclet or 1.0))
 
 
-def test_other_conditions_than_the_listing_has_are_refused() -> None:
+def test_other_conditions_than_the_listing_has_are_refused(tmp_path) -> None:
+    (offer,) = listing.SOLVES
+    other = rod(tmp_path, {"on": "left", "value": 0}, {"on": "right", "value": 1})
     with pytest.raises(InputError, match="boundary: got other conditions, want value 0 on the left and slope -1"):
-        listing.solve_field(rod(fluxes=()), listing.ListingSettings())
+        offer.run(other, listing.ListingSettings())

@@ -7,6 +7,7 @@ import subprocess
 from pathlib import Path
 
 import numpy as np
+import octave_points
 import pytest
 from scipy import sparse
 
@@ -47,7 +48,7 @@ def random_nodes(count, seed):
 
 def grid_triangles(other):
     """Triangles of the square plate; ``other`` (361,) says which squares have the diagonal that falls in y as x grows."""
-    corner = np.arange(kernels.SIDE**2).reshape(kernels.SIDE, kernels.SIDE)
+    corner = np.arange(octave_points.SIDE**2).reshape(octave_points.SIDE, octave_points.SIDE)
     a, b, c, d = (part.ravel() for part in (corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]))
     rising = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
     falling = np.concatenate([np.column_stack([a, b, d]), np.column_stack([b, c, d])])
@@ -101,18 +102,18 @@ def test_equal_to_what_octave_computes(tmp_path):
 
 
 def test_points_and_bounds_are_octaves():
-    points, bounds = kernels.square()
+    points, bounds = octave_points.square()
     _, there, fixed = mesh("plate_square")
     assert apart(points, there) <= 1e-15  # a difference of one in the last digit in linspace
     assert np.array_equal(bounds, fixed)
     triangles, there, fixed = mesh("plate_spiral")
-    assert apart(kernels.spiral(400), there) <= 1e-15
-    assert np.array_equal(kernels.rim(triangles), np.sort(fixed[0]))
+    assert apart(octave_points.spiral(400), there) <= 1e-15
+    assert np.array_equal(octave_points.rim(triangles), np.sort(fixed[0]))
 
 
 def test_triangulation_without_ties_is_octaves():
     triangles, points, _ = mesh("plate_spiral")
-    found = kernels.delaunay(points)
+    found = octave_points.delaunay(points)
     assert set(map(frozenset, found.tolist())) == set(map(frozenset, triangles.tolist()))
 
 
@@ -231,8 +232,8 @@ def test_the_number_of_points_is_felt():
     # A layer as wide as a few edges: the finer the grid, the nearer the plate comes to b / 0.05 = 20 in both components.
     highest = []
     for side in (10, 20, 40, 80):
-        points, bounds = kernels.uniform(side**2)
-        highest.append(kernels.fem2d(kernels.delaunay(points), points, bounds)[0].max())
+        points, bounds = octave_points.uniform(side**2)
+        highest.append(kernels.fem2d(octave_points.delaunay(points), points, bounds)[0].max())
     assert np.all(np.diff(highest) > 0.5)
     assert 10 < highest[-1] < 20 * math.sqrt(2)
 
@@ -243,7 +244,7 @@ def test_other_diagonals_change_the_square_plate():
     drawn = kernels.fem2d(triangles, points, bounds)[0]
     rng = np.random.default_rng(0)
     meshes = [grid_triangles(np.full(361, flip)) for flip in (False, True)]
-    meshes += [grid_triangles(rng.random(361) < 0.5) for _ in range(5)] + [kernels.delaunay(points)]
+    meshes += [grid_triangles(rng.random(361) < 0.5) for _ in range(5)] + [octave_points.delaunay(points)]
     changes = [apart(kernels.fem2d(triangles, points, bounds)[0], drawn) for triangles in meshes]
     assert min(changes) > 0.1
     assert max(changes) > 1.0
@@ -270,9 +271,9 @@ def test_heated_is_what_lies_above_the_average():
 
 
 def test_rim_of_a_grid_is_what_uniform_fixes():
-    points, bounds = kernels.uniform(49)
+    points, bounds = octave_points.uniform(49)
     assert len(bounds[0]) == 24
-    assert np.array_equal(np.sort(bounds[0]), kernels.rim(kernels.delaunay(points)))
+    assert np.array_equal(np.sort(bounds[0]), octave_points.rim(octave_points.delaunay(points)))
     on_rim = ((points == 0) | (points == 1)).any(axis=1)
     assert np.array_equal(np.sort(bounds[0]), np.flatnonzero(on_rim))
 
@@ -302,7 +303,7 @@ def test_edge_without_a_direction(place):
 @pytest.mark.parametrize("n", [1, 8, 401])
 def test_number_that_is_no_square(n):
     with pytest.raises(InputError, match=f"n: got {n}, want a square number"):
-        kernels.uniform(n)
+        octave_points.uniform(n)
 
 
 def test_vertex_fixed_twice():
