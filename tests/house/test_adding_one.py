@@ -88,6 +88,29 @@ def circle(radius: float) -> float:
     return 22 / 7 * radius**2
 '''.lstrip()
 
+VERB = '''
+"""The verb ``own_verb``: how many cases there are."""
+
+import argparse
+
+from fem_reference.cli._printing import DONE, write_output
+from fem_reference.scenes import casefile
+
+HELP = "how many cases there are"
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The option to name them."""
+    parser.add_argument("--names", action="store_true", help="name them too")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Count them."""
+    found = casefile.cases()
+    write_output({"cases": len(found)}, " ".join(found) if options.names else f"{len(found)} cases", options)
+    return DONE
+'''.lstrip()
+
 KINDS = {
     "verification entry": New(
         {"fem_reference/verification/own_entry.py": ENTRY},
@@ -112,6 +135,16 @@ KINDS = {
     "truth": New(
         {"validation/own_truth.py": TRUTH},
         {"pytest -q tests/verification/test_truths.py -k own_truth": "1 passed"},
+    ),
+    "verb": New(
+        {"fem_reference/cli/own_verb.py": VERB},
+        {
+            "fem_reference --help": "how many cases there are",
+            "fem_reference own_verb": " cases",
+            "fem_reference own_verb --names --quiet": "hip_flexion",
+            "!fem_reference own_verb --no-such-option": "--no-such-option",
+            "pytest -q tests/cli/test_verbs.py -k own_verb": "3 passed",
+        },
     ),
 }
 
