@@ -13,9 +13,9 @@ from fem_reference.geometry import tessellation
 from fem_reference.geometry.rigid_bodies import Sphere
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body, ByCell, Cells, Prescribed
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.paths import Rest, Turn
-from fem_reference.problems.setup import AttachedVertices, RigidBody, Setup
+from fem_reference.problems.setup import AttachedVertices, Bone, Setup
 
 # The fusiform body: its length and its radius in the middle [mm], and by what share it is thinner at its ends.
 LENGTH, RADIUS, THINNER = 60.0, 10.0, 0.6
@@ -70,7 +70,7 @@ def ellipsoid(subdivisions: int) -> Setup:
     return Setup(surface, bones, attached, (0, 1), None)
 
 
-def spindle(rings: int, slices: int) -> Problem:
+def spindle(rings: int, slices: int) -> MuscleProblem:
     """The fusiform body filled with tetrahedra, its ends attached to bones, of which the upper one turns."""
     cells = fusiform("P2/P1", rings, slices).mesh
     half = LENGTH / 2
@@ -84,12 +84,12 @@ def spindle(rings: int, slices: int) -> Problem:
     ends = (np.flatnonzero(np.isclose(surface.points[:, 2], end)) for end in (-half, half))
     attached = tuple(AttachedVertices(*each) for each in zip(facets, bones, ends, strict=True))
     axis = Polylines(np.array([[0.0, 0.0, -half], [0.0, 0.0, half]]), np.array([0, 2]))
-    return Problem(surface, bones, attached, (0, 1), None, mesh, (), axis, {}, 0.0)
+    return MuscleProblem(surface, bones, attached, (0, 1), None, mesh, (), axis, {}, 0.0)
 
 
-def _bones(half: float, beside: Floats) -> tuple[RigidBody, RigidBody]:
+def _bones(half: float, beside: Floats) -> tuple[Bone, Bone]:
     """Balls beyond the ends at -half and half [mm], the upper one turning about the middle."""
     turning: RigidMotion = Rotation((1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 100.0), (0.0, 100 * TURN))
     balls = (Sphere((0.0, 0.0, side * (half + BONE)), BONE) for side in (-1, 1))
     (lower, below), (upper, above) = [(ball, tessellation.tessellated(ball, beside, "bone")) for ball in balls]
-    return RigidBody("lower", below, None, solid=lower), RigidBody("upper", above, turning, solid=upper)
+    return Bone("lower", below, None, solid=lower), Bone("upper", above, turning, solid=upper)

@@ -19,3 +19,4 @@ for number, value, known in zip(reference.numbers, deviation.values, bar.values,
 worst = deviation.worst
 assert worst.error_bar is not None
 print("bar over deviation in the worst frame:", worst.error_bar / worst.value)
+# Ends in 0.11 within 0.055: an estimate from two meshes.

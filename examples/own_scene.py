@@ -56,3 +56,4 @@ if __name__ == "__main__":
     case = make()
     result = fr.compare(case, fr.solve(case, progress=print), [fr.solve(case, "pbd", **PBD)])
     print("greatest deviation of pbd [mm]:", result["pbd", "surface_deviation", "max"].values.max())
+# Ends in 1.75 within 0.0875: pinned: by a mesh that gmsh makes.

@@ -35,3 +35,4 @@ if __name__ == "__main__":
         print(metric, statistic, measure.values.round(3), measure.unit)
     print("page:", fr.write_report(result, "my_page"))
     print("worst deviation of my solver [mm]:", result[mine.name, "surface_deviation", "max"].values.max())
+# Ends in 4.24 within 0.0848: pinned.

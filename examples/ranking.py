@@ -25,3 +25,4 @@ for name in sorted(worst, key=worst.__getitem__):
     volume = abs(result[name, "volume", "deviation"].values).max()
     print(f"{name:9} {worst[name]:6.3f} mm rms, volume {volume:.3f} %")
 print("nearest is off by [mm]:", min(worst.values()))
+# Ends in 0.377 within 0.0377: pinned.

@@ -15,3 +15,4 @@ for count in (5, 9, 17):
     result = fr.compare(coarse, fr.solve(coarse))
     print(count, "nodes: L2 error", result["reference", "l2_error", "norm"].values[0])
 print("greatest difference at nodes:", np.abs(listing.vertex_values - reference.vertex_values).max())
+# Ends in 0 within 1e-10: both are exact at nodes.

@@ -11,8 +11,8 @@ import shapes
 from fem_reference.foundations.motion import Rotation, Translation
 from fem_reference.foundations.records import parse
 from fem_reference.problems.body import ByCell
-from fem_reference.problems.muscle import Problem
-from fem_reference.problems.setup import RigidBody
+from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.setup import Bone
 
 FRAMES = (10, 15, 20, 25)
 TURNS = Rotation((1, 2, 2), (3.0, -4.0, 5.0), (10.0, 18.0, 40.0), (0.0, -0.7, 0.4))
@@ -26,7 +26,7 @@ def effects(*names: str) -> tuple[Any, ...]:
     )
 
 
-def bar() -> Problem:
+def bar() -> MuscleProblem:
     """A bar attached to a bone that slides and to an obstacle that turns, beside one that rests; its fibres point anywhere."""
     acts = effects("neo_hooke", "incompressible", "fibre_passive_febio", "contact")
     plain = shapes.bar((2, 2, 3), (10, 10, 30), {"bottom": SLIDES, "top": TURNS}, acts, FRAMES)
@@ -35,7 +35,7 @@ def bar() -> Problem:
     attached = tuple(replace(attached, bone=bones[attached.bone.name]) for attached in plain.attached)
     along = np.random.default_rng(3).normal(size=(len(plain.mesh.tets), 3))
     directions = along / np.linalg.norm(along, axis=1)[:, None]
-    rests = RigidBody("rests & <waits>", ball.moved_to(ball.points + [50, 0, 0]), None)
+    rests = Bone("rests & <waits>", ball.moved_to(ball.points + [50, 0, 0]), None)
     return replace(plain, bones=(*bones.values(), rests), attached=attached, fibre=ByCell(directions))
 
 

@@ -369,7 +369,7 @@ def read_run(folder: Path) -> None:
     found._repr_html_()
     recorded.solve(SETUP, recorded.RecordedSettings(folder=str(folder / "run"), unit="mm"), lambda _frame: None)
     mesh, fibre = states.read_rest(folder / "run")
-    known = results.Results(mesh, (), states.Stored(folder / "run", found.numbers), fibre)
+    known = results.Results(mesh, (), states.StoredStates(folder / "run", found.numbers), fibre)
     for number in found.numbers:
         known.evaluate([[1.0, 1.0, 1.0]], number)
 

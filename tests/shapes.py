@@ -6,8 +6,8 @@ import numpy as np
 
 from fem_reference.foundations.mesh import Floats, Polylines, Surface, TetMesh, boundary
 from fem_reference.foundations.motion import Rotation
-from fem_reference.problems.muscle import Problem
-from fem_reference.problems.setup import AttachedVertices, RigidBody
+from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.setup import AttachedVertices, Bone
 
 
 def box(cells: tuple[int, int, int], size: tuple[float, float, float]) -> TetMesh:
@@ -76,7 +76,7 @@ def bar(
     motions: dict[str, Rotation | None],
     effects: tuple,
     frames: tuple[int, ...],
-) -> Problem:
+) -> MuscleProblem:
     """A bar whose ``bottom`` and ``top`` are each attached by a bone with its own motion, with one fibre along its middle."""
     mesh = box(cells, size)
     surface = skin(mesh)
@@ -84,9 +84,9 @@ def bar(
     attached = []
     for name, z in (("bottom", 0.0), ("top", size[2])):
         vertices = np.flatnonzero(np.isclose(surface.points[:, 2], z))
-        attached.append(AttachedVertices(name, RigidBody(name, bone, motions[name]), vertices))
+        attached.append(AttachedVertices(name, Bone(name, bone, motions[name]), vertices))
     middle = np.column_stack([np.full(5, size[0] / 2), np.full(5, size[1] / 2), np.linspace(0, size[2], 5)])
-    return Problem(
+    return MuscleProblem(
         surface,
         tuple(entry.bone for entry in attached),
         tuple(attached),

@@ -82,21 +82,21 @@ class Baseline(Record):
     scene: str
 
 
-def check(path: Path, scene: MuscleCase, candidate: str) -> None:
+def check(path: Path, case: MuscleCase, candidate: str) -> None:
     """InputError where an update of ``path`` would write over what is damaged, or of another case or candidate."""
     if path.exists():
-        _check_whose(path, _read(path), scene, candidate)
+        _check_whose(path, _read(path), case, candidate)
 
 
-def read(path: Path, scene: MuscleCase, candidate: str) -> Baseline:
+def read(path: Path, case: MuscleCase, candidate: str) -> Baseline:
     """The baseline in ``path``; InputError where there is none, or it is damaged, or of another case, scene or candidate."""
     baseline = _read(path)
-    _check_whose(path, baseline, scene, candidate)
-    if baseline.scene != scene.key:
-        got = f"{baseline.scene[:16]}..., while {scene.place} is {scene.key[:16]}..."
+    _check_whose(path, baseline, case, candidate)
+    if baseline.scene != case.key:
+        got = f"{baseline.scene[:16]}..., while {case.place} is {case.key[:16]}..."
         want = "the key of this scene (it was changed since; --update takes the current measures)"
         raise InputError(f"{path}: scene", got, want)
-    if baseline.frames != scene.numbers:
+    if baseline.frames != case.numbers:
         raise InputError(f"{path}: frames", f"{len(baseline.frames)} others", "the frame numbers of the scene")
     return baseline
 
@@ -142,9 +142,9 @@ def _check_shape(place: str, baseline: Baseline) -> None:
         raise InputError(f"{place}: positions.values", "another number of them", want)
 
 
-def _check_whose(path: Path, baseline: Baseline, scene: MuscleCase, candidate: str) -> None:
+def _check_whose(path: Path, baseline: Baseline, case: MuscleCase, candidate: str) -> None:
     """InputError where a baseline is of another case or candidate."""
-    for key, got, want in (("case", baseline.case, scene.name), ("candidate", baseline.candidate, candidate)):
+    for key, got, want in (("case", baseline.case, case.name), ("candidate", baseline.candidate, candidate)):
         if got != want:
             raise InputError(f"{path}: {key}", f'"{got}"', f'"{want}", which is what is checked')
 

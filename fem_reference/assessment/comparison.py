@@ -102,34 +102,34 @@ class Comparison:
 
 
 def compare(
-    scene: Case, setup: Any, reference: Run, candidates: tuple[Run, ...], error_bars: ErrorBars | None = None
+    case: Case, setup: Any, reference: Run, candidates: tuple[Run, ...], error_bars: ErrorBars | None = None
 ) -> Comparison:
-    """Measure and judge runs of a scene.
+    """Measure and judge runs of a case.
 
     Parameters
     ----------
-    scene, setup
-        The scene, and what its problem is made from.
+    case, setup
+        The case, and what its problem is made from.
     reference
         The run that counts as the truth.
     candidates
-        Runs with all frames of the scene, NaN where one did not reach a frame. Of a run only what it carries is judged.
+        Runs with all frames of the case, NaN where one did not reach a frame. Of a run only what it carries is judged.
     error_bars
         Those of the reference: nothing is judged that they are too wide for. None without any.
 
     """
     context, runs = context_of(setup, reference), (reference, *candidates)
-    candidate, alone = names(scene.standards("candidates")), names(scene.standards("reference"))
+    candidate, alone = names(case.standards("candidates")), names(case.standards("reference"))
     deviations = {
         run.name: _with_bars(measure(run, reference, context, candidate), "deviation", error_bars) for run in candidates
     }
     changes = {run.name: measure(run, at_rest(run), context, alone) for run in runs}
     changes["reference"] = _with_bars(changes["reference"], "change", error_bars)
     measured = {"reference": changes["reference"]} | deviations
-    _check_expected(scene, measured)
+    _check_expected(case, measured)
     verdicts = tuple(
         verdict(expectation.model_copy(update={"of": name}), measured[name], reference.numbers)
-        for expectation in map(resolved, scene.expect)
+        for expectation in map(resolved, case.expect)
         for name in (deviations if expectation.of == "candidates" else [expectation.of])
         if _is_measured(expectation, measured.get(name, ()))
     )
@@ -138,7 +138,7 @@ def compare(
             replace(one, word="fail" if one.expectation.of == "reference" else "inconclusive") for one in verdicts
         )
     error = extension_error(reference, context) if isinstance(context, MeasurementContext) else None
-    return Comparison(scene, setup, reference, candidates, context, deviations, changes, error, verdicts, error_bars)
+    return Comparison(case, setup, reference, candidates, context, deviations, changes, error, verdicts, error_bars)
 
 
 class Alone(NamedTuple):
@@ -149,24 +149,24 @@ class Alone(NamedTuple):
     word: Word
 
 
-def alone(scene: Case, setup: Any, run: Run) -> Alone:
+def alone(case: Case, setup: Any, run: Run) -> Alone:
     """The measures and verdicts of a ``run`` without a reference: of a muscle none, whose measures all take their context from
     one.
     """
-    if "reference" in scene.standards("reference"):
+    if "reference" in case.standards("reference"):
         return Alone((), (), "not judged")
-    measures = measure(run, run, context_of(setup, run), names(scene.standards("reference")))
-    expected = [one for one in map(resolved, scene.expect) if one.of == run.name and _is_measured(one, measures)]
+    measures = measure(run, run, context_of(setup, run), names(case.standards("reference")))
+    expected = [one for one in map(resolved, case.expect) if one.of == run.name and _is_measured(one, measures)]
     verdicts = tuple(verdict(one, measures, run.numbers) for one in expected)
     return Alone(measures, verdicts, doubted(overall(one.word for one in verdicts), doubts(run)))
 
 
-def _check_expected(scene: Case, measured: dict[str, tuple[Measure, ...]]) -> None:
-    """InputError where a scene expects of a run by its name what is not measured of it, as it has no surface."""
-    for i, one in enumerate(map(resolved, scene.expect)):
+def _check_expected(case: Case, measured: dict[str, tuple[Measure, ...]]) -> None:
+    """InputError where a case expects of a run by its name what is not measured of it, as it has no surface."""
+    for i, one in enumerate(map(resolved, case.expect)):
         if one.of in measured and not _is_measured(one, measured[one.of]):
             got = f"{one.metric}.{one.statistic} of {one.of}, which has no surface"
-            raise InputError(join(scene.place, f"expect[{i}]"), got, "a measure of lines")
+            raise InputError(join(case.place, f"expect[{i}]"), got, "a measure of lines")
 
 
 def _is_measured(expectation: Expectation, measures: tuple[Measure, ...]) -> bool:

@@ -12,7 +12,7 @@ from fem_reference.foundations.mesh import Floats, Surface, TetMesh, diagonal, e
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.signed_distance import signed_distances
 from fem_reference.geometry.windings import outer_windings
-from fem_reference.problems.setup import RigidBody
+from fem_reference.problems.setup import Bone
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +30,7 @@ class Followed:
     positions: Floats
     mesh: TetMesh | None = None
     nodes: Floats | None = None
-    bones: tuple[RigidBody, ...] = ()
+    bones: tuple[Bone, ...] = ()
     free: NDArray[np.bool_] | None = None
     truth: Floats | None = None
     integrated: Floats | None = None

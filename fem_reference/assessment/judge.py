@@ -73,13 +73,13 @@ def doubted(word: Word, doubts: Collection[str]) -> Word:
     return "doubtful pass" if word == "pass" and doubts else word
 
 
-def check(scene: Case) -> None:
-    """InputError unless every expectation of the scene is of a measure and a frame that there will be, in its unit."""
-    numbers = scene.numbers
-    for i, entry in enumerate(scene.expect):
-        place, expectation = join(scene.place, f"expect[{i}]"), resolved(entry)
+def check(case: Case) -> None:
+    """InputError unless every expectation of the case is of a measure and a frame that there will be, in its unit."""
+    numbers = case.numbers
+    for i, entry in enumerate(case.expect):
+        place, expectation = join(case.place, f"expect[{i}]"), resolved(entry)
         name = f"{expectation.metric}.{expectation.statistic}"
-        known = units(scene.carries, scene.standards(expectation.of))
+        known = units(case.carries, case.standards(expectation.of))
         if name not in known:
             got = f'"{expectation.metric}"' if entry.statistic is None else f'"{name}"'
             raise InputError(f"{place}: metric and statistic", got, f"one of {', '.join(sorted(known))}")

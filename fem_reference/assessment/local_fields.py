@@ -7,7 +7,7 @@ from fem_reference.foundations.mesh import Floats, Polylines, Surface
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.signed_distance import signed_distances
 from fem_reference.metrics import MeasurementContext
-from fem_reference.problems.setup import DISTANCE_MARGIN, RigidBody
+from fem_reference.problems.setup import DISTANCE_MARGIN, Bone
 from fem_reference.runs.store import Run
 
 
@@ -49,7 +49,7 @@ def _gaps(points: Floats, number: int, context: MeasurementContext) -> Floats:
     return np.where(context.exempt.vertices, np.nan, gaps)
 
 
-def to_bone(bone: RigidBody, number: int, points: Floats) -> Floats:
+def to_bone(bone: Bone, number: int, points: Floats) -> Floats:
     """Distance (n,) [mm] of ``points`` (n, 3) to a ``bone`` where it is at a frame ``number``, negative inside; InputError where
     the bone is not closed.
     """

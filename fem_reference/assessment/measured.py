@@ -26,14 +26,14 @@ class CurrentMeasures:
 
     @classmethod
     def of(
-        cls, scene: MuscleCase, setup: Setup, candidate: Run, reference: Run, error_bars: ErrorBars | None = None
+        cls, case: MuscleCase, setup: Setup, candidate: Run, reference: Run, error_bars: ErrorBars | None = None
     ) -> "CurrentMeasures":
-        """Measure a candidate and its reference, which both have the frames of the scene."""
+        """Measure a candidate and its reference, which both have the frames of the case."""
         if reference.fibres is None:
             got, want = "a run without an interior", "a reference that carries the fibres"
             raise InputError(f"{reference.name}: fibres", got, want)
         context = MeasurementContext.of(reference, reference.fibres, setup.bones, setup.exempt)
-        return cls(scene, candidate, reference, metrics.measure(candidate, reference, context), error_bars)
+        return cls(case, candidate, reference, metrics.measure(candidate, reference, context), error_bars)
 
     @property
     def points(self) -> Floats:

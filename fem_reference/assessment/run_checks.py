@@ -22,8 +22,8 @@ from fem_reference.geometry.signed_distance import Grid
 from fem_reference.geometry.skins import spacing
 from fem_reference.problems.body import Body
 from fem_reference.problems.checks import SAME
-from fem_reference.problems.muscle import Problem
-from fem_reference.problems.setup import AttachedVertices, RigidBody
+from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.setup import AttachedVertices, Bone
 from fem_reference.runs.store import Run
 
 # What is in place to this share of the size of a body is in place: rounding of what is stored is a thousandth of it.
@@ -102,7 +102,7 @@ def _prescribed(body: Body, solved: Run) -> Iterator[RunCheck]:
                 yield _at(f"prescribed at {entry.name}", off, np.full(len(off), allowed), state.number, rest)
 
 
-def of_muscle(problem: Problem, run: Run, nodes: Nodes = lambda _: None) -> RunChecks:
+def of_muscle(problem: MuscleProblem, run: Run, nodes: Nodes = lambda _: None) -> RunChecks:
     """All frames there, in order and finite; attachments where their bones are; load steps small enough; forces in balance; and no
     bone and no surface crossed. ``nodes``: where the points of the tetrahedra are, where that is known.
     """
@@ -148,7 +148,7 @@ def _finite(numbers: tuple[float, ...], arrays: list[Floats]) -> RunCheck:
     return RunCheck("positions that are not finite", float(sum(lost)), 0.0, "", frame)
 
 
-def _attached(problem: Problem, run: Run, entry: AttachedVertices) -> Iterator[RunCheck]:
+def _attached(problem: MuscleProblem, run: Run, entry: AttachedVertices) -> Iterator[RunCheck]:
     """Exact: vertices at the pose of their bone, but for strain over how far they are from the facets that are attached. Springs:
     by their mean extension, which is the force over stiffness and area.
     """
@@ -169,7 +169,7 @@ def _attached(problem: Problem, run: Run, entry: AttachedVertices) -> Iterator[R
             yield RunCheck(f"springs of {entry.attachment}, mean", mean, _SPRINGS * yielded + 1e-4 * size, "mm", number)
 
 
-def _steps(problem: Problem, run: Run) -> Iterator[RunCheck]:
+def _steps(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
     """Rotation and travel of a bone in a load step, on average from a frame to the next; not of a frame that needed none."""
     counts = run.scalars.get("load_steps", np.full(len(run.numbers), np.nan))
     contact, attached = problem.contact, {entry.bone.name for entry in problem.attached}
@@ -187,7 +187,7 @@ def _steps(problem: Problem, run: Run) -> Iterator[RunCheck]:
             yield RunCheck(f"{bone.name} {words} by load step", travelled, allowed, unit, number)
 
 
-def _travel(bone: RigidBody, before: float, after: float) -> float:
+def _travel(bone: Bone, before: float, after: float) -> float:
     """Travel of a bone between two frames, there and back counted twice: [rad], or of one that slides [mm]."""
     motion = bone.motion
     assert motion is not None  # of those that move
@@ -196,7 +196,7 @@ def _travel(bone: RigidBody, before: float, after: float) -> float:
     return float(np.abs(np.diff(np.interp(stops, motion.frames, amounts))).sum())
 
 
-def _balance(problem: Problem, run: Run) -> Iterator[RunCheck]:
+def _balance(problem: MuscleProblem, run: Run) -> Iterator[RunCheck]:
     """The sums of forces and of moments of bones on the muscle, by attachments and contact: 0 where nothing acts from outside."""
     outer = any(one.outer or _is_foreign(one) for one in problem.effects)
     residual = _BALANCE * run.origin.get("settings", {}).get("residual", math.nan)
@@ -212,7 +212,7 @@ def _is_foreign(effect: Effect) -> bool:
     return not type(effect).__module__.startswith("fem_reference.effects.")
 
 
-def _states(run: Run, bones: Sequence[RigidBody]) -> Iterator[tuple[int, int]]:
+def _states(run: Run, bones: Sequence[Bone]) -> Iterator[tuple[int, int]]:
     """Index and number of the frames at which muscle or ``bones`` are elsewhere than at rest, and at all frames before."""
     seen, near = [(run.surface.points, *(np.eye(4) for _ in bones))], _ROUNDING * diagonal(run.surface.points)
     for i, number in enumerate(run.numbers):
@@ -222,7 +222,7 @@ def _states(run: Run, bones: Sequence[RigidBody]) -> Iterator[tuple[int, int]]:
             yield i, number
 
 
-def _depths(problem: Problem, run: Run, nodes: Nodes) -> Iterator[RunCheck]:
+def _depths(problem: MuscleProblem, run: Run, nodes: Nodes) -> Iterator[RunCheck]:
     """Depths of each bone in contact and the muscle in each other. Where its surface, whose triangles may be large, is deeper
     than is allowed, that of its tetrahedra is checked too: the muscle is crossed where both are.
     """
@@ -243,7 +243,7 @@ def _depths(problem: Problem, run: Run, nodes: Nodes) -> Iterator[RunCheck]:
 
 
 def _deep(
-    bone: RigidBody, number: int, give: float, muscle: ClosedSurface, rest: ClosedSurface, *, pressed: bool
+    bone: Bone, number: int, give: float, muscle: ClosedSurface, rest: ClosedSurface, *, pressed: bool
 ) -> RunCheck:
     """Depth of a bone and the muscle in each other; beyond rest, where that is more than contact gives way. Never to the middle
     of a bone.
@@ -258,11 +258,11 @@ def _deep(
 
 
 @lru_cache(maxsize=8)
-def _at_rest(muscle: ClosedSurface, bone: RigidBody) -> Depths:
+def _at_rest(muscle: ClosedSurface, bone: Bone) -> Depths:
     return depths(muscle, bone.surface, bone.shape, np.eye(4))
 
 
-def _give(problem: Problem, bone: RigidBody, pressure: float) -> float:
+def _give(problem: MuscleProblem, bone: Bone, pressure: float) -> float:
     """The depth [mm] allowed to a bone: the give of contact under the ``pressure`` [MPa] that was recorded, the error of the bone's
     distance, and what is between points of contact.
     """

@@ -13,7 +13,7 @@ from fem_reference.assessment import run_checks
 from fem_reference.assessment.run_checks import RunCheck, RunChecks, of_body, of_muscle
 from fem_reference.foundations.records import Record
 from fem_reference.problems.body import Body
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.runs.contents import amend
 from fem_reference.runs.cut_off import places
 from fem_reference.runs.store import Frame, Outcome, Run, collected
@@ -32,7 +32,7 @@ def confirmed(outcome: Outcome, checks: RunChecks) -> Outcome:
     return replace(outcome, status="denied", message=f"denied by the second check: {lost[0]}; {outcome.message}")
 
 
-def confirmed_run(problem: Callable[[], Problem], run: Run) -> Run:
+def confirmed_run(problem: Callable[[], MuscleProblem], run: Run) -> Run:
     """A ``run`` that ended as converged with the second check of it in its origin, stored with it; as it is where it has that of
     this code.
     """
@@ -51,7 +51,7 @@ def confirmed_run(problem: Callable[[], Problem], run: Run) -> Run:
     return replace(run, outcome=outcome, origin=origin)
 
 
-def confirmed_frames(problem: Problem, frames: Sequence[Frame], outcome: Outcome, settings: Record) -> Outcome:
+def confirmed_frames(problem: MuscleProblem, frames: Sequence[Frame], outcome: Outcome, settings: Record) -> Outcome:
     """The ``outcome`` of ``frames`` of a muscle that are not stored, denied where the check denies that they converged."""
     if outcome.status != "converged":
         return outcome

@@ -52,23 +52,23 @@ def _expectation(text: str, units: Mapping[str, str]) -> Expectation:
     return parse(Expectation, table, "--limit")
 
 
-def own_candidates(scene: Case) -> list[tuple[Candidate, str]]:
-    """The candidates of the scene, each with its place."""
-    return [(candidate, f"candidate[{i}]") for i, candidate in enumerate(scene.candidate)]
+def own_candidates(case: Case) -> list[tuple[Candidate, str]]:
+    """The candidates of the case, each with its place."""
+    return [(candidate, f"candidate[{i}]") for i, candidate in enumerate(case.candidate)]
 
 
-def choose(scene: Case, text: str, unit: str | None) -> tuple[Candidate, str]:
-    """The candidate of the scene with this name, else the recorded frames in this folder, else the solver of this name with the
+def choose(case: Case, text: str, unit: str | None) -> tuple[Candidate, str]:
+    """The candidate of the case with this name, else the recorded frames in this folder, else the solver of this name with the
     settings of the page table-5-1; and the place that chooses it.
     """
-    names = [candidate.name for candidate in scene.candidate]
+    names = [candidate.name for candidate in case.candidate]
     if text in names:
         if Path(text).is_dir():
             got = f'"{text}", a candidate of the case and a folder'
             raise InputError("--candidate", got, f"another name, or ./{text}")
-        return scene.candidate[names.index(text)], f"candidate[{names.index(text)}]"
-    if text in solvers.names(scene.task) and not Path(text).exists():
-        found = solver_table.choice(scene, text)[1]
+        return case.candidate[names.index(text)], f"candidate[{names.index(text)}]"
+    if text in solvers.names(case.task) and not Path(text).exists():
+        found = solver_table.choice(case, text)[1]
         return Candidate(name=text, solver=text, **found.settings), "--candidate"
     if not text or not Path(text).exists():
         raise InputError("--candidate", f'"{text}"', f"a folder of frames, a solver, or one of {', '.join(names)}")
@@ -84,10 +84,10 @@ def check_names(names: list[str]) -> None:
             raise InputError("--candidate", f'"{name}" twice', "folders and candidates of different names")
 
 
-def refuse_error_bar(scene: Case, options: argparse.Namespace) -> None:
+def refuse_error_bar(case: Case, options: argparse.Namespace) -> None:
     """InputError where error bars are wanted of what has none."""
     if options.error_bar:
-        casefile.muscle(scene, "--error-bar")
+        casefile.muscle(case, "--error-bar")
 
 
 def checked_bench[C: Case](scene: C, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> Bench[C]:

@@ -13,24 +13,24 @@ from fem_reference.solvers import fenicsx
 from fem_reference.studies import judging, refinement
 
 
-def judge(scene: Case, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
+def judge(case: Case, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
     """Measure and judge the ``chosen`` candidates. What is bad in the input shows before anything is solved."""
     with fenicsx.shared():
-        return _judge(scene, options, chosen)
+        return _judge(case, options, chosen)
 
 
-def _judge(scene: Case, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
-    refuse_error_bar(scene, options)
+def _judge(case: Case, options: argparse.Namespace, chosen: list[tuple[Candidate, str]]) -> int:
+    refuse_error_bar(case, options)
     check_names([entry.name for entry, _ in chosen])
-    bench = checked_bench(scene, options, chosen)
+    bench = checked_bench(case, options, chosen)
     read = {entry.name: bench.read(entry.name, entry, place) for entry, place in chosen if entry.solver == "recorded"}
-    reference = bench.obtain("reference", scene.reference, "reference")
+    reference = bench.obtain("reference", case.reference, "reference")
     solved = {
         entry.name: bench.obtain(entry.name, entry, place) for entry, place in chosen if entry.solver != "recorded"
     }
     bars = refinement.obtain(bench, reference) if options.error_bar else refinement.offered(bench, reference)
     result = judging.compare(bench, reference, [(read | solved)[entry.name] for entry, _ in chosen], bars)
-    asked = _asked(scene, options, [entry for entry, _ in chosen])
+    asked = _asked(case, options, [entry for entry, _ in chosen])
     _, lines = written(options, asked, report.of_comparison(result))
     write_output(
         report.summary(result), "\n".join([comparison_text(result), *unturned(options, result.word), *lines]), options
@@ -48,8 +48,8 @@ def unturned(options: argparse.Namespace, word: str) -> list[str]:
     return [f"negative control: the verdict is {word} and was to be fail: {why}"]
 
 
-def _asked(scene: Case, options: argparse.Namespace, chosen: list[Candidate]) -> Asked:
+def _asked(case: Case, options: argparse.Namespace, chosen: list[Candidate]) -> Asked:
     """The page of the case; where it has candidates and none is wanted, that of the reference alone."""
-    alone = bool(scene.candidate) and not chosen
-    who = (Part((), "reference"),) if alone else candidates(scene, chosen)
-    return Asked("run" if alone else "compare", scene.name, (case_part(scene), *changes(options), *who), "report")
+    alone = bool(case.candidate) and not chosen
+    who = (Part((), "reference"),) if alone else candidates(case, chosen)
+    return Asked("run" if alone else "compare", case.name, (case_part(case), *changes(options), *who), "report")

@@ -11,9 +11,9 @@ from fem_reference.report.pages import Page
 from fem_reference.scenes.case import HOME, Candidate, Case
 
 
-def case_part(scene: Case) -> Part:
+def case_part(case: Case) -> Part:
     """The case of a page: by its name where it is a shipped one, else by its folder."""
-    return Part((scene.name if scene.folder.parent == HOME / "cases" else str(scene.folder),))
+    return Part((case.name if case.folder.parent == HOME / "cases" else str(case.folder),))
 
 
 def changes(options: argparse.Namespace) -> tuple[Part, ...]:
@@ -22,13 +22,13 @@ def changes(options: argparse.Namespace) -> tuple[Part, ...]:
     return (*(Part(("--set", text), text) for text in getattr(options, "set", ())), *control)
 
 
-def candidates(scene: Case, chosen: Iterable[Candidate]) -> tuple[Part, ...]:
-    """The candidates of a page; nothing where they are the scene's own."""
+def candidates(case: Case, chosen: Iterable[Candidate]) -> tuple[Part, ...]:
+    """The candidates of a page; nothing where they are the case's own."""
     found = tuple(chosen)
-    if found == scene.candidate:
+    if found == case.candidate:
         return ()
     folders = [
-        one.settings["folder"] if one.solver == "recorded" and one not in scene.candidate else "" for one in found
+        one.settings["folder"] if one.solver == "recorded" and one not in case.candidate else "" for one in found
     ]
     return tuple(
         Part(("--candidate", folder or one.name), one.name) for one, folder in zip(found, folders, strict=True)

@@ -49,16 +49,16 @@ def run(options: argparse.Namespace) -> int:
     return DONE
 
 
-def _runs(scene: MuscleCase, options: argparse.Namespace) -> int:
+def _runs(case: MuscleCase, options: argparse.Namespace) -> int:
     """Write the reference, with its states, and candidates for ParaView."""
     check(options.to)
-    chosen = [choose(scene, text, options.unit) for text in options.candidate]
+    chosen = [choose(case, text, options.unit) for text in options.candidate]
     check_names([entry.name for entry, _ in chosen])
-    bench = checked_bench(scene, options, chosen)
+    bench = checked_bench(case, options, chosen)
     reference = kept_states.reference(bench, again=options.solve)
     runs = [bench.obtain(entry.name, entry, place) for entry, place in chosen]
     result = judging.compare(bench, reference, runs, refinement.stored(reference))
     written = paraview.write(result, options.to)
-    facts = {"case": scene.name, "index": str(options.to / paraview.INDEX), "files": len(written)}
+    facts = {"case": case.name, "index": str(options.to / paraview.INDEX), "files": len(written)}
     write_output(facts, "\n".join(lines(facts)), options)
     return DONE if all(one.outcome.status == "converged" for one in result.runs) else SOLVER_FAILED

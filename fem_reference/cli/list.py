@@ -39,14 +39,14 @@ def run(options: argparse.Namespace) -> int:
     return DONE
 
 
-def _data(scene: Case) -> str | None:
+def _data(case: Case) -> str | None:
     """The reason why the data of a case is not here, "" where it is; None of a case that needs none."""
     root = os.environ.get(DATA_SETTING)
-    if not scene.needed_data:
+    if not case.needed_data:
         return None
     if not root:
         return f"{DATA_SETTING} is not set"
-    lacking = [name for name in scene.needed_data if not (Path(root) / name).exists()]
+    lacking = [name for name in case.needed_data if not (Path(root) / name).exists()]
     return f"{DATA_SETTING} has no {lacking[0]}" if lacking else ""
 
 

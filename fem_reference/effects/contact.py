@@ -12,7 +12,7 @@ from fem_reference.foundations.units import AreaStiffness, PositiveLength
 
 
 class Contact(Interaction):
-    """A pressure of the gap to each bone; see ``fem_reference.problems.contact.Contact`` for the law.
+    """A pressure of the gap to each bone; see ``fem_reference.problems.contact.ContactLaw`` for the law.
 
     ``stiffness`` [MPa/mm]: where the bone presses with p, the surface gets at most p / stiffness deep. ``smoothing`` [mm]: from
     this distance on a bone is felt. ``bones``: their names, by default all.

@@ -9,7 +9,7 @@ from fem_reference.export import febio, febio_differences, open_formats, texts
 from fem_reference.export.folders import check, new_folder
 from fem_reference.foundations.errors import InputError
 from fem_reference.io import files
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.scenes.muscle import MuscleCase
 
 log = logging.getLogger(__name__)
@@ -18,8 +18,8 @@ Format = Literal["open", "febio"]
 FORMATS: tuple[Format, ...] = get_args(Format)
 
 
-def export(case: MuscleCase, build: Callable[[], Problem], folder: Path, form: Format) -> list[str]:
-    """Write the problem that ``build`` makes of a ``scene`` into ``folder``, whole or not at all; the names of its files.
+def export(case: MuscleCase, build: Callable[[], MuscleProblem], folder: Path, form: Format) -> list[str]:
+    """Write the problem that ``build`` makes of a ``case`` into ``folder``, whole or not at all; the names of its files.
 
     ``"febio"`` adds FEBio's own file to the open ones, and warns of what is another model there. InputError where the folder is
     not free, or FEBio has not the same.
@@ -36,7 +36,7 @@ def export(case: MuscleCase, build: Callable[[], Problem], folder: Path, form: F
     return written
 
 
-def _write(case: MuscleCase, problem: Problem, folder: Path, form: Format) -> None:
+def _write(case: MuscleCase, problem: MuscleProblem, folder: Path, form: Format) -> None:
     open_formats.write(case, problem, folder)
     files.write_text(folder / "candidate.toml", texts.candidate())
     if form == "febio":

@@ -38,8 +38,8 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.motion import Rotation
 from fem_reference.foundations.records import join
 from fem_reference.io import files
-from fem_reference.problems.muscle import Problem
-from fem_reference.problems.setup import RigidBody
+from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.setup import Bone
 from fem_reference.scenes.muscle import MuscleCase
 
 # What FEBio has in the same form.
@@ -68,7 +68,7 @@ def check(case: MuscleCase) -> None:
             raise InputError(join(case.place, "effect"), got, "one of them, which FEBio's uncoupled materials need")
 
 
-def write(problem: Problem, folder: Path) -> None:
+def write(problem: MuscleProblem, folder: Path) -> None:
     """``scene.feb`` and, for whoever reads FEBio's nodes, ``tet10.csv`` into ``folder``."""
     _, tets = quadratic(problem.mesh)
     rows = "".join(",".join(map(str, row)) + "\n" for row in tets.tolist())
@@ -79,7 +79,7 @@ def write(problem: Problem, folder: Path) -> None:
     files.write_text(folder / "scene.feb", f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n')
 
 
-def model(problem: Problem) -> Element:
+def model(problem: MuscleProblem) -> Element:
     """The whole input file."""
     root = Element("febio_spec", version="4.0")
     for text in (f"mm, N, MPa; time is the frame number minus {problem.frames[0]}", *notes(problem)):
@@ -97,7 +97,7 @@ def model(problem: Problem) -> Element:
     return root
 
 
-def _control(root: Element, problem: Problem) -> None:
+def _control(root: Element, problem: MuscleProblem) -> None:
     """Steps from frame to frame, at most ``LONGEST_STEP`` long, shorter where FEBio needs it."""
     control, step = SubElement(root, "Control"), _step(problem)
     steps = round((problem.frames[-1] - problem.frames[0]) / step)
@@ -115,13 +115,13 @@ def _control(root: Element, problem: Problem) -> None:
     leaf(SubElement(solver, "qn_method", type="BFGS"), "max_ups", 0)
 
 
-def _step(problem: Problem) -> float:
+def _step(problem: MuscleProblem) -> float:
     """The initial and longest step [frame numbers]: as many of one length as reach from a frame wanted to the next."""
     apart = problem.frames[1] - problem.frames[0]
     return apart / ceil(apart / LONGEST_STEP)
 
 
-def _domains(root: Element, problem: Problem) -> None:
+def _domains(root: Element, problem: MuscleProblem) -> None:
     """The formulation of the muscle's elements; bones, and the areas that springs hang from, are rigid."""
     domains = SubElement(root, "MeshDomains")
     mixed = any(isinstance(effect, Incompressible) for effect in problem.effects)
@@ -134,7 +134,7 @@ def _domains(root: Element, problem: Problem) -> None:
         leaf(shell, "shell_thickness", "0.01")
 
 
-def _motions(root: Element, problem: Problem) -> None:
+def _motions(root: Element, problem: MuscleProblem) -> None:
     if exactly(problem):
         boundaries = SubElement(root, "Boundary")
         for attached in exactly(problem):
@@ -156,7 +156,7 @@ def _motions(root: Element, problem: Problem) -> None:
             leaf(entry, "value", repr(share), lc=str(curves[bone.name]))
 
 
-def axis(bone: RigidBody) -> list[float]:
+def axis(bone: Bone) -> list[float]:
     """The unit vector that a bone turns about or slides along; none where it rests."""
     if bone.motion is None:
         return []
@@ -164,13 +164,13 @@ def axis(bone: RigidBody) -> list[float]:
     return [float(share) for share in along / np.linalg.norm(along)]
 
 
-def _curve_numbers(problem: Problem) -> dict[str, int]:
+def _curve_numbers(problem: MuscleProblem) -> dict[str, int]:
     """The load curve of each bone that moves: from 2, without gaps, for FEBio takes an id for a place in their list."""
     moving = [bone.name for bone in problem.bones if bone.motion is not None]
     return {name: number for number, name in enumerate(moving, start=2)}
 
 
-def _curves(root: Element, problem: Problem) -> None:
+def _curves(root: Element, problem: MuscleProblem) -> None:
     """The times that FEBio must pass, curve 1; then for each bone that moves, how far [rad, mm]."""
     data, (first, *_, last) = SubElement(root, "LoadData"), problem.frames
     _curve(data, 1, "STEP", [(frame - first, _step(problem)) for frame in problem.frames])

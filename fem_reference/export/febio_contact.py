@@ -21,7 +21,7 @@ from fem_reference.export.febio_mesh import (
     springs_id,
 )
 from fem_reference.geometry.signed_distance import signed_distances
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 
 SEARCH_RADIUS = 5.0  # [mm]: contact is not looked for deeper than this inside a bone
 # Shear moduli of the matrix with which an overlap at rest may press at once: in gluteus_maximus_anatomical, where it is up to 34 of
@@ -32,12 +32,12 @@ SPRING_SEARCH_RADIUS = 1.0  # [mm]: at rest the two surfaces of springs coincide
 PENALTY = {"laugon": 0, "two_pass": 0, "auto_penalty": 0, "symmetric_stiffness": 0}
 
 
-def has_contact(problem: Problem) -> bool:
+def has_contact(problem: MuscleProblem) -> bool:
     """True where the file has a section ``Contact``, whose tangent is not symmetric."""
     return bool(obstacles(problem) or by_springs(problem))
 
 
-def add_contact(root: Element, problem: Problem) -> None:
+def add_contact(root: Element, problem: MuscleProblem) -> None:
     """The section ``Contact``, where something acts between surfaces."""
     if not has_contact(problem):
         return
@@ -59,7 +59,7 @@ def _pair(contacts: Element, kind: str, name: str, settings: dict[str, float | N
     leaves(entry, {**PENALTY, **settings})
 
 
-def overlaps(problem: Problem) -> dict[str, float]:
+def overlaps(problem: MuscleProblem) -> dict[str, float]:
     """Depths [mm] by bone in contact of the facets of the contact surface inside it at rest: at corners and middles; 0 outside."""
     if not obstacles(problem):
         return {}
@@ -70,7 +70,7 @@ def overlaps(problem: Problem) -> dict[str, float]:
     return {name: float(depths.max(initial=0.0)) for name, depths in inside}
 
 
-def search_radius(problem: Problem, deep: float) -> float:
+def search_radius(problem: MuscleProblem, deep: float) -> float:
     """Depth [mm] inside a bone to which FEBio looks for contact, where the muscle is ``deep`` [mm] in it at rest: less where that
     would press at once with more than the matrix bears.
     """

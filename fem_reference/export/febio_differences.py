@@ -8,7 +8,7 @@ from scipy.linalg import eigh
 from fem_reference.export.febio_contact import overlaps, search_radius
 from fem_reference.export.febio_mesh import by_springs
 from fem_reference.foundations.mesh import Floats, corner_areas
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.setup import AttachedVertices
 
 # What FEBio 4.11 gave with springs over facets, for the reference's own, at 1 rad on gluteus_medius and gluteus_maximus.
@@ -19,18 +19,18 @@ MEASURED = (
 _FELT = 1e-3  # [mm]: an overlap at rest that is worth a word
 
 
-def notes(problem: Problem) -> list[str]:
+def notes(problem: MuscleProblem) -> list[str]:
     """The sentences; none where nothing of this is there."""
     springs = [_springs(problem, attached) for attached in by_springs(problem) if _has_points(problem, attached)]
     return [*springs, *([MEASURED] if springs else []), *_overlapping(problem)]
 
 
-def _has_points(problem: Problem, attached: AttachedVertices) -> bool:
+def _has_points(problem: MuscleProblem, attached: AttachedVertices) -> bool:
     """True where the reference has its springs at points of the surface, not over facets too."""
     return attached.attachment in problem.attached_skins
 
 
-def _springs(problem: Problem, attached: AttachedVertices) -> str:
+def _springs(problem: MuscleProblem, attached: AttachedVertices) -> str:
     """Stiffness of FEBio's springs, in all and against turning about the middle of the reference's, and their place."""
     assert attached.stiffness is not None  # one by springs
     skin = problem.attached_skins[attached.attachment]
@@ -55,7 +55,7 @@ def _turning(arms: Floats, areas: Floats) -> Floats:
     return np.asarray(np.trace(squares) * np.eye(3) - squares)
 
 
-def _overlapping(problem: Problem) -> Iterator[str]:
+def _overlapping(problem: MuscleProblem) -> Iterator[str]:
     for bone, deep in overlaps(problem).items():
         if deep > _FELT:
             radius = search_radius(problem, deep)

@@ -15,13 +15,13 @@ from fem_reference.effects.neo_hooke import NeoHooke
 from fem_reference.export.febio_mesh import bone_id, leaf, leaves, vector
 from fem_reference.foundations.mesh import Floats
 from fem_reference.foundations.motion import Rotation
-from fem_reference.problems.muscle import Problem
-from fem_reference.problems.setup import RigidBody
+from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.setup import Bone
 
 VOLUME_LAW = 2  # FEBio's pressure_model whose energy is K/2 (J - 1)^2
 
 
-def add_materials(root: Element, problem: Problem) -> None:
+def add_materials(root: Element, problem: MuscleProblem) -> None:
     """The muscle's material, number 1, and a rigid one for each bone."""
     materials = SubElement(root, "Material")
     _muscle(materials, problem.effects)
@@ -81,12 +81,12 @@ def fibre_constants(effect: FibrePassive) -> dict[str, float]:
     return off | toe | {"lam_max": effect.linear_from * effect.optimal_stretch}
 
 
-def _centre(bone: RigidBody) -> Floats:
+def _centre(bone: Bone) -> Floats:
     """The point [mm] that FEBio turns a bone about: that of its motion."""
     return np.asarray(bone.motion.centre if isinstance(bone.motion, Rotation) else bone.surface.points.mean(axis=0))
 
 
-def add_fibres(root: Element, problem: Problem) -> None:
+def add_fibres(root: Element, problem: MuscleProblem) -> None:
     """The axes of each element: the first along the fibre, the second anywhere across it."""
     if problem.directions is None:
         return

@@ -4,12 +4,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, Surface, TetMesh, boundary, enclosed_volume
 from fem_reference.geometry.distance import distances
-from fem_reference.problems.muscle import Problem
-from fem_reference.problems.setup import AttachedVertices, RigidBody
+from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.setup import AttachedVertices, Bone
 
 # Corners between which the last six nodes of a tet10 are; the first three pairs are those of a tri6 too.
 EDGES = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
@@ -38,7 +39,7 @@ def vector(values: Iterable[float]) -> str:
     return ",".join(repr(float(value)) for value in values)
 
 
-def bone_id(bone: RigidBody) -> str:
+def bone_id(bone: Bone) -> str:
     """The name of a bone in the file: of its material, of its elements."""
     return f"bone_{bone.name}"
 
@@ -48,12 +49,12 @@ def springs_id(attached: AttachedVertices) -> str:
     return f"springs_{attached.attachment}"
 
 
-def by_springs(problem: Problem) -> list[AttachedVertices]:
+def by_springs(problem: MuscleProblem) -> list[AttachedVertices]:
     """The attachments by springs."""
     return [attached for attached in problem.attached if attached.stiffness is not None]
 
 
-def exactly(problem: Problem) -> list[AttachedVertices]:
+def exactly(problem: MuscleProblem) -> list[AttachedVertices]:
     """The attachments whose nodes move with their bone."""
     return [attached for attached in problem.attached if attached.stiffness is None]
 
@@ -66,7 +67,7 @@ def quadratic(mesh: TetMesh) -> tuple[Floats, Ints]:
     return np.vstack([mesh.points, mesh.points[edges].mean(axis=1)]), np.hstack([mesh.tets, middles])
 
 
-def obstacles(problem: Problem) -> list[RigidBody]:
+def obstacles(problem: MuscleProblem) -> list[Bone]:
     """The bones in contact with the muscle."""
     contact = problem.contact
     return [bone for bone in problem.bones if contact is not None and contact.is_by(bone.name)]
@@ -78,14 +79,19 @@ def outward(surface: Surface) -> Surface:
     return Surface(surface.points, surface.triangles[:, ::-1]) if turned else surface
 
 
-def free_facets(problem: Problem) -> Ints:
+def among(facets: Ints, others: Ints) -> NDArray[np.bool_]:
+    """Mask (m,) of the ``facets`` (m, 3) that are among ``others`` (k, 3), whichever corner is first."""
+    known = set(map(tuple, np.sort(others, axis=1).tolist()))
+    return np.array([tuple(facet) in known for facet in np.sort(facets, axis=1).tolist()], bool)
+
+
+def free_facets(problem: MuscleProblem) -> Ints:
     """The facets (m, 3) of the tets that are in contact: those not attached in whose middle contact is felt; InputError where there
     are none.
     """
     outer, _ = boundary(problem.mesh.tets)
     attached = np.concatenate([np.zeros((0, 3), np.int64), *problem.mesh.facets.values()])
-    known = set(map(tuple, np.sort(attached, axis=1).tolist()))
-    loose = outer[[tuple(facet) not in known for facet in np.sort(outer, axis=1).tolist()]]
+    loose = outer[~among(outer, attached)]
     middles = problem.mesh.points[loose].mean(axis=1)
     away, _ = problem.exempt.away(distances(middles, problem.surface).triangle, middles)
     felt = loose[away > problem.exempt.reach]
@@ -98,7 +104,7 @@ def free_facets(problem: Problem) -> Ints:
 class Mesh:
     """Nodes, elements, node sets and surfaces; node numbers of FEBio begin at 1, with those of the muscle."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: MuscleProblem) -> None:
         self.problem = problem
         self.points, self.tets = quadratic(problem.mesh)
         ends = np.sort(problem.mesh.tets[:, EDGES].reshape(-1, 2), axis=1)
@@ -115,25 +121,16 @@ class Mesh:
         before = np.cumsum([0, *(len(points) for _, _, points, _ in groups[:-1])])
         cells = {name: own + first for (name, _, _, own), first in zip(groups, before, strict=True)}
         for (name, _, points, _), first in zip(groups, before.tolist(), strict=True):
-            self._nodes(mesh, f"{name}_nodes", points, first)
-        self._elements(mesh, {name: kind for name, kind, _, _ in groups}, cells)
+            rows(SubElement(mesh, "Nodes", name=f"{name}_nodes"), "node", points.tolist(), first + 1)
+        number = 1
+        for name, kind, _, _ in groups:
+            rows(SubElement(mesh, "Elements", name=name, type=kind), "elem", (cells[name] + 1).tolist(), number)
+            number += len(cells[name])
         self._attached(mesh)
         if obstacles(self.problem):
             self._contact_surface(mesh, cells)
         for attached in by_springs(self.problem):
             self._tied(mesh, attached, cells[springs_id(attached)])
-
-    @staticmethod
-    def _nodes(mesh: Element, name: str, points: Floats, before: int) -> None:
-        rows(SubElement(mesh, "Nodes", name=name), "node", points.tolist(), before + 1)
-
-    @staticmethod
-    def _elements(mesh: Element, kinds: dict[str, str], cells: dict[str, Ints]) -> None:
-        """The elements of each group, numbered through from 1."""
-        first = 1
-        for name, kind in kinds.items():
-            rows(SubElement(mesh, "Elements", name=name, type=kind), "elem", (cells[name] + 1).tolist(), first)
-            first += len(cells[name])
 
     def _curved(self, facets: Ints) -> Ints:
         """Straight triangles (m, 3) of the tets with the middles of their edges, (m, 6)."""
@@ -143,9 +140,7 @@ class Mesh:
 
     def _area(self, attached: AttachedVertices) -> Ints:
         """The triangles (m, 6) of an attachment, outward."""
-        own = set(map(tuple, np.sort(self.problem.mesh.facets[attached.attachment], axis=1).tolist()))
-        mine = [tuple(facet) in own for facet in np.sort(self.outer, axis=1).tolist()]
-        return self._curved(self.outer[mine])
+        return self._curved(self.outer[among(self.outer, self.problem.mesh.facets[attached.attachment])])
 
     def _copy(self, attached: AttachedVertices) -> tuple[Floats, Ints]:
         """Points (n, 3) [mm] and triangles (m, 6) that coincide with the area attached and face it, as FEBio's pairs must."""

@@ -14,7 +14,7 @@ from fem_reference.foundations.version import __version__
 from fem_reference.geometry.embedding import embed
 from fem_reference.io import files
 from fem_reference.io.soup import rows
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.scenes.muscle import MuscleCase
 
 UNITS = {"length": "mm", "force": "N", "pressure": "MPa", "time": "s", "mass": "tonne", "angle": "rad"}
@@ -25,7 +25,7 @@ CONVENTIONS = {
 }
 
 
-def write(case: MuscleCase, problem: Problem, folder: Path) -> None:
+def write(case: MuscleCase, problem: MuscleProblem, folder: Path) -> None:
     """Every file of the export of a ``problem`` but those that explain it, into ``folder``."""
     (folder / "bones").mkdir()
     files.write_surface(folder / "muscle.ply", problem.surface, problem.surface.points)
@@ -39,12 +39,12 @@ def write(case: MuscleCase, problem: Problem, folder: Path) -> None:
     files.write_text(folder / "scene.json", json.dumps(facts(case, problem), indent=1, allow_nan=False))
 
 
-def bone_files(problem: Problem) -> list[str]:
+def bone_files(problem: MuscleProblem) -> list[str]:
     """The file of each bone: numbered, as its name may be any text."""
     return [f"bones/{i}.ply" for i in range(len(problem.bones))]
 
 
-def _write_tables(problem: Problem, folder: Path) -> None:
+def _write_tables(problem: MuscleProblem, folder: Path) -> None:
     poses = [
         (bone.name, frame, *map(repr, bone.pose(frame).ravel().tolist()))
         for bone in problem.bones
@@ -72,7 +72,7 @@ def _write_csv(path: Path, columns: Sequence[str], entries: Iterable[Sequence[An
     files.write_text(path, text.getvalue())
 
 
-def facts(case: MuscleCase, problem: Problem) -> dict[str, Any]:
+def facts(case: MuscleCase, problem: MuscleProblem) -> dict[str, Any]:
     """The facts that no mesh file has: units, conventions, frames, bones, attachments, effects with the unit of every parameter."""
     bones = [
         entry.model_dump(mode="json", exclude_none=True, exclude={"surface", "unit"})
@@ -97,7 +97,7 @@ def facts(case: MuscleCase, problem: Problem) -> dict[str, Any]:
     }
 
 
-def _are_obstacles(problem: Problem) -> list[bool]:
+def _are_obstacles(problem: MuscleProblem) -> list[bool]:
     contact = problem.contact
     return [contact is not None and contact.is_by(bone.name) for bone in problem.bones]
 

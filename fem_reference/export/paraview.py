@@ -22,7 +22,7 @@ from fem_reference.geometry.embedding import embed
 from fem_reference.io import files
 from fem_reference.io.formats.vtk import DataBlock, Tree
 from fem_reference.metrics import MeasurementContext
-from fem_reference.problems.contact import Contact
+from fem_reference.problems.contact import ContactLaw
 from fem_reference.runs import results, states
 from fem_reference.runs.results import Results
 from fem_reference.runs.store import Run
@@ -94,7 +94,7 @@ class _Frames:
         """The sum over the bones (f, n) [MPa] of the law of contact at the vertices; 0 where these are not free."""
         effect = among(self.case.effects)
         assert effect is not None  # the caller asked
-        law, run = Contact("free", effect.stiffness, effect.smoothing), self.reference
+        law, run = ContactLaw("free", effect.stiffness, effect.smoothing), self.reference
         bones = [bone for bone in self.setup.bones if effect.is_by(bone.name)]
         pressures = np.zeros(run.positions.shape[:2])
         for i, (number, points) in enumerate(zip(run.numbers, run.positions, strict=True)):

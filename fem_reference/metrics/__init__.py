@@ -19,7 +19,7 @@ from fem_reference.foundations.mesh import Floats, Ints, Polylines, vertex_areas
 from fem_reference.geometry.exemption import Exemption
 from fem_reference.geometry.extension import Extension
 from fem_reference.problems.of_case import CaseSetup
-from fem_reference.problems.setup import RigidBody, Setup
+from fem_reference.problems.setup import Bone, Setup
 from fem_reference.runs.store import Run
 from fem_reference.scenes.case import Part, Standard
 
@@ -123,12 +123,12 @@ class MeasurementContext:
     fibres: Polylines
     extension: Extension
     travel: float
-    bones: tuple[RigidBody, ...]
+    bones: tuple[Bone, ...]
     exempt: Exemption
 
     @classmethod
     def of(
-        cls, reference: Run, fibres: Polylines, bones: tuple[RigidBody, ...], exempt: Exemption | None = None
+        cls, reference: Run, fibres: Polylines, bones: tuple[Bone, ...], exempt: Exemption | None = None
     ) -> "MeasurementContext":
         """The measurement context of a reference run; without ``exempt``, nothing is."""
         rest = reference.surface

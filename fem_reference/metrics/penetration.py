@@ -16,7 +16,7 @@ from fem_reference.geometry.exemption import Exemption
 from fem_reference.geometry.overlap import shared
 from fem_reference.geometry.pieces import edge_lengths
 from fem_reference.metrics import Measure, MeasurementContext, Statistic
-from fem_reference.problems.setup import RigidBody
+from fem_reference.problems.setup import Bone
 from fem_reference.runs.store import Run
 
 STATISTICS = {
@@ -98,7 +98,7 @@ def _frame(surface: Surface, number: int, context: MeasurementContext, allowed: 
     return [deepest, _Worst(volume, largest.where)]
 
 
-def _deepest(exempt: Exemption, fine: Surface, bone: RigidBody, number: int, allowed: Floats) -> _Worst:
+def _deepest(exempt: Exemption, fine: Surface, bone: Bone, number: int, allowed: Floats) -> _Worst:
     """Depth beyond what is ``allowed`` (k,) at the points (k,) of a surface in pieces."""
     corners, reach = exempt.corners, exempt.reach
     gaps = _distance(bone, number, fine.points)
@@ -115,7 +115,7 @@ def _deepest(exempt: Exemption, fine: Surface, bone: RigidBody, number: int, all
     return _Worst(float(depths[worst]), f"{what} at {place_of(fine.points[worst])} in {bone.name}")
 
 
-def _allowed(exempt: Exemption, bones: tuple[RigidBody, ...], numbers: tuple[int, ...]) -> dict[str, Floats]:
+def _allowed(exempt: Exemption, bones: tuple[Bone, ...], numbers: tuple[int, ...]) -> dict[str, Floats]:
     """The depth [mm] by bone that is allowed at the corners (k,) of the pieces of a surface: none where contact is felt, beside
     attachments that at rest, and any on attachments to this bone or to one that moves as it does at all frame ``numbers``.
     """
@@ -130,7 +130,7 @@ def _allowed(exempt: Exemption, bones: tuple[RigidBody, ...], numbers: tuple[int
     return found
 
 
-def _alike(bone: RigidBody, name: str, bones: tuple[RigidBody, ...], numbers: tuple[int, ...]) -> bool:
+def _alike(bone: Bone, name: str, bones: tuple[Bone, ...], numbers: tuple[int, ...]) -> bool:
     """True where a ``bone`` has this ``name`` or moves as the one that has."""
     own = next((other for other in bones if other.name == name), bone)
     return own.name == name and all(np.allclose(own.pose(frame), bone.pose(frame)) for frame in numbers)
@@ -140,7 +140,7 @@ def _value(one: _Worst) -> float:
     return one.value
 
 
-def _distance(bone: RigidBody, number: int, points: Floats) -> Floats:
+def _distance(bone: Bone, number: int, points: Floats) -> Floats:
     """Distance (n,) [mm] of ``points`` (n, 3) to ``bone`` where it is at frame ``number``, negative inside."""
     return bone.shape.sample(apply(np.linalg.inv(bone.pose(number)), points)).distance
 
@@ -150,7 +150,7 @@ def _is_body(surface: Surface) -> bool:
     return bool(np.isfinite(enclosed_volume(surface.points, surface.triangles)))
 
 
-def _without_inside(bones: tuple[RigidBody, ...]) -> str:
+def _without_inside(bones: tuple[Bone, ...]) -> str:
     """Which bone has no inside, and why; nothing where all have."""
     for bone in bones:
         try:

@@ -28,12 +28,12 @@ _SAMPLES = np.array(
 )
 
 
-def pick(scene: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> Ints:
-    """The vertices of a muscle that an attachment of a scene selects.
+def pick(case: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> Ints:
+    """The vertices of a muscle that an attachment of a case selects.
 
     Parameters
     ----------
-    scene, i
+    case, i
         The selection is that of ``scene.attachment[i]``.
     surface
         The surface of the muscle.
@@ -48,20 +48,20 @@ def pick(scene: MuscleCase, i: int, surface: Surface, bone_surface: Surface) -> 
     Raises
     ------
     InputError
-        Names the key of the scene, or the file and row (comment lines not counted), that is not usable.
+        Names the key of the case, or the file and row (comment lines not counted), that is not usable.
 
     """
-    attachment = scene.attachment[i]
+    attachment = case.attachment[i]
     key = f"attachment[{i}]"
     if attachment.vertices is not None:
-        path = scene.file(attachment.vertices.file, f"{key}.vertices.file")
+        path = case.file(attachment.vertices.file, f"{key}.vertices.file")
         return _listed(path, attachment.vertices, len(surface.points))
     if attachment.within is not None:
         return np.flatnonzero(distances(surface.points, bone_surface).distance <= attachment.within)
     outline = attachment.outline
     assert outline is not None  # an Attachment record has one of the three
-    path = scene.file(outline.file, f"{key}.outline.file")
-    patches = draped(_patches(path, outline, join(scene.place, f"{key}.outline.clouds")), bone_surface)
+    path = case.file(outline.file, f"{key}.outline.file")
+    patches = draped(_patches(path, outline, join(case.place, f"{key}.outline.clouds")), bone_surface)
     return np.flatnonzero(distances(surface.points, patches).distance <= outline.reach)
 
 

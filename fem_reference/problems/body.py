@@ -15,7 +15,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats, Ints, diagonal
 from fem_reference.geometry.fibres import Directions
 from fem_reference.geometry.skins import Skin
-from fem_reference.problems.contact import Contact, Obstruction
+from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.problems.problem import NOTHING, AtRest, Task
 from fem_reference.problems.resolved_paths import Moving, moving_ramp, posed, some, stops, turning
 
@@ -189,7 +189,7 @@ class ByCell:
 @dataclass(frozen=True, eq=False)
 class Body:
     """A body of ``mesh`` with its ``effects``; at ``frames[0]`` it rests. A load acts on the facets that its ``on`` names; by
-    ``contact``, where there is one, with every obstruction. ``interval`` [s]: from a frame number to the next, None where nothing
+    ``contact``, where there is one, with every bone. ``interval`` [s]: from a frame number to the next, None where nothing
     depends on time. ``start``: at ``frames[0]`` the body is where this takes rest points (n, 3), and not at rest.
     """
 
@@ -198,8 +198,8 @@ class Body:
     prescribed: tuple[Prescribed, ...]
     frames: tuple[float, ...]
     fibre: Directions | None = None
-    contact: Contact | None = None
-    obstructions: tuple[Obstruction, ...] = ()
+    contact: ContactLaw | None = None
+    bones: tuple[ContactBone, ...] = ()
     interval: float | None = None
     start: Callable[[Floats], Floats] | None = None
 
@@ -227,7 +227,7 @@ class Body:
         be followed.
         """
         things = [_moving(entry, some(self.points_on(entry.on))) for entry in self.prescribed]
-        things += [posed(f'obstruction "{one.name}"', one.pose, self.mesh.points) for one in self.obstructions]
+        things += [posed(f'bone "{one.name}"', one.pose, self.mesh.points) for one in self.bones]
         ramps = (moving_ramp(effect, self.size) for effect in self.effects)
         return stops([*things, *(ramp for ramp in ramps if ramp)], self.frames, self.size)
 

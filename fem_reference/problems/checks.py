@@ -12,7 +12,7 @@ from fem_reference.foundations.given import said
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import Body, Cells, Prescribed, boundary_facets, check_element, reference_nodes
-from fem_reference.problems.contact import Contact, Obstruction
+from fem_reference.problems.contact import ContactBone, ContactLaw
 
 SAME = 1e-6  # of the body's size, by which two regions may prescribe what is meant to be the same
 _UNIT = 1e-6  # by which a unit vector may be longer or shorter
@@ -115,13 +115,13 @@ def _check_rest(body: Body) -> None:
         part = getattr(body, name)
         if part is not None and not callable(part):
             raise InputError(name, said(part), "a function, or None")
-    _check_many("obstructions", body.obstructions, Obstruction, "bones that may press")
+    _check_many("bones", body.bones, ContactBone, "bones that may press")
     if body.start is not None:
         begun = np.asarray(body.start(np.array(body.mesh.points)))
         if begun.shape != body.mesh.points.shape or not np.isfinite(begun).all():
             raise InputError("start", f"places {begun.shape}, not all finite", "finite places (n, 3) of points (n, 3)")
-    if body.contact is not None and not isinstance(body.contact, Contact):
-        raise InputError("contact", said(body.contact), "a Contact, or None")
+    if body.contact is not None and not isinstance(body.contact, ContactLaw):
+        raise InputError("contact", said(body.contact), "a ContactLaw, or None")
 
 
 def _check_cells(mesh: Any) -> None:

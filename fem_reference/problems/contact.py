@@ -22,7 +22,7 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
-class Obstruction:
+class ContactBone:
     """An obstacle: its ``shape`` in its own rest frame, and the 4 x 4 matrix ``pose`` of a frame number that takes it
     to where it is; both picklable.
     """
@@ -33,8 +33,8 @@ class Obstruction:
 
 
 @dataclass(frozen=True)
-class Contact:
-    """Frictionless contact of obstructions, with any sliding, on ``on``: the facets of a region, by name, or a skin. The
+class ContactLaw:
+    """Frictionless contact of bones, with any sliding, on ``on``: the facets of a region, by name, or a skin. The
     pressure depends on the gap g, the signed distance (negative inside): zero beyond ``smoothing`` d [mm],
     ``k (d - g)^2 / (4 d)`` from d to -d, and ``-k g`` deeper: the slope of an energy per rest area, twice differentiable.
     ``stiffness``: k [MPa/mm]; pressed by p, a surface gets p / k deep.
@@ -63,12 +63,12 @@ class Contact:
         return float(np.clip((last - frame) / (last - first), 0, 1))
 
 
-def nearest_on_path(obstruction: Obstruction, starts: Floats, paths: Floats, least: float) -> Floats:
-    """The smallest gap to an obstruction on straight paths, walked in strides that the gap allows without missing anything.
+def nearest_on_path(bone: ContactBone, starts: Floats, paths: Floats, least: float) -> Floats:
+    """The smallest gap to a bone on straight paths, walked in strides that the gap allows without missing anything.
 
     Parameters
     ----------
-    obstruction
+    bone
         The body whose distance is sampled, in its rest frame.
     starts, paths
         Where the paths begin and what they add to that, (n, 3) each [mm].
@@ -87,7 +87,7 @@ def nearest_on_path(obstruction: Obstruction, starts: Floats, paths: Floats, lea
     going = np.arange(len(starts))
     while len(going):
         shares = walked[going] / np.maximum(lengths[going], least)
-        gaps = obstruction.shape.sample(starts[going] + shares[:, None] * paths[going]).distance
+        gaps = bone.shape.sample(starts[going] + shares[:, None] * paths[going]).distance
         smallest[going] = np.minimum(smallest[going], gaps)
         # The gradient of a sampled distance is a unit vector but for a tenth; beyond its grid strides are short.
         walked[going] += np.where(gaps < FAR, np.maximum(0.9 * np.abs(gaps), least), 1.0)

@@ -10,7 +10,7 @@ from fem_reference.foundations.mesh import Surface, enclosed_volume
 from fem_reference.foundations.motion import RigidMotion, Translation
 from fem_reference.geometry.sectors import attached_area, attached_shares
 from fem_reference.problems.scalar import FieldProblem
-from fem_reference.problems.setup import AttachedVertices, RigidBody, Setup
+from fem_reference.problems.setup import AttachedVertices, Bone, Setup
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
 
@@ -60,7 +60,7 @@ def _parameters(effect: Effect) -> dict[str, str]:
     return {name: f"{exact(value)} {unit}".rstrip() for name, value, unit in effect.parameters}
 
 
-def _shape(bone: RigidBody) -> str:
+def _shape(bone: Bone) -> str:
     """The fineness of the surface of a bone, or its closed form."""
     if bone.solid is None:
         return f"{len(bone.surface.triangles)} triangles"

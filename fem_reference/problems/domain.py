@@ -13,17 +13,17 @@ from fem_reference.io import files
 from fem_reference.scenes.scalar import Interval, MeshFiles, ScalarCase
 
 
-def mesh_of(scene: ScalarCase) -> FieldMesh:
+def mesh_of(case: ScalarCase) -> FieldMesh:
     """The mesh of a scalar case; InputError names what is not usable."""
-    domain = scene.domain
+    domain = case.domain
     if domain.mesh is not None:
-        return _mesh_files(scene, domain.mesh)
+        return _mesh_files(case, domain.mesh)
     if domain.surface is not None:
-        surface = files.read_surface(scene.file(domain.surface.file, "domain.surface.file"), domain.surface.scale)
+        surface = files.read_surface(case.file(domain.surface.file, "domain.surface.file"), domain.surface.scale)
         return FieldMesh(surface.points, surface.triangles, surface.place)
     nodes = _nodes(domain.interval) if domain.interval is not None else np.array(domain.nodes)
     vertices = np.arange(len(nodes))
-    return FieldMesh(nodes[:, None], np.column_stack([vertices[:-1], vertices[1:]]), join(scene.place, "domain"))
+    return FieldMesh(nodes[:, None], np.column_stack([vertices[:-1], vertices[1:]]), join(case.place, "domain"))
 
 
 def _nodes(interval: Interval) -> Floats:
@@ -33,21 +33,21 @@ def _nodes(interval: Interval) -> Floats:
     return np.array([interval.start, *np.sort(inside), interval.end])
 
 
-def _mesh_files(scene: ScalarCase, given: MeshFiles) -> FieldMesh:
-    path = scene.file(given.points, "domain.mesh.points")
+def _mesh_files(case: ScalarCase, given: MeshFiles) -> FieldMesh:
+    path = case.file(given.points, "domain.mesh.points")
     points = numbers(path)
     if points.shape[1] not in (2, 3):
         raise InputError(path, f"rows of {points.shape[1]} numbers", "2 or 3 coordinates a vertex")
     if given.triangles == "delaunay":
         if points.shape[1] == 3:
-            raise InputError(join(scene.place, "domain.mesh.triangles"), '"delaunay" of points in space', "a file")
+            raise InputError(join(case.place, "domain.mesh.triangles"), '"delaunay" of points in space', "a file")
         try:
             return FieldMesh(points, Delaunay(points).simplices, str(path))
         except QhullError as error:
             raise InputError(
                 path, "points that cannot be triangulated", "points in the plane, not on a line"
             ) from error
-    path = scene.file(given.triangles, "domain.mesh.triangles")
+    path = case.file(given.triangles, "domain.mesh.triangles")
     triangles = whole_numbers(path, numbers(path))
     if triangles.shape[1] != 3:
         raise InputError(path, f"rows of {triangles.shape[1]} numbers", "3 vertices a triangle")

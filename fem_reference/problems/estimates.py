@@ -32,7 +32,7 @@ from fem_reference.problems.guess import (
     thickness_of,
     turn,
 )
-from fem_reference.problems.setup import RigidBody, Setup
+from fem_reference.problems.setup import Bone, Setup
 from fem_reference.scenes.muscle import MuscleCase
 
 log = logging.getLogger(__name__)
@@ -98,10 +98,10 @@ class Decision:
         return ", and ".join(over or [text for text, _ in said])
 
 
-def decisions(scene: MuscleCase, rest: Setup) -> tuple[Decision, ...]:
+def decisions(case: MuscleCase, rest: Setup) -> tuple[Decision, ...]:
     """Decisions on each effect of a case, before it is solved."""
-    known, listed = estimates(scene, rest), scene.choice == "listed"
-    return tuple(replace(decision(effect, effect.indicator(known), known), listed=listed) for effect in scene.effects)
+    known, listed = estimates(case, rest), case.choice == "listed"
+    return tuple(replace(decision(effect, effect.indicator(known), known), listed=listed) for effect in case.effects)
 
 
 def decision(effect: Effect, found: Indicator | None, known: Estimates) -> Decision:
@@ -110,7 +110,7 @@ def decision(effect: Effect, found: Indicator | None, known: Estimates) -> Decis
     return Decision(effect, not within, found, known.tolerance, known.stress_tolerance)
 
 
-def solved(known: Estimates, rest: Setup, bones: tuple[RigidBody, ...], number: float, at: Floats) -> Estimates:
+def solved(known: Estimates, rest: Setup, bones: tuple[Bone, ...], number: float, at: Floats) -> Estimates:
     """Estimates that were ``known`` before, with where the surface is ``at`` (n, 3) in a frame that was solved, beside those
     ``bones``.
     """
@@ -129,33 +129,33 @@ def _chosen(rest: Setup) -> Ints:
     return np.unique(np.linspace(0, len(rest.surface.points) - 1, _VERTICES).astype(int))
 
 
-def estimates(scene: MuscleCase, rest: Setup) -> Estimates:
+def estimates(case: MuscleCase, rest: Setup) -> Estimates:
     """Estimates that effects ask of a case, by a guess of where the surface goes, each point with the bones nearest to it."""
-    frames, chosen = _sampled(scene.numbers), _chosen(rest)
+    frames, chosen = _sampled(case.numbers), _chosen(rest)
     points, places = rest.surface.points[chosen], rest.exempt.places(_PLACES) @ rest.surface.points
     guess, felt = Guess.of(points, rest), Guess.of(places, rest)
     moved = {frame: felt.at(frame) if rest.attached else places for frame in frames}
     travel = max(float(np.linalg.norm(guess.at(frame) - points, axis=1).max()) for frame in frames)
-    speed, sideways, jump, acceleration = motion(guess, axis_of(rest), scene.numbers)
-    size, shear = scene.muscle.tet_size / 2**scene.muscle.refinements, _shear(scene)
+    speed, sideways, jump, acceleration = motion(guess, axis_of(rest), case.numbers)
+    size, shear = case.muscle.tet_size / 2**case.muscle.refinements, _shear(case)
     most = max(strain(points, guess.at(frame)) for frame in frames) if rest.attached else 0.0
-    (low, high), taut = _stretch(rest, frames), _taut(scene)
+    (low, high), taut = _stretch(rest, frames), _taut(case)
     return Estimates(
         length=length_of(rest),
         thickness=thickness_of(rest),
         shear=shear,
-        tension=_tension(scene),
+        tension=_tension(case),
         fixed=len(rest.attached),
         sag=sag(rest, frames, travel),
-        lean=fibre_field.lean(scene, axis_of(rest)),
+        lean=fibre_field.lean(case, axis_of(rest)),
         travel=travel,
         stretch=(taut * low, taut * high),
-        interval=scene.frames.interval,
+        interval=case.frames.interval,
         speed=speed,
         sideways=sideways,
         jump=jump,
         acceleration=acceleration,
-        frames=_instants(scene),
+        frames=_instants(case),
         tolerance=TOLERANCE * (min(size, travel) if travel > _STILL else size),
         stress_tolerance=STRESS_TOLERANCE * shear * max(most, ROUNDING),
         near={bone.name: _near(bone, places, moved, _DOUBT) for bone in rest.bones},
@@ -166,17 +166,17 @@ def _sampled(numbers: tuple[int, ...]) -> list[int]:
     return [numbers[i] for i in np.unique(np.linspace(0, len(numbers) - 1, _FRAMES).round().astype(int))]
 
 
-def _instants(scene: MuscleCase) -> tuple[float, ...]:
+def _instants(case: MuscleCase) -> tuple[float, ...]:
     """All frame numbers, and those between them at which a ramp has a knot."""
-    knots = [knot.frame for effect in scene.effects if isinstance(effect, Ramped) for knot in effect.ramp]
-    first, last = scene.frames.first, scene.frames.last
-    return tuple(sorted({*map(float, scene.numbers), *(knot for knot in knots if first <= knot <= last)}))
+    knots = [knot.frame for effect in case.effects if isinstance(effect, Ramped) for knot in effect.ramp]
+    first, last = case.frames.first, case.frames.last
+    return tuple(sorted({*map(float, case.numbers), *(knot for knot in knots if first <= knot <= last)}))
 
 
-def _shear(scene: MuscleCase) -> float:
+def _shear(case: MuscleCase) -> float:
     """The shear modulus at rest [MPa] of all that is stored in the material, without fibres."""
     laws = [
-        (one, 1.0) for one in scene.effects if isinstance(one, Energy) and one.stored and not isinstance(one, Ramped)
+        (one, 1.0) for one in case.effects if isinstance(one, Energy) and one.stored and not isinstance(one, Ramped)
     ]
     isotropic = [(law, amount) for law, amount in laws if not law.needs]
     small = 1e-3
@@ -184,17 +184,17 @@ def _shear(scene: MuscleCase) -> float:
     return 2 * float(total_energy(isotropic or laws, sheared)) / small**2 or np.finfo(float).tiny
 
 
-def _tension(scene: MuscleCase) -> float:
+def _tension(case: MuscleCase) -> float:
     """The stress that all fibres pull with at their length at rest [MPa], the mean over the frames."""
-    pulling = [one for one in scene.effects if isinstance(one, Energy) and one.stored and "fibre" in one.needs]
-    amounts = [np.mean([one.amount(number) for number in scene.numbers]) for one in pulling]
+    pulling = [one for one in case.effects if isinstance(one, Energy) and one.stored and "fibre" in one.needs]
+    amounts = [np.mean([one.amount(number) for number in case.numbers]) for one in pulling]
     return float(sum(amount * fibre_tension(one, 1.0) for one, amount in zip(pulling, amounts, strict=True)))
 
 
-def _taut(scene: MuscleCase) -> float:
+def _taut(case: MuscleCase) -> float:
     """The stretch of fibres at rest, at the most over the frames."""
-    rest, amounts = State(F=np.eye(3).tolist(), fibre=(1.0, 0.0, 0.0)), _instants(scene)
-    found = [elastic_state([(one, one.amount(number)) for one in scene.effects], rest).F[0][0] for number in amounts]
+    rest, amounts = State(F=np.eye(3).tolist(), fibre=(1.0, 0.0, 0.0)), _instants(case)
+    found = [elastic_state([(one, one.amount(number)) for one in case.effects], rest).F[0][0] for number in amounts]
     return float(max(found))
 
 
@@ -235,7 +235,7 @@ def _combined(edges: Floats, parts: Floats) -> Floats:
     return np.asarray(np.einsum("tij,tj->ti", edges, parts))
 
 
-def _near(bone: RigidBody, points: Floats, moved: Mapping[int, Floats] | Mapping[float, Floats], doubt: float) -> Near:
+def _near(bone: Bone, points: Floats, moved: Mapping[int, Floats] | Mapping[float, Floats], doubt: float) -> Near:
     """The gap to a ``bone`` of ``points`` (n, 3) that are ``moved``, wrong by ``doubt`` of their path past it at most."""
     low, high = bone.surface.points.min(axis=0), bone.surface.points.max(axis=0)
     local = np.stack([apply(np.linalg.inv(bone.pose(frame)), at) for frame, at in moved.items()])

@@ -18,12 +18,12 @@ log = logging.getLogger(__name__)
 TETS = 8000
 
 
-def of(scene: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh]) -> tuple[Polylines, Directions]:
-    """The fibres of a scene: traced, or given as polylines.
+def of(case: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh]) -> tuple[Polylines, Directions]:
+    """The fibres of a case: traced, or given as polylines.
 
     Parameters
     ----------
-    scene
+    case
         Says which.
     surface
         The closed surface of the muscle.
@@ -36,11 +36,11 @@ def of(scene: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh]) ->
         The lines, and a callable for the direction at any point: of the field, or of the nearest given line.
 
     """
-    if scene.fibres.polylines is not None:
-        given = scene.fibres.polylines
-        lines = files.read_polylines(scene.file(given.file, "fibres.polylines.file"), given.unit)
+    if case.fibres.polylines is not None:
+        given = case.fibres.polylines
+        lines = files.read_polylines(case.file(given.file, "fibres.polylines.file"), given.unit)
         return inside(surface, lines), NearestLine(lines)
-    traced = scene.fibres.traced
+    traced = case.fibres.traced
     assert traced is not None  # a Fibres record has one of the two
     volume = enclosed_volume(surface.points, surface.triangles)
     mesh = fill(float(np.cbrt(6 * np.sqrt(2) * volume / TETS)))
@@ -48,14 +48,14 @@ def of(scene: MuscleCase, surface: Surface, fill: Callable[[float], TetMesh]) ->
     return trace(field, traced.count), field
 
 
-def lean(scene: MuscleCase, axis: Floats) -> float:
+def lean(case: MuscleCase, axis: Floats) -> float:
     """The lean of fibres that are given against the unit vector ``axis`` (3,): the root mean square of ``sin 2 a``, a their
     angle to it, which is the shear by their tension. 0 of those that are traced from one attachment to the other.
     """
-    if scene.fibres.polylines is None:
+    if case.fibres.polylines is None:
         return 0.0
-    given = scene.fibres.polylines
-    lines = files.read_polylines(scene.file(given.file, "fibres.polylines.file"), given.unit)
+    given = case.fibres.polylines
+    lines = files.read_polylines(case.file(given.file, "fibres.polylines.file"), given.unit)
     pieces = np.delete(np.diff(lines.points, axis=0), lines.offsets[1:-1] - 1, axis=0)
     lengths, along = np.linalg.norm(pieces, axis=1), np.abs(pieces @ axis)
     cosine = along / np.maximum(lengths, np.finfo(float).tiny)

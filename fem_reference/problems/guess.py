@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from fem_reference.foundations.mesh import Floats, diagonal, enclosed_volume, vertex_areas
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.signed_distance import signed_distances
-from fem_reference.problems.setup import RigidBody, Setup
+from fem_reference.problems.setup import Bone, Setup
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +20,7 @@ class Guess:
     """
 
     points: Floats
-    bones: tuple[RigidBody, ...]
+    bones: tuple[Bone, ...]
     weights: Floats
 
     @classmethod
@@ -45,7 +45,7 @@ class Guess:
         return replace(self, points=self.points[every], weights=self.weights[every])
 
 
-def distance(bone: RigidBody, points: Floats) -> Floats:
+def distance(bone: Bone, points: Floats) -> Floats:
     """The signed distance (n,) [mm] of ``points`` to a bone at rest."""
     return bone.solid.sample(points).distance if bone.solid else signed_distances(points, bone.surface)
 

@@ -45,8 +45,8 @@ from fem_reference.problems.body import Body
 from fem_reference.problems.contact import check_exempt, check_outside, check_thickness
 from fem_reference.problems.muscle_body import body_of
 from fem_reference.problems.problem import AtRest
-from fem_reference.problems.setup import AttachedVertices, RigidBody, Setup
-from fem_reference.scenes.bones import Bone
+from fem_reference.problems.setup import AttachedVertices, Bone, Setup
+from fem_reference.scenes.bones import CaseBone
 from fem_reference.scenes.muscle import MuscleCase
 
 
@@ -56,7 +56,7 @@ def kept_meshes() -> Path | None:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem(Setup):
+class MuscleProblem(Setup):
     """A setup filled with tetrahedra (``mesh.facets`` by attachment), with its effects and fibres; ``fibre``, the direction of the
     fibres at any point, where an effect needs it; ``skin``, the contact surface, where there is contact; ``attached_skins``, by
     attachment by springs, what these pull at; ``mesh_facts`` are what the mesh is like, ``seconds`` how long it took
@@ -79,7 +79,7 @@ class Problem(Setup):
         return None if self.fibre is None else self.fibre(np.arange(len(middles)), middles)
 
     @property
-    def muscle(self) -> "Problem":
+    def muscle(self) -> "MuscleProblem":
         """Itself."""
         return self
 
@@ -105,40 +105,40 @@ class Problem(Setup):
         files.write_tets(folder / "tets.vtu", self.mesh, self.mesh.points)
 
 
-def setup(scene: MuscleCase) -> Setup:
-    """Read and check the surfaces of a scene and choose its attachments; InputError names what is not usable."""
-    place = join(scene.place, "muscle.surface")
-    surface = files.read_surface(scene.file(scene.muscle.surface, "muscle.surface"), scene.muscle.unit)
+def setup(case: MuscleCase) -> Setup:
+    """Read and check the surfaces of a case and choose its attachments; InputError names what is not usable."""
+    place = join(case.place, "muscle.surface")
+    surface = files.read_surface(case.file(case.muscle.surface, "muscle.surface"), case.muscle.unit)
     surface = check_closed(Surface(surface.points, surface.triangles, f"{place}: {surface.place}"))
-    bones = tuple(_body(scene, i, surface) for i in range(len(scene.bone)))
-    return Setup(surface, bones, _attached(scene, surface, bones), scene.frames.numbers, scene.frames.interval)
+    bones = tuple(_body(case, i, surface) for i in range(len(case.bone)))
+    return Setup(surface, bones, _attached(case, surface, bones), case.frames.numbers, case.frames.interval)
 
 
-def build(scene: MuscleCase, rest: Setup) -> Problem:
-    """The whole problem of a scene: its setup ``rest``, filled with tetrahedra and fibres."""
+def build(case: MuscleCase, rest: Setup) -> MuscleProblem:
+    """The whole problem of a case: its setup ``rest``, filled with tetrahedra and fibres."""
     begin = time.perf_counter()
-    contact = among(scene.effects)
-    distances_known = {} if contact is None else _distances(scene, rest, contact)
-    mesh = _filled(scene, rest, scene.muscle.tet_size)
+    contact = among(case.effects)
+    distances_known = {} if contact is None else _distances(case, rest, contact)
+    mesh = _filled(case, rest, case.muscle.tet_size)
     exact = tuple(attached.attachment for attached in rest.attached if attached.stiffness is None)
-    for _ in range(scene.muscle.refinements):
+    for _ in range(case.muscle.refinements):
         mesh = refined(mesh, rest.surface, exact)
     for i, attached in enumerate(rest.attached):
         if len(mesh.facets[attached.attachment]) == 0:
-            place = join(scene.place, f"attachment[{i}]")
+            place = join(case.place, f"attachment[{i}]")
             raise InputError(place, "an area smaller than the tetrahedra resolve", "a smaller muscle.tet_size")
-    fibres, fibre = fibre_field.of(scene, rest.surface, partial(_filled, scene, rest))
-    apart, asked = spacing(rest.surface), (*scene.effects, *(one.effect for one in scene.decisions))
-    return Problem(
+    fibres, fibre = fibre_field.of(case, rest.surface, partial(_filled, case, rest))
+    apart, asked = spacing(rest.surface), (*case.effects, *(one.effect for one in case.decisions))
+    return MuscleProblem(
         rest.surface,
         rest.bones,
         rest.attached,
         rest.frames,
         rest.interval,
         mesh=mesh,
-        effects=scene.effects,
+        effects=case.effects,
         fibres=fibres,
-        mesh_facts=_mesh_facts(rest, mesh, scene.muscle.tet_size / 2) | distances_known,
+        mesh_facts=_mesh_facts(rest, mesh, case.muscle.tet_size / 2) | distances_known,
         seconds=time.perf_counter() - begin,
         fibre=fibre if any("fibre" in effect.needs for effect in asked) else None,
         skin=None if contact is None else free_skin(rest.exempt, mesh, apart),
@@ -172,12 +172,12 @@ def _distances(case: MuscleCase, rest: Setup, contact: ContactEffect) -> dict[st
     }
 
 
-def _filled(scene: MuscleCase, rest: Setup, size: float) -> TetMesh:
+def _filled(case: MuscleCase, rest: Setup, size: float) -> TetMesh:
     """Tets of a ``size`` [mm], with the facets of each attachment: up to its rim where the mesher keeps it, else those
     under it.
     """
     shares = {attached.attachment: attached_shares(rest.surface, attached.vertices) for attached in rest.attached}
-    blocks = scene.muscle.mesher == "block"
+    blocks = case.muscle.mesher == "block"
     filled = partial(cached_mesh, tetrahedralise, shares=shares, folder=kept_meshes())
     mesh = block.fill(rest.surface, size) if blocks else filled(rest.surface, size)
     if set(mesh.facets) == set(shares):
@@ -185,26 +185,26 @@ def _filled(scene: MuscleCase, rest: Setup, size: float) -> TetMesh:
     return replace(mesh, facets={name: facets_under(mesh, rest.surface, attached) for name, attached in shares.items()})
 
 
-def _body(scene: MuscleCase, i: int, muscle: Surface) -> RigidBody:
-    bone, form = scene.bone[i], solid(scene.bone[i])
+def _body(case: MuscleCase, i: int, muscle: Surface) -> Bone:
+    bone, form = case.bone[i], solid(case.bone[i])
     motion = bone.motion.poses() if bone.motion else None
     if form is not None:
-        surface = tessellated(form, muscle.points, join(scene.place, f"bone[{i}]"))
-        return RigidBody(bone.name, surface, motion, solid=form)
-    assert bone.surface is not None  # a Bone record has a closed form or a surface with its unit
+        surface = tessellated(form, muscle.points, join(case.place, f"bone[{i}]"))
+        return Bone(bone.name, surface, motion, solid=form)
+    assert bone.surface is not None  # a CaseBone record has a closed form or a surface with its unit
     assert bone.unit is not None
-    surface = files.read_surface(scene.file(bone.surface, f"bone[{i}].surface"), bone.unit)
+    surface = files.read_surface(case.file(bone.surface, f"bone[{i}].surface"), bone.unit)
     check_finite(surface)
-    return RigidBody(bone.name, surface, motion, bone.distance_error, bone.distance_rounding)
+    return Bone(bone.name, surface, motion, bone.distance_error, bone.distance_rounding)
 
 
-def _attached(scene: MuscleCase, surface: Surface, bones: tuple[RigidBody, ...]) -> tuple[AttachedVertices, ...]:
+def _attached(case: MuscleCase, surface: Surface, bones: tuple[Bone, ...]) -> tuple[AttachedVertices, ...]:
     by_name = {bone.name: bone for bone in bones}
     taken = np.zeros(len(surface.points), bool)
     attached = []
-    for i, attachment in enumerate(scene.attachment):
-        place = join(scene.place, f"attachment[{i}]")
-        vertices = pick(scene, i, surface, by_name[attachment.bone].surface)
+    for i, attachment in enumerate(case.attachment):
+        place = join(case.place, f"attachment[{i}]")
+        vertices = pick(case, i, surface, by_name[attachment.bone].surface)
         if len(vertices) == 0:
             raise InputError(place, "no vertex of the muscle", "an attachment that selects some")
         if taken[vertices].any():
@@ -216,7 +216,7 @@ def _attached(scene: MuscleCase, surface: Surface, bones: tuple[RigidBody, ...])
     return tuple(attached)
 
 
-def solid(bone: Bone) -> Obstacle | None:
+def solid(bone: CaseBone) -> Obstacle | None:
     """The body of closed form that a ``bone`` of a scene is; None where it is a surface in a file."""
     given = ((name, getattr(bone, name)) for name in CLOSED_FORMS)
     return next((CLOSED_FORMS[name](**form.model_dump()) for name, form in given if form is not None), None)

@@ -14,9 +14,9 @@ from fem_reference.geometry.fibres import Directions
 from fem_reference.geometry.skins import Skin
 from fem_reference.problems.body import Body, Cells, Prescribed
 from fem_reference.problems.checks import check_agreement
-from fem_reference.problems.contact import Contact, Obstruction
+from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.problems.paths import Follows, From
-from fem_reference.problems.setup import RigidBody, Setup
+from fem_reference.problems.setup import Bone, Setup
 
 # Frame numbers before the first one over which an overlap at rest is removed.
 RELAXING = 10
@@ -64,19 +64,19 @@ def body_of(
     return body
 
 
-def _among_bones(body: Body, bones: tuple[RigidBody, ...], skin: Skin, effect: ContactEffect) -> Body:
+def _among_bones(body: Body, bones: tuple[Bone, ...], skin: Skin, effect: ContactEffect) -> Body:
     """The body with the bones in contact with it; where they overlap it at rest, it is relaxed before the first frame."""
-    bones = tuple(bone for bone in bones if effect.is_by(bone.name))
+    pressing = [bone for bone in bones if effect.is_by(bone.name)]
     first, points = body.frames[0], skin.points
-    nearest = min((_nearest(bone, points) for bone in bones), default=np.inf)
+    nearest = min((_nearest(bone, points) for bone in pressing), default=np.inf)
     before = first - RELAXING if nearest < effect.smoothing else None
-    law = Contact(skin, effect.stiffness, effect.smoothing, None if before is None else (before, first))
+    law = ContactLaw(skin, effect.stiffness, effect.smoothing, None if before is None else (before, first))
     frames = body.frames if before is None else (before, *body.frames)
-    obstructions = tuple(Obstruction(bone.name, bone.shape, From(first, bone.pose)) for bone in bones)
-    return replace(body, frames=frames, contact=law, obstructions=obstructions)
+    posed = tuple(ContactBone(bone.name, bone.shape, From(first, bone.pose)) for bone in pressing)
+    return replace(body, frames=frames, contact=law, bones=posed)
 
 
-def _nearest(bone: RigidBody, points: Floats) -> float:
+def _nearest(bone: Bone, points: Floats) -> float:
     """The least distance [mm] to a bone; InputError where a point is in its middle."""
     nearest, half = float(bone.shape.sample(points).distance.min(initial=np.inf)), bone.shape.half_thickness
     if nearest < -_MIDDLE * half:

@@ -10,11 +10,10 @@ from fem_reference.problems import contents, muscle, scalar
 from fem_reference.problems.body import Body
 from fem_reference.problems.estimates import Decision, decisions, estimates
 from fem_reference.problems.guess import described_motion
-from fem_reference.problems.muscle import Problem
-from fem_reference.problems.problem import Meshed
-from fem_reference.problems.problem import Problem as AnyProblem
+from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.problem import Meshed, Problem
 from fem_reference.problems.scalar import FieldProblem
-from fem_reference.problems.setup import RigidBody, Setup
+from fem_reference.problems.setup import Bone, Setup
 from fem_reference.problems.watch import Watch
 from fem_reference.scenes.case import Case
 from fem_reference.scenes.muscle import MuscleCase
@@ -23,7 +22,7 @@ from fem_reference.scenes.scalar import ScalarCase
 log = logging.getLogger(__name__)
 
 
-class CaseSetup(AnyProblem, Protocol):
+class CaseSetup(Problem, Protocol):
     """Facts on a case that are known before it is meshed, and all that judging its runs needs: the ``Setup`` of a muscle, or the
     whole ``FieldProblem``.
     """
@@ -33,7 +32,7 @@ class CaseSetup(AnyProblem, Protocol):
         """The formula of the solution, where it is known."""
 
     @property
-    def bones(self) -> tuple[RigidBody, ...]:
+    def bones(self) -> tuple[Bone, ...]:
         """The bones, of which a scalar field has none."""
 
     @property
@@ -50,10 +49,10 @@ class CaseSetup(AnyProblem, Protocol):
 
 
 class CaseProblem(CaseSetup, Meshed, Protocol):
-    """A problem as a solver of cases is given it: the ``Problem`` of a muscle, or the ``FieldProblem``."""
+    """A problem as a solver of cases is given it: the ``MuscleProblem`` of a muscle, or the ``FieldProblem``."""
 
     @property
-    def muscle(self) -> Problem | None:
+    def muscle(self) -> MuscleProblem | None:
         """The muscle, None of a scalar field."""
 
 

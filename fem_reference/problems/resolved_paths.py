@@ -1,6 +1,6 @@
 """Stops of load steps between frames, so that none leaves out what happens within it, whatever the frames.
 
-Between two stops nothing that is prescribed, and no obstruction, turns by more than a right angle, from half a turn on the straight
+Between two stops nothing that is prescribed, and no bone, turns by more than a right angle, from half a turn on the straight
 line between two poses no longer shows the direction; nothing goes farther, apart from what all do alike, than the body is
 long; and nothing goes there and back, but for a fifteenth of that distance and a hundredth of the body's size.
 

@@ -90,41 +90,41 @@ class FieldProblem:
         return next((effect for effect in self.effects if isinstance(effect, Advection)), None)
 
 
-def build(scene: ScalarCase, refinements: int = 0) -> FieldProblem:
-    """The problem of a scene, its mesh refined so many times; InputError names what is not usable."""
-    mesh = check(domain.mesh_of(scene))
-    _check_effects(scene, mesh)
+def build(case: ScalarCase, refinements: int = 0) -> FieldProblem:
+    """The problem of a case, its mesh refined so many times; InputError names what is not usable."""
+    mesh = check(domain.mesh_of(case))
+    _check_effects(case, mesh)
     average = float(mesh.points[:, 1].mean()) if mesh.points.shape[1] > 1 else 0.0
-    given = _given(scene, mesh)
+    given = _given(case, mesh)
     for _ in range(refinements):
         given = np.concatenate([given, _between(mesh, given)])
         mesh = refined(mesh)
-    velocity = next((effect.velocity for effect in scene.effects if isinstance(effect, Advection)), None)
-    diffusion = next(effect.coefficient for effect in scene.effects if isinstance(effect, Diffusion))
+    velocity = next((effect.velocity for effect in case.effects if isinstance(effect, Advection)), None)
+    diffusion = next(effect.coefficient for effect in case.effects if isinstance(effect, Diffusion))
     flow = np.zeros(mesh.points.shape[1]) if velocity is None else np.array(velocity)
-    peclet, tau = stabilisation(mesh, diffusion, flow, scene.element.order)
-    form = scene.element.form
-    fixed = _fixed(scene, mesh, given)
-    _check_unique(scene, fixed)
+    peclet, tau = stabilisation(mesh, diffusion, flow, case.element.order)
+    form = case.element.form
+    fixed = _fixed(case, mesh, given)
+    _check_unique(case, fixed)
     return FieldProblem(
         mesh,
-        scene.element.order,
-        scene.effects,
+        case.element.order,
+        case.effects,
         fixed,
-        tuple(_flux(entry, mesh) for entry in scene.boundary if entry.slope is not None),
+        tuple(_flux(entry, mesh) for entry in case.boundary if entry.slope is not None),
         share_above(mesh, average) if mesh.points.shape[1] > 1 else np.zeros(len(mesh.cells)),
         tau if form == "supg" or (form == "auto" and peclet > 1) else None,
         peclet,
-        scene.exact,
+        case.exact,
     )
 
 
-def _check_effects(scene: ScalarCase, mesh: FieldMesh) -> None:
+def _check_effects(case: ScalarCase, mesh: FieldMesh) -> None:
     dimension = mesh.points.shape[1]
-    if not any(isinstance(effect, Diffusion) for effect in scene.effects):
-        raise InputError(join(scene.place, "effect"), "no diffusion", "an effect with name diffusion")
-    for i, effect in enumerate(scene.effects):
-        place = join(scene.place, f"effect[{i}]")
+    if not any(isinstance(effect, Diffusion) for effect in case.effects):
+        raise InputError(join(case.place, "effect"), "no diffusion", "an effect with name diffusion")
+    for i, effect in enumerate(case.effects):
+        place = join(case.place, f"effect[{i}]")
         if isinstance(effect, Advection) and len(effect.velocity) != dimension:
             raise InputError(
                 f"{place}.velocity", f"{len(effect.velocity)} components", f"{dimension}, one a coordinate"
@@ -133,8 +133,8 @@ def _check_effects(scene: ScalarCase, mesh: FieldMesh) -> None:
             _try(effect.strength, mesh.points[mesh.cells].mean(axis=1), f"{place}.strength")
             if effect.where == "y above average" and dimension == 1:
                 raise InputError(f"{place}.where", f'"{effect.where}" on an interval', '"everywhere"')
-    if scene.exact is not None:
-        _try(scene.exact, mesh.points, join(scene.place, "exact"))
+    if case.exact is not None:
+        _try(case.exact, mesh.points, join(case.place, "exact"))
 
 
 def _try(formula: str, points: Floats, place: str) -> None:
@@ -161,12 +161,12 @@ def at(formula: str, points: Floats) -> Floats:
     return np.asarray(np.broadcast_to(values, len(points)), dtype=np.float64)
 
 
-def _given(scene: ScalarCase, mesh: FieldMesh) -> Floats:
+def _given(case: ScalarCase, mesh: FieldMesh) -> Floats:
     """The values (n,) that files of bounds prescribe at vertices, NaN where they prescribe none."""
     values = np.full(len(mesh.points), np.nan)
-    for i, entry in enumerate(scene.boundary):
+    for i, entry in enumerate(case.boundary):
         if entry.bounds is not None:
-            path = scene.file(entry.bounds, f"boundary[{i}].bounds")
+            path = case.file(entry.bounds, f"boundary[{i}].bounds")
             table = domain.numbers(path)
             if len(table) != 2:
                 raise InputError(path, f"{len(table)} rows", "2: vertices, and values")
@@ -191,12 +191,12 @@ def _between(mesh: FieldMesh, values: Floats) -> Floats:
     return middles
 
 
-def _fixed(scene: ScalarCase, mesh: FieldMesh, given: Floats) -> Floats:
+def _fixed(case: ScalarCase, mesh: FieldMesh, given: Floats) -> Floats:
     """The value at each node, NaN where it is free; InputError where two conditions disagree on one."""
-    fixed = given if scene.element.order == 1 else np.concatenate([given, _between(mesh, given)])
-    nodes, sloped = mesh.nodes[scene.element.order], np.empty(0, np.int64)
-    for i, entry in enumerate(scene.boundary):
-        place = join(scene.place, f"boundary[{i}]")
+    fixed = given if case.element.order == 1 else np.concatenate([given, _between(mesh, given)])
+    nodes, sloped = mesh.nodes[case.element.order], np.empty(0, np.int64)
+    for i, entry in enumerate(case.boundary):
+        place = join(case.place, f"boundary[{i}]")
         if entry.on is not None:
             if entry.where is not None:
                 _try(entry.where, mesh.points, f"{place}.where")
@@ -212,7 +212,7 @@ def _fixed(scene: ScalarCase, mesh: FieldMesh, given: Floats) -> Floats:
             key = "slope" if entry.value is None else "value"
             _try(str(getattr(entry, key)), mesh.points[np.unique(facets)], f"{place}.{key}")
         if entry.value is not None:
-            which = _nodes_of(facets, mesh, scene.element.order)
+            which = _nodes_of(facets, mesh, case.element.order)
             values = at(entry.value, nodes[which])
             clash = np.flatnonzero(np.abs(fixed[which] - values) > 1e-12 * (1 + np.abs(values)))
             if len(clash):
@@ -257,9 +257,9 @@ def _flux(entry: Boundary, mesh: FieldMesh) -> Flux:
     return Flux(_facets(entry, mesh), entry.slope)
 
 
-def _check_unique(scene: ScalarCase, fixed: Floats) -> None:
+def _check_unique(case: ScalarCase, fixed: Floats) -> None:
     """InputError where a constant can be added to the solution."""
-    if np.isnan(fixed).all() and not any(isinstance(effect, Reaction) and effect.rate for effect in scene.effects):
+    if np.isnan(fixed).all() and not any(isinstance(effect, Reaction) and effect.rate for effect in case.effects):
         raise InputError(
-            join(scene.place, "boundary"), "no value anywhere and no reaction", "a value somewhere, or a reaction"
+            join(case.place, "boundary"), "no value anywhere and no reaction", "a value somewhere, or a reaction"
         )

@@ -29,7 +29,7 @@ def kept_distances() -> Path:
 
 
 @dataclass(frozen=True, eq=False)
-class RigidBody:
+class Bone:
     """A rigid bone: its ``surface`` at rest, its ``motion``, None where it rests, and how its distance shall be known, as
     ``scene.Bone`` has it [mm]; or the ``solid`` of closed form whose vertices the surface has.
     """
@@ -61,7 +61,7 @@ class AttachedVertices:
     """
 
     attachment: str
-    bone: RigidBody
+    bone: Bone
     vertices: Ints
     stiffness: float | None = None
 
@@ -74,7 +74,7 @@ class Setup:
     """
 
     surface: Surface
-    bones: tuple[RigidBody, ...]
+    bones: tuple[Bone, ...]
     attached: tuple[AttachedVertices, ...]
     frames: tuple[int, ...]
     interval: float | None

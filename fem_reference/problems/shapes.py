@@ -35,7 +35,7 @@ _APEX = 0.3
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class Brick:
     """A part of a body: ``place`` takes points (n, 3) of the unit cube smoothly to points (n, 3) [mm], ``counts`` are the cells
     along its axes, ``faces`` names the region of the surface that a face of the cube, x0 to z1, is in.
 
@@ -47,7 +47,7 @@ class Block:
     faces: dict[str, str] = field(default_factory=dict)
 
 
-def mapped(blocks: Sequence[Block], kind: Kind, degree: int) -> Cells:
+def mapped(blocks: Sequence[Brick], kind: Kind, degree: int) -> Cells:
     """The body that ``blocks`` make up: nodes at the same place are one, every cell has a positive Jacobian."""
     grids = [tuple(degree * count + 1 for count in block.counts) for block in blocks]
     units = [np.indices(grid).reshape(3, -1).T / np.subtract(grid, 1) for grid in grids]
@@ -130,7 +130,7 @@ def box(counts: Counts, size: tuple[float, float, float], kind: Kind, degree: in
 
     """
     check_box(counts, size, kind, degree)
-    return mapped([Block(lambda unit: unit * size, counts, _SIX)], kind, degree)
+    return mapped([Brick(lambda unit: unit * size, counts, _SIX)], kind, degree)
 
 
 def warped_box(
@@ -145,7 +145,7 @@ def warped_box(
         height = bump * np.sin(np.pi * unit).prod(axis=1)
         return np.asarray((unit + height[:, None] * [1.0, -0.7, 0.5]) * size)
 
-    return mapped([Block(place, counts, _SIX)], kind, degree)
+    return mapped([Brick(place, counts, _SIX)], kind, degree)
 
 
 def tube_quarter(inner: float, outer: float, length: float, counts: Counts, kind: Kind, degree: int) -> Cells:
@@ -159,7 +159,7 @@ def tube_quarter(inner: float, outer: float, length: float, counts: Counts, kind
         return np.stack([radius * np.cos(angle), radius * np.sin(angle), length * unit[:, 2]], axis=1)
 
     faces = {"x0": "inner", "x1": "outer", "y0": "y0", "y1": "x0", "z0": "bottom", "z1": "top"}
-    return mapped([Block(place, counts, faces)], kind, degree)
+    return mapped([Brick(place, counts, faces)], kind, degree)
 
 
 def sphere_octant(inner: float, outer: float, n: int, layers: int, kind: Kind, degree: int) -> Cells:
@@ -169,7 +169,7 @@ def sphere_octant(inner: float, outer: float, n: int, layers: int, kind: Kind, d
     equal angles. Faces: inner, outer, x0, y0, z0.
     """
 
-    def patch(axis: int) -> Block:
+    def patch(axis: int) -> Brick:
         one, other = (other for other in range(3) if other != axis)
 
         def place(unit: Floats) -> Floats:
@@ -179,7 +179,7 @@ def sphere_octant(inner: float, outer: float, n: int, layers: int, kind: Kind, d
             return np.asarray(direction * (radius / np.linalg.norm(direction, axis=1))[:, None])
 
         faces = {"x0": f"{'xyz'[one]}0", "y0": f"{'xyz'[other]}0", "z0": "inner", "z1": "outer"}
-        return Block(place, (n, n, layers), faces)
+        return Brick(place, (n, n, layers), faces)
 
     return mapped([patch(axis) for axis in range(3)], kind, degree)
 
@@ -199,7 +199,7 @@ def _fan(unit: Floats, half: float, low: float, side: tuple[int, int]) -> Floats
     return points * [sign, 1] if axis == 0 else points[:, ::-1] * [1, sign]
 
 
-def _disc(place: Map, half: float, counts: Counts, faces: dict[str, str], *, quarter: bool) -> list[Block]:
+def _disc(place: Map, half: float, counts: Counts, faces: dict[str, str], *, quarter: bool) -> list[Brick]:
     """Blocks of a body over the unit disc, or its quarter x, y >= 0: ``place`` takes (x, y, third in [0, 1]) to points [mm].
 
     A square of ``half`` the side is in the middle; ``counts``: cells along half its side, from it to the circle and along the
@@ -213,14 +213,14 @@ def _disc(place: Map, half: float, counts: Counts, faces: dict[str, str], *, qua
     def middle(unit: Floats) -> Floats:
         return place(np.column_stack([_square(low + (1 - low) * unit[:, :2], half), unit[:, 2]]))
 
-    def fan(axis: int, sign: int) -> Block:
+    def fan(axis: int, sign: int) -> Brick:
         def outside(unit: Floats) -> Floats:
             return place(np.column_stack([_fan(unit, half, low, (axis, sign)), unit[:, 2]]))
 
-        return Block(outside, (rings, along, layers), faces | cuts[1 + axis])
+        return Brick(outside, (rings, along, layers), faces | cuts[1 + axis])
 
     fans = [fan(axis, sign) for axis in range(2) for sign in ((1,) if quarter else (1, -1))]
-    return [Block(middle, (along, along, layers), ends | cuts[0]), *fans]
+    return [Brick(middle, (along, along, layers), ends | cuts[0]), *fans]
 
 
 def cylinder(radius: float, length: float, rings: int, slices: int, kind: Kind, degree: int) -> Cells:
@@ -272,7 +272,7 @@ def ball_octant(core: float, outer: float, n: int, layers: int, kind: Kind, degr
     size, far = core / n, outer - core
     growth = brentq(lambda q: size * (q**layers - 1) / (q - 1) - far, 1 + 1e-9, 1 + far / size)
 
-    def patch(axis: int) -> Block:
+    def patch(axis: int) -> Brick:
         one, other = (other for other in range(3) if other != axis)
 
         def place(unit: Floats) -> Floats:
@@ -284,7 +284,7 @@ def ball_octant(core: float, outer: float, n: int, layers: int, kind: Kind, degr
             share = (growth ** (layers * unit[:, 2:]) - 1) / (growth**layers - 1)
             return np.asarray(core * face + share * (sphere - core * face))
 
-        return Block(place, (n, n, layers), {"x0": f"{'xyz'[one]}0", "y0": f"{'xyz'[other]}0", "z1": "outer"})
+        return Brick(place, (n, n, layers), {"x0": f"{'xyz'[one]}0", "y0": f"{'xyz'[other]}0", "z1": "outer"})
 
-    middle = Block(lambda unit: core * unit, (n, n, n), {face: face for face in ("x0", "y0", "z0")})
+    middle = Brick(lambda unit: core * unit, (n, n, n), {face: face for face in ("x0", "y0", "z0")})
     return mapped([middle, *(patch(axis) for axis in range(3))], kind, degree)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fem_reference.foundations.motion import Rotation, Translation
-from fem_reference.problems.setup import RigidBody
+from fem_reference.problems.setup import Bone
 from fem_reference.report.words import number
 from fem_reference.scenes.case import Case
 
@@ -22,14 +22,14 @@ class Column:
     at: Callable[[int], float]
 
 
-def columns(scene: Case, setup: Any) -> list[Column]:
+def columns(case: Case, setup: Any) -> list[Column]:
     """Time [s], where the case has any, and the motions of its bones."""
-    interval = getattr(getattr(scene, "frames", None), "interval", None)
+    interval = getattr(getattr(case, "frames", None), "interval", None)
     found = [] if interval is None else [Column("time", "s", lambda frame: frame * float(interval))]
     return found + motions(getattr(setup, "bones", ()))
 
 
-def motions(bones: Iterable[RigidBody]) -> list[Column]:
+def motions(bones: Iterable[Bone]) -> list[Column]:
     """The angle [°] by which each bone that moves is turned, or the distance [mm] by which it is shifted."""
     found = list[Column]()
     for bone in bones:
@@ -41,10 +41,10 @@ def motions(bones: Iterable[RigidBody]) -> list[Column]:
     return found
 
 
-def label(scene: Case, setup: Any, frame: int) -> str:
+def label(case: Case, setup: Any, frame: int) -> str:
     """A frame in words: its number, and in brackets what is known of it."""
     known = [
-        f"{one.name} {number(one.at(frame))}{'' if one.unit == '°' else ' '}{one.unit}" for one in columns(scene, setup)
+        f"{one.name} {number(one.at(frame))}{'' if one.unit == '°' else ' '}{one.unit}" for one in columns(case, setup)
     ]
     return f"frame {frame}" + (f" ({', '.join(known)})" if known else "")
 

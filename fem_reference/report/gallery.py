@@ -19,7 +19,7 @@ from fem_reference.foundations.errors import MissingSoftware
 from fem_reference.foundations.mesh import Floats, Surface
 from fem_reference.foundations.subprocesses import command, environment
 from fem_reference.metrics import find
-from fem_reference.problems.setup import RigidBody, Setup
+from fem_reference.problems.setup import Bone, Setup
 from fem_reference.report import pictures
 from fem_reference.report.drawings import picture_source
 from fem_reference.runs.store import Run
@@ -121,7 +121,7 @@ def ramp() -> str:
     return ", ".join(to_hex(colour) for colour in mpl.colormaps[pictures.COLOURS](np.linspace(0, 1, 17)))
 
 
-def directions(surface: Surface, bones: tuple[RigidBody, ...]) -> Floats:
+def directions(surface: Surface, bones: tuple[Bone, ...]) -> Floats:
     """Unit vectors (2, 3) towards the cameras: along the smallest and the middle principal axis of the surface.
 
     From the first its silhouette is largest, the second is a quarter turn about its long axis from there. Both cameras
@@ -139,7 +139,7 @@ def directions(surface: Surface, bones: tuple[RigidBody, ...]) -> Floats:
     return np.asarray(views[np.argsort(hidden, kind="stable")[:2]])
 
 
-def _hidden(points: Floats, view: Floats, bones: tuple[RigidBody, ...]) -> bool:
+def _hidden(points: Floats, view: Floats, bones: tuple[Bone, ...]) -> bool:
     """True where most of ``points`` (n, 3) have a bone of closed form before them within four times ``view`` (3,) to the camera."""
     behind = np.zeros(len(points), bool)
     for solid in (bone.solid for bone in bones if bone.solid is not None):

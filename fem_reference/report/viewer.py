@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.thinning import thin
-from fem_reference.problems.setup import RigidBody
+from fem_reference.problems.setup import Bone
 from fem_reference.report import gallery, pictures
 from fem_reference.report.viewer_fields import Fields, joints
 from fem_reference.runs.store import Run
@@ -201,7 +201,7 @@ def _positions(frames: Floats, box: _Box) -> str:
     return _packed((zigzag & 255).astype(np.uint8).tobytes() + (zigzag >> 8).astype(np.uint8).tobytes())
 
 
-def _bone(bone: RigidBody, numbers: tuple[int, ...]) -> dict[str, Any]:
+def _bone(bone: Bone, numbers: tuple[int, ...]) -> dict[str, Any]:
     surface = thin(bone.surface, BONE_TRIANGLES)
     box = _Box.around(surface.points.min(axis=0), surface.points.max(axis=0))
     return {

@@ -20,7 +20,7 @@ from fem_reference.assessment import local_fields
 from fem_reference.assessment.comparison import Comparison
 from fem_reference.foundations.mesh import Floats, Polylines
 from fem_reference.metrics import MeasurementContext
-from fem_reference.problems.setup import RigidBody
+from fem_reference.problems.setup import Bone
 from fem_reference.report.at_frames import motions
 from fem_reference.report.tables import finite
 from fem_reference.runs.store import Run
@@ -139,7 +139,7 @@ class Fields:
         }
 
 
-def joints(bones: tuple[RigidBody, ...], numbers: tuple[int, ...]) -> list[dict[str, Any]]:
+def joints(bones: tuple[Bone, ...], numbers: tuple[int, ...]) -> list[dict[str, Any]]:
     """The angle [degrees] or the distance [mm] of each bone that moves, by frame."""
     return [
         {

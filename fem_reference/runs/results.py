@@ -169,7 +169,7 @@ def of_run(folder: Path | str, case: str | Path | Case) -> Results:
     scene = read_muscle(case) if isinstance(case, str | Path) else muscle(case)
     if run.origin.get("scene") != scene.key:
         raise InputError(folder, f"a run of another scene than {scene.place}", "the scene that was solved")
-    return Results(mesh, scene.effects, states.Stored(folder, run.numbers), fibre)
+    return Results(mesh, scene.effects, states.StoredStates(folder, run.numbers), fibre)
 
 
 class _Places:

@@ -95,7 +95,7 @@ def read_rest(folder: Path) -> tuple[TetMesh, Floats | None]:
     return TetMesh(arrays["points"], arrays["tets"]), arrays["fibre"] if len(arrays["fibre"]) else None
 
 
-class Stored(Mapping[float, NodalState]):
+class StoredStates(Mapping[float, NodalState]):
     """The states of the run in ``folder`` by frame number, read as they are asked for; the last one is kept."""
 
     def __init__(self, folder: Path, frames: tuple[int, ...]) -> None:

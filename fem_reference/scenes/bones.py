@@ -71,7 +71,7 @@ class Motion(Record):
         return Rotation(self.axis, self.centre, frames, tuple(key.angle or 0.0 for key in self.keyframes))
 
 
-class HalfSpace(Record):
+class CaseHalfSpace(Record):
     """All that lies behind the plane through ``point`` across ``normal``, which points out of it."""
 
     point: Point
@@ -83,7 +83,7 @@ class HalfSpace(Record):
         return _checked_direction(normal, "a normal")
 
 
-class Box(Record):
+class CaseBox(Record):
     """A box about ``centre`` with edges along the axes, of outer ``size``, edges and corners of radius ``rounding``."""
 
     centre: Point
@@ -105,7 +105,7 @@ class Box(Record):
         return rounding
 
 
-class Sphere(Record):
+class CaseSphere(Record):
     """A ball of ``radius`` about ``centre``."""
 
     centre: Point
@@ -127,7 +127,7 @@ class Rod(Record):
         return end
 
 
-class Bone(Record):
+class CaseBone(Record):
     """A rigid body: exactly one of a ``surface`` in a file, its coordinates in ``unit``, and the closed forms; without ``motion``
     it rests. ``distance_error``: the error allowed in the distance to a surface, root mean square beside it, before
     ``distance_rounding`` takes its Gaussian mean, of this standard deviation: on flat triangles nothing slides smoothly.
@@ -136,9 +136,9 @@ class Bone(Record):
     name: Name
     surface: str | None = None
     unit: LengthUnit | None = None
-    half_space: HalfSpace | None = None
-    box: Box | None = None
-    sphere: Sphere | None = None
+    half_space: CaseHalfSpace | None = None
+    box: CaseBox | None = None
+    sphere: CaseSphere | None = None
     capsule: Rod | None = None
     cylinder: Rod | None = None
     motion: Motion | None = None

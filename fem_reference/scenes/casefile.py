@@ -149,15 +149,15 @@ def _with_negative_control(table: dict[str, Any], path: Path) -> Case:
         ) from error
 
 
-def _check_negative_control(scene: Case, changed: Case) -> None:
-    control = scene.negative_control
-    if control is None or changed.decides != scene.decides:
+def _check_negative_control(case: Case, changed: Case) -> None:
+    control = case.negative_control
+    if control is None or changed.decides != case.decides:
         return
-    if changed.model_copy(update={"negative_control": control}) == scene:
-        place = join(scene.place, "negative_control.value")
+    if changed.model_copy(update={"negative_control": control}) == case:
+        place = join(case.place, "negative_control.value")
         raise InputError(place, _value_text(control), f"a value that changes {control.key}")
     want = "a key that changes what is solved, which alone can turn a verdict: of an effect, say"
-    raise InputError(join(scene.place, "negative_control.key"), f'"{control.key}"', want)
+    raise InputError(join(case.place, "negative_control.key"), f'"{control.key}"', want)
 
 
 def _value_text(control: NegativeControl) -> str:
@@ -227,40 +227,40 @@ def _effect(table: Any, place: str, kind: type[Record]) -> Record:
     return parse(find_effect(table["name"]), {key: value for key, value in table.items() if key != "name"}, place)
 
 
-def _check_names(scene: MuscleCase) -> None:
+def _check_names(case: MuscleCase) -> None:
     """Names are used once and refer to something."""
-    bones = [bone.name for bone in scene.bone]
-    attachments = [attachment.name for attachment in scene.attachment]
-    check_acting(scene.effects, bones, scene.frames, scene.place)
-    _check_once([*attachments, FREE], join(scene.place, "attachment"))
-    traced = scene.fibres.traced
+    bones = [bone.name for bone in case.bone]
+    attachments = [attachment.name for attachment in case.attachment]
+    check_acting(case.effects, bones, case.frames, case.place)
+    _check_once([*attachments, FREE], join(case.place, "attachment"))
+    traced = case.fibres.traced
     ends = [(f"fibres.traced.{end}", getattr(traced, end)) for end in ("start", "end") if traced]
-    _check_used(bones, [(f"attachment[{i}].bone", entry.bone) for i, entry in enumerate(scene.attachment)], scene.place)
-    _check_used(attachments, ends, scene.place)
-    _check_forces(scene)
-    loads = [(f"effect[{i}].on", effect.on) for i, effect in enumerate(scene.effects) if isinstance(effect, Load)]
-    _check_used([*attachments, FREE], loads, scene.place)
+    _check_used(bones, [(f"attachment[{i}].bone", entry.bone) for i, entry in enumerate(case.attachment)], case.place)
+    _check_used(attachments, ends, case.place)
+    _check_forces(case)
+    loads = [(f"effect[{i}].on", effect.on) for i, effect in enumerate(case.effects) if isinstance(effect, Load)]
+    _check_used([*attachments, FREE], loads, case.place)
 
 
-def _check_forces(scene: MuscleCase) -> None:
+def _check_forces(case: MuscleCase) -> None:
     """Forces are reported by the name of the bone, and something keeps the muscle from drifting."""
-    bones = [bone.name for bone in scene.bone]
-    contact = among(scene.effects) is not None
-    for i, attachment in enumerate(scene.attachment):
+    bones = [bone.name for bone in case.bone]
+    contact = among(case.effects) is not None
+    for i, attachment in enumerate(case.attachment):
         if contact and attachment.name in bones:
-            place = join(scene.place, f"attachment[{i}].name")
+            place = join(case.place, f"attachment[{i}].name")
             raise InputError(place, f'"{attachment.name}", which a bone in contact has too', "a name of its own")
-    if not scene.attachment and not any(
-        isinstance(effect, Damping) or "momentum" in effect.needs for effect in scene.effects
+    if not case.attachment and not any(
+        isinstance(effect, Damping) or "momentum" in effect.needs for effect in case.effects
     ):
         want = 'an attachment, soft as it may be, or the effect "damping" or "inertia": without any the muscle drifts'
-        raise InputError(join(scene.place, "attachment"), "none", want)
+        raise InputError(join(case.place, "attachment"), "none", want)
 
 
-def _candidate_names(scene: Case) -> list[str]:
+def _candidate_names(case: Case) -> list[str]:
     """Names of runs: the reference and each candidate, which have names of their own."""
-    names = ["reference", *(candidate.name for candidate in scene.candidate)]
-    _check_once([*names, "candidates"], join(scene.place, "candidate"))
+    names = ["reference", *(candidate.name for candidate in case.candidate)]
+    _check_once([*names, "candidates"], join(case.place, "candidate"))
     return names
 
 
@@ -277,18 +277,18 @@ def _check_used(known: list[str], uses: list[tuple[str, str]], place: str) -> No
             raise InputError(join(place, key), f'"{name}"', want)
 
 
-def _check_rest(scene: MuscleCase) -> None:
+def _check_rest(case: MuscleCase) -> None:
     """At the first frame every bone is where its surface is, and nothing acts that comes and goes: the muscle rests."""
-    for i, effect in enumerate(scene.effects):
-        if isinstance(effect, Ramped) and effect.amount(scene.frames.first) != 0:
-            got = f"an amount of {effect.amount(scene.frames.first):g} at frame {scene.frames.first}, the first"
-            raise InputError(join(scene.place, f"effect[{i}].ramp"), got, "0 there, where the muscle rests")
-    for i, bone in enumerate(scene.bone):
-        pose = bone.motion.poses().pose(scene.frames.first) if bone.motion else np.eye(4)
+    for i, effect in enumerate(case.effects):
+        if isinstance(effect, Ramped) and effect.amount(case.frames.first) != 0:
+            got = f"an amount of {effect.amount(case.frames.first):g} at frame {case.frames.first}, the first"
+            raise InputError(join(case.place, f"effect[{i}].ramp"), got, "0 there, where the muscle rests")
+    for i, bone in enumerate(case.bone):
+        pose = bone.motion.poses().pose(case.frames.first) if bone.motion else np.eye(4)
         if not abs(pose - np.eye(4)).max() <= 1e-12:  # NaN is no rest
             slid = np.array_equal(pose[:3, :3], np.eye(3))
             what, want = ("moved", "distance 0 there") if slid else ("turned", "angle 0 there")
-            raise InputError(join(scene.place, f"bone[{i}].motion"), f"a bone {what} at the first frame", want)
+            raise InputError(join(case.place, f"bone[{i}].motion"), f"a bone {what} at the first frame", want)
 
 
 def check_acting(acting: tuple[Record, ...], bones: list[str], frames: Frames, place: str) -> None:

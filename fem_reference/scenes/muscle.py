@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 from fem_reference.effects import Effect
 from fem_reference.foundations.records import Name, Record
 from fem_reference.foundations.units import AreaStiffness, LengthUnit, PositiveLength, Time
-from fem_reference.scenes.bones import Bone
+from fem_reference.scenes.bones import CaseBone
 from fem_reference.scenes.case import Case
 
 MOST_FRAMES = 100_000
@@ -124,7 +124,7 @@ class MuscleCase(Case):
 
     choice: Literal["listed", "auto"] = Field(default="listed", alias="effects")
     muscle: Muscle
-    bone: tuple[Bone, ...] = Field(min_length=1)
+    bone: tuple[CaseBone, ...] = Field(min_length=1)
     attachment: tuple[Attachment, ...] = ()
     fibres: Fibres
     frames: Frames

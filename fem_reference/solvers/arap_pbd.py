@@ -22,8 +22,8 @@ from fem_reference.runs.store import Outcome, Sink
 from fem_reference.solvers.arap import Alternation, GlobalStep, Relaxed, Symmetric, VertexCells, alternate, farthest
 from fem_reference.solvers.common.protocol import MuscleSolver, Trade
 from fem_reference.solvers.common.state_checks import Trouble
-from fem_reference.solvers.pbd import PbdConstraints, Stiffness
-from fem_reference.solvers.pbd_kernels import project_dihedrals, project_distances, project_volume, volume
+from fem_reference.solvers.pbd import PbdConstraints, Stiffness, sweep
+from fem_reference.solvers.pbd_kernels import volume
 
 # The volume counts as reached when it is off by this share, and as out of reach after this many steps of Newton's method.
 _REACHED, _STEPS = 1e-12, 20
@@ -144,9 +144,7 @@ def projected(points: Floats, rest: PbdConstraints, projections: Projections) ->
     """``points`` (n, 3) after the sweeps of PBD's projections."""
     moved = points.copy()
     for _ in range(projections.sweeps):
-        project_distances(moved, rest.inverse_masses, rest.edges, rest.lengths, projections.stretch * rest.share)
-        project_volume(moved, rest.inverse_masses, rest.triangles, rest.six_volumes, projections.volume)
-        project_dihedrals(moved, rest.inverse_masses, rest.hinges, rest.angles, projections.bending)
+        sweep(moved, rest, projections.stretch, projections.volume, projections.bending)
     return moved
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fem_reference.foundations.mesh import Floats, Ints
 from fem_reference.geometry.signed_distance import FAR, Grid
-from fem_reference.problems.setup import RigidBody
+from fem_reference.problems.setup import Bone
 from fem_reference.solvers.compiled_kernels import compiled
 from fem_reference.solvers.pbd_kernels import Vector
 
@@ -122,7 +122,7 @@ class CollidingBone:
     jumps at the first step. Vertices that are not ``free`` (n,) are never asked.
     """
 
-    def __init__(self, bone: RigidBody, rest: Floats, free: NDArray[np.bool_], gap: float) -> None:
+    def __init__(self, bone: Bone, rest: Floats, free: NDArray[np.bool_], gap: float) -> None:
         self.bone, shape = bone, bone.shape
         self.grid = shape if isinstance(shape, Grid) else None
         self.coefficients = np.array(shape.coefficients) if isinstance(shape, Grid) else np.zeros((0, 0, 0))
@@ -159,6 +159,13 @@ class CollidingBone:
     def _known(self, distance: Floats) -> Floats:
         """Not more than what the distance is for sure: beyond the margin of a grid it is coarse."""
         return distance if self.grid is None else np.minimum(distance, self.grid.margin)
+
+
+def colliding_bones(bones: Sequence[Bone], rest: Floats, attached: Ints, gap: float) -> list[CollidingBone]:
+    """The ``bones`` that points, at ``rest`` (n, 3) [mm], collide with, but for those ``attached`` (k,)."""
+    free = np.ones(len(rest), bool)
+    free[attached] = False
+    return [CollidingBone(bone, rest, free, gap) for bone in bones]
 
 
 def move_out(points: Floats, bones: Sequence[CollidingBone], stiffness: float) -> None:

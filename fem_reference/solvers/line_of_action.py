@@ -17,8 +17,8 @@ from fem_reference.foundations.mesh import Floats, Ints, Polylines
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record, join
 from fem_reference.geometry.wrapping import Paths, WrappingCylinder, WrappingSphere, WrappingSurface, straight
-from fem_reference.problems.muscle import Problem
-from fem_reference.problems.setup import RigidBody
+from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.setup import Bone
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.scenes import bones
 from fem_reference.solvers.common.frame_loop import each
@@ -36,7 +36,7 @@ class Via(Record):
     bone: str
 
 
-class SphereOn(bones.Sphere):
+class SphereOn(bones.CaseSphere):
     """A sphere, given at rest, that moves with a ``bone``."""
 
     bone: str
@@ -77,7 +77,7 @@ class Lines:
     the share ``share[j]`` of its length.
     """
 
-    bones: tuple[RigidBody, ...]
+    bones: tuple[Bone, ...]
     fixed: Floats
     on: Ints
     part: Ints
@@ -96,7 +96,7 @@ class Wrap:
     """An ``obstacle``, given at rest, on a ``bone``; ``name`` is what messages call it."""
 
     obstacle: WrappingSurface
-    bone: RigidBody
+    bone: Bone
     name: str
 
 
@@ -105,7 +105,7 @@ class Shortest:
 
     advice = "a smaller radius may help"
 
-    def __init__(self, problem: Problem, settings: LineSettings) -> None:
+    def __init__(self, problem: MuscleProblem, settings: LineSettings) -> None:
         self.problem, self.vias = problem, len(settings.via)
         self.lines, self.wrap = _made(problem, settings, "line_of_action")
         self.cost = {"seconds_compile": 0.0}
@@ -135,17 +135,17 @@ class Shortest:
         return Outcome("converged", f"{len(self.lines.fixed)} lines, {kind}{around}; no surface")
 
 
-def solve(problem: Problem, settings: LineSettings, sink: Sink) -> Outcome:
+def solve(problem: MuscleProblem, settings: LineSettings, sink: Sink) -> Outcome:
     """The lines at every frame wanted, up to one with a fixed point inside the obstacle; InputError where that is the first."""
     return each(Shortest(problem, settings), problem.frames, sink)
 
 
-def check(settings: LineSettings, problem: Problem, place: str) -> None:
+def check(settings: LineSettings, problem: MuscleProblem, place: str) -> None:
     """InputError below ``place`` where lines cannot go through and around what the settings say."""
     _made(problem, settings, place)
 
 
-def _made(problem: Problem, settings: LineSettings, place: str) -> tuple[Lines, Wrap | None]:
+def _made(problem: MuscleProblem, settings: LineSettings, place: str) -> tuple[Lines, Wrap | None]:
     """The lines and the obstacle; InputError below ``place`` where the case has not what they need, or a fixed point is inside the
     obstacle at the first frame.
     """
@@ -182,7 +182,7 @@ def _inside(wrap: Wrap, fixed: Floats, number: int) -> str:
     return "" if depths[line] <= _TOUCHES else f"a fixed point of line {line} {depths[line]:.3g} mm inside"
 
 
-def _wrap(problem: Problem, settings: LineSettings, place: str) -> Wrap | None:
+def _wrap(problem: MuscleProblem, settings: LineSettings, place: str) -> Wrap | None:
     """The obstacle of the settings, None without one."""
     if (ball := settings.sphere) is not None:
         bone = problem.bones[_index(problem.bones, ball.bone, join(place, "sphere.bone"))]
@@ -194,7 +194,7 @@ def _wrap(problem: Problem, settings: LineSettings, place: str) -> Wrap | None:
     return None
 
 
-def _lines(problem: Problem, settings: LineSettings, place: str) -> Lines:
+def _lines(problem: MuscleProblem, settings: LineSettings, place: str) -> Lines:
     fibres, places = problem.fibres, [0.0, *(via.at for via in settings.via), 1.0]
     vias = [_index(problem.bones, via.bone, join(place, f"via[{i}].bone")) for i, via in enumerate(settings.via)]
     parts, count = len(places) - 1, len(fibres)
@@ -234,7 +234,7 @@ def _spread(count: int, places: list[float]) -> tuple[Ints, Floats]:
     return part, (np.arange(count) - at[part]) / np.diff(at)[part]
 
 
-def _nearest(problem: Problem, points: Floats, place: str) -> Ints:
+def _nearest(problem: MuscleProblem, points: Floats, place: str) -> Ints:
     """The index of the bone (n,) whose attachment has the vertex nearest to each of ``points`` (n, 3)."""
     if not problem.attached:
         raise InputError(place, "a muscle without attachments", "attachments that lines are fixed to")
@@ -248,7 +248,7 @@ def _nearest(problem: Problem, points: Floats, place: str) -> Ints:
     return np.array(found)[np.argmin(away, axis=0)]
 
 
-def _index(bodies: tuple[RigidBody, ...], name: str, place: str) -> int:
+def _index(bodies: tuple[Bone, ...], name: str, place: str) -> int:
     names = [body.name for body in bodies]
     if name not in names:
         raise InputError(place, f'"{name}"', f"one of {', '.join(names)}")

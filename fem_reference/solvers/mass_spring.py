@@ -19,13 +19,13 @@ from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import AccelerationVector, Density, Stiffness, Time, positive
 from fem_reference.geometry.embedding import Locator
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.runs.store import Frame, Outcome, Sink
-from fem_reference.solvers.collision_kernels import CollidingBone, move_out
+from fem_reference.solvers.collision_kernels import colliding_bones, move_out
 from fem_reference.solvers.common.frame_loop import carry, follow, other_clock, refused, tetrahedron
 from fem_reference.solvers.common.protocol import MuscleSolver, Trade
 from fem_reference.solvers.common.state_checks import Trouble, first_trouble, surface_checks
-from fem_reference.solvers.pbd import PbdCollision, colliding_bones
+from fem_reference.solvers.pbd import PbdCollision
 from fem_reference.solvers.spring_kernels import Network, PrescribedPath, advance, forces
 
 # Where no time step is asked for, it is this share of the greatest that is stable.
@@ -120,16 +120,20 @@ class MassSpringModel:
     bones that others collide with; masses are at ``points`` (n, 3) [mm], and were at ``previous`` a step before.
     """
 
-    def __init__(self, problem: Problem, settings: MassSpringSettings, seconds_compile: float = 0.0) -> None:
+    def __init__(self, problem: MuscleProblem, settings: MassSpringSettings, seconds_compile: float = 0.0) -> None:
         mesh, collision, locator = problem.mesh, settings.collision, Locator(problem.mesh)
         self.problem, self.settings, self.network = problem, settings, network_of(mesh, settings)
         self.attached = [np.unique(mesh.facets[entry.attachment]) for entry in problem.attached]
         self.fixed = np.unique(np.concatenate([np.zeros(0, np.int64), *self.attached]))
-        self.bones = [] if collision is None else _colliding_bones(problem, self.fixed, collision.gap)
+        skin = boundary(mesh.tets)[0]
+        still = np.union1d(
+            self.fixed, np.setdiff1d(np.arange(len(mesh.points)), skin)
+        )  # what is inside collides with nothing
+        self.bones = [] if collision is None else colliding_bones(problem.bones, mesh.points, still, collision.gap)
         self.surface, self.fibres = locator.embed(problem.surface.points), locator.embed(problem.fibres.points)
         self.points = problem.begin(mesh.points)
         self.previous = self.points.copy()
-        self.checks = surface_checks(Surface(mesh.points, boundary(mesh.tets)[0]), self.fixed)
+        self.checks = surface_checks(Surface(mesh.points, skin), self.fixed)
         longest = settings.time_step or SHARE_OF_STABLE * stable_time_step(self.network, self.fixed)
         self.wanted = settings.frame_time / longest
         self.steps = max(1, math.ceil(self.wanted - 1e-9))
@@ -199,15 +203,7 @@ class MassSpringModel:
         return Outcome("converged", done + note + other_clock(self.problem, self.settings.frame_time))
 
 
-def _colliding_bones(problem: Problem, fixed: Ints, gap: float) -> list[CollidingBone]:
-    """All bones, which the free masses of the surface collide with."""
-    loose = np.zeros(len(problem.mesh.points), bool)
-    loose[boundary(problem.mesh.tets)[0]] = True
-    loose[fixed] = False
-    return [CollidingBone(bone, problem.mesh.points, loose, gap) for bone in problem.bones]
-
-
-def solve(problem: Problem, settings: MassSpringSettings, sink: Sink) -> Outcome:
+def solve(problem: MuscleProblem, settings: MassSpringSettings, sink: Sink) -> Outcome:
     """Step from rest at the first of ``problem.frames`` to the last of them; each frame wanted goes into ``sink``."""
     model = MassSpringModel(problem, settings, _compile(settings))
     if model.wanted > _MOST_STEPS:
@@ -233,7 +229,8 @@ def _compile(settings: MassSpringSettings) -> float:
     advance(points, points.copy(), network, PrescribedPath(np.zeros(0, np.int64), nothing, nothing), 0.1, 1)
     forces(points, network)
     if settings.collision is not None:
-        move_out(np.zeros((4, 3)), colliding_bones(tetrahedron(), 0.0), 1.0)
+        tet, nobody = tetrahedron(), np.zeros(0, np.int64)
+        move_out(np.zeros((4, 3)), colliding_bones(tet.bones, tet.surface.points, nobody, 0.0), 1.0)
     return time.perf_counter() - begin
 
 

@@ -20,7 +20,7 @@ from fem_reference.foundations.records import Record
 from fem_reference.foundations.units import Length
 from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Outcome, Sink
-from fem_reference.solvers.collision_kernels import CollidingBone, move_out
+from fem_reference.solvers.collision_kernels import CollidingBone, colliding_bones, move_out
 from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow, timed
 from fem_reference.solvers.common.protocol import MuscleSolver, Trade
 from fem_reference.solvers.pbd_kernels import (
@@ -139,7 +139,11 @@ def solve(setup: Setup, settings: PbdSettings, sink: Sink) -> Outcome:
 def moving_surface(settings: PbdSettings, setup: Setup) -> MovingSurface:
     """The surface of ``setup`` with its constraints."""
     constraints = constraints_of(setup, settings)
-    bones = [] if settings.collision is None else colliding_bones(setup, settings.collision.gap)
+    bones = (
+        []
+        if settings.collision is None
+        else colliding_bones(setup.bones, setup.surface.points, setup.attached_vertices, settings.collision.gap)
+    )
 
     def iterate(points: Floats, displacement: Floats, frame: int) -> tuple[Floats, Floats]:
         carry(points, setup, frame)
@@ -149,8 +153,8 @@ def moving_surface(settings: PbdSettings, setup: Setup) -> MovingSurface:
             points, displacement = advance(points, displacement, constraints, settings, bones)
         return points, displacement
 
-    sweep = len(constraints.edges) + len(constraints.hinges) + 1
-    return MovingSurface(setup, iterate, sweep * settings.solver_iterations * settings.sub_iterations)
+    each = len(constraints.edges) + len(constraints.hinges) + 1
+    return MovingSurface(setup, iterate, each * settings.solver_iterations * settings.sub_iterations)
 
 
 def constraints_of(setup: Setup, settings: PbdSettings) -> PbdConstraints:
@@ -164,11 +168,11 @@ def constraints_of(setup: Setup, settings: PbdSettings) -> PbdConstraints:
     return replace(found, share=1 - settings.anisotropy * along_fibres(surface.points, found.edges, fibres))
 
 
-def colliding_bones(setup: Setup, gap: float) -> list[CollidingBone]:
-    """All bones, which free vertices collide with."""
-    loose = np.ones(len(setup.surface.points), bool)
-    loose[setup.attached_vertices] = False
-    return [CollidingBone(bone, setup.surface.points, loose, gap) for bone in setup.bones]
+def sweep(points: Floats, at: PbdConstraints, stretch: float, volume: float, bending: float) -> None:
+    """Project all constraints once, each with the stiffness of its kind: ``points`` (n, 3) [mm] move in place."""
+    project_distances(points, at.inverse_masses, at.edges, at.lengths, stretch * at.share)
+    project_volume(points, at.inverse_masses, at.triangles, at.six_volumes, volume)
+    project_dihedrals(points, at.inverse_masses, at.hinges, at.angles, bending)
 
 
 def advance(
@@ -180,11 +184,8 @@ def advance(
 ) -> tuple[Floats, Floats]:
     """Positions (n, 3) [mm] and ``displacement`` = dt v (n, 3) [mm] after one step of Algorithm 1, lines 8 to 20."""
     moved = points + (1 - settings.damping) * displacement
-    at = constraints
     for _ in range(settings.solver_iterations):
-        project_distances(moved, at.inverse_masses, at.edges, at.lengths, settings.stretch * at.share)
-        project_volume(moved, at.inverse_masses, at.triangles, at.six_volumes, settings.volume)
-        project_dihedrals(moved, at.inverse_masses, at.hinges, at.angles, settings.bending)
+        sweep(moved, constraints, settings.stretch, settings.volume, settings.bending)
         if settings.collision is not None:
             move_out(moved, bones, settings.collision.stiffness)
     return moved, moved - points

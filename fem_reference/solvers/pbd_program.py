@@ -44,7 +44,7 @@ from pydantic import Field
 from fem_reference.foundations.mesh import Floats, Ints, Surface
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import Record
-from fem_reference.problems.setup import RigidBody, Setup
+from fem_reference.problems.setup import Bone, Setup
 from fem_reference.runs.store import Outcome, Sink
 from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow, timed
 from fem_reference.solvers.common.protocol import MuscleSolver, Trade
@@ -117,7 +117,7 @@ class VoxelBone:
     The pose is the product of all motions, as there, and not the one ``given``: they differ by rounding.
     """
 
-    def __init__(self, body: RigidBody, count: int, frame: int) -> None:
+    def __init__(self, body: Bone, count: int, frame: int) -> None:
         self.body, self.voxels = body, Voxels.of(body.surface, count)
         self.given = self.pose = body.pose(frame)
         self.last = np.eye(4)

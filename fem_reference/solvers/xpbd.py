@@ -34,10 +34,10 @@ from fem_reference.foundations.units import (
 )
 from fem_reference.problems.setup import Setup
 from fem_reference.runs.store import Outcome, Sink
-from fem_reference.solvers.collision_kernels import CollidingBone
+from fem_reference.solvers.collision_kernels import CollidingBone, colliding_bones
 from fem_reference.solvers.common.frame_loop import MovingSurface, carry, follow, other_clock, timed
 from fem_reference.solvers.common.protocol import MuscleSolver, Trade
-from fem_reference.solvers.pbd import colliding_bones, hinges_of
+from fem_reference.solvers.pbd import hinges_of
 from fem_reference.solvers.pbd_kernels import dihedrals, distances, volume
 from fem_reference.solvers.xpbd_kernels import pull_dihedrals, pull_distances, pull_volume
 
@@ -225,7 +225,8 @@ def _contacts(setup: Setup, settings: XpbdSettings) -> list[BoneContact]:
     if settings.collision is None:
         return []
     softness = 1 / (settings.collision.stiffness * vertex_areas(setup.surface.points, setup.surface.triangles))
-    return [BoneContact(bone, softness) for bone in colliding_bones(setup, settings.collision.gap)]
+    places = setup.surface.points, setup.attached_vertices
+    return [BoneContact(bone, softness) for bone in colliding_bones(setup.bones, *places, settings.collision.gap)]
 
 
 _EXAMPLE = {"frame_time": "20 ms", "sub_steps": 2, "sweeps": 2, "density": "1060 kg/m3", "stretch": "0.4 N/mm"}

@@ -92,11 +92,11 @@ def _kept(key: str, store: Path, case: str) -> list[Bench[MuscleCase]]:  # noqa:
     return []
 
 
-def shared_bench(scene: MuscleCase, store: Path) -> Bench[MuscleCase]:
-    """The bench, and so the tetrahedra, that runs on a scene share in this process."""
-    kept = _kept(scene.key, store, str(scene.folder))
+def shared_bench(case: MuscleCase, store: Path) -> Bench[MuscleCase]:
+    """The bench, and so the tetrahedra, that runs on a case share in this process."""
+    kept = _kept(case.key, store, str(case.folder))
     if not kept:
-        kept.append(Bench(scene, store, ranks=1))
+        kept.append(Bench(case, store, ranks=1))
     return kept[0]
 
 

@@ -32,30 +32,30 @@ def ladders(problem: CaseSetup, case: Case) -> tuple[Ladder, ...]:
     return () if problem.field is None else tuple(_ladders(problem.field, of_case.scalar_case(case)))
 
 
-def _ladders(coarse: FieldProblem, scene: ScalarCase) -> Iterator[Ladder]:
+def _ladders(coarse: FieldProblem, case: ScalarCase) -> Iterator[Ladder]:
     kind = coarse.mesh.cells.shape[1]
     growth = 2 if kind == 2 else 4
     levels = min(_REFINEMENTS[kind], int(math.log(_MOST_CELLS / len(coarse.mesh.cells), growth)))
     if levels < 1:
         return
-    settings = solvers.settings(scene.reference, join(scene.place, "reference"), "solve_field")
-    solver = solvers.find(scene.reference.solver, scene.place, "solve_field")
+    settings = solvers.settings(case.reference, join(case.place, "reference"), "solve_field")
+    solver = solvers.find(case.reference.solver, case.place, "solve_field")
 
     def solved(order: int, level: int) -> tuple[FieldProblem, Floats]:
-        element = Element(order=order, form=scene.element.form)  # type: ignore[arg-type]
-        built = scalar.build(scene.model_copy(update={"element": element}), level)
+        element = Element(order=order, form=case.element.form)  # type: ignore[arg-type]
+        built = scalar.build(case.model_copy(update={"element": element}), level)
         return built, solver.run(built, settings).values[0]
 
-    error, against = _error(scene, lambda: solved(2, levels)[1])
+    error, against = _error(case, lambda: solved(2, levels)[1])
     for order in (1, 2):
         # Without an exact solution the finest one of order 2 is what the others are measured against.
-        finest = levels if order == 1 or scene.exact is not None else levels - 1
+        finest = levels if order == 1 or case.exact is not None else levels - 1
         steps = [solved(order, level) for level in range(finest + 1)]
         errors = tuple(error(*step) for step in steps)
         scale = float(np.abs(steps[-1][1]).max())
         exact = len(errors) < 2 or not errors[-1] > _EXACT * scale
         measured = math.nan if exact else math.log2(errors[-2] / errors[-1])
-        log.info("%s: elements of order %d measured on %d meshes", scene.name, order, len(steps))
+        log.info("%s: elements of order %d measured on %d meshes", case.name, order, len(steps))
         yield Ladder(f"P{order}", tuple(len(built.mesh.cells) for built, _ in steps), errors, measured, against)
 
 

@@ -70,34 +70,34 @@ def alone(found: Study, case: CaseStudy) -> Study:
     return replace(found, cases=(case,), missing={})
 
 
-def _of(scene: MuscleCase, store: Path, workers: Workers, only: Collection[str]) -> CaseStudy:
-    bench = Bench(scene, store)
-    log.info("%s: the truth", scene.name)
-    truth = bench.obtain("reference", scene.reference, "reference")
+def _of(case: MuscleCase, store: Path, workers: Workers, only: Collection[str]) -> CaseStudy:
+    bench = Bench(case, store)
+    log.info("%s: the truth", case.name)
+    truth = bench.obtain("reference", case.reference, "reference")
     if truth.outcome.status != "converged" or truth.fibres is None:
-        raise InputError(scene.place, f"a reference that {truth.outcome.status}", "one that reaches all frames")
+        raise InputError(case.place, f"a reference that {truth.outcome.status}", "one that reaches all frames")
     bars = refinement.bars(bench, truth, model=False)
     context = context_of(bench.setup(), truth)
     trials = list[Trial]()
-    if not only or scene.reference.solver in only:
-        trials += reference_trials(scene)
-    if not only or set(only) - {scene.reference.solver}:
+    if not only or case.reference.solver in only:
+        trials += reference_trials(case)
+    if not only or set(only) - {case.reference.solver}:
         own = len(truth.surface.triangles)
         others = [
-            (f"{4.0**power:g} times", resample(scene, bench.setup(), power, store / SURFACES))
+            (f"{4.0**power:g} times", resample(case, bench.setup(), power, store / SURFACES))
             for power in _POWERS
             if power < 0 or 4**power * own <= _MOST_TRIANGLES
         ]
-        trials += [one for one in candidate_trials(scene, dict(others)) if not only or one.choice.solver in only]
+        trials += [one for one in candidate_trials(case, dict(others)) if not only or one.choice.solver in only]
     made = carry_out(trials, store, workers)
     points = list[Point]()
     for i, one in enumerate(made):
         log.info("measuring run %d of %d: %s", i + 1, len(made), one.trial.label)
-        points.append(_point(scene, one, truth, context))
-    size = scene.muscle.tet_size / 2**scene.muscle.refinements
+        points.append(_point(case, one, truth, context))
+    size = case.muscle.tet_size / 2**case.muscle.refinements
     return CaseStudy(
-        case=scene.name,
-        title=scene.title,
+        case=case.name,
+        title=case.title,
         truth=f"its reference on tetrahedra of {size:.3g} mm",
         points=tuple(points),
         units=metrics.units(),
@@ -105,7 +105,7 @@ def _of(scene: MuscleCase, store: Path, workers: Workers, only: Collection[str])
         claims=_claims(made, truth, context, store),
         triangles=len(truth.surface.triangles),
         travel=context.travel,
-        features=features(scene, bench.setup()),
+        features=features(case, bench.setup()),
     )
 
 
@@ -117,10 +117,10 @@ def known(bars: ErrorBars | None) -> dict[str, float]:
     return {name: value for name, value in worst.items() if math.isfinite(value)}
 
 
-def _point(scene: MuscleCase, one: Made, truth: Run, context: MeasurementContext) -> Point:
+def _point(case: MuscleCase, one: Made, truth: Run, context: MeasurementContext) -> Point:
     trial, run = one.trial, one.run
     return Point(
-        case=scene.name,
+        case=case.name,
         solver=trial.choice.solver,
         name=trial.name,
         knob=trial.knob,

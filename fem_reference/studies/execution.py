@@ -18,7 +18,7 @@ from fem_reference.foundations.usage import forget_peak_memory, peak_memory
 from fem_reference.foundations.version import __version__
 from fem_reference.problems import of_case
 from fem_reference.problems.estimates import Decision
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.of_case import CaseProblem, CaseSetup
 from fem_reference.problems.setup import Setup
 from fem_reference.problems.watch import Watch
@@ -75,7 +75,7 @@ class Bench[C: Case]:
         return self._setup()
 
     @overload
-    def problem(self: "Bench[MuscleCase]") -> Problem: ...
+    def problem(self: "Bench[MuscleCase]") -> MuscleProblem: ...
     @overload
     def problem(self) -> CaseProblem: ...
     def problem(self) -> CaseProblem:

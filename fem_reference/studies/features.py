@@ -10,7 +10,7 @@ from fem_reference.problems.setup import Setup
 from fem_reference.scenes.muscle import MuscleCase
 
 
-def features(scene: MuscleCase, setup: Setup) -> dict[str, float]:
+def features(case: MuscleCase, setup: Setup) -> dict[str, float]:
     """``size`` [mm], the diagonal of the muscle's box; ``triangles``; ``motion`` [mm], the greatest displacement of an
     attached vertex over the frames; ``contact``, how many bones may press; ``bulk_to_shear`` and ``fibres_to_shear`` of the
     material, 0 where it has none; ``tet_size`` [mm] and ``refinements`` of the reference.
@@ -22,9 +22,9 @@ def features(scene: MuscleCase, setup: Setup) -> dict[str, float]:
         for number in setup.frames
         if len(entry.vertices)
     ]
-    contact = among(scene.effects)
-    shear, bulk, fibres = moduli(scene.effects)
-    pressing = 0 if contact is None else len(scene.bone if contact.bones is None else contact.bones)
+    contact = among(case.effects)
+    shear, bulk, fibres = moduli(case.effects)
+    pressing = 0 if contact is None else len(case.bone if contact.bones is None else contact.bones)
     return {
         "size": diagonal(points),
         "triangles": float(len(setup.surface.triangles)),
@@ -32,6 +32,6 @@ def features(scene: MuscleCase, setup: Setup) -> dict[str, float]:
         "contact": float(pressing),
         "bulk_to_shear": bulk / shear if shear else 0.0,
         "fibres_to_shear": fibres / shear if shear else 0.0,
-        "tet_size": float(scene.muscle.tet_size),
-        "refinements": float(scene.muscle.refinements),
+        "tet_size": float(case.muscle.tet_size),
+        "refinements": float(case.muscle.refinements),
     }

@@ -43,32 +43,32 @@ class Trial:
         return f"{self.name}, {self.knob} = {self.value}" if self.knob else f"{self.name}, as it is"
 
 
-def reference_trials(scene: MuscleCase) -> Iterator[Trial]:
-    """The reference of a scene on other tetrahedra; and on coarse ones with each setting varied that its solver says trades
+def reference_trials(case: MuscleCase) -> Iterator[Trial]:
+    """The reference of a case on other tetrahedra; and on coarse ones with each setting varied that its solver says trades
     accuracy for time, and with contact stiffer and softer.
     """
-    whole = Trial(scene, scene.reference, "reference")
+    whole = Trial(case, case.reference, "reference")
     yield whole
     yield from _sizes(whole)
-    size, refinements = scene.muscle.tet_size, scene.muscle.refinements
+    size, refinements = case.muscle.tet_size, case.muscle.refinements
     base = _on(whole, size, refinements - 1) if refinements else _on(whole, _COARSER * size, 0)
     yield from _settings(base)
     yield from _contact(base)
 
 
-def candidate_trials(scene: MuscleCase, surfaces: Mapping[str, MuscleCase]) -> Iterator[Trial]:
-    """The candidates of a scene, and those that Table 5.1 has on every scene: as they are, with each setting varied that
-    their solver says trades accuracy for time, and on other meshes; ``surfaces``: by what they are called, the scene on
+def candidate_trials(case: MuscleCase, surfaces: Mapping[str, MuscleCase]) -> Iterator[Trial]:
+    """The candidates of a case, and those that Table 5.1 has on every scene: as they are, with each setting varied that
+    their solver says trades accuracy for time, and on other meshes; ``surfaces``: by what they are called, the case on
     other triangles.
     """
     known = list[dict[str, Any]]()
-    for candidate in (*scene.candidate, *(one for row in solver_kinds() for one in row.candidate)):
+    for candidate in (*case.candidate, *(one for row in solver_kinds() for one in row.candidate)):
         offer = solvers.find(candidate.solver, candidate.name)
         settings = {"solver": candidate.solver} | candidate.settings
         if offer.moves == "nothing" or settings in known:
             continue
         known.append(settings)
-        whole = Trial(scene, candidate, candidate.name)
+        whole = Trial(case, candidate, candidate.name)
         yield whole
         yield from _settings(whole)
         if offer.moves == "tetrahedra":
@@ -150,9 +150,9 @@ def _contact(base: Trial) -> Iterator[Trial]:
             yield _changed(base, other, "error of distances to bones", text, "bone[*].distance_error")
 
 
-def _changed(base: Trial, scene: MuscleCase, knob: str, value: str, key: str) -> Trial:
+def _changed(base: Trial, case: MuscleCase, knob: str, value: str, key: str) -> Trial:
     """The trial ``base`` with another value in its scene."""
-    return replace(base, scene=scene, knob=knob, value=value + _beside(base), changed=base.changed | {key: value})
+    return replace(base, scene=case, knob=knob, value=value + _beside(base), changed=base.changed | {key: value})
 
 
 def _beside(base: Trial) -> str:

@@ -45,17 +45,17 @@ class LeftOut:
         return *self.effects, *self.features
 
 
-def study(scene: MuscleCase, store: Path, workers: Workers) -> CaseOmissions:
-    """The reference and the candidates of a scene, whole and with each thing left out that can be; runs are in ``store``, solved
+def study(case: MuscleCase, store: Path, workers: Workers) -> CaseOmissions:
+    """The reference and the candidates of a case, whole and with each thing left out that can be; runs are in ``store``, solved
     where that was not done before.
     """
     with fenicsx.shared():
         if workers == Workers():
-            _warm_up(scene, store)
-        wholes = carry_out(_wholes(scene), store, workers)
+            _warm_up(case, store)
+        wholes = carry_out(_wholes(case), store, workers)
         parted = [(whole, part) for whole in wholes if whole.reached for part in parts(whole.trial)]
         others = carry_out([_limited(without(whole.trial, part), whole) for whole, part in parted], store, workers)
-        bench, truth = shared_bench(scene, store), wholes[0].reached
+        bench, truth = shared_bench(case, store), wholes[0].reached
         context = None if truth is None or truth.fibres is None else context_of(bench.setup(), truth)
         bars, unknown = _bars(bench, truth)
     made = list(zip(parted, others, strict=True))
@@ -63,8 +63,8 @@ def study(scene: MuscleCase, store: Path, workers: Workers) -> CaseOmissions:
         _ablation(whole, [(part, other) for (own, part), other in made if own is whole], context) for whole in wholes
     )
     return CaseOmissions(
-        scene.name,
-        scene.title,
+        case.name,
+        case.title,
         tuple(ablations),
         {name: unit for name, unit in metrics.units().items() if name in MEASURES},
         bars,
@@ -119,8 +119,8 @@ def without(whole: Trial, part: LeftOut) -> Trial:
     return Trial(scene, choice, whole.name, "without", " and ".join(part.names), instead)
 
 
-def _kept(scene: MuscleCase, part: LeftOut) -> tuple[Effect, ...]:
-    return tuple(effect for effect in scene.effects if effect not in part.effects.values())
+def _kept(case: MuscleCase, part: LeftOut) -> tuple[Effect, ...]:
+    return tuple(effect for effect in case.effects if effect not in part.effects.values())
 
 
 def fitting(element: str, effects: Sequence[Effect]) -> str:
@@ -133,19 +133,19 @@ def fitting(element: str, effects: Sequence[Effect]) -> str:
     return next((name for name, one in others if (one[2] is not None) == brings))
 
 
-def _wholes(scene: MuscleCase) -> list[Trial]:
+def _wholes(case: MuscleCase) -> list[Trial]:
     """The reference, and the candidates of which something can be left out."""
-    trials = [Trial(scene, candidate, candidate.name) for candidate in scene.candidate]
+    trials = [Trial(case, candidate, candidate.name) for candidate in case.candidate]
     moving = (one for one in trials if solvers.find(one.choice.solver, one.name).moves != "nothing")
-    return [Trial(scene, scene.reference, "reference"), *(one for one in moving if parts(one))]
+    return [Trial(case, case.reference, "reference"), *(one for one in moving if parts(one))]
 
 
-def _warm_up(scene: MuscleCase, store: Path) -> None:
+def _warm_up(case: MuscleCase, store: Path) -> None:
     """Solve the first frames with each candidate, and keep nothing: what is then measured in this process is compiled, and its
     processor time is that of solving.
     """
-    bench = shared_bench(scene, store)
-    for trial in _wholes(scene)[1:]:
+    bench = shared_bench(case, store)
+    for trial in _wholes(case)[1:]:
         offer = solvers.find(trial.choice.solver, trial.name)
         if not solvers.takes_effects(trial.choice.solver):
             with suppress(InputError, MissingSoftware):  # of which its run says more
@@ -192,12 +192,12 @@ def _ablation(one: Made, others: Sequence[tuple[LeftOut, Made]], context: Measur
     return Ablation(trial.name, trial.choice.solver, kept, _omission(one, ()), tuple(found))
 
 
-def _predicted(scene: MuscleCase, part: LeftOut) -> dict[str, float]:
+def _predicted(case: MuscleCase, part: LeftOut) -> dict[str, float]:
     """The displacement of the surface by an effect, as its indicator estimates it, where that alone is left out."""
     if len(part.effects) != 1:
         return {}
     (left_out,) = part.effects.values()
-    (found,) = (one.indicator for one in of_case.explained(scene) if one.effect is left_out)
+    (found,) = (one.indicator for one in of_case.explained(case) if one.effect is left_out)
     return {"surface_deviation.rms": found.estimate} if found else {}
 
 

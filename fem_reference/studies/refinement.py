@@ -43,19 +43,19 @@ CHEAP = 0.2
 Vary = Callable[[MuscleCase], MuscleCase]
 
 
-def variations(scene: MuscleCase, settings: Record, *, pressed: bool = True) -> dict[str, Vary]:
+def variations(case: MuscleCase, settings: Record, *, pressed: bool = True) -> dict[str, Vary]:
     """Changes that each halve one cause of numerical error apart from tetrahedra, by name: of contact its stiffness and smoothing,
     and how well the distances to surfaces of bones are known and how far they are rounded, unless no bone ``pressed``; load
     steps, where the reference's ``settings`` have them, with drag or viscosity only: else a state does not depend on them.
     """
-    found, contact = dict[str, Vary](), among(scene.effects)
+    found, contact = dict[str, Vary](), among(case.effects)
     if contact is not None and pressed:
         found["contact stiffness"] = partial(with_contact, stiffness=2 * contact.stiffness)
         found["contact smoothing"] = partial(with_contact, smoothing=contact.smoothing / 2)
-        if any(bone.surface for bone in scene.bone):
+        if any(bone.surface for bone in case.bone):
             found["distances to bones"] = lambda one: with_distances(one, 0.5, "distance_error", "distance_rounding")
-    if any("interval" in effect.needs for effect in scene.effects) and "largest_step" in solvers.trades(type(settings)):
-        found["load steps"] = half_steps(scene, settings)
+    if any("interval" in effect.needs for effect in case.effects) and "largest_step" in solvers.trades(type(settings)):
+        found["load steps"] = half_steps(case, settings)
     return found
 
 
@@ -167,20 +167,20 @@ def safety(bench: Bench[MuscleCase]) -> float:
     return SAFETY * max(1.0, bench.scene.muscle.tet_size / min(radii))
 
 
-def coarser(scene: MuscleCase) -> tuple[MuscleCase, tuple[float, float]]:
-    """The scene with larger tetrahedra, and the sizes [mm] of its own and of these."""
-    size, refinements = scene.muscle.tet_size, scene.muscle.refinements
+def coarser(case: MuscleCase) -> tuple[MuscleCase, tuple[float, float]]:
+    """The case with larger tetrahedra, and the sizes [mm] of its own and of these."""
+    size, refinements = case.muscle.tet_size, case.muscle.refinements
     if refinements:
-        larger = on_tetrahedra(scene, refinements=refinements - 1)
+        larger = on_tetrahedra(case, refinements=refinements - 1)
         return larger, (size / 2**refinements, size / 2 ** (refinements - 1))
-    return on_tetrahedra(scene, tet_size=size * RATIO), (size, size * RATIO)
+    return on_tetrahedra(case, tet_size=size * RATIO), (size, size * RATIO)
 
 
-def _solved(bench: Bench[MuscleCase], scene: MuscleCase, name: str, reference: Run) -> Run:
+def _solved(bench: Bench[MuscleCase], case: MuscleCase, name: str, reference: Run) -> Run:
     """The reference's run of a changed scene, over the frames of ``reference``."""
-    other = Bench(scene, bench.store, bench.ranks)
+    other = Bench(case, bench.store, bench.ranks)
     try:
-        run = other.obtain(f"reference, {name}", without_states(scene.reference), "reference")
+        run = other.obtain(f"reference, {name}", without_states(case.reference), "reference")
     except InputError as error:
         got = f"a scene that cannot be set up ({error})"
         raise InputError(f"error bar, {name}", got, "a finer reference") from error

@@ -16,8 +16,8 @@ from fem_reference.runs.store import Run
 from fem_reference.scenes.muscle import Attachment, MuscleCase, VertexList
 
 
-def resample(scene: MuscleCase, setup: Setup, power: int, folder: Path) -> MuscleCase:
-    """The scene on a surface of ``4**power`` times as many triangles; its files go into ``folder``, named by what they contain.
+def resample(case: MuscleCase, setup: Setup, power: int, folder: Path) -> MuscleCase:
+    """The case on a surface of ``4**power`` times as many triangles; its files go into ``folder``, named by what they contain.
 
     A vertex is attached where the nearest of the original surface is.
     """
@@ -30,10 +30,10 @@ def resample(scene: MuscleCase, setup: Setup, power: int, folder: Path) -> Muscl
     attached = {entry.attachment: np.flatnonzero(np.isin(nearest, entry.vertices)) for entry in setup.attached}
     for name, vertices in attached.items():
         files.write_text(place / f"{name}.csv", "".join(f"{vertex}\n" for vertex in vertices))
-    muscle = scene.muscle.model_copy(update={"surface": str(place / "surface.vtp"), "unit": 1.0})
-    attachments = tuple(_listed(entry, place) for entry in scene.attachment)
+    muscle = case.muscle.model_copy(update={"surface": str(place / "surface.vtp"), "unit": 1.0})
+    attachments = tuple(_listed(entry, place) for entry in case.attachment)
     # No file names these surfaces, so that they may be where they are.
-    return scene.model_copy(update={"muscle": muscle, "attachment": attachments, "from_file": False})
+    return case.model_copy(update={"muscle": muscle, "attachment": attachments, "from_file": False})
 
 
 def _listed(entry: Attachment, place: Path) -> Attachment:

@@ -82,23 +82,23 @@ def _on(
     return Scenario(scene.name, scene.title, triangles, context.travel, reference.outcome), results
 
 
-def _chosen(scene: MuscleCase, rows: Iterable[SolverKind]) -> list[tuple[str, Candidate, str]]:
-    """The solvers measured on a scene, row by row: the kind, the candidate, and the place that names it."""
+def _chosen(case: MuscleCase, rows: Iterable[SolverKind]) -> list[tuple[str, Candidate, str]]:
+    """The solvers measured on a case, row by row: the kind, the candidate, and the place that names it."""
     found = list[tuple[str, Candidate, str]]()
     for row in rows:
-        for i, candidate in enumerate(scene.candidate):
+        for i, candidate in enumerate(case.candidate):
             if any(fnmatch(candidate.name, pattern) for pattern in row.of_case):
                 found.append((row.name, candidate, f"candidate[{i}]"))
         found += [(row.name, candidate, f"{row.name} of Table 5.1") for candidate in row.candidate]
     return found
 
 
-def _result(scene: MuscleCase, kind: str, run: Run, measures: tuple[Measure, ...]) -> SolverResult:
+def _result(case: MuscleCase, kind: str, run: Run, measures: tuple[Measure, ...]) -> SolverResult:
     cost, machine = run.outcome.cost, str(run.origin["machine"])
     # Time of a frame number where a solver makes one for each, so says candidate.toml; else of a frame that is wanted.
     each = cost.get("seconds_per_iteration", cost.get("seconds_per_frame"))
     seconds = seconds_per_frame(run) if each is None else each
     numbers, outcome, is_reference = run.numbers, run.outcome, kind == REFERENCE
     return SolverResult(
-        kind, run.name, run.solver, scene.name, outcome, seconds, measures, numbers, machine, of_reference=is_reference
+        kind, run.name, run.solver, case.name, outcome, seconds, measures, numbers, machine, of_reference=is_reference
     )

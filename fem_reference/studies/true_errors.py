@@ -46,17 +46,17 @@ def stake(scenes: Iterable[MuscleCase], store: Path) -> Claims:
     return Claims(tuple(claims), sizes, missing)
 
 
-def _of(scene: MuscleCase, store: Path) -> list[Claim]:
-    bench = Bench(scene, store)
-    reference = bench.obtain("reference", scene.reference, "reference")
+def _of(case: MuscleCase, store: Path) -> list[Claim]:
+    bench = Bench(case, store)
+    reference = bench.obtain("reference", case.reference, "reference")
     bars = refinement.bars(bench, reference)
     if bars is None:
         return []
     finer = Bench(refinement.finer(bench, reference, FINER), store)
-    run = complete(finer.obtain("finer", scene.reference, "reference"), reference.numbers)
+    run = complete(finer.obtain("finer", case.reference, "reference"), reference.numbers)
     if reference.fibres is None or run.outcome.status != "converged":
         return []
-    return claims_of(scene.name, bars, (reference, run), context_of(bench.setup(), reference))
+    return claims_of(case.name, bars, (reference, run), context_of(bench.setup(), reference))
 
 
 def claims_of(case: str, bars: ErrorBars, runs: tuple[Run, Run], context: MeasurementContext) -> list[Claim]:

@@ -13,7 +13,7 @@ from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere, Vector
 from fem_reference.problems import shapes
 from fem_reference.problems.body import ELEMENTS, Body
-from fem_reference.problems.contact import Contact, Obstruction
+from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.runs.store import Frame
 from fem_reference.verification.parts import SYMMETRY, clamped, neo_hooke
 from fem_reference.verification.truths import find
@@ -45,9 +45,9 @@ class Slide:
 def plate(lab: Lab, element: str, stiffness: float) -> Finding:
     """The force [N] of a smooth plate that is moved down on an eighth of a cube of 2 mm."""
     mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), ELEMENTS[element][0])
-    law = Contact("z1", stiffness, 0.01)
-    above = Obstruction("plate", HalfSpace((0.0, 0.0, 1.0), (0.0, 0.0, -1.0)), Slide((0.0, 0.0, -PLATE_TRAVEL)))
-    body = Body(mesh, neo_hooke(MU, PLATE_BULK), SYMMETRY, (0.0, 1.0), contact=law, obstructions=(above,))
+    law = ContactLaw("z1", stiffness, 0.01)
+    above = ContactBone("plate", HalfSpace((0.0, 0.0, 1.0), (0.0, 0.0, -1.0)), Slide((0.0, 0.0, -PLATE_TRAVEL)))
+    body = Body(mesh, neo_hooke(MU, PLATE_BULK), SYMMETRY, (0.0, 1.0), contact=law, bones=(above,))
     state = lab.solve(body, element, first_step=0.2, residual=1e-12).last
     return Finding(float(state.forces["plate"][2]), note=f"{state.scalars['contact_depth']:.4f} mm deep")
 
@@ -65,11 +65,9 @@ def known_plate() -> float:
 def pressed(lab: Lab, n: int, radius: float) -> Frame:
     """A quarter of a large body, z >= 0, into which a ball of ``radius`` [mm] is pressed by APPROACH."""
     mesh = shapes.ball_octant(CORE, FAR, n, 2 * n + 2, "hexahedron", 2)
-    law = Contact("z0", BALL_STIFFNESS, 5e-4)
-    ball = Obstruction("ball", Sphere((0.0, 0.0, -radius), radius), Slide((0.0, 0.0, APPROACH)))
-    body = Body(
-        mesh, neo_hooke(MU, BULK), (*SYMMETRY[:2], *clamped("outer")), (0.0, 1.0), contact=law, obstructions=(ball,)
-    )
+    law = ContactLaw("z0", BALL_STIFFNESS, 5e-4)
+    ball = ContactBone("ball", Sphere((0.0, 0.0, -radius), radius), Slide((0.0, 0.0, APPROACH)))
+    body = Body(mesh, neo_hooke(MU, BULK), (*SYMMETRY[:2], *clamped("outer")), (0.0, 1.0), contact=law, bones=(ball,))
     return lab.solve(body, "Q2/Q1", first_step=0.5, residual=1e-10, newton_iterations=25).last
 
 

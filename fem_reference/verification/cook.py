@@ -48,7 +48,7 @@ class Panel:
         """The panel in n by n cells."""
         membrane = getattr(cook, self.name)
         faces = {face: face for face in ("x0", "x1", "z0", "z1")}
-        mesh = shapes.mapped([shapes.Block(_place, (n, n, 1), faces)], ELEMENTS[self.element][0], 1)
+        mesh = shapes.mapped([shapes.Brick(_place, (n, n, 1), faces)], ELEMENTS[self.element][0], 1)
         pull = f"0, {membrane.traction * self.share}, 0 MPa"
         acting = (
             *neo_hooke(membrane.shear * self.shear, membrane.bulk * self.bulk, self.element),

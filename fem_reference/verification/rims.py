@@ -43,7 +43,7 @@ def _halves(counts: shapes.Counts, grading: float) -> Cells:
     blocks = []
     for sign in (-1.0, 1.0):
         faces = {"y0": "y0", "y1": "y1"} | ({"x0": "x0", "z0": "clamped"} if sign < 0 else {"x1": "pulled"})
-        blocks.append(shapes.Block(_Side(sign, 0.5, grading), counts, faces))
+        blocks.append(shapes.Brick(_Side(sign, 0.5, grading), counts, faces))
     return shapes.mapped(blocks, ELEMENTS[ELEMENT][0], 1)
 
 

@@ -11,12 +11,12 @@ from fem_reference import effects
 from fem_reference.assessment.catalogue import Entry, Finding, Lab
 from fem_reference.assessment.run_checks import of_muscle
 from fem_reference.foundations.records import parse
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.runs.store import Run
 from fem_reference.studies.hard import blocks
 from fem_reference.studies.hard.records import Hard
 
-Mistake = Callable[[Problem, Run], tuple[Problem, Run]]
+Mistake = Callable[[MuscleProblem, Run], tuple[MuscleProblem, Run]]
 
 
 def _slides(direction: list[float], distance: str) -> dict[str, object]:
@@ -24,7 +24,7 @@ def _slides(direction: list[float], distance: str) -> dict[str, object]:
     return {"direction": direction, "keyframes": stops}
 
 
-def bar(ball: str = "2 mm") -> Problem:
+def bar(ball: str = "2 mm") -> MuscleProblem:
     """A bar of 10 x 10 x 40 mm between two bones, one of which moves by 3 mm; a ball of 3 mm is pressed into it by ``ball``."""
     ball_bone = {"sphere": {"centre": "-3.2, 5, 20 mm", "radius": "3 mm"}, "motion": _slides([1, 0, 0], ball)}
     hold = [{"face": "z0"}, {"face": "z1", "motion": _slides([0, 1, 0], "3 mm")}]
@@ -43,17 +43,17 @@ def bar(ball: str = "2 mm") -> Problem:
     return blocks.problem(parse(Hard, table | {"name": "bar", "place": place, "effect": acting}, place))
 
 
-_SOLVED = WeakKeyDictionary[Lab, tuple[Problem, Run]]()
+_SOLVED = WeakKeyDictionary[Lab, tuple[MuscleProblem, Run]]()
 
 
-def solved(lab: Lab) -> tuple[Problem, Run]:
+def solved(lab: Lab) -> tuple[MuscleProblem, Run]:
     """The bar as a muscle, and its run, which a lab makes once."""
     if lab not in _SOLVED:
         _SOLVED[lab] = _solve(lab)
     return _SOLVED[lab]
 
 
-def _solve(lab: Lab) -> tuple[Problem, Run]:
+def _solve(lab: Lab) -> tuple[MuscleProblem, Run]:
     problem = bar()
     found = lab.solve(problem.body, "P2/P1", first_step=5.0)
     _, nodes = cKDTree(problem.mesh.points).query(problem.surface.points)
@@ -71,36 +71,36 @@ def denials(lab: Lab, mistake: Mistake | None = None) -> Finding:
     return Finding(float(len(lost)), note="; ".join(lost))
 
 
-def swapped(problem: Problem, run: Run) -> tuple[Problem, Run]:
+def swapped(problem: MuscleProblem, run: Run) -> tuple[MuscleProblem, Run]:
     """Two frames in each other's place."""
     return problem, replace(run, positions=run.positions[[0, 2, 1]])
 
 
-def missing(problem: Problem, run: Run) -> tuple[Problem, Run]:
+def missing(problem: MuscleProblem, run: Run) -> tuple[MuscleProblem, Run]:
     """The last frame missing."""
     return problem, replace(run, positions=run.positions[:2], numbers=run.numbers[:2])
 
 
-def lost(problem: Problem, run: Run) -> tuple[Problem, Run]:
+def lost(problem: MuscleProblem, run: Run) -> tuple[MuscleProblem, Run]:
     """A coordinate that is not a number."""
     positions = run.positions.copy()
     positions[2, 0, 1] = np.nan
     return problem, replace(run, positions=positions)
 
 
-def off(problem: Problem, run: Run) -> tuple[Problem, Run]:
+def off(problem: MuscleProblem, run: Run) -> tuple[MuscleProblem, Run]:
     """An attached vertex 0.01 mm off its bone."""
     positions = run.positions.copy()
     positions[1, problem.attached[0].vertices[0]] += [0.01, 0.0, 0.0]
     return problem, replace(run, positions=positions)
 
 
-def pushed(problem: Problem, run: Run) -> tuple[Problem, Run]:
+def pushed(problem: MuscleProblem, run: Run) -> tuple[MuscleProblem, Run]:
     """The ball 3 mm farther than the bar was pressed: within it."""
     return replace(problem, bones=bar("5 mm").bones), run
 
 
-def folded(problem: Problem, run: Run) -> tuple[Problem, Run]:
+def folded(problem: MuscleProblem, run: Run) -> tuple[MuscleProblem, Run]:
     """A vertex of one side of the bar 2 mm beyond the other side."""
     positions = run.positions.copy()
     positions[1, (run.surface.points == [10.0, 5.0, 20.0]).all(axis=1)] -= [12.0, 0.0, 0.0]

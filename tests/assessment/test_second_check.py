@@ -29,7 +29,7 @@ from fem_reference.io import files
 from fem_reference.problems import of_case
 from fem_reference.problems import shapes as bodies
 from fem_reference.problems.body import Body, Prescribed
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.paths import Affine
 from fem_reference.runs import store
 from fem_reference.runs.store import Frame, Outcome, Run, collected
@@ -169,7 +169,7 @@ because = "it is the same"
 
 
 @cache
-def coarse(folder: Path) -> Problem:
+def coarse(folder: Path) -> MuscleProblem:
     """The bar whose surface has 2 x 2 x 3 cells."""
     files.write_surface(folder / "bar.ply", BLOCK, BLOCK.points)
     (folder / "case.toml").write_text(SCENE.replace('effects = "listed"\n', ""))
@@ -177,12 +177,12 @@ def coarse(folder: Path) -> Problem:
     return of_case.problem(case, of_case.setup(case))
 
 
-def resting(problem: Problem, **scalars) -> Run:
+def resting(problem: MuscleProblem, **scalars) -> Run:
     positions = np.broadcast_to(problem.surface.points, (len(problem.frames), *problem.surface.points.shape))
     return Run("reference", "fenicsx", CONVERGED, problem.frames, problem.surface, positions, scalars=scalars)
 
 
-def lost(problem: Problem, run: Run) -> list[str]:
+def lost(problem: MuscleProblem, run: Run) -> list[str]:
     return [one.name for one in of_muscle(problem, run) if not one.met]
 
 
@@ -257,7 +257,7 @@ def test_bones_that_are_not_in_contact_may_cross(tmp_path) -> None:
     assert lost(problem, resting(problem)) == []
 
 
-def away(problem: Problem) -> Problem:
+def away(problem: MuscleProblem) -> MuscleProblem:
     """Without the ball."""
     return replace(problem, bones=problem.bones[:2])
 

@@ -8,7 +8,7 @@ import subprocess
 import pytest
 
 from fem_reference import cli, solvers
-from fem_reference.cli import _parser, completion
+from fem_reference.cli import completion
 from fem_reference.scenes import casefile
 
 
@@ -28,7 +28,7 @@ def offered(script: str, *line: str) -> list[str]:
 
 def test_bash_offers_verbs_options_and_names(scripts) -> None:
     script = scripts["bash"]
-    assert offered(script, "fem-reference", "") == _parser.names()
+    assert offered(script, "fem-reference", "") == [*options()]
     assert offered(script, "fem-reference", "--v") == ["--version"]
     assert offered(script, "fem-reference", "comp") == ["compare", "completion"]
     assert offered(script, "fem-reference", "run", "") == casefile.cases()
@@ -50,7 +50,7 @@ def test_bash_offers_folders_and_files(scripts, tmp_path, monkeypatch) -> None:
 
 def options() -> dict[str, list[argparse.Action]]:
     """The options of each verb."""
-    verbs = _parser.parser()._subparsers._group_actions[0].choices.items()
+    verbs = cli.parser()._subparsers._group_actions[0].choices.items()
     return {name: [action for action in sub._actions if action.option_strings] for name, sub in verbs}
 
 

@@ -67,7 +67,7 @@ def values(scene: MuscleCase, run: Run) -> dict[str, Floats]:
     assert run.fibre_positions is not None
     assert run.fibres is not None
     mesh, fibre = states.read_rest(run.folder)
-    results = Results(mesh, scene.effects, states.Stored(run.folder, run.numbers), fibre)
+    results = Results(mesh, scene.effects, states.StoredStates(run.folder, run.numbers), fibre)
     tets, middle = np.arange(len(mesh.tets)), np.full((len(mesh.tets), 4), 0.25)
     found = [results.evaluate_in(tets, middle, number, ["cauchy_stress"])["cauchy_stress"] for number in run.numbers]
     stress = np.stack(found)

@@ -54,7 +54,7 @@ class Reading:
 
     def solve(self, body: Body, element: str, **settings: float) -> Run:  # noqa: ARG002
         self.cells[body.mesh.kind].append(len(body.mesh.cells))
-        around = {entry.name: np.ones(3) for entry in (*body.prescribed, *body.obstructions)}
+        around = {entry.name: np.ones(3) for entry in (*body.prescribed, *body.bones)}
         points, scalars = body.mesh.points, defaultdict[str, float](lambda: 1.0)
         states = [
             Frame(number, points=points + (number - body.frames[0]), forces=around, moments=around, scalars=scalars)

@@ -14,7 +14,7 @@ from fem_reference.foundations.records import Record, parse
 from fem_reference.io import files
 from fem_reference.problems import scalar
 from fem_reference.problems.body import Body, Prescribed
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.paths import Turn
 from fem_reference.problems.setup import AttachedVertices
 from fem_reference.problems.shapes import box
@@ -40,11 +40,11 @@ def offered(task: str) -> list:
 OFFERS = [(name, offer.task) for name in solvers.names() for offer in solvers.offers(name)]
 
 
-def problem(motion: Rotation | None = BEND, other: Rotation | None = None) -> Problem:
+def problem(motion: Rotation | None = BEND, other: Rotation | None = None) -> MuscleProblem:
     return shapes.bar((2, 2, 4), (10, 10, 30), {"bottom": other, "top": motion}, MUSCLE, (0, 5, 10))
 
 
-def solved(name: str, given: Problem, folder) -> tuple:
+def solved(name: str, given: MuscleProblem, folder) -> tuple:
     solver = solvers.find(name, "case.toml")
     settings = dict(solver.example)
     if "folder" in settings:  # of frames: the attached vertices move, and nothing else
@@ -175,7 +175,7 @@ def test_a_body_turns_with_its_ends(name) -> None:
     assert all(np.isfinite(value) for value in solved.outcome.cost.values())
 
 
-def shuffled(given: Problem, seed: int) -> tuple[Problem, np.ndarray]:
+def shuffled(given: MuscleProblem, seed: int) -> tuple[MuscleProblem, np.ndarray]:
     """The same problem with its tets, tet points and surface vertices in another order; new place of each surface vertex."""
     random = np.random.default_rng(seed)
     points, vertices = (random.permutation(count) for count in (len(given.mesh.points), len(given.surface.points)))
@@ -187,7 +187,7 @@ def shuffled(given: Problem, seed: int) -> tuple[Problem, np.ndarray]:
     )
     surface = Surface(given.surface.points[vertices], vertex_at[given.surface.triangles])
     mesh = TetMesh(given.mesh.points[points], tets, facets)
-    return Problem(**(vars(given) | {"surface": surface, "attached": attached, "mesh": mesh})), vertex_at
+    return MuscleProblem(**(vars(given) | {"surface": surface, "attached": attached, "mesh": mesh})), vertex_at
 
 
 @pytest.mark.slow

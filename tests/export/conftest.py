@@ -14,18 +14,18 @@ from fem_reference import export
 from fem_reference.export import febio
 from fem_reference.problems import muscle
 from fem_reference.problems.body import ByCell
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
 
 
 @pytest.fixture(scope="module")
-def bar() -> Problem:
+def bar() -> MuscleProblem:
     return feb_file.bar()
 
 
 @pytest.fixture(scope="module")
-def feb(bar: Problem, tmp_path_factory: pytest.TempPathFactory) -> Element:
+def feb(bar: MuscleProblem, tmp_path_factory: pytest.TempPathFactory) -> Element:
     folder = tmp_path_factory.mktemp("febio")
     febio.write(bar, folder)
     return ElementTree.parse(folder / "scene.feb").getroot()
@@ -39,7 +39,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> MuscleCase:
 
 
 @pytest.fixture(scope="module")
-def built(scene: MuscleCase) -> Problem:
+def built(scene: MuscleCase) -> MuscleProblem:
     """The small scene, with a direction of fibres in each tet, no two the same."""
     bar = muscle.build(scene, muscle.setup(scene))
     along = np.random.default_rng(6).normal(size=(len(bar.mesh.tets), 3))
@@ -47,7 +47,7 @@ def built(scene: MuscleCase) -> Problem:
 
 
 @pytest.fixture(scope="module")
-def exported(scene: MuscleCase, built: Problem, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def exported(scene: MuscleCase, built: MuscleProblem, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("export") / "bar"
     export.export(scene, lambda: built, folder, "open")
     return folder

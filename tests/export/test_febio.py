@@ -26,7 +26,7 @@ from fem_reference.effects import total_energy
 from fem_reference.export import febio, febio_material
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.motion import apply
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
 
@@ -37,7 +37,7 @@ def test_the_sections_are_those_of_the_format(feb: Element) -> None:
     assert [section.tag for section in feb] == sections.split()
 
 
-def test_what_is_empty_is_written_short(bar: Problem, tmp_path: Path) -> None:
+def test_what_is_empty_is_written_short(bar: MuscleProblem, tmp_path: Path) -> None:
     """FEBio takes ``<Module type="solid"></Module>`` for the beginning of a list (FEBioModuleSection.cpp)."""
     febio.write(bar, tmp_path)
     text = (tmp_path / "scene.feb").read_text()
@@ -104,14 +104,14 @@ def pose(feb: Element, name: str, time: float) -> np.ndarray:
     return matrix
 
 
-def test_load_curves_are_the_poses(feb: Element, bar: Problem) -> None:
+def test_load_curves_are_the_poses(feb: Element, bar: MuscleProblem) -> None:
     """At frames, between them and at keyframes beside them."""
     for bone in bar.bones:
         for frame in (*FRAMES, 11.3, 12.5, 18.0, 22.2):
             assert np.allclose(pose(feb, f"bone_{bone.name}", frame - 10), bone.pose(frame), rtol=0, atol=1e-13)
 
 
-def test_every_freedom_of_a_bone_is_fixed_or_moved(feb: Element, bar: Problem) -> None:
+def test_every_freedom_of_a_bone_is_fixed_or_moved(feb: Element, bar: MuscleProblem) -> None:
     for bone in bar.bones:
         mine = [entry for entry in feb.iterfind("Rigid/rigid_bc") if entry.find("rb").text == f"bone_{bone.name}"]
         fixed = [
@@ -139,7 +139,7 @@ def test_febio_passes_every_frame_wanted(feb: Element) -> None:
     ("frames", "step", "count"), [((0, 10, 20), 2, 10), ((0, 1, 2), 1, 2), ((10, 15, 20), 5 / 3, 6), ((3, 7), 2, 2)]
 )
 def test_steps_are_two_frames_or_what_is_shorter_and_goes_up_evenly(
-    bar: Problem, frames: tuple[int, ...], step: float, count: int
+    bar: MuscleProblem, frames: tuple[int, ...], step: float, count: int
 ) -> None:
     feb = febio.model(replace(bar, frames=frames))
     control = feb.find("Control")
@@ -157,7 +157,7 @@ def test_what_febio_does_where_a_step_fails_and_when_it_stops(feb: Element) -> N
 
 
 @pytest.mark.parametrize("moving", [("bottom",), ("top",), ("bottom", "top"), ()])
-def test_load_controllers_are_numbered_without_gaps(bar: Problem, moving: tuple[str, ...]) -> None:
+def test_load_controllers_are_numbered_without_gaps(bar: MuscleProblem, moving: tuple[str, ...]) -> None:
     """FEBio refuses an id that its list has no place for: here as well where the first bone rests."""
     bones = tuple(bone if bone.name in moving else replace(bone, motion=None) for bone in bar.bones)
     attached = tuple(replace(attached, bone=bones[i]) for i, attached in enumerate(bar.attached))
@@ -169,7 +169,7 @@ def test_load_controllers_are_numbered_without_gaps(bar: Problem, moving: tuple[
             assert np.allclose(pose(feb, f"bone_{bone.name}", frame - 10), bone.pose(frame), rtol=0, atol=1e-13)
 
 
-def test_fibres_are_the_first_axis_of_each_element(feb: Element, bar: Problem) -> None:
+def test_fibres_are_the_first_axis_of_each_element(feb: Element, bar: MuscleProblem) -> None:
     axes = list(feb.iterfind("MeshData/ElementData[@type='mat_axis'][@elem_set='muscle']/e"))
     assert [int(entry.attrib["lid"]) for entry in axes] == list(range(1, len(bar.mesh.tets) + 1))
     along, across = (np.array([numbers(entry.find(axis)) for entry in axes]) for axis in "ad")
@@ -198,7 +198,7 @@ def test_the_law_is_the_same(matrix: tuple[str, ...]) -> None:
         assert energy == pytest.approx(ours, rel=1e-9)
 
 
-def test_constants_of_fibres_and_kind_of_element(feb: Element, bar: Problem) -> None:
+def test_constants_of_fibres_and_kind_of_element(feb: Element, bar: MuscleProblem) -> None:
     muscle = feb.find("Material/material[@name='muscle']")
     assert muscle.attrib["type"] == "trans iso Mooney-Rivlin"
     found = {entry.tag: float(entry.text) for entry in muscle if entry.tag != "fiber"}
@@ -237,7 +237,7 @@ def test_what_febio_has_not_is_refused_before_any_work(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_frames_come_back_from_febios_log(folder: Path, bar: Problem, tmp_path: Path) -> None:
+def test_frames_come_back_from_febios_log(folder: Path, bar: MuscleProblem, tmp_path: Path) -> None:
     """Its quadratic elements show a quadratic motion exactly; so does every vertex of the surface, wherever in a tet it lies."""
     scene = casefile.read(folder)
     assert isinstance(scene, MuscleCase)

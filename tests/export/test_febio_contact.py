@@ -9,10 +9,10 @@ import shapes
 
 from fem_reference.export import febio, febio_differences
 from fem_reference.export.febio_contact import overlaps
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 
 
-def test_contact_has_its_whole_tangent(bar: Problem, feb: Element) -> None:
+def test_contact_has_its_whole_tangent(bar: MuscleProblem, feb: Element) -> None:
     """That of sliding is not symmetric; without contact FEBio's solver is left as it is."""
     assert feb.find("Contact/contact/symmetric_stiffness").text == "0"
     assert feb.find("Control/solver/symmetric_stiffness").text == "non-symmetric"
@@ -20,7 +20,7 @@ def test_contact_has_its_whole_tangent(bar: Problem, feb: Element) -> None:
     assert plain.find("Control/solver/symmetric_stiffness") is None
 
 
-def overlapping(deep: float, name: str = "top") -> Problem:
+def overlapping(deep: float, name: str = "top") -> MuscleProblem:
     """The bar, and a bone of this name that is ``deep`` [mm] in one of its sides between its ends."""
     bar = feb_file.bar()
     plate = shapes.skin(shapes.box((1, 1, 1), (10, 30, 6)))
@@ -30,7 +30,7 @@ def overlapping(deep: float, name: str = "top") -> Problem:
     return replace(bar, bones=bones)
 
 
-def radius(problem: Problem) -> float:
+def radius(problem: MuscleProblem) -> float:
     (contact,) = febio.model(problem).iterfind("Contact/contact[@type='sliding-elastic']")
     return float(contact.find("search_radius").text)
 

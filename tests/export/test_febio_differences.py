@@ -14,13 +14,13 @@ from fem_reference import cli
 from fem_reference.export import febio, febio_differences
 from fem_reference.foundations.mesh import Surface
 from fem_reference.geometry.skins import attached_skin
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 
 STIFFNESS = 0.1  # MPa/mm
 
 
 @pytest.fixture(scope="module")
-def springs() -> Problem:
+def springs() -> MuscleProblem:
     """A bar whose top of 10 x 10 mm, all of it facets of the tets, is attached on 10 x 8 mm of the muscle's own surface; the bones
     are far from its sides.
     """
@@ -33,7 +33,7 @@ def springs() -> Problem:
     return replace(bar, attached=(bar.attached[0], top), attached_skins={"top": skin})
 
 
-def test_springs_of_another_spread_are_said_with_how_stiff_they_are(springs: Problem) -> None:
+def test_springs_of_another_spread_are_said_with_how_stiff_they_are(springs: MuscleProblem) -> None:
     """0.1 MPa/mm over 100 and 80 mm2, whose middles are 5 and 4 mm from the edge; about that of the 80, second moments of area are
     ``10^3 10 / 12`` and ``10^3 10 / 12 + 100`` for ``10^3 8 / 12`` and ``8^3 10 / 12``, about z their sums.
     """
@@ -46,7 +46,7 @@ def test_springs_of_another_spread_are_said_with_how_stiff_they_are(springs: Pro
     assert "5.3 and 8.8 % of the force" in measured
 
 
-def test_nothing_is_said_where_nothing_differs(springs: Problem) -> None:
+def test_nothing_is_said_where_nothing_differs(springs: MuscleProblem) -> None:
     """Exact attachments; springs that the reference has over facets too."""
     exact = replace(springs, attached=tuple(replace(one, stiffness=None) for one in springs.attached))
     assert febio_differences.notes(exact) == []
@@ -54,14 +54,14 @@ def test_nothing_is_said_where_nothing_differs(springs: Problem) -> None:
     assert len(list(comments(exact))) == 1  # units
 
 
-def comments(problem: Problem) -> list[str]:
+def comments(problem: MuscleProblem) -> list[str]:
     """Those of the file, as a reader of it sees them."""
     kept = ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True))
     root = ElementTree.fromstring(ElementTree.tostring(febio.model(problem)), kept)
     return [str(entry.text) for entry in root if entry.tag is ElementTree.Comment]
 
 
-def test_the_file_says_it_whatever_the_name(springs: Problem) -> None:
+def test_the_file_says_it_whatever_the_name(springs: MuscleProblem) -> None:
     """Two hyphens would end a comment of XML."""
     top = replace(springs.attached[1], attachment="a--b -->")
     mesh = replace(

@@ -11,14 +11,14 @@ from feb_file import cells, effects, nodes
 
 from fem_reference.export import febio, febio_material
 from fem_reference.foundations.mesh import triangle_areas
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 
 FIBRE = {"stress": "300 kPa", "p1": 0.05, "p2": 6.6, "linear_from": 1.4}
 STIFFNESS = 0.1  # MPa/mm
 
 
 @pytest.fixture(scope="module")
-def bar() -> Problem:
+def bar() -> MuscleProblem:
     """With passive fibres; attached exactly at one end and by springs at the other."""
     plain = feb_file.bar()
     acts = effects("neo_hooke", "incompressible", "fibre_passive", "contact")
@@ -27,7 +27,7 @@ def bar() -> Problem:
 
 
 @pytest.fixture(scope="module")
-def feb(bar: Problem) -> Element:
+def feb(bar: MuscleProblem) -> Element:
     return febio.model(bar)
 
 
@@ -91,7 +91,7 @@ def test_the_muscle_is_a_mixture_of_its_matrix_and_its_fibres(feb: Element) -> N
     assert feb.find("MeshData/ElementData").attrib == {"type": "mat_axis", "elem_set": "muscle"}
 
 
-def test_both_laws_of_fibres_together(bar: Problem) -> None:
+def test_both_laws_of_fibres_together(bar: MuscleProblem) -> None:
     both = effects("mooney_rivlin", "incompressible", "fibre_passive", "fibre_passive_febio")
     solids = febio.model(replace(bar, effects=both)).findall("Material/material[@name='muscle']/solid")
     assert [solid.attrib["type"] for solid in solids] == ["trans iso Mooney-Rivlin", "muscle material"]
@@ -112,7 +112,7 @@ def test_an_end_attached_by_springs_is_attached_by_them_alone(feb: Element) -> N
     assert feb.find("MeshDomains/ShellDomain[@name='springs_top']").attrib["mat"] == "bone_top"
 
 
-def test_no_node_of_the_muscle_is_attached_where_all_is_attached_by_springs(bar: Problem) -> None:
+def test_no_node_of_the_muscle_is_attached_where_all_is_attached_by_springs(bar: MuscleProblem) -> None:
     feb = febio.model(replace(bar, attached=tuple(replace(attached, stiffness=STIFFNESS) for attached in bar.attached)))
     assert feb.find("Boundary") is None
     assert len(feb.findall("Contact/contact[@type='tied-elastic']")) == 2

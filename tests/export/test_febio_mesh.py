@@ -10,7 +10,7 @@ from feb_file import cells, nodes
 from fem_reference.export import febio
 from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import boundary, tet_volumes, triangle_areas
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 
 
 def shapes_of_febio(r: np.ndarray) -> np.ndarray:
@@ -20,7 +20,7 @@ def shapes_of_febio(r: np.ndarray) -> np.ndarray:
     return np.stack([*corners, 4 * a * b, 4 * b * c, 4 * c * a, 4 * a * d, 4 * b * d, 4 * c * d], axis=1)
 
 
-def test_elements_are_straight_tets_of_positive_volume_in_febios_order(feb: Element, bar: Problem) -> None:
+def test_elements_are_straight_tets_of_positive_volume_in_febios_order(feb: Element, bar: MuscleProblem) -> None:
     """In that order alone its shape functions carry its reference tet linearly to where the corners are (rounding at 30 mm)."""
     at = nodes(feb)[cells(feb, "muscle")]
     r = np.random.default_rng(1).dirichlet(np.ones(4), size=20)
@@ -42,7 +42,7 @@ def test_attached_nodes_are_all_of_an_end(feb: Element) -> None:
         assert feb.find(f"Boundary/bc[@node_set='attached_{name}']/rb").text == f"bone_{name}"
 
 
-def test_a_node_goes_with_one_bone(bar: Problem) -> None:
+def test_a_node_goes_with_one_bone(bar: MuscleProblem) -> None:
     """Attachments that share an edge: what the first has, the second has not."""
     facets = bar.mesh.facets["bottom"]
     split = replace(bar.mesh, facets={"bottom": facets[:4], "top": facets[4:]})
@@ -73,7 +73,7 @@ def test_the_contact_surfaces(feb: Element) -> None:
     assert np.array_equal(ball, cells(feb, "bone_top"))
 
 
-def test_a_contact_surface_without_facets_is_refused(bar: Problem) -> None:
+def test_a_contact_surface_without_facets_is_refused(bar: MuscleProblem) -> None:
     """All sides attached: no facet is left, where FEBio would run without contact and say nothing."""
     outer = boundary(bar.mesh.tets)[0]
     nowhere = replace(bar, mesh=replace(bar.mesh, facets={"bottom": outer, "top": outer[:1]}))
@@ -83,7 +83,7 @@ def test_a_contact_surface_without_facets_is_refused(bar: Problem) -> None:
         febio.model(nowhere)
 
 
-def test_a_bone_whose_triangles_face_inwards_is_turned(bar: Problem) -> None:
+def test_a_bone_whose_triangles_face_inwards_is_turned(bar: MuscleProblem) -> None:
     ball = bar.bones[0].surface
     inwards = replace(bar.bones[0], surface=replace(ball, triangles=ball.triangles[:, ::-1]))
     upright, turned = (febio.model(replace(bar, bones=(bone,), attached=())) for bone in (bar.bones[0], inwards))

@@ -7,7 +7,7 @@ import pytest
 from fem_reference import export
 from fem_reference.export import open_formats
 from fem_reference.foundations.errors import InputError
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.scenes.muscle import MuscleCase
 
 pytestmark = pytest.mark.slow
@@ -30,7 +30,9 @@ def test_a_folder_that_cannot_be_written_shows_before_the_problem_is_built(scene
         export.export(scene, lambda: pytest.fail("built"), tmp_path / "file" / "scene", "open")
 
 
-def test_an_export_that_fails_leaves_nothing(scene: MuscleCase, built: Problem, tmp_path: Path, monkeypatch) -> None:
+def test_an_export_that_fails_leaves_nothing(
+    scene: MuscleCase, built: MuscleProblem, tmp_path: Path, monkeypatch
+) -> None:
     def fails(*_: object) -> None:
         raise OSError("no space left")
 

@@ -11,7 +11,7 @@ import pytest
 from fem_reference import cli, export, report
 from fem_reference.foundations.motion import apply
 from fem_reference.problems import muscle
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.runs.cost import seconds_per_frame
 from fem_reference.runs.store import Outcome, Run
 from fem_reference.scenes import casefile
@@ -32,7 +32,7 @@ def foreign(exported: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_foreign_solver_is_judged(
-    scene: MuscleCase, built: Problem, foreign: Path, tmp_path: Path, monkeypatch
+    scene: MuscleCase, built: MuscleProblem, foreign: Path, tmp_path: Path, monkeypatch
 ) -> None:
     """Against a reference that slides by 1 mm a frame number. Bodies turned as a whole keep volume and fibre lengths."""
     slid = np.multiply.outer(np.array(built.frames, float), [0, 0, 1.0])

@@ -14,7 +14,7 @@ from fem_reference.export import open_formats
 from fem_reference.foundations.records import parse
 from fem_reference.io import files
 from fem_reference.problems import muscle
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.scenes import casefile
 from fem_reference.scenes.muscle import MuscleCase
 
@@ -26,7 +26,7 @@ def rows(path: Path) -> list[list[str]]:
         return list(csv.reader(table))[1:]
 
 
-def test_surfaces_and_fibres_come_back_to_the_bit(exported: Path, built: Problem) -> None:
+def test_surfaces_and_fibres_come_back_to_the_bit(exported: Path, built: MuscleProblem) -> None:
     surfaces = [built.surface, *(bone.surface for bone in built.bones)]
     for name, surface in zip(("muscle.ply", "bones/0.ply", "bones/1.ply"), surfaces, strict=True):
         for points, triangles in (
@@ -41,14 +41,14 @@ def test_surfaces_and_fibres_come_back_to_the_bit(exported: Path, built: Problem
 
 
 @pytest.mark.parametrize("name", ["tets.vtu", "tets.msh"])
-def test_tets_and_fibre_directions_come_back_to_the_bit(exported: Path, built: Problem, name: str) -> None:
+def test_tets_and_fibre_directions_come_back_to_the_bit(exported: Path, built: MuscleProblem, name: str) -> None:
     mesh = meshio.gmsh.read(exported / name) if name.endswith("msh") else meshio.read(exported / name)
     assert np.array_equal(mesh.points, built.mesh.points)
     assert np.array_equal(mesh.cells_dict["tetra"], built.mesh.tets)
     assert np.array_equal(mesh.cell_data["fibre"][0], built.directions)
 
 
-def test_poses_of_every_bone_and_frame(exported: Path, built: Problem) -> None:
+def test_poses_of_every_bone_and_frame(exported: Path, built: MuscleProblem) -> None:
     found = {
         (bone, int(frame)): np.reshape(row, (4, 4)).astype(float) for bone, frame, *row in rows(exported / "poses.csv")
     }
@@ -58,7 +58,7 @@ def test_poses_of_every_bone_and_frame(exported: Path, built: Problem) -> None:
             assert np.array_equal(found[bone.name, frame], bone.pose(frame))
 
 
-def test_what_is_attached(exported: Path, built: Problem) -> None:
+def test_what_is_attached(exported: Path, built: MuscleProblem) -> None:
     for attached in built.attached:
         vertices = [
             int(row[2])
@@ -74,7 +74,7 @@ def test_what_is_attached(exported: Path, built: Problem) -> None:
         assert np.array_equal(np.array(facets, int), built.mesh.facets[attached.attachment])
 
 
-def test_the_surface_lies_where_its_shares_of_the_tets_say(exported: Path, built: Problem) -> None:
+def test_the_surface_lies_where_its_shares_of_the_tets_say(exported: Path, built: MuscleProblem) -> None:
     """1e-9 mm is rounding at 40 mm in flat tets, whose shares are large."""
     table = np.array(rows(exported / "surface_in_tets.csv"), float)
     corners = built.mesh.points[built.mesh.tets[table[:, 1].astype(int)]]
@@ -82,7 +82,7 @@ def test_the_surface_lies_where_its_shares_of_the_tets_say(exported: Path, built
     assert np.allclose(np.einsum("vi,vik->vk", table[:, 2:], corners), built.surface.points, rtol=0, atol=1e-9)
 
 
-def test_the_scene_says_units_and_values(exported: Path, built: Problem) -> None:
+def test_the_scene_says_units_and_values(exported: Path, built: MuscleProblem) -> None:
     facts = json.loads((exported / "scene.json").read_text())
     assert facts["frames"] == [0, 5, 10, 15, 20]
     assert [effect["name"] for effect in facts["effects"]] == ["neo_hooke", "incompressible"]
@@ -94,7 +94,7 @@ def test_the_scene_says_units_and_values(exported: Path, built: Problem) -> None
     assert facts["mesh"]["tets"] == len(built.mesh.tets)
 
 
-def test_springs_are_stated_in_the_unit_that_they_have(scene: MuscleCase, built: Problem) -> None:
+def test_springs_are_stated_in_the_unit_that_they_have(scene: MuscleCase, built: MuscleProblem) -> None:
     soft = casefile.read_muscle(scene.folder, changes={"attachment[0].stiffness": "250 kPa/mm"})
     facts = open_formats.facts(soft, replace(built, attached=muscle.setup(soft).attached))
     assert facts["attachments"] == [
@@ -103,14 +103,14 @@ def test_springs_are_stated_in_the_unit_that_they_have(scene: MuscleCase, built:
     ]
 
 
-def test_bones_that_contact_names_are_obstacles(scene: MuscleCase, built: Problem) -> None:
+def test_bones_that_contact_names_are_obstacles(scene: MuscleCase, built: MuscleProblem) -> None:
     contact = parse(acting.effects.find("contact"), acting.PARAMETERS["contact"] | {"bones": ["lid"]}, "test")
     facts = open_formats.facts(scene, replace(built, effects=(*built.effects, contact)))
     assert [bone["obstacle"] for bone in facts["bones"]] == [False, True]
 
 
 @pytest.mark.parametrize("name", sorted(acting.PARAMETERS))
-def test_every_effect_can_be_stated(scene: MuscleCase, built: Problem, name: str) -> None:
+def test_every_effect_can_be_stated(scene: MuscleCase, built: MuscleProblem, name: str) -> None:
     effect = parse(acting.effects.find(name), acting.PARAMETERS[name], "test")
     (printed,) = open_formats.facts(scene, replace(built, effects=(effect,)))["effects"]
     assert printed["name"] == name

@@ -11,7 +11,7 @@ import pytest
 
 from fem_reference.foundations.motion import apply
 from fem_reference.foundations.records import parse
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.solvers import recorded
 
 pytestmark = pytest.mark.slow
@@ -23,7 +23,7 @@ def code(text: str) -> str:
     return block
 
 
-def test_the_reading_example_runs(exported: Path, built: Problem) -> None:
+def test_the_reading_example_runs(exported: Path, built: MuscleProblem) -> None:
     """With numpy and meshio, from a process that cannot see this project; numpy prints 8 digits."""
     text = (exported / "README.md").read_text()
     words = [sys.executable, "-I", "-W", "error", "-c", code(text)]

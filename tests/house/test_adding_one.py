@@ -16,7 +16,7 @@ pytestmark = [
     pytest.mark.skipif(not processes.installed(), reason="FEniCSx is not installed"),
 ]
 PROJECT = Path(__file__).parents[2]
-FOLDERS = ("fem_reference", "cases", "meshes", "validation", "tests")
+FOLDERS = ("fem_reference", "cases", "meshes", "validation", "tests", "examples")
 
 
 class New(NamedTuple):
@@ -111,6 +111,15 @@ def run(options: argparse.Namespace) -> int:
     return DONE
 '''.lstrip()
 
+EXAMPLE = '''
+"""A half, by the public API."""
+
+import fem_reference as fr
+
+print("share of a pressure [MPa]:", fr.make_effect("neo_hooke", mu="5 kPa").mu * 100)
+# Ends in 0.5 within 1e-12: the unit of pressure is 1 MPa.
+'''.lstrip()
+
 KINDS = {
     "verification entry": New(
         {"fem_reference/verification/own_entry.py": ENTRY},
@@ -131,6 +140,10 @@ KINDS = {
             "fem_reference run own_case --solver listing --quiet": "pass: listing nodal_error",
             "pytest -q tests/contracts/test_every_case.py -k own_case": "passed",
         },
+    ),
+    "example": New(
+        {"examples/own_example.py": EXAMPLE},
+        {"pytest -q tests/house/test_examples.py -k own_example": "1 passed"},
     ),
     "truth": New(
         {"validation/own_truth.py": TRUTH},

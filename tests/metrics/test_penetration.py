@@ -16,7 +16,7 @@ from fem_reference.geometry.exemption import Exemption
 from fem_reference.geometry.rigid_bodies import Box, HalfSpace, Sphere
 from fem_reference.io.files import read_surface, write_surface
 from fem_reference.metrics import Measure, MeasurementContext, at_rest, measure, penetration
-from fem_reference.problems.setup import AttachedVertices, RigidBody, Setup
+from fem_reference.problems.setup import AttachedVertices, Bone, Setup
 from fem_reference.runs.store import Outcome, Run
 
 RADIUS = 20.0
@@ -28,9 +28,9 @@ PLATE = shapes.skin(shapes.box((1, 1, 1), (60.0, 60.0, 10.0)))
 LOW = float(BALL.points[:, 2].min())  # [mm]
 
 
-def floor(height: float, motion: Rotation | None = None) -> RigidBody:
+def floor(height: float, motion: Rotation | None = None) -> Bone:
     """All below z = ``height`` [mm]."""
-    return RigidBody("floor", PLATE, motion, solid=HalfSpace((0, 0, height), (0, 0, 1)))
+    return Bone("floor", PLATE, motion, solid=HalfSpace((0, 0, height), (0, 0, 1)))
 
 
 def run_of(*frames: np.ndarray, numbers: tuple[int, ...] | None = None, rest: Surface = BALL) -> Run:
@@ -39,7 +39,7 @@ def run_of(*frames: np.ndarray, numbers: tuple[int, ...] | None = None, rest: Su
     return Run("run", "test", Outcome("converged", ""), numbers, rest, np.array(frames), FIBRE, inside)
 
 
-def taken(run: Run, *bones: RigidBody, exempt: Exemption | None = None) -> tuple[Measure, Measure]:
+def taken(run: Run, *bones: Bone, exempt: Exemption | None = None) -> tuple[Measure, Measure]:
     """``deepest`` and ``volume``."""
     deepest, volume = penetration.measure(run, run, MeasurementContext.of(at_rest(run), FIBRE, bones, exempt))
     assert (deepest.statistic, deepest.unit, volume.statistic, volume.unit) == ("deepest", "mm", "volume", "mm3")
@@ -80,9 +80,7 @@ def test_a_bone_is_where_its_frame_number_takes_it() -> None:
 def test_turning_everything_changes_nothing_but_the_draw() -> None:
     turn = Turn.random(rng=np.random.default_rng(8))
     frames = [turn.apply(BALL.points - [0, 0, depth]) for depth in (2.0, 6.0)]
-    ground = RigidBody(
-        "floor", PLATE, None, solid=HalfSpace(tuple(turn.apply([0, 0, LOW])), tuple(turn.apply([0, 0, 1])))
-    )
+    ground = Bone("floor", PLATE, None, solid=HalfSpace(tuple(turn.apply([0, 0, LOW])), tuple(turn.apply([0, 0, 1]))))
     deepest, volume = taken(run_of(*frames), ground)
     assert_allclose(deepest.values, [2, 6], atol=1e-12)
     assert_allclose(volume.values, [cap(2), cap(6)], rtol=0.06)
@@ -92,7 +90,7 @@ def test_a_bone_of_triangles_is_met_in_its_own_frame() -> None:
     # A head of 15 mm at z = 40 mm that a half turn about x takes to z = -40 mm.
     head = shapes.sphere(3, 15.0)
     head = Surface(head.points + [0, 0, 40], head.triangles)
-    bone = RigidBody("head", head, Rotation((1, 0, 0), (0, 0, 0), (0.0, 10.0), (0.0, np.pi)))
+    bone = Bone("head", head, Rotation((1, 0, 0), (0, 0, 0), (0.0, 10.0), (0.0, np.pi)))
     lowered = BALL.points - [0, 0, 7.0]
     deepest, volume = taken(run_of(lowered, lowered, numbers=(0, 10)), bone)
     exact = (15 - np.linalg.norm(lowered - [0, 0, -40], axis=1)).max()
@@ -104,7 +102,7 @@ def test_a_bone_of_triangles_is_met_in_its_own_frame() -> None:
 
 
 def test_the_deepest_bone_decides_and_volumes_add() -> None:
-    ground, stone = floor(LOW + 2), RigidBody("stone", PLATE, None, solid=Sphere((0, 0, RADIUS + 5), 10.0))
+    ground, stone = floor(LOW + 2), Bone("stone", PLATE, None, solid=Sphere((0, 0, RADIUS + 5), 10.0))
     one, other, both = (taken(run_of(BALL.points), *bones) for bones in ((ground,), (stone,), (ground, stone)))
     assert_allclose(both[0].values, [max(one[0].values[0], other[0].values[0])])
     assert_allclose(both[1].values, one[1].values + other[1].values)
@@ -138,7 +136,7 @@ def test_where_contact_is_exempt_what_has_been_added_since_rest_counts(slides, a
     bar = shapes.skin(shapes.box((1, 1, 80), (10.0, 10.0, 40.0)))
     z = bar.points[:, 2]
     aside = Translation((0, 1, 0), (0.0, 1.0), (0.0, 5.0)) if slides else None
-    wall = RigidBody("wall", PLATE, aside, solid=HalfSpace((0.3, 0, 0), (1, 0, 0)))
+    wall = Bone("wall", PLATE, aside, solid=HalfSpace((0.3, 0, 0), (1, 0, 0)))
     base = floor(-5.0)
     rest = Setup(bar, (base, wall), (AttachedVertices("origin", base, np.flatnonzero(z == 0)),), (0, 1), None)
     assert np.array_equal(~rest.free, z < 0.6)
@@ -149,14 +147,14 @@ def test_where_contact_is_exempt_what_has_been_added_since_rest_counts(slides, a
     assert f", {at}) mm in wall" in deepest.where[1]
 
 
-def in_a_dent(cells: int, radius: float) -> tuple[Run, RigidBody]:
+def in_a_dent(cells: int, radius: float) -> tuple[Run, Bone]:
     """A plate whose upper vertices are all on a ball of a ``radius`` or beside it, which is 2 mm lower than the plate."""
     plate = shapes.skin(shapes.box((cells, cells, 1), (60.0, 60.0, 10.0)))
     points, centre = np.array(plate.points), np.array([30.0, 30.0, 8 + radius])
     top = np.flatnonzero(points[:, 2] == 10)
     across = np.linalg.norm(points[top, :2] - 30, axis=1)
     points[top, 2] = np.minimum(10, centre[2] - np.sqrt(radius**2 - across**2))
-    return run_of(points, rest=plate), RigidBody("stone", PLATE, None, solid=Sphere(tuple(centre), radius))
+    return run_of(points, rest=plate), Bone("stone", PLATE, None, solid=Sphere(tuple(centre), radius))
 
 
 def test_what_flat_triangles_cut_off_a_round_bone_does_not_count_unless_they_are_large() -> None:
@@ -172,7 +170,7 @@ def test_a_bone_between_the_vertices_of_a_coarse_surface_is_met() -> None:
     # A ball of 3 mm goes through a bar, both its sides 10 mm away from any vertex; its own middle is in it for 10 mm.
     bar = shapes.skin(shapes.box((1, 1, 1), (10.0, 10.0, 40.0)))
     stone = Translation((1, 0, 0), (0.0, 22.0), (0.0, 22.0))
-    ball = RigidBody("ball", shapes.sphere(2, 3.0).moved_to(shapes.sphere(2, 3.0).points + [-4, 5, 20]), stone)
+    ball = Bone("ball", shapes.sphere(2, 3.0).moved_to(shapes.sphere(2, 3.0).points + [-4, 5, 20]), stone)
     ball = replace(ball, solid=Sphere((-4, 5, 20), 3.0))
     numbers = (0, 2, 3, 6, 9, 13, 16, 18, 20)
     deepest, volume = taken(run_of(*[bar.points] * 9, numbers=numbers, rest=bar), ball)
@@ -235,7 +233,7 @@ def test_without_bones_nothing_is_inside() -> None:
 
 def test_a_bone_that_is_not_closed_has_no_inside(tmp_path, caplog) -> None:
     write_surface(tmp_path / "open.vtp", Surface(PLATE.points, PLATE.triangles[1:]), PLATE.points)
-    bone = RigidBody("femur", read_surface(tmp_path / "open.vtp", 1.0), None)
+    bone = Bone("femur", read_surface(tmp_path / "open.vtp", 1.0), None)
     with pytest.raises(
         InputError, match=r'bone "femur": .*open\.vtp: got 3 edges of one triangle only, .* closed surface'
     ):
@@ -249,7 +247,7 @@ def test_a_bone_that_is_not_closed_has_no_inside(tmp_path, caplog) -> None:
 
 def test_a_box_that_stands_out_on_both_sides_is_counted_whole() -> None:
     # A rod of 6 x 6 mm through the middle: 36 mm2 times 2 R, less by (x^2 + y^2) / 2 R^2 with means of 3 mm2 each.
-    rod = RigidBody("rod", PLATE, None, solid=Box((0, 0, 0), (60, 6, 6), 0))
+    rod = Bone("rod", PLATE, None, solid=Box((0, 0, 0), (60, 6, 6), 0))
     deepest, volume = taken(run_of(BALL.points), rod)
     assert_allclose(volume.values, 36 * 2 * RADIUS * (1 - 6 / (2 * RADIUS**2)), rtol=0.03)
     assert 2 < deepest.values <= 3  # nowhere in the rod is deeper

@@ -6,10 +6,10 @@ import pytest
 from fem_reference.geometry.rigid_bodies import Box, Sphere
 from fem_reference.geometry.signed_distance import Grid, build
 from fem_reference.geometry.tessellation import tessellated
-from fem_reference.problems.contact import Contact
+from fem_reference.problems.contact import ContactLaw
 
 D, K = 0.1, 2.0
-LAW = Contact("top", K, D)
+LAW = ContactLaw("top", K, D)
 
 
 def test_the_slope_is_that_of_the_pressure() -> None:
@@ -74,6 +74,6 @@ def test_a_gradient_is_nowhere_steeper_than_said() -> None:
 
 
 def test_what_overlaps_at_rest_is_felt_more_and_more() -> None:
-    law = Contact("skin", 1.0, 0.1, relaxed=(-4.0, 0.0))
+    law = ContactLaw("skin", 1.0, 0.1, relaxed=(-4.0, 0.0))
     assert [law.allowance(frame) for frame in (-5.0, -4.0, -3.0, -2.0, 0.0, 7.0)] == [1, 1, 0.75, 0.5, 0, 0]
-    assert Contact("skin", 1.0, 0.1).allowance(-4.0) == 0
+    assert ContactLaw("skin", 1.0, 0.1).allowance(-4.0) == 0

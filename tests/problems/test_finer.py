@@ -10,7 +10,7 @@ from fem_reference.geometry.skins import Skin
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body, ByCell, Cells, Prescribed, boundary_facets
 from fem_reference.problems.checks import check
-from fem_reference.problems.contact import Contact
+from fem_reference.problems.contact import ContactLaw
 from fem_reference.problems.finer import finer
 
 SIZE = (10.0, 20.0, 30.0)
@@ -63,7 +63,7 @@ def test_parts_of_curved_cells_lie_on_them(kind) -> None:
         return np.column_stack([unit[:, 0] + 0.2 * unit[:, 1] ** 2, unit[:, 1], unit[:, 2] * (1 + 0.1 * unit[:, 0])])
 
     faces = {"z0": "z0"}
-    coarse, fine = (shapes.mapped([shapes.Block(place, (n, n, n), faces)], kind, 2) for n in (1, 2))
+    coarse, fine = (shapes.mapped([shapes.Brick(place, (n, n, n), faces)], kind, 2) for n in (1, 2))
     assert_allclose(order(finer(body_of(coarse))[0].mesh.points), order(fine.points), atol=1e-12)
 
 
@@ -82,7 +82,7 @@ def test_fibres_and_skins_are_where_they_were() -> None:
     points = np.einsum("nc,ncd->nd", shares, mesh.points[mesh.cells])
     skin = Skin(np.arange(48), points, np.ones(48))
     springs = Prescribed("skin", skin, (0,), lambda points, _: 0 * points, stiffness=1.0)
-    body = Body(mesh, (), (springs,), (0.0, 1.0), fibre=ByCell(vectors), contact=Contact(skin, 1.0, 0.1))
+    body = Body(mesh, (), (springs,), (0.0, 1.0), fibre=ByCell(vectors), contact=ContactLaw(skin, 1.0, 0.1))
     fine, _ = finer(body)
     (moved,) = fine.prescribed
     assert moved.on.cells.tolist() == fine.contact.on.cells.tolist()

@@ -12,9 +12,9 @@ from fem_reference.foundations.motion import Rotation, Translation
 from fem_reference.geometry.rigid_bodies import Sphere
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body, Prescribed
-from fem_reference.problems.contact import Obstruction
+from fem_reference.problems.contact import ContactBone
 from fem_reference.problems.paths import Affine, Follows, From, Rest, Turn
-from fem_reference.problems.setup import AttachedVertices, RigidBody, Setup
+from fem_reference.problems.setup import AttachedVertices, Bone, Setup
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers.common.frame_loop import follow
 from fem_reference.solvers.common.load_steps import Attempt, StepSizes, march
@@ -41,7 +41,7 @@ def test_a_whole_turn_is_four_steps_wherever_it_is_among_the_frames() -> None:
     for head in (Follows(ALONG_Z.pose), Follows(From(0.0, ALONG_Z.pose)), Turn((0, 0, 1), 2 * np.pi, (0.5, 0.5, 0.0))):
         assert body(head).stops == pytest.approx([0.25, 0.5, 0.75])
     # As bones of a scene have it.
-    bone = RigidBody("lid", BALL, ALONG_Z)
+    bone = Bone("lid", BALL, ALONG_Z)
     assert body(Follows(From(0.0, bone.pose))).stops == pytest.approx([0.25, 0.5, 0.75])
     # What a motion does before the first frame is no part of the path.
     assert body(Follows(From(0.5, ALONG_Z.pose)), frames=(0.5, 20.0)).stops == pytest.approx([0.75])
@@ -94,9 +94,9 @@ def test_ramps_that_come_back_are_followed_and_others_ask_for_nothing() -> None:
     assert body(Rest()).stops == ()
 
 
-def test_obstructions_are_followed() -> None:
-    ball = Obstruction("ball", Sphere((0.0, 0.0, 9.0), 1.0), ALONG_Z.pose)
-    assert replace(body(Rest()), obstructions=(ball,)).stops == pytest.approx([0.25, 0.5, 0.75])
+def test_bones_are_followed() -> None:
+    ball = ContactBone("ball", Sphere((0.0, 0.0, 9.0), 1.0), ALONG_Z.pose)
+    assert replace(body(Rest()), bones=(ball,)).stops == pytest.approx([0.25, 0.5, 0.75])
 
 
 def test_what_all_do_alike_is_no_travel_and_the_rest_is_bounded_by_the_size() -> None:
@@ -167,7 +167,7 @@ class Counting:
 
 def setup(motion, frames=(0, 5, 20)) -> Setup:
     surface = BALL
-    bone = RigidBody("lid", surface, motion)
+    bone = Bone("lid", surface, motion)
     return Setup(surface, (bone,), (AttachedVertices("top", bone, np.array([0, 1])),), frames, None)
 
 

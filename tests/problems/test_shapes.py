@@ -267,10 +267,10 @@ def test_cells_of_a_ventricle_are_alike_in_size() -> None:
 
 def test_a_wrongly_glued_body_of_tetrahedra_would_show() -> None:
     halves = [
-        shapes.Block(lambda unit: unit, (1, 1, 1)),
-        shapes.Block(lambda unit: [2, 1, 0] + unit * [-1, -1, 1], (1, 1, 1)),
+        shapes.Brick(lambda unit: unit, (1, 1, 1)),
+        shapes.Brick(lambda unit: [2, 1, 0] + unit * [-1, -1, 1], (1, 1, 1)),
     ]
-    right = [halves[0], shapes.Block(lambda unit: unit + [1, 0, 0], (1, 1, 1))]
+    right = [halves[0], shapes.Brick(lambda unit: unit + [1, 0, 0], (1, 1, 1))]
     # Eight corners less four on the common face; its two triangles are inside only where their diagonals agree.
     assert len(alone(shapes.mapped(right, "tetrahedron", 1))) == 20
     assert len(alone(shapes.mapped(halves, "tetrahedron", 1))) == 24

@@ -12,7 +12,7 @@ from fem_reference.assessment.error_bars import ErrorBar, ErrorBars, Of
 from fem_reference.assessment.judge import Verdict
 from fem_reference.foundations.mesh import Polylines, Surface
 from fem_reference.metrics import Measure, MeasurementContext
-from fem_reference.problems.setup import RigidBody, Setup
+from fem_reference.problems.setup import Bone, Setup
 from fem_reference.report import comparison_page, gallery
 from fem_reference.runs.store import Outcome, Run
 from fem_reference.scenes import casefile
@@ -124,7 +124,7 @@ def small_comparison(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Compari
         "reference", "fenicsx", moved, scalars={"min_det_F_points": 1 - steps[:, 0, 0] / 8}, origin=origin
     )
     quick, torn = a_run("quick", "pbd", moved + steps * [0, 0, 1.0]), a_run("torn", "recorded", torn, "diverged")
-    plate = RigidBody("plate", Surface(rest.points - [0, 0, 25], rest.triangles), scene.bone[0].motion.poses())
+    plate = Bone("plate", Surface(rest.points - [0, 0, 25], rest.triangles), scene.bone[0].motion.poses())
     return Comparison(
         scene=scene,
         setup=Setup(rest, (plate,), (), NUMBERS, None),

@@ -10,7 +10,7 @@ from fem_reference.foundations.errors import MissingSoftware
 from fem_reference.foundations.mesh import Surface
 from fem_reference.geometry.rigid_bodies import HalfSpace
 from fem_reference.geometry.tessellation import tessellated
-from fem_reference.problems.setup import RigidBody
+from fem_reference.problems.setup import Bone
 from fem_reference.report import gallery
 from tests.report.comparisons import a_run, html
 
@@ -58,7 +58,7 @@ def test_cameras_look_at_the_widest_side_away_from_the_bones(comparison, up):
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     body = comparison.setup.surface
     bone = Surface((body.points + np.array([0, 12, -25 * up])) @ turn.T, body.triangles)
-    views = gallery.directions(body.moved_to(body.points @ turn.T), (RigidBody("plate", bone, None),))
+    views = gallery.directions(body.moved_to(body.points @ turn.T), (Bone("plate", bone, None),))
     # The body is symmetric, so only rounding is between its axes and the computed ones.
     np.testing.assert_allclose(views @ turn, [[0, 0, up], [0, -1, 0]], atol=1e-9)
 
@@ -66,7 +66,7 @@ def test_cameras_look_at_the_widest_side_away_from_the_bones(comparison, up):
 def test_cameras_look_along_the_coordinates_where_two_axes_are_as_long(comparison):
     body = comparison.setup.surface
     points = body.points / [30, 20, 10] * [20, 8, 20] + np.random.default_rng(4).normal(size=body.points.shape) * 1e-12
-    plate = RigidBody("plate", body.moved_to(body.points - [300, 200, 100]), None)
+    plate = Bone("plate", body.moved_to(body.points - [300, 200, 100]), None)
     np.testing.assert_allclose(gallery.directions(body.moved_to(points), (plate,)), [[0, 1, 0], [1, 0, 0]], atol=0.01)
 
 
@@ -74,9 +74,7 @@ def test_cameras_do_not_look_through_plates(comparison):
     # Half axes 30, 20, 10 again, now between plates across z: seen along y and x. With one plate alone, from its other side.
     body = comparison.setup.surface
     floor, lid = (HalfSpace((0, 0, -10 * up), (0, 0, up)) for up in (1, -1))
-    bones = tuple(
-        RigidBody("plate", tessellated(solid, body.points, "plate"), None, solid=solid) for solid in (floor, lid)
-    )
+    bones = tuple(Bone("plate", tessellated(solid, body.points, "plate"), None, solid=solid) for solid in (floor, lid))
     np.testing.assert_allclose(np.abs(gallery.directions(body, bones)), [[0, 1, 0], [1, 0, 0]], atol=1e-9)
     np.testing.assert_allclose(gallery.directions(body, bones[:1])[0], [0, 0, 1], atol=1e-9)
     np.testing.assert_allclose(gallery.directions(body, bones[1:])[0], [0, 0, -1], atol=1e-9)

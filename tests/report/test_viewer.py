@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import shapes
 
-from fem_reference.problems.setup import RigidBody
+from fem_reference.problems.setup import Bone
 from fem_reference.report import comparison_page, viewer, viewer_fields
 from tests.report.comparisons import NAN, NUMBERS, html
 from tests.report.packed import positions, top, unpacked
@@ -57,7 +57,7 @@ def test_bones_have_a_pose_for_each_frame_and_few_triangles(comparison):
     np.testing.assert_allclose(bone["poses"], [body.pose(number).ravel() for number in NUMBERS], atol=0)
     points = positions(bone, bone, 1)[0]
     assert np.abs(points - body.surface.points).max() <= bone["step"] / 2 + 1e-12
-    fine = RigidBody("fine", shapes.sphere(5, 20.0), None)
+    fine = Bone("fine", shapes.sphere(5, 20.0), None)
     assert len(fine.surface.triangles) > viewer.BONE_TRIANGLES
     changed = replace(comparison, setup=replace(comparison.setup, bones=(fine,)))
     (bone,) = json.loads(viewer.view(changed).data)["bones"]

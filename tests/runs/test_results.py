@@ -224,7 +224,7 @@ def test_states_are_read_as_they_were_written(tmp_path) -> None:
     state = replace(moved(affine(F), lambda X: X[..., 0]), before=nodes(MESH, 2), rate=2.5)
     stored(tmp_path / "run", state)
     mesh, fibre = states.read_rest(tmp_path / "run")
-    (read,) = states.Stored(tmp_path / "run", (0,)).values()
+    (read,) = states.StoredStates(tmp_path / "run", (0,)).values()
     assert np.array_equal(mesh.points, MESH.points)
     assert np.array_equal(mesh.tets, MESH.tets)
     assert np.array_equal(fibre, FIBRES)
@@ -243,4 +243,4 @@ def test_a_run_without_states_another_scene_or_a_damaged_file_is_named(tmp_path)
         results.of_run(tmp_path / "run", "hip_flexion")
     (tmp_path / "run" / "state" / "frame_0000.npz").write_bytes(b"PK\x03\x04 half")
     with pytest.raises(InputError, match=r"frame_0000.npz: .* want the arrays displacement, pressure, before, rate"):
-        states.Stored(tmp_path / "run", (0,))[0]
+        states.StoredStates(tmp_path / "run", (0,))[0]

@@ -12,7 +12,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Surface, enclosed_volume
 from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
-from fem_reference.problems.setup import AttachedVertices, RigidBody, Setup
+from fem_reference.problems.setup import AttachedVertices, Bone, Setup
 from fem_reference.solvers import arap
 
 USUAL = {
@@ -46,7 +46,7 @@ def attached_setup(low, high, surface=None, last=1, pose=None):
     ends = np.flatnonzero(z < -24), np.flatnonzero(z > 24)
     if pose is not None:
         surface = surface.moved_to(apply(pose, surface.points))
-    bones = tuple(RigidBody(name, surface, motion) for name, motion in (("low", low), ("high", high)))
+    bones = tuple(Bone(name, surface, motion) for name, motion in (("low", low), ("high", high)))
     attached = tuple(AttachedVertices(bone.name, bone, vertices) for bone, vertices in zip(bones, ends, strict=True))
     return Setup(surface, bones, attached, tuple(range(last + 1)), interval=None)
 

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere
 from fem_reference.geometry.signed_distance import FAR, Grid, build
-from fem_reference.problems.setup import RigidBody
+from fem_reference.problems.setup import Bone
 from fem_reference.solvers import collision_kernels as collision
 
 BALL = shapes.sphere(2, 20.0)
@@ -19,13 +19,13 @@ def grid() -> Grid:
     return build(BALL, 2.0, 6.0)
 
 
-def floor(height: float = 0.0, motion: Translation | None = None, normal=(0, 0, 1)) -> RigidBody:
+def floor(height: float = 0.0, motion: Translation | None = None, normal=(0, 0, 1)) -> Bone:
     """All below z = ``height`` [mm]; its surface is not asked."""
-    return RigidBody("floor", BALL, motion, solid=HalfSpace((0, 0, height), normal))
+    return Bone("floor", BALL, motion, solid=HalfSpace((0, 0, height), normal))
 
 
-def gridded(grid: Grid, motion: Rotation | None) -> RigidBody:
-    body = RigidBody("ball", BALL, motion)
+def gridded(grid: Grid, motion: Rotation | None) -> Bone:
+    body = Bone("ball", BALL, motion)
     vars(body)["shape"] = grid  # as if it had been read from the kept distances
     return body
 
@@ -76,7 +76,7 @@ def test_nobody_inside_a_bone_is_missed_and_few_are_asked(grid, kind) -> None:
     # Points that wander while the ball turns about an axis beside it: after each step those asked are all that are inside.
     random = np.random.default_rng(3)
     turn = Rotation((0, 1, 1), (40, 0, 0), (0.0, 60.0), (0.0, 3.0))
-    body = gridded(grid, turn) if kind == "grid" else RigidBody("ball", BALL, turn, solid=Sphere((0, 0, 0), 20.0))
+    body = gridded(grid, turn) if kind == "grid" else Bone("ball", BALL, turn, solid=Sphere((0, 0, 0), 20.0))
     points = 60 * random.normal(size=(3000, 3))
     points = points[body.shape.sample(points).distance > 0]
     obstacle = collision.CollidingBone(body, points, np.ones(len(points), bool), 0.0)
@@ -94,7 +94,7 @@ def test_nobody_inside_a_bone_is_missed_and_few_are_asked(grid, kind) -> None:
 
 
 def test_a_vertex_takes_the_shortest_path_out() -> None:
-    ball = RigidBody("ball", BALL, Translation((1, 0, 0), (0.0, 1.0), (0.0, 30.0)), solid=Sphere((0, 0, 0), 20.0))
+    ball = Bone("ball", BALL, Translation((1, 0, 0), (0.0, 1.0), (0.0, 30.0)), solid=Sphere((0, 0, 0), 20.0))
     rest = np.array([[40.0, 0, 0], [40, 5, 0], [80, 0, 0], [40, 0, 5]])
     obstacle = collision.CollidingBone(ball, rest, np.array([True, True, True, False]), 0.0)
     obstacle.move(1)
@@ -147,7 +147,7 @@ def test_in_the_middle_of_a_ball_there_is_no_path_out_but_no_harm() -> None:
     # The gradient of a spline vanishes on a ridge; nothing goes farther than it is deep.
     rest = np.array([[50.0, 0, 0]])
     obstacle = collision.CollidingBone(
-        RigidBody("ball", BALL, None, solid=Sphere((0, 0, 0), 20.0)), rest, np.ones(1, bool), 0.0
+        Bone("ball", BALL, None, solid=Sphere((0, 0, 0), 20.0)), rest, np.ones(1, bool), 0.0
     )
     points = np.zeros((1, 3))
     collision.move_out(points, [obstacle], 1.0)

@@ -19,8 +19,8 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Polylines
 from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
-from fem_reference.problems.muscle import Problem
-from fem_reference.problems.setup import RigidBody
+from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.setup import Bone
 from fem_reference.report import gallery
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import line_of_action
@@ -31,7 +31,7 @@ pytestmark = pytest.mark.slow
 SWING = Rotation((1, 0, 0), (5, 25, 15), (0.0, 10.0), (0.0, 1.2))
 
 
-def bar(motion=SWING, points: int = 41, bottom=None) -> Problem:
+def bar(motion=SWING, points: int = 41, bottom=None) -> MuscleProblem:
     """The bar of the contract, 30 mm long, with one fibre of many points that is bent at rest, and one straight."""
     given = shapes.bar((2, 2, 4), (10, 10, 30), {"bottom": bottom, "top": motion}, (), (0, 5, 10))
     heights = np.linspace(0, 30, points)
@@ -40,13 +40,13 @@ def bar(motion=SWING, points: int = 41, bottom=None) -> Problem:
     return replace(given, fibres=Polylines(np.vstack([bent, straight]), np.array([0, points, 2 * points])))
 
 
-def solved(given: Problem, **settings: object) -> tuple[Outcome, list[Frame]]:
+def solved(given: MuscleProblem, **settings: object) -> tuple[Outcome, list[Frame]]:
     frames: list[Frame] = []
     record = parse(line_of_action.LineSettings, settings, "candidate[0]")
     return line_of_action.solve(given, record, frames.append), frames
 
 
-def lengths(given: Problem, frames: list[Frame]) -> np.ndarray:
+def lengths(given: MuscleProblem, frames: list[Frame]) -> np.ndarray:
     return np.array([given.fibres.lengths(frame.fibres) for frame in frames])
 
 
@@ -339,6 +339,6 @@ def test_a_reference_of_lines_alone_is_refused(tmp_path, capsys) -> None:
 
 def test_the_ends_are_attached_by_the_bones_of_the_nearest_attachments() -> None:
     given = bar()
-    spare = RigidBody("spare", given.bones[0].surface, Translation((1, 0, 0), (0.0, 10.0), (0.0, 50.0)))
+    spare = Bone("spare", given.bones[0].surface, Translation((1, 0, 0), (0.0, 10.0), (0.0, 50.0)))
     _, frames = solved(replace(given, bones=(spare, *given.bones)))
     assert_allclose(frames[-1].fibres, solved(given)[1][-1].fibres, atol=1e-12)

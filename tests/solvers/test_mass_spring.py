@@ -15,8 +15,8 @@ from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
 from fem_reference.geometry.embedding import Locator
 from fem_reference.geometry.rigid_bodies import HalfSpace
-from fem_reference.problems.muscle import Problem
-from fem_reference.problems.setup import RigidBody
+from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.setup import Bone
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.solvers import mass_spring
 from fem_reference.solvers.spring_kernels import Network, PrescribedPath, advance, forces
@@ -79,11 +79,11 @@ def test_the_stable_time_step_is_safe_for_any_shape() -> None:
     assert mass_spring.stable_time_step(springs, np.arange(12)) == math.inf
 
 
-def bar(top: Rotation | Translation | None, frames=(0, 5, 10), bottom=None) -> Problem:
+def bar(top: Rotation | Translation | None, frames=(0, 5, 10), bottom=None) -> MuscleProblem:
     return shapes.bar((2, 2, 4), (10, 10, 30), {"bottom": bottom, "top": top}, (), frames)
 
 
-def solved(problem: Problem, **changes: object) -> tuple[Outcome, list[Frame]]:
+def solved(problem: MuscleProblem, **changes: object) -> tuple[Outcome, list[Frame]]:
     frames: list[Frame] = []
     settings = {name: value for name, value in (USUAL | changes).items() if value is not None}
     return mass_spring.solve(
@@ -164,9 +164,7 @@ def test_every_setting_is_felt(change) -> None:
 def test_bones_keep_masses_out() -> None:
     """A soft bar that hangs sideways between its ends sags onto a plane that comes up, in the end above where they are fixed."""
     lift = Translation((0, 1, 0), (0.0, 40.0), (0.0, 3.5))
-    floor = RigidBody(
-        "floor", Surface(np.eye(3), np.array([[0, 1, 2]])), lift, solid=HalfSpace((5, -3.0, 5), (0, 1, 0))
-    )
+    floor = Bone("floor", Surface(np.eye(3), np.array([[0, 1, 2]])), lift, solid=HalfSpace((5, -3.0, 5), (0, 1, 0)))
     given = replace(bar(None, (0, 40)), bones=(floor,))
     soft = {"stiffness": "0.01 N/mm", "gravity": "0, -40, 0 m/s^2", "damping": "0.001 N s/m"}
     _, sagging = solved(given, **soft)
@@ -212,7 +210,7 @@ def test_a_muscle_spread_too_wide_is_an_outcome() -> None:
     assert "the muscle is spread over " in outcome.message
 
 
-def pressed(travel: float) -> Problem:
+def pressed(travel: float) -> MuscleProblem:
     """A soft bar of two cells, 30 mm long, whose upper end goes down by ``travel`` [mm] faster than the middle follows."""
     down = Translation((0, 0, -1), (0.0, 1.0), (0.0, travel))
     return shapes.bar((1, 1, 2), (10, 10, 30), {"bottom": None, "top": down}, (), (0, 1))

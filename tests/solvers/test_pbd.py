@@ -12,8 +12,8 @@ from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
 from fem_reference.geometry.rigid_bodies import Sphere
 from fem_reference.geometry.signed_distance import build
-from fem_reference.problems.muscle import Problem
-from fem_reference.problems.setup import AttachedVertices, RigidBody, Setup
+from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.problems.setup import AttachedVertices, Bone, Setup
 from fem_reference.solvers import pbd
 
 USUAL = {
@@ -57,7 +57,7 @@ def attached_setup(low, high, last=10, every=1, pose=None):
     ends = np.flatnonzero(z < -24), np.flatnonzero(z > 24)
     if pose is not None:
         surface = surface.moved_to(apply(pose, surface.points))
-    bones = tuple(RigidBody(name, surface, motion) for name, motion in (("low", low), ("high", high)))
+    bones = tuple(Bone(name, surface, motion) for name, motion in (("low", low), ("high", high)))
     attached = tuple(AttachedVertices(bone.name, bone, vertices) for bone, vertices in zip(bones, ends, strict=True))
     return Setup(surface, bones, attached, tuple(range(0, last + 1, every)), interval=None)
 
@@ -162,7 +162,7 @@ def ball_against(last, back=None):
     """The spindle attached at its ends, and a ball of 8 mm that gets 10 mm into its side by frame 40, and is gone by ``back``."""
     setup = attached_setup(None, None, last=last)
     frames, distances = ((0.0, 40.0), (0.0, 12.0)) if back is None else ((0.0, 40.0, float(back)), (0.0, 12.0, 0.0))
-    ball = RigidBody(
+    ball = Bone(
         "ball", shapes.sphere(0, 8.0), Translation((-1, 0, 0), frames, distances), solid=Sphere((20, 0, 0), 8.0)
     )
     return Setup(setup.surface, (ball,), setup.attached, setup.frames, None)
@@ -208,7 +208,7 @@ def test_a_bone_that_is_gone_leaves_the_rest_state():
 
 def test_what_overlaps_at_rest_does_not_jump():
     setup = ball_against(10)
-    ball = RigidBody("ball", shapes.sphere(0, 8.0), None, solid=Sphere((15, 0, 0), 8.0))
+    ball = Bone("ball", shapes.sphere(0, 8.0), None, solid=Sphere((15, 0, 0), 8.0))
     setup = Setup(setup.surface, (ball,), setup.attached, setup.frames, None)
     assert deepest(setup, {0: setup.surface.points}) > 2
     _, frames = run(setup, collision=CONTACT)
@@ -217,7 +217,7 @@ def test_what_overlaps_at_rest_does_not_jump():
 
 def test_attached_vertices_go_with_their_bone_whatever_are_obstacles():
     setup = ball_against(5)
-    everywhere = RigidBody("ball", shapes.sphere(0, 100.0), None, solid=Sphere((0, 0, 0), 100.0))
+    everywhere = Bone("ball", shapes.sphere(0, 100.0), None, solid=Sphere((0, 0, 0), 100.0))
     _, frames = run(Setup(setup.surface, (everywhere,), setup.attached, setup.frames, None), collision=CONTACT)
     for attached in setup.attached:
         np.testing.assert_array_equal(frames[5][attached.vertices], setup.surface.points[attached.vertices])
@@ -239,7 +239,7 @@ def kinked():
     fibre = np.column_stack([6 * (-1.0) ** np.arange(23), np.zeros(23), z])
     given = shapes.bar((1, 1, 1), (10, 10, 30), {"bottom": None, "top": None}, (), (0, 50))
     setup = attached_setup(None, SWING, last=50)
-    return Problem(**vars(given) | vars(setup) | {"fibres": Polylines(fibre, np.array([0, 23]))})
+    return MuscleProblem(**vars(given) | vars(setup) | {"fibres": Polylines(fibre, np.array([0, 23]))})
 
 
 def test_a_turned_scene_has_the_same_fibres_at_its_edges():
@@ -260,7 +260,7 @@ def test_with_fibres_independent_of_where_the_world_is():
     x, y, z = TURN[:3, :3] @ SWING.axis
     moved = Rotation((x, y, z), tuple(apply(TURN, np.array([SWING.centre]))[0]), SWING.frames, SWING.angles)
     fibres = Polylines(apply(TURN, here.fibres.points), here.fibres.offsets)
-    there = Problem(**vars(here) | vars(attached_setup(None, moved, last=50, pose=TURN)) | {"fibres": fibres})
+    there = MuscleProblem(**vars(here) | vars(attached_setup(None, moved, last=50, pose=TURN)) | {"fibres": fibres})
     states = [run(given, anisotropy=1.0)[1][50] for given in (here, there)]
     np.testing.assert_allclose(states[1], apply(TURN, states[0]), atol=60e-6)
 
@@ -342,7 +342,7 @@ def pressed(pose, spacing):
     surface = shapes.sphere(2, 8.0)
     surface = surface.moved_to(apply(pose, surface.points + [20, 0, 0]))
     x, y, z = -pose[:3, 0]
-    ball = RigidBody("ball", surface, Translation((x, y, z), (0.0, 40.0), (0.0, 12.0)))
+    ball = Bone("ball", surface, Translation((x, y, z), (0.0, 40.0), (0.0, 12.0)))
     vars(ball)["shape"] = build(surface, spacing, 6.0)  # as if it had been read from the kept distances
     _, frames = run(Setup(setup.surface, (ball,), setup.attached, setup.frames, None), collision=CONTACT)
     return apply(np.linalg.inv(pose), frames[16])

@@ -13,7 +13,7 @@ from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
 from fem_reference.io import files
 from fem_reference.problems import muscle
-from fem_reference.problems.setup import AttachedVertices, RigidBody, Setup
+from fem_reference.problems.setup import AttachedVertices, Bone, Setup
 from fem_reference.scenes import casefile
 from fem_reference.solvers import pbd_program
 from fem_reference.solvers.pbd_kernels import dihedrals
@@ -48,9 +48,7 @@ def attached_setup(low, high, last=10, every=1):
     ends = np.flatnonzero(z < -18), np.flatnonzero(z > 18)
     plates = cube(30, (-15, -15, -49.9)), cube(30, (-15, -15, 19.9))
     names = ("low", "high")
-    bones = tuple(
-        RigidBody(name, plate, motion) for name, plate, motion in zip(names, plates, (low, high), strict=True)
-    )
+    bones = tuple(Bone(name, plate, motion) for name, plate, motion in zip(names, plates, (low, high), strict=True))
     attached = tuple(AttachedVertices(bone.name, bone, vertices) for bone, vertices in zip(bones, ends, strict=True))
     return Setup(surface, bones, attached, tuple(range(0, last + 1, every)), interval=None)
 
@@ -126,7 +124,7 @@ def test_voxels_of_a_ball_contain_it():
 
 def test_who_marches_too_far_ends_at_its_start():
     # The cube of 4 voxels with a shaft of one, which lies as above.
-    bone = pbd_program.VoxelBone(RigidBody("bone", cube(4.0), None), 4, 0)
+    bone = pbd_program.VoxelBone(Bone("bone", cube(4.0), None), 4, 0)
     bone.voxels.inside[2, 2] = False
     start = np.array([[2.05, 2.05, 1.0]])
     np.testing.assert_array_equal(pbd_program.collided(start, start + [0.5, -0.5, 0], [bone]), start)
@@ -134,7 +132,7 @@ def test_who_marches_too_far_ends_at_its_start():
 
 def test_the_motions_of_a_bone_add_up():
     # As the program adds up: 0.9 mm a hundred times are not 90 mm.
-    bone = pbd_program.VoxelBone(RigidBody("bone", cube(8.0), Translation((0, -1, 0), (0.0, 100.0), (0.0, 90.0))), 1, 0)
+    bone = pbd_program.VoxelBone(Bone("bone", cube(8.0), Translation((0, -1, 0), (0.0, 100.0), (0.0, 90.0))), 1, 0)
     height = 0.0
     for frame in range(1, 101):
         bone.move(frame)
@@ -144,7 +142,7 @@ def test_the_motions_of_a_bone_add_up():
 
 
 def test_a_bone_takes_along_what_it_has_come_over_and_forgets_nothing():
-    bone = pbd_program.VoxelBone(RigidBody("bone", cube(8.0), Translation((0, 0, 1), (0.0, 2.0), (0.0, 3.0))), 8, 0)
+    bone = pbd_program.VoxelBone(Bone("bone", cube(8.0), Translation((0, 0, 1), (0.0, 2.0), (0.0, 3.0))), 8, 0)
     starts, goals = np.array([[4.0, 4, 9], [4, 4, 12]]), np.array([[4.0, 5, 8], [4, 5, 12]])
     bone.move(1)  # now its upper face is at 9.5, and the first vertex inside, wherever it goes
     np.testing.assert_allclose(pbd_program.collided(starts, goals, [bone]), [[4, 4, 10.5], [4, 5, 12]])
@@ -154,8 +152,8 @@ def test_a_bone_takes_along_what_it_has_come_over_and_forgets_nothing():
 
 
 def test_of_two_bones_the_later_wins():
-    lower = pbd_program.VoxelBone(RigidBody("lower", cube(8.0), None), 8, 0)
-    upper = pbd_program.VoxelBone(RigidBody("upper", cube(8.0, (0, 0, 4)), None), 8, 0)
+    lower = pbd_program.VoxelBone(Bone("lower", cube(8.0), None), 8, 0)
+    upper = pbd_program.VoxelBone(Bone("upper", cube(8.0, (0, 0, 4)), None), 8, 0)
     start, goal = np.array([[-1.0, 4, 6]]), np.array([[2.25, 4, 6]])
     only = pbd_program.collided(start, goal, [upper])
     np.testing.assert_array_equal(pbd_program.collided(start, goal, [lower, upper]), only)

@@ -13,7 +13,7 @@ from fem_reference.foundations.mesh import Surface, enclosed_volume, vertex_area
 from fem_reference.foundations.motion import Rotation, Translation, apply
 from fem_reference.foundations.records import parse
 from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere
-from fem_reference.problems.setup import AttachedVertices, RigidBody, Setup
+from fem_reference.problems.setup import AttachedVertices, Bone, Setup
 from fem_reference.solvers import pbd, xpbd
 from fem_reference.solvers.collision_kernels import CollidingBone
 from fem_reference.solvers.xpbd import XpbdConstraints, XpbdStep
@@ -200,7 +200,7 @@ def test_a_balloon_is_as_large_as_membrane_and_filling_agree():
 def test_a_weight_lies_as_deep_as_the_bone_yields(seconds, sweeps):
     # The contact force is the gap's depth over the compliance: alone on it, one mass is solved by one projection.
     weight = graph([1 / MASS], [], 0, 0)
-    bone = RigidBody("floor", icosahedron(), None, solid=HalfSpace((0, 0, 0), (0, 0, 1)))
+    bone = Bone("floor", icosahedron(), None, solid=HalfSpace((0, 0, 0), (0, 0, 1)))
     contact = xpbd.BoneContact(CollidingBone(bone, np.array([[0.0, 0, 1]]), np.ones(1, bool), 0.0), np.array([2.0]))
     end = settle([[0.0, 0, 1]], weight, XpbdStep(seconds, sweeps, 300.0, (0, 0, -GRAVITY)), 0.5, [contact])
     assert end[0, 2] == pytest.approx(-2.0 * MASS * GRAVITY, rel=1e-6)
@@ -208,7 +208,7 @@ def test_a_weight_lies_as_deep_as_the_bone_yields(seconds, sweeps):
 
 def test_bones_never_pull():
     weight = graph([1 / MASS], [], 0, 0)
-    bone = RigidBody("floor", icosahedron(), None, solid=HalfSpace((0, 0, 0), (0, 0, 1)))
+    bone = Bone("floor", icosahedron(), None, solid=HalfSpace((0, 0, 0), (0, 0, 1)))
     points = np.array([[0.0, 0, 1]])
     contact = xpbd.BoneContact(CollidingBone(bone, points, np.ones(1, bool), 0.0), np.array([1e-3]))
     velocities = np.array([[0.0, 0, -2000]])
@@ -234,7 +234,7 @@ def muscle(motion, last=10, ball=None) -> Setup:
     surface = sphere.moved_to(sphere.points * [10, 10, 30])
     z = surface.points[:, 2]
     bones = tuple(
-        RigidBody(name, surface, moves, solid=Sphere((0, 0, far), 1.0))
+        Bone(name, surface, moves, solid=Sphere((0, 0, far), 1.0))
         for name, moves, far in (("low", None, -99), ("high", motion, 99))
     )
     attached = (
@@ -292,9 +292,7 @@ def test_the_state_in_the_end_knows_neither_steps_nor_sweeps():
 
 
 def test_bones_are_obstacles():
-    ball = RigidBody(
-        "ball", icosahedron(), Translation((-1, 0, 0), (0.0, 20.0), (0.0, 12.0)), solid=Sphere((20, 0, 0), 8.0)
-    )
+    ball = Bone("ball", icosahedron(), Translation((-1, 0, 0), (0.0, 20.0), (0.0, 12.0)), solid=Sphere((20, 0, 0), 8.0))
     setup = muscle(None, last=20, ball=ball)
     loose = np.setdiff1d(np.arange(len(setup.surface.points)), setup.attached_vertices)
     depths = []

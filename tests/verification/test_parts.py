@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fem_reference.problems.paths import Rest
-from fem_reference.runs.store import Frame, Outcome, Run
+from fem_reference.runs.store import Frame, Outcome, collected
 from fem_reference.verification import parts
 
 
@@ -35,6 +35,6 @@ def test_distances_are_those_of_points() -> None:
 def test_a_rate_is_that_of_an_exponential() -> None:
     # 10 + e^(-3 t) at t = 0.5 and 1.5, above a height of 10 at rest: the rate is 3.
     heights = (10.0, 10 + np.exp(-1.5), 10 + np.exp(-4.5))
-    states = tuple(Frame(i, np.array([[0.0, 0.0, 0.0], [0.0, 0.0, z]]), {}, {}) for i, z in enumerate(heights))
-    solved = Run(states, Outcome("converged", "", {}))
-    assert parts.relaxation_rate(solved, (1, 2), 1.0) == pytest.approx(3, rel=1e-12)
+    states = [Frame(i, points=np.array([[0.0, 0.0, 0.0], [0.0, 0.0, z]])) for i, z in enumerate(heights)]
+    run = collected(states, Outcome("converged", "", {}))
+    assert parts.relaxation_rate(run, (1, 2), 1.0) == pytest.approx(3, rel=1e-12)

@@ -27,26 +27,26 @@ def _flat(table: Any, key: str = "") -> list[tuple[str, Any]]:
     return [(key, table if isinstance(table, str | float | int | None) else json.dumps(table, default=str))]
 
 
-def changes(scene: Case) -> list[tuple[str, Any, Any]]:
+def changes(case: Case) -> list[tuple[str, Any, Any]]:
     """The keys in which a case differs from its file, with the value in the file and the value here."""
-    if not scene.place.endswith(".toml"):  # made without a file
+    if not case.place.endswith(".toml"):  # made without a file
         return []
     try:
-        in_file = dict(_flat(_table(casefile.read(scene.place))))
+        in_file = dict(_flat(_table(casefile.read(case.place))))
     except InputError as error:
         return [("the scene file", "not readable any more", str(error))]
-    here = dict(_flat(_table(scene)))
+    here = dict(_flat(_table(case)))
     return [
         (key, in_file.get(key, ""), here.get(key, "")) for key in in_file | here if in_file.get(key) != here.get(key)
     ]
 
 
-def _table(scene: Case) -> dict[str, Any]:
-    """The scene as nested tables, entries of a list by their number; with all effects of its file where it chose among them."""
-    effects = [one.effect for one in scene.decisions] or scene.effects
+def _table(case: Case) -> dict[str, Any]:
+    """The case as nested tables, entries of a list by their number; with all effects of its file where it chose among them."""
+    effects = [one.effect for one in case.decisions] or case.effects
     listed: dict[str, Any] = {"effect": [effect.model_dump(mode="json") for effect in effects]}
-    listed |= {"choice": "auto"} if scene.decisions else {}
-    return dict(_numbered(scene.model_dump(mode="json", exclude={"folder", "effect"}) | listed))
+    listed |= {"choice": "auto"} if case.decisions else {}
+    return dict(_numbered(case.model_dump(mode="json", exclude={"folder", "effect"}) | listed))
 
 
 def _numbered(value: Any) -> Any:
@@ -57,6 +57,6 @@ def _numbered(value: Any) -> Any:
     return value
 
 
-def _scene_text(scene: Case) -> str:
-    path = Path(scene.place)
+def _scene_text(case: Case) -> str:
+    path = Path(case.place)
     return path.read_text(encoding="utf-8") if path.is_file() else ""

@@ -12,9 +12,9 @@ import numpy as np
 from fem_reference.foundations.mesh import TET_FACES, Floats, Polylines, Surface, TetMesh, diagonal
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.signed_distance import Grid
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.resolved_paths import posed, skipped
-from fem_reference.problems.setup import AttachedVertices, RigidBody, Setup
+from fem_reference.problems.setup import AttachedVertices, Bone, Setup
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers.common.state_checks import StateCheck, Trouble, first_trouble, surface_checks
 
@@ -128,15 +128,15 @@ def timed[M: FrameModel](make: Callable[[Setup], M], setup: Setup) -> M:
     return model
 
 
-def tetrahedron() -> Problem:
+def tetrahedron() -> MuscleProblem:
     """A tetrahedron with a fibre, attached at a vertex to a bone."""
     corners = np.vstack([np.zeros(3), np.eye(3)])
     surface, facets = Surface(corners, TET_FACES), {"end": TET_FACES[:1]}
     clear = Grid(np.ones((5, 5, 5)), (-1.0, -1.0, -1.0), 1.0, 1.0, 0.0, 0.0)
-    bone = RigidBody("bone", surface, None, solid=clear)
+    bone = Bone("bone", surface, None, solid=clear)
     attached = (AttachedVertices("end", bone, np.zeros(1, np.int64)),)
     mesh, fibre = TetMesh(corners, np.arange(4)[None], facets), Polylines(corners[:2], np.array([0, 2]))
-    return Problem(
+    return MuscleProblem(
         surface, (bone,), attached, (0, 1), None, mesh=mesh, effects=(), fibres=fibre, mesh_facts={}, seconds=0.0
     )
 

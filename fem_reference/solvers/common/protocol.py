@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal, Protocol
 from fem_reference.effects import Effect
 from fem_reference.foundations.records import Record
 from fem_reference.problems.body import Body
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.problem import Task
 from fem_reference.problems.scalar import FieldProblem
 from fem_reference.runs.cut_off import CutOff
@@ -88,7 +88,7 @@ class Solver[P, S: Record]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class MuscleSolver[S: Record](Solver[Problem, S]):
+class MuscleSolver[S: Record](Solver[MuscleProblem, S]):
     """A solver of muscles; ``moves``: what carries its unknowns, whose mesh its accuracy and cost depend on;
     ``check_effects`` of one that simulates the effects of a scene, None of one that does not; ``fibres``: whether one of surfaces
     needs the fibres under such settings: without them it is given a ``Setup``, as the muscle is not filled for it.

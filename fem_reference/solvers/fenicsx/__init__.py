@@ -24,7 +24,7 @@ from fem_reference.foundations.records import join
 from fem_reference.foundations.subprocesses import command
 from fem_reference.geometry.embedding import Locator
 from fem_reference.problems.body import Body, check_element, check_quadrature
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.runs.cut_off import CutOff
 from fem_reference.runs.store import Frame, Outcome, Sink
 from fem_reference.solvers.common.protocol import BodySolver, FieldSolver, MuscleSolver
@@ -69,14 +69,14 @@ def check_effects(settings: Settings, effects: tuple[Effect, ...], place: str) -
     check_quadrature(settings.element, settings.quadrature_degree, join(place, "quadrature_degree"))
 
 
-def solve(problem: Problem, settings: Settings, sink: Sink) -> Outcome:
+def solve(problem: MuscleProblem, settings: Settings, sink: Sink) -> Outcome:
     """Solve every requested frame in worker processes; frames carry surface, fibres and tets."""
     require(settings)
     with scratch.folder() as folder:
         return _solve(problem, settings, sink, folder, None)
 
 
-def go_on(problem: Problem, settings: Settings, sink: Sink, cut_off: CutOff) -> Outcome:
+def go_on(problem: MuscleProblem, settings: Settings, sink: Sink, cut_off: CutOff) -> Outcome:
     """Solve from the last stored frame of a run that was cut off; states are kept until the caller removes them."""
     require(settings)
     there = kept(cut_off, problem.body)
@@ -95,7 +95,7 @@ def go_on(problem: Problem, settings: Settings, sink: Sink, cut_off: CutOff) -> 
     return _solve(problem, settings, pass_on, there.folder, there)
 
 
-def _solve(problem: Problem, settings: Settings, sink: Sink, folder: Path, kept: Kept | None) -> Outcome:
+def _solve(problem: MuscleProblem, settings: Settings, sink: Sink, folder: Path, kept: Kept | None) -> Outcome:
     body = problem.body
     settings = _planned(_with_states(problem, settings), body)
     job = folder.resolve() / "job.pickle"  # a process that is shared may have been started elsewhere
@@ -124,7 +124,7 @@ def _solved(job: Path, settings: Settings, sink: Sink) -> Outcome:
     return own.run(job, settings.time_limit, take, "frames")
 
 
-def _pass_on(problem: Problem, frame: Frame, sink: Sink, passed: list[float]) -> None:
+def _pass_on(problem: MuscleProblem, frame: Frame, sink: Sink, passed: list[float]) -> None:
     """A frame that is wanted, its number noted in ``passed``; what relaxes before the first is not."""
     if frame.number in problem.frames:
         if not passed and (overlap := frame.scalars.get("overlap_at_rest", 0.0)) > 0:
@@ -133,7 +133,7 @@ def _pass_on(problem: Problem, frame: Frame, sink: Sink, passed: list[float]) ->
         sink(_with_attachment_errors(problem, frame))
 
 
-def _with_attachment_errors(problem: Problem, frame: Frame) -> Frame:
+def _with_attachment_errors(problem: MuscleProblem, frame: Frame) -> Frame:
     """The frame with how far attached surface vertices are from where their bones have them, ``attachment_error_rms``
     and ``attachment_error_max`` [mm]: exact attachments are facets of tets, which cover them only roughly, and springs
     yield. As it is where nothing is attached.
@@ -155,7 +155,7 @@ def _with_attachment_errors(problem: Problem, frame: Frame) -> Frame:
     return replace(frame, scalars=frame.scalars | scalars)
 
 
-def _samples(problem: Problem) -> dict[str, tuple[Ints, Floats]]:
+def _samples(problem: MuscleProblem) -> dict[str, tuple[Ints, Floats]]:
     """Places where displacement is wanted: by name, the tet of each point and the point at rest, as the tet's own map places it."""
     locator = Locator(problem.mesh)
     wanted = {"surface": problem.surface.points, "fibres": problem.fibres.points}
@@ -192,7 +192,7 @@ def _check_ranks(settings: Settings, place: str) -> None:
         raise InputError(place, settings.ranks, "1, on which multigrid works")
 
 
-def _with_states(problem: Problem, settings: Settings) -> Settings:
+def _with_states(problem: MuscleProblem, settings: Settings) -> Settings:
     """The settings with whether states are kept: as asked for, else where those of all frames are small."""
     if settings.store_state is not None:
         return settings

@@ -27,7 +27,6 @@ from fem_reference.solvers.fenicsx.multigrid import Multigrid
 from fem_reference.solvers.fenicsx.newton import Newton
 from fem_reference.solvers.fenicsx.nodal import Nodal
 from fem_reference.solvers.fenicsx.path import Path, settle
-from fem_reference.solvers.fenicsx.reactions import Reactions
 from fem_reference.solvers.fenicsx.resources import SMALL
 from fem_reference.solvers.fenicsx.settings import BodySettings
 from fem_reference.solvers.fenicsx.spent import Spent
@@ -82,7 +81,6 @@ class AssembledBody:
         self.path = Path(self.system, self.determinants)
         inside: tuple[StateCheck, ...] = self.determinants, self.validity, self.path, FiniteEnergy(self.energy)
         self.checks: tuple[StateCheck, ...] = inside if self.contact is None else (self.contact, *inside)
-        self.reactions = Reactions(self.system, self.conditions, self.contact)
         self.known = Known(self.comm)
         self.recalled: KnownState | None = None
         self.modes: float | None = None  # of the state that was examined last
@@ -108,7 +106,7 @@ class AssembledBody:
             points = contact_points.on_facets(space, parents, body.mesh, facets, form.degree)
         else:
             points = contact_points.on_skin(space, parents, law.on, self.local)
-        return ContactForces(law, body.obstructions, points, self.unknowns, body.frames[0], self.spent)
+        return ContactForces(law, body.bones, points, self.unknowns, body.frames[0], self.spent)
 
     def start(self, moved: Callable[[Floats], Floats]) -> None:
         """Begin with the nodes where ``moved`` takes rest points (n, 3) [mm]."""
@@ -200,7 +198,7 @@ class AssembledBody:
     def _acting(self, frame: float) -> Floats:
         """All numbers that determine the state at ``frame``, beside the body itself."""
         amounts = [effect.amount(frame) for effect in self.effects]
-        poses = [entry.pose(frame).ravel() for entry in self.contact.obstructions] if self.contact else []
+        poses = [entry.pose(frame).ravel() for entry in self.contact.bones] if self.contact else []
         allowed = [self.contact.law.allowance(frame)] if self.contact else []
         values = [one.prescribed for one in self.conditions]
         return np.concatenate([amounts, allowed, *poses, *values])

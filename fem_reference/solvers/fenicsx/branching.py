@@ -4,7 +4,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fem_reference.foundations.mesh import Floats
+from fem_reference.foundations.mesh import Floats, diagonal
 from fem_reference.solvers.fenicsx.body import AssembledBody
 from fem_reference.solvers.fenicsx.linear import Factorised
 from fem_reference.solvers.fenicsx.spent import Spent
@@ -21,7 +21,7 @@ def leave(body: AssembledBody, frame: float, share: float) -> float | None:
     if body.stability is None or not (modes := body.stability.negative_modes()) > 0:
         return None
     before, body.system.contact = np.array(body.unknowns.x.array), body.contact
-    direction, size = lowest(body), share * _size(body)
+    direction, size = lowest(body), share * diagonal(body.nodes.cells.points)
     for amount in (sign * larger * size for larger in _LARGER for sign in (1, -1)):
         body.unknowns.x.array[:] = before + amount * direction
         body.unknowns.x.scatter_forward()
@@ -33,9 +33,7 @@ def leave(body: AssembledBody, frame: float, share: float) -> float | None:
             if body.contact:
                 body.contact.settle()
             return float(abs(amount))
-        body.unknowns.x.array[:] = before
-        if body.contact:
-            body.contact.go_back()
+        body.go_back(before)
     body.system.linearise()
     return None
 
@@ -73,11 +71,3 @@ def _shifted(matrix: PETSc.Mat, shift: Floats, spent: Spent) -> Factorised:
     raised.setDiagonal(diagonal)
     raised.setOption(PETSc.Mat.Option.SYMMETRIC, True)  # type: ignore[arg-type]  # as its stubs have it
     return Factorised(raised, True, False, "double", spent)
-
-
-def _size(body: AssembledBody) -> float:
-    """The diagonal of the box around the body at rest [mm]."""
-    points = body.mesh.geometry.x
-    low = [body.comm.allreduce(float(axis.min(initial=np.inf)), MPI.MIN) for axis in points.T]
-    high = [body.comm.allreduce(float(axis.max(initial=-np.inf)), MPI.MAX) for axis in points.T]
-    return float(np.linalg.norm(np.subtract(high, low)))

@@ -37,8 +37,8 @@ class Patches:
 
 
 class Nearby:
-    """Finds the points within ``reach`` [mm] of an obstruction of a ``shape``, and perhaps some more. By patch: how ``free`` (p,)
-    [mm] its points were when they were looked at last, with its nodes where they were ``seen`` (p, k, 3), in the obstruction's
+    """Finds the points within ``reach`` [mm] of a bone of a ``shape``, and perhaps some more. By patch: how ``free`` (p,)
+    [mm] its points were when they were looked at last, with its nodes where they were ``seen`` (p, k, 3), in the bone's
     frame; and whether they were ``met`` since the last settled state.
     """
 
@@ -49,7 +49,7 @@ class Nearby:
         self.met = np.ones(patches.count, bool)
 
     def find(self, nodes: Floats, local: Callable[[Ints], Floats]) -> tuple[Ints, Sampled]:
-        """The points (n,) that may be within reach, with ``nodes`` (m, 3) [mm] in the obstruction's frame, and the distance there;
+        """The points (n,) that may be within reach, with ``nodes`` (m, 3) [mm] in the bone's frame, and the distance there;
         ``local`` says where any points are in that frame.
         """
         now = nodes[self.patches.nodes]

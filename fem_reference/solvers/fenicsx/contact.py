@@ -15,13 +15,13 @@ from mpi4py import MPI
 from fem_reference.foundations.mesh import Floats, Ints, place_of
 from fem_reference.foundations.motion import apply
 from fem_reference.geometry.rigid_bodies import Sampled
-from fem_reference.problems.contact import Contact, Obstruction, nearest_on_path
+from fem_reference.problems.contact import ContactBone, ContactLaw, nearest_on_path
 from fem_reference.solvers.common.state_checks import Trouble
 from fem_reference.solvers.fenicsx.broad_phase import Nearby, Patches
 from fem_reference.solvers.fenicsx.contact_points import ContactPoints
 from fem_reference.solvers.fenicsx.spent import Spent
 
-# A point deeper in an obstruction than this share of its half thickness is as good as through.
+# A point deeper in a bone than this share of its half thickness is as good as through.
 _GIVEN_WAY = 0.75
 # What slides round a rim may be so deep in it on its straight path, of half the thickness, and what smoothing rounds; no deeper.
 _RIM = 0.25
@@ -51,19 +51,19 @@ class ContactForces:
 
     def __init__(
         self,
-        law: Contact,
-        obstructions: tuple[Obstruction, ...],
+        law: ContactLaw,
+        bones: tuple[ContactBone, ...],
         points: ContactPoints,
         unknowns: fem.Function,
         frame: float,
         spent: Spent,
     ) -> None:
         """``frame``: where the body rests."""
-        self.law, self.obstructions, self.points, self.unknowns, self.frame = law, obstructions, points, unknowns, frame
+        self.law, self.bones, self.points, self.unknowns, self.frame = law, bones, points, unknowns, frame
         self.comm, self.spent = unknowns.function_space.mesh.comm, spent
         patches = Patches(points)
-        self.nearby = [Nearby(entry.shape, law.smoothing, patches) for entry in obstructions]
-        self.overlaps = [np.zeros(len(points.areas)) for _ in obstructions]
+        self.nearby = [Nearby(entry.shape, law.smoothing, patches) for entry in bones]
+        self.overlaps = [np.zeros(len(points.areas)) for _ in bones]
         self.update(frame)
         if law.relaxed:
             for overlap, one in zip(self.overlaps, self.now, strict=True):
@@ -76,11 +76,11 @@ class ContactForces:
         with self.spent.on("contact"):
             self.frame, carried = frame, self.points.carried
             self.moved = self.unknowns.x.array[carried.dofs]
-            self.now = [self._pressed(i, carried.rest + self.moved) for i in range(len(self.obstructions))]
+            self.now = [self._pressed(i, carried.rest + self.moved) for i in range(len(self.bones))]
 
     def _pressed(self, i: int, nodes: Floats) -> Pressed:
         """The contact with one bone, with the ``nodes`` (m, 3) [mm] that carry the points: less of what overlaps at rest."""
-        pose = self.obstructions[i].pose(self.frame)
+        pose = self.bones[i].pose(self.frame)
         turn, local = pose[:3, :3], partial(self._local, i, self.frame, self.moved)
         near, (gap, gradient, bend) = self.nearby[i].find((nodes - pose[:3, 3]) @ turn, local)
         allowed = self.law.allowance(self.frame) * self.overlaps[i][near]
@@ -93,7 +93,7 @@ class ContactForces:
 
     def _local(self, i: int, frame: float, moved: Floats, some: Ints) -> Floats:
         """The places (k, 3) [mm] of ``some`` points (k,) in the frame of a bone, with nodes ``moved`` (m, 3) by ``frame``."""
-        pose = self.obstructions[i].pose(frame)
+        pose = self.bones[i].pose(frame)
         return np.asarray((self._places(moved, some) - pose[:3, 3]) @ pose[:3, :3])
 
     def _places(self, moved: Floats, some: Ints) -> Floats:
@@ -113,7 +113,7 @@ class ContactForces:
         """The ``tractions`` if the unknowns made ``moves`` and the bones went on to ``frame``, linearly in both."""
         which, found = self.tractions()
         ahead, carried = [np.zeros((0, 3))], self.points.carried
-        for entry, one in zip(self.obstructions, self.now, strict=True):
+        for entry, one in zip(self.bones, self.now, strict=True):
             step = entry.pose(frame) @ np.linalg.inv(entry.pose(self.frame))
             points, displacement = (
                 self._places(self.moved, one.pressed),
@@ -142,7 +142,7 @@ class ContactForces:
         origin.
         """
         found = {}
-        for entry, one in zip(self.obstructions, self.now, strict=True):
+        for entry, one in zip(self.bones, self.now, strict=True):
             forces = self.points.areas[one.pressed, None] * one.traction
             places = self._places(self.moved, one.pressed)
             found[entry.name] = forces.sum(axis=0), np.cross(places, forces).sum(axis=0)
@@ -171,16 +171,12 @@ class ContactForces:
 
     def deepest(self) -> str:
         """The depth of the deepest point, the bone that it is in, and its place."""
-        mine = [
-            (float(-one.gap.min()), entry.name, self._places(self.moved, one.near[[np.argmin(one.gap)]])[0].tolist())
-            for entry, one in zip(self.obstructions, self.now, strict=True)
-            if len(one.near)
-        ]
-        found = [one for rank in self.comm.allgather(mine) for one in rank]
-        if not found:
-            return "nowhere"
-        depth, name, at = max(found)
-        return f'{max(depth, 0.0):.2f} mm in "{name}" at {place_of(at)}'
+        mine = []
+        for entry, one in zip(self.bones, self.now, strict=True):
+            if len(one.near):
+                depth, (at,) = float(-one.gap.min()), self._places(self.moved, one.near[[np.argmin(one.gap)]])
+                mine.append((depth, f'{max(depth, 0.0):.2f} mm in "{entry.name}" at {place_of(at)}'))
+        return self._worst(mine) or "nowhere"
 
     def settle(self) -> None:
         """Take the present state as the one that the next step starts from."""
@@ -201,19 +197,22 @@ class ContactForces:
     def yielded(self) -> str | None:
         """The bone near whose middle a point is pressed, from where it would leave on any side; None without."""
         mine, allowed = list[tuple[float, str]](), self.law.allowance(self.frame)
-        for entry, one, before in zip(self.obstructions, self.now, self.overlaps, strict=True):
+        for entry, one, before in zip(self.bones, self.now, self.overlaps, strict=True):
             depth = float((-one.gap - allowed * before[one.near]).max(initial=0.0))
             half = entry.shape.half_thickness
             said = f'contact gives way: the surface is {depth:.2g} mm deep in "{entry.name}", whose middle is at {half:.2g} mm'
             mine += [(depth / half, said)] if depth > _GIVEN_WAY * half else []
-        found = [one for rank in self.comm.allgather(mine) for one in rank]
-        return max(found)[1] if found else None
+        return self._worst(mine)
 
     def tunnelled(self) -> str | None:
         """The point that went through a bone since the last settled state: on its straight path through the bone's frame it was
         inside, deeper than at both ends, and it left on the other side. None where none did.
         """
-        mine = [one for i in range(len(self.obstructions)) if (one := self._through(i))]
+        mine = [one for i in range(len(self.bones)) if (one := self._through(i))]
+        return self._worst(mine)
+
+    def _worst(self, mine: list[tuple[float, str]]) -> str | None:
+        """The sentence with the greatest number, of any rank; None without."""
         found: list[tuple[float, str]] = [one for rank in self.comm.allgather(mine) for one in rank]
         return max(found)[1] if found else None
 
@@ -221,7 +220,7 @@ class ContactForces:
         _, settled_at, settled = self.settled
         there, here = partial(self._local, i, settled_at, settled), partial(self._local, i, self.frame, self.moved)
         met, starts, ends = self.nearby[i].crossing(there, here)
-        before, now = (self.obstructions[i].shape.sample(places) for places in (starts, ends))
+        before, now = (self.bones[i].shape.sample(places) for places in (starts, ends))
         displacements = ends - starts
         # A gap is not known far away: what points outward there is the direction back, and the direction on.
         outward = [
@@ -229,11 +228,11 @@ class ContactForces:
             for one, sign in ((before, -1), (now, 1))
         ]
         turned = np.flatnonzero(np.einsum("ni,ni->n", *outward) < 0)
-        felt = min(self.law.smoothing, _RIM * self.obstructions[i].shape.half_thickness)
-        on_path = nearest_on_path(self.obstructions[i], starts[turned], displacements[turned], felt)
+        felt = min(self.law.smoothing, _RIM * self.bones[i].shape.half_thickness)
+        on_path = nearest_on_path(self.bones[i], starts[turned], displacements[turned], felt)
         excess = np.minimum(np.minimum(before.distance, now.distance)[turned], 0) - on_path
         if not excess.max(initial=0.0) > felt:
             return None
         worst = int(np.argmax(excess))
         where = f"the point that rests at {place_of(self.points.rest[met[turned[worst]]])}"
-        return float(excess[worst]), f'{where} went through "{self.obstructions[i].name}"'
+        return float(excess[worst]), f'{where} went through "{self.bones[i].name}"'

@@ -46,7 +46,8 @@ def ahead(body: AssembledBody, step: float) -> LimitPoint | None:
     except LinearSolveError:
         return None
     finally:
-        _take_up(body, before)
+        body.set_frame(body.at)
+        body.go_back(before)
     return found if found is not None and found.frame - body.at <= _NEAR * step else None
 
 
@@ -118,11 +119,3 @@ def _largest(body: AssembledBody, mode: PETSc.Vec) -> tuple[float, float, float]
     place = body.displacement.space.tabulate_dof_coordinates()[i].tolist()
     _, (x, y, z) = max(body.comm.allgather((float(lengths[i]), place)))
     return x, y, z
-
-
-def _take_up(body: AssembledBody, unknowns: Floats) -> None:
-    """Be in the last good state again, that of the ``unknowns``."""
-    body.set_frame(body.at)
-    body.unknowns.x.array[:] = unknowns
-    if body.contact:
-        body.contact.go_back()

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from dolfinx import la
 from mpi4py import MPI
 
 from fem_reference.foundations.limits import ENERGY_GAP
@@ -29,7 +28,7 @@ class Path:
     def __init__(self, system: System, determinants: Determinants) -> None:
         self.system, self.determinants = system, determinants
         self.energy, self.greatest, self.gap = 0.0, 0.0, 0.0
-        self.unknowns, self.forces = np.array(system.unknowns.x.array), self._forces()
+        self.unknowns, self.forces = np.array(system.unknowns.x.array), self.system.reactions(inside=True)
 
     def jumped(self, before: Floats) -> Smallest | None:
         """The least det F, as a share of itself, on the straight line from the unknowns ``before`` to those at present; None where
@@ -64,12 +63,15 @@ class Path:
         rule is Simpson's, whose error falls with the fourth power. Of a body that jumped, the energy has fallen without work, by
         any rule. ``gap`` is the greatest difference since it was taken, over the greatest energy so far.
         """
-        states = [(self.unknowns, self.forces), (np.array(self.system.unknowns.x.array), self._forces())]
+        states = [
+            (self.unknowns, self.forces),
+            (np.array(self.system.unknowns.x.array), self.system.reactions(inside=True)),
+        ]
         self.greatest = max(self.greatest, energy)
         if connected and self.greatest > 0:
             gap = self._gap(energy, states)
             if halfway and abs(gap) > ENERGY_GAP and halfway():
-                states.insert(1, (np.array(self.system.unknowns.x.array), self._forces()))
+                states.insert(1, (np.array(self.system.unknowns.x.array), self.system.reactions(inside=True)))
                 gap = self._gap(energy, states)
             self.system.unknowns.x.array[:] = states[-1][0]
             self.gap = gap if abs(gap) > abs(self.gap) else self.gap
@@ -88,13 +90,6 @@ class Path:
         """The gap, which is 0 from now on."""
         gap, self.gap = self.gap, 0.0
         return gap
-
-    def _forces(self) -> Floats:
-        """The forces of cells (n,) on the ranks that own the unknowns."""
-        self.system.work.array[:] = 0
-        self.system.cells.add_residual(self.system.work.array)
-        self.system.work.scatter_reverse(la.InsertMode.add)
-        return np.array(self.system.work.array)
 
 
 def settle(body: "AssembledBody", before: Floats, frame: float) -> None:

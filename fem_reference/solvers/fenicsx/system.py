@@ -150,13 +150,15 @@ class System:
         most = np.abs(self.missing()).max(initial=0.0)
         return bool(self.unknowns.function_space.mesh.comm.allreduce(most, MPI.MAX) > _ROUNDING)
 
-    def reactions(self) -> Floats:
-        """The residual (n,) without springs and without what is prescribed, on the ranks that own the unknowns."""
+    def reactions(self, *, inside: bool = False) -> Floats:
+        """The residual (n,) without springs and without what is prescribed, on the ranks that own the unknowns; or of what acts
+        ``inside`` alone.
+        """
         self.work.array[:] = 0
         self.cells.add_residual(self.work.array)
-        if self.loads:
+        if self.loads and not inside:
             self.loads.add_residual(self.work.array, None)
-        if self.contact:
+        if self.contact and not inside:
             self.contact.add_residual(self.work.array, None)
         self.work.scatter_reverse(la.InsertMode.add)
         return np.array(self.work.array)

@@ -23,6 +23,7 @@ from fem_reference.solvers.fenicsx import compiling, assembled_field  # isort: s
 from fem_reference.solvers.fenicsx.body import AssembledBody  # isort: skip
 from fem_reference.solvers.fenicsx.branching import leave  # isort: skip
 from fem_reference.solvers.fenicsx.limit_points import ahead  # isort: skip
+from fem_reference.solvers.fenicsx.reactions import reactions  # isort: skip
 from fem_reference.solvers.fenicsx.restart import Restart  # isort: skip
 from fem_reference.solvers.fenicsx.validity import Ranges  # isort: skip
 from fem_reference.solvers.common.load_steps import Attempt, Step, StepSizes, march  # isort: skip
@@ -176,7 +177,7 @@ class Worker:
 
     def report_frame(self, reached: Step) -> None:
         """Write the frame's positions and forces beside the job and report it."""
-        forces, moments = self.body.reactions.now(divided=bool(self.job.samples))
+        forces, moments = reactions(self.body.system, self.body.contact, divided=bool(self.job.samples))
         arrays = {name: self.body.positions(*sample) for name, sample in self.job.samples.items()}
         arrays |= {"nodes": self.body.node_positions()}
         arrays |= {f"force {name}": force for name, force in forces.items()}

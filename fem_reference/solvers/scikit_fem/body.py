@@ -50,7 +50,7 @@ def solve(body: Body, settings: ScikitBodySettings, sink: Sink) -> Outcome:
     check(body, settings.element)
     check_quadrature(settings.element, settings.quadrature_degree, "quadrature_degree")
     if body.contact is not None:
-        raise InputError("contact", "obstructions", "a body without, as this solver knows no contact")
+        raise InputError("contact", "bones", "a body without, as this solver knows no contact")
     if any(not isinstance(entry.on, str) for entry in body.prescribed):
         raise InputError(
             "prescribed", "springs at points of a skin", "springs on facets, as this solver knows no others"

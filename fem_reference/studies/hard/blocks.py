@@ -17,10 +17,10 @@ from fem_reference.geometry.rigid_bodies import Sphere
 from fem_reference.geometry.skins import spacing
 from fem_reference.geometry.tessellation import tessellated
 from fem_reference.problems.contact import check_exempt
-from fem_reference.problems.muscle import Problem, solid, spring_skins
+from fem_reference.problems.muscle import MuscleProblem, solid, spring_skins
 from fem_reference.problems.paths import Along
-from fem_reference.problems.setup import AttachedVertices, RigidBody, Setup
-from fem_reference.scenes.bones import Bone
+from fem_reference.problems.setup import AttachedVertices, Bone, Setup
+from fem_reference.scenes.bones import CaseBone
 from fem_reference.studies.hard.records import FACES, Face, Hard, Hold, Lattice, Start
 
 # What blocks are of where a case says nothing else: muscle's usual matrix.
@@ -31,7 +31,7 @@ _BALL, _AWAY = 0.01, 50.0
 _SAME = 1e-9  # of the block's size: rounding of what two holds do alike
 
 
-def problem(hard: Hard) -> Problem:
+def problem(hard: Hard) -> MuscleProblem:
     """The problem that the block of ``hard`` poses."""
     block, frames = hard.block, hard.frames
     assert block is not None  # a Hard record with a block has frames
@@ -87,13 +87,13 @@ def _start(block: Lattice, start: Start | None) -> Moved | None:
     return Moved(start, np.asarray(block.corner) + size / 2, float((size / block.cells).min()))
 
 
-def _problem(block: Lattice, setup: Setup, mesh: TetMesh, acting: tuple[effects.Effect, ...]) -> Problem:
+def _problem(block: Lattice, setup: Setup, mesh: TetMesh, acting: tuple[effects.Effect, ...]) -> MuscleProblem:
     if among(acting) is not None:
         check_exempt(setup.exempt, "hold")
     apart = block.points_apart or spacing(setup.surface)
     x, y, z = (np.asarray(block.fibre) / np.linalg.norm(block.fibre)).tolist()
     fibre = Along((x, y, z)) if any("fibre" in effect.needs for effect in acting) else None
-    return Problem(
+    return MuscleProblem(
         setup.surface,
         setup.bones,
         setup.attached,
@@ -147,7 +147,7 @@ def _held(block: Lattice, hold: Hold, nodes: Ints, surface: Surface) -> Attached
     x, y, z = (surface.points.mean(axis=0) + away).tolist()
     ball = Sphere((x, y, z), _BALL * largest)
     motion = hold.motion.poses() if hold.motion else None
-    bone = RigidBody(f"bone of {hold.face}", tessellated(ball, surface.points, "hold"), motion, solid=ball)
+    bone = Bone(f"bone of {hold.face}", tessellated(ball, surface.points, "hold"), motion, solid=ball)
     return AttachedVertices(hold.face, bone, vertices, hold.stiffness)
 
 
@@ -165,12 +165,12 @@ def _check_held(hard: Hard, ends: list[AttachedVertices], surface: Surface) -> N
             raise InputError(join(hard.place, f"hold[{j}].face"), got, "a face without a common edge, or one motion")
 
 
-def _bone(hard: Hard, i: int, surface: Surface) -> RigidBody:
-    bone: Bone = hard.bone[i]
+def _bone(hard: Hard, i: int, surface: Surface) -> Bone:
+    bone: CaseBone = hard.bone[i]
     form = solid(bone)
     assert form is not None  # a Hard record has no others
     motion = bone.motion.poses() if bone.motion else None
-    return RigidBody(bone.name, tessellated(form, surface.points, join(hard.place, f"bone[{i}]")), motion, solid=form)
+    return Bone(bone.name, tessellated(form, surface.points, join(hard.place, f"bone[{i}]")), motion, solid=form)
 
 
 def _lines(block: Lattice) -> Polylines:

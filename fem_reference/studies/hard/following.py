@@ -11,7 +11,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.foundations.mesh import Floats
 from fem_reference.geometry.embedding import Locator
 from fem_reference.problems.body import Body
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.problems.of_case import CaseProblem
 from fem_reference.problems.problem import NO_SURFACE
 from fem_reference.problems.scalar import FieldProblem
@@ -49,7 +49,7 @@ def follow(built: CaseProblem, choice: SolverChoice) -> tuple[Outcome, Followed]
     return outcome, _of_muscle(muscle, frames or [Frame(muscle.frames[0], np.array(muscle.surface.points))])
 
 
-def _small_body(muscle: Problem, solver: str) -> Body:
+def _small_body(muscle: MuscleProblem, solver: str) -> Body:
     """The body of a muscle, for a solver that is written in Python, to be right and not fast."""
     if len(muscle.mesh.tets) > _MOST_FOR_SECOND:
         want = f"at most {_MOST_FOR_SECOND}: it is written in Python, to be right and not fast"
@@ -57,7 +57,7 @@ def _small_body(muscle: Problem, solver: str) -> Body:
     return muscle.body
 
 
-def _with_surface(muscle: Problem, frames: list[Frame]) -> list[Frame]:
+def _with_surface(muscle: MuscleProblem, frames: list[Frame]) -> list[Frame]:
     """The frames of a body with the surface, which goes along with the tetrahedra."""
     rest, mesh = muscle.surface.points, muscle.mesh
     inside = Locator(mesh).embed(rest)
@@ -71,7 +71,7 @@ def _of_field(field: FieldProblem, frames: list[Frame]) -> Followed:
     return Followed((0,), NO_SURFACE, np.zeros((1, 0, 3)), values=values, range=(boundary.min(), boundary.max()))
 
 
-def _of_muscle(built: Problem, frames: list[Frame]) -> Followed:
+def _of_muscle(built: MuscleProblem, frames: list[Frame]) -> Followed:
     tets = [frame.points for frame in frames if len(frame.points)]
     whole = len(tets) == len(frames)
     return Followed(

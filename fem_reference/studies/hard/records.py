@@ -17,7 +17,7 @@ from fem_reference.foundations.units import AreaStiffness, Point, PositiveLength
 from fem_reference.io import texts
 from fem_reference.problems.problem import Task
 from fem_reference.scenes import casefile
-from fem_reference.scenes.bones import Bone, Motion
+from fem_reference.scenes.bones import CaseBone, Motion
 from fem_reference.scenes.case import HOME, Case, SolverChoice
 from fem_reference.scenes.muscle import Frames
 from fem_reference.studies.hard.choosing import choices, task_of
@@ -111,7 +111,7 @@ class Hard(Record):
     bound: tuple[Bound, ...] = Field(min_length=1)
     block: Lattice | None = None
     hold: tuple[Hold, ...] = ()
-    bone: tuple[Bone, ...] = ()
+    bone: tuple[CaseBone, ...] = ()
     effect: tuple[Effect, ...] = ()
     frames: Frames | None = None
     start: Start | None = None
@@ -145,7 +145,7 @@ class Hard(Record):
 
     @field_validator("bone")
     @classmethod
-    def _check_forms(cls, bones: tuple[Bone, ...]) -> tuple[Bone, ...]:
+    def _check_forms(cls, bones: tuple[CaseBone, ...]) -> tuple[CaseBone, ...]:
         if any(bone.surface for bone in bones):
             raise ValueError("bones of closed forms, and not of files")
         return bones

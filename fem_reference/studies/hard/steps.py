@@ -6,7 +6,7 @@ import numpy as np
 
 from fem_reference.assessment.health import Followed
 from fem_reference.foundations.mesh import Floats, diagonal
-from fem_reference.problems.muscle import Problem
+from fem_reference.problems.muscle import MuscleProblem
 from fem_reference.runs.store import Frame, Outcome
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.solvers import fenicsx
@@ -34,7 +34,7 @@ def farthest(followed: Followed) -> StepCounts | None:
     return StepCounts(until=followed.numbers[1 + int(np.argmax(moved))]) if len(moved) and moved.max() > 0 else None
 
 
-def compare(built: Problem, choice: SolverChoice, steps: StepCounts) -> SameEnd:
+def compare(built: MuscleProblem, choice: SolverChoice, steps: StepCounts) -> SameEnd:
     """The reference up to a frame in several numbers of even load steps; the finest run that got there is the standard."""
     ends, words = dict[int, Floats](), list[str]()
     for count in steps.counts:
@@ -52,7 +52,7 @@ def compare(built: Problem, choice: SolverChoice, steps: StepCounts) -> SameEnd:
     return SameEnd(max(off.values()) <= SAME, f"end state at frame {steps.until} by number of load steps: {listed}")
 
 
-def _end(built: Problem, choice: SolverChoice, until: int, count: int) -> tuple[str, Floats | None]:
+def _end(built: MuscleProblem, choice: SolverChoice, until: int, count: int) -> tuple[str, Floats | None]:
     """The status of a run in ``count`` steps, and the tetrahedra's points (n, 3) [mm], None where it did not get there."""
     span = until - built.frames[0]
     step = {"first_step": span / count, "largest_step": span / count, "smallest_step": span / count / _CUTS}

@@ -8,7 +8,7 @@ pytest.importorskip("fem_reference.solvers.fenicsx.dolfinx_door", reason="FEniCS
 from fem_reference.geometry.rigid_bodies import Obstacle, Sphere
 from fem_reference.geometry.signed_distance import build
 from fem_reference.geometry.tessellation import tessellated
-from fem_reference.problems.contact import Contact, Obstruction
+from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.solvers.fenicsx.contact import ContactForces
 from fem_reference.solvers.fenicsx.contact_points import ContactPoints
 from fem_reference.solvers.fenicsx.spent import Spent
@@ -43,9 +43,9 @@ def passage(ball: Obstacle, every: bool) -> list[tuple[list[float], str | None, 
     """
     heights = [*np.linspace(60, 3.6, 20), *[3.6] * 5, -40, *np.linspace(-40, -3.7, 12), *np.linspace(-4, -60, 8)]
     own, unknowns = sheet(), nodes_of(13**2)
-    obstruction = Obstruction("ball", ball, lambda frame: Slide((0, 0, 0), (0, 0, heights[int(frame)]), (0, 0.1, 0))(0))
+    obstruction = ContactBone("ball", ball, lambda frame: Slide((0, 0, 0), (0, 0, heights[int(frame)]), (0, 0.1, 0))(0))
     forces, random, found = (
-        ContactForces(Contact("skin", 3.0, SMOOTHING), (obstruction,), own, unknowns, 0.0, Spent()),
+        ContactForces(ContactLaw("skin", 3.0, SMOOTHING), (obstruction,), own, unknowns, 0.0, Spent()),
         rng(),
         [],
     )
@@ -88,8 +88,8 @@ def test_what_stays_out_of_reach_is_not_looked_at(monkeypatch) -> None:
     """After the first look; and nothing is summed."""
     far = Slide((0, 0, 0), (0, 0, 30))
     forces = ContactForces(
-        Contact("skin", 3.0, SMOOTHING),
-        (Obstruction("ball", balls()["grid"], far),),
+        ContactLaw("skin", 3.0, SMOOTHING),
+        (ContactBone("ball", balls()["grid"], far),),
         sheet(),
         nodes_of(13**2),
         0.0,

@@ -7,7 +7,7 @@ from fem_reference.foundations.errors import InputError
 from fem_reference.geometry.rigid_bodies import HalfSpace, Sphere
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body, Prescribed
-from fem_reference.problems.contact import Contact, Obstruction
+from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.problems.paths import Rest
 from fem_reference.solvers import scikit_fem
 from fem_reference.verification import contact, parts
@@ -16,21 +16,21 @@ from fem_reference.verification.contact import Slide
 pytestmark = pytest.mark.slow
 
 FIXED = (Prescribed("ground", "z0", (0, 1, 2), Rest()),)
-LAW = Contact("z1", 1.0, 0.01)
+LAW = ContactLaw("z1", 1.0, 0.01)
 
 
-def block(*obstructions: Obstruction) -> Body:
+def block(*bones: ContactBone) -> Body:
     mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), "hexahedron")
-    return Body(mesh, parts.neo_hooke(0.01, 10.0), FIXED, (0.0, 1.0), contact=LAW, obstructions=obstructions)
+    return Body(mesh, parts.neo_hooke(0.01, 10.0), FIXED, (0.0, 1.0), contact=LAW, bones=bones)
 
 
-def solved(lab, *obstructions: Obstruction):
-    return lab.solve(block(*obstructions), "Q2/Q1", first_step=0.25, residual=1e-12).last
+def solved(lab, *bones: ContactBone):
+    return lab.solve(block(*bones), "Q2/Q1", first_step=0.25, residual=1e-12).last
 
 
 def test_forces_and_moments_balance(fem_lab) -> None:
     # The residual of Newton's method is 1e-12 N; arms are 1 mm.
-    ball = Obstruction("ball", Sphere((0.3, 0.4, 1.5), 0.5), Slide((0.0, 0.1, -0.15)))
+    ball = ContactBone("ball", Sphere((0.3, 0.4, 1.5), 0.5), Slide((0.0, 0.1, -0.15)))
     state = solved(fem_lab, ball)
     assert state.forces["ball"][2] < -1e-4
     assert state.forces["ball"] + state.forces["ground"] == pytest.approx([0, 0, 0], abs=1e-11)
@@ -50,15 +50,15 @@ def test_a_body_is_felt_where_its_pose_has_it(fem_lab) -> None:
     # Turned about y by a right angle, x points along -z: the half space whose normal is x is then a plate from above.
     pose = Slide((0.0, 0.0, -0.2), (0.0, 0.0, 1.0), (0.0, np.pi / 2, 0.0))
     assert pose(1.0) @ [1, 0, 0, 0] == pytest.approx([0, 0, -1, 0])
-    straight = Obstruction("plate", HalfSpace((0.0, 0.0, 1.0), (0.0, 0.0, -1.0)), Slide((0.0, 0.0, -0.2)))
-    turned = Obstruction("plate", HalfSpace((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), pose)
+    straight = ContactBone("plate", HalfSpace((0.0, 0.0, 1.0), (0.0, 0.0, -1.0)), Slide((0.0, 0.0, -0.2)))
+    turned = ContactBone("plate", HalfSpace((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), pose)
     one, other = solved(fem_lab, straight), solved(fem_lab, turned)
     assert other.forces["plate"] == pytest.approx(one.forces["plate"], abs=1e-11)
     assert other.points == pytest.approx(one.points, abs=1e-9)
 
 
 def test_what_is_far_away_does_nothing(fem_lab) -> None:
-    state = solved(fem_lab, Obstruction("moon", Sphere((0.0, 0.0, 9.0), 1.0), Slide((0.0, 0.0, -1.0))))
+    state = solved(fem_lab, ContactBone("moon", Sphere((0.0, 0.0, 9.0), 1.0), Slide((0.0, 0.0, -1.0))))
     assert not state.forces["moon"].any()
     assert [state.scalars[name] for name in ("contact_depth", "contact_pressure", "contact_area")] == [0, 0, 0]
     assert [state.scalars[name] for name in ("contact_points", "contact_points_near")] == [0, 0]
@@ -66,7 +66,7 @@ def test_what_is_far_away_does_nothing(fem_lab) -> None:
 
 def test_the_second_opinion_knows_no_contact() -> None:
     settings = scikit_fem.ScikitBodySettings(element="Q2/Q1")
-    with pytest.raises(InputError, match="contact: got obstructions, want a body without"):
+    with pytest.raises(InputError, match="contact: got bones, want a body without"):
         scikit_fem.solve_body(block(), settings)
 
 

@@ -1,4 +1,4 @@
-"""What obstructions do at material points of a body: the slope that Newton's method is given is that of the tractions."""
+"""What bones do at material points of a body: the slope that Newton's method is given is that of the tractions."""
 
 from types import SimpleNamespace
 
@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("fem_reference.solvers.fenicsx.dolfinx_door", reason="FEniCSx is not installed")
 
 from fem_reference.geometry.rigid_bodies import Capsule
-from fem_reference.problems.contact import Contact, Obstruction
+from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.solvers.fenicsx.contact import ContactForces
 from fem_reference.solvers.fenicsx.contact_points import ContactPoints
 from fem_reference.solvers.fenicsx.spent import Spent
@@ -31,8 +31,8 @@ def moved(points: np.ndarray, pose: Slide) -> ContactForces:
     dofs = np.arange(3 * count).reshape(count, 1, 3)
     own = ContactPoints(points, np.ones(count), np.arange(count), np.ones((count, 1)), points[:, None, :], dofs)
     unknowns = nodes_of(count)
-    capsule = Obstruction("capsule", Capsule((0.0, 0, 0), (0.0, 0, 4), 1.0), pose)
-    return ContactForces(Contact("skin", 3.0, SMOOTHING), (capsule,), own, unknowns, 0.0, Spent())
+    capsule = ContactBone("capsule", Capsule((0.0, 0, 0), (0.0, 0, 4), 1.0), pose)
+    return ContactForces(ContactLaw("skin", 3.0, SMOOTHING), (capsule,), own, unknowns, 0.0, Spent())
 
 
 @pytest.mark.parametrize("turned", [(0.0, 0.0, 0.0), (0.7, -0.4, 1.1)])

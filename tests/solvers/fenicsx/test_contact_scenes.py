@@ -11,7 +11,7 @@ from fem_reference.foundations.motion import apply
 from fem_reference.geometry.rigid_bodies import Box
 from fem_reference.problems import muscle, shapes
 from fem_reference.problems.body import Body
-from fem_reference.problems.contact import Contact, Obstruction, nearest_on_path
+from fem_reference.problems.contact import ContactBone, ContactLaw, nearest_on_path
 from fem_reference.scenes import casefile
 from fem_reference.solvers import fenicsx
 from fem_reference.verification import parts
@@ -90,21 +90,21 @@ def test_attached_vertices_are_exempt_from_contact(tmp_path) -> None:
     case = scene(tmp_path / "bar", -5.5)
     rest = muscle.setup(case)
     body = muscle.build(case, rest).body
-    assert [entry.name for entry in body.obstructions] == ["floor", "lid", "ball"]
+    assert [entry.name for entry in body.bones] == ["floor", "lid", "ball"]
     assert [type(effect).__name__ for effect in body.effects] == ["NeoHooke", "Incompressible"]
     heights = body.contact.on.points[:, 2]
     reach = np.linalg.norm(np.ptp(rest.surface.points, axis=0)) / 80
     assert (
         reach < heights.min() < 1.0 < 39.0 < heights.max() < 40 - reach
     )  # the ends are attached; pieces are 0.5 mm high
-    turned = body.obstructions[1].pose(10)
+    turned = body.bones[1].pose(10)
     assert apply(turned, np.array([[5.0, 5, 30]])) == pytest.approx(np.array([[5, 5, 30]]))
 
 
 def test_only_some_bones_are_obstacles(tmp_path) -> None:
     some = CONTACT.replace("\n\n", '\nbones = ["ball"]\n\n')
     case = scene(tmp_path / "bar", -5.5, some)
-    assert [entry.name for entry in muscle.build(case, muscle.setup(case)).body.obstructions] == ["ball"]
+    assert [entry.name for entry in muscle.build(case, muscle.setup(case)).body.bones] == ["ball"]
     with pytest.raises(InputError, match=r'effect\[2\]\.bones: got "bal", want one of floor, lid, ball'):
         scene(tmp_path / "other", -5.5, some.replace("ball", "bal"))
 
@@ -113,14 +113,14 @@ def test_a_step_through_a_plate_is_cut(fem_lab) -> None:
     # A plate 0.2 mm thin jumps over the top of a block in one step: at both ends of the step it touches nothing.
     mesh = shapes.box((2, 2, 2), (1.0, 1.0, 1.0), "tetrahedron")
     attached = parts.SYMMETRY
-    plate = Obstruction("plate", Box((0.5, 0.5, 1.2), (4.0, 4.0, 0.2), 0.0), Slide((0.0, 0.0, -0.5)))
+    plate = ContactBone("plate", Box((0.5, 0.5, 1.2), (4.0, 4.0, 0.2), 0.0), Slide((0.0, 0.0, -0.5)))
     body = Body(
         mesh,
         parts.neo_hooke(0.01, 10.0),
         attached,
         (0.0, 1.0),
-        contact=Contact("z1", 1.0, 0.01),
-        obstructions=(plate,),
+        contact=ContactLaw("z1", 1.0, 0.01),
+        bones=(plate,),
     )
     state = fem_lab.solve(body, "P2/P1", first_step=1.0, residual=1e-11).last
     assert state.scalars["cut_backs"] > 0
@@ -131,7 +131,7 @@ def test_a_step_through_a_plate_is_cut(fem_lab) -> None:
 @pytest.mark.parametrize("start", np.linspace(3.0, 33.0, 11))
 def test_no_path_through_a_thin_plate_is_missed(start: float) -> None:
     # A plate 1 mm thin, paths of 36 mm from 3 to 33 mm before it: at most half a millimetre deep, and out on the other side.
-    plate = Obstruction("plate", Box((0.0, 0.0, 0.0), (90.0, 90.0, 1.0), 0.0), Slide((0.0, 0.0, 0.0)))
+    plate = ContactBone("plate", Box((0.0, 0.0, 0.0), (90.0, 90.0, 1.0), 0.0), Slide((0.0, 0.0, 0.0)))
     starts, displacements = np.array([[0.3, 0.2, start], [0.0, 0.0, 40.0]]), np.array([[1.0, 2.0, -36.0]] * 2)
     through, short = nearest_on_path(plate, starts, displacements, 0.1)
     assert -0.5 <= through < -0.3
@@ -150,7 +150,7 @@ def test_what_relaxes_waits_for_the_first_frame(tmp_path) -> None:
     case = casefile.read(path)
     body = muscle.build(case, muscle.setup(case)).body
     assert body.first == 0
-    assert body.obstructions[1].pose(-10.0) == pytest.approx(np.eye(4))
+    assert body.bones[1].pose(-10.0) == pytest.approx(np.eye(4))
     top = np.array([[5.0, 5.0, 40.0]])
     assert body.prescribed[1].path(top, -10.0) == pytest.approx(np.zeros((1, 3)))
     assert np.abs(body.prescribed[1].path(top, 5.0)).max() > 0.1

@@ -9,7 +9,7 @@ from fem_reference.effects import make
 from fem_reference.geometry.rigid_bodies import Box
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body, ByCell
-from fem_reference.problems.contact import Contact, Obstruction
+from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.solvers.fenicsx import BodySettings
 from fem_reference.solvers.fenicsx.body import AssembledBody
 from fem_reference.solvers.fenicsx.contact import ContactForces
@@ -29,10 +29,10 @@ def down_and_up(frame: float) -> np.ndarray:
 
 def solved_states() -> tuple[list[np.ndarray], list[bool]]:
     """A plate comes down on a cube of 1 mm and leaves it: by frame the unknowns, and whether contact was in the equations."""
-    plate = Obstruction("plate", Box((0.5, 0.5, 1.25), (4.0, 4.0, 0.2), 0.0), down_and_up)
-    law = Contact("z1", 1.0, 0.01)
+    plate = ContactBone("plate", Box((0.5, 0.5, 1.25), (4.0, 4.0, 0.2), 0.0), down_and_up)
+    law = ContactLaw("z1", 1.0, 0.01)
     mesh = shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
-    body = Body(mesh, parts.neo_hooke(0.01, 10.0), parts.SYMMETRY, FRAMES, contact=law, obstructions=(plate,))
+    body = Body(mesh, parts.neo_hooke(0.01, 10.0), parts.SYMMETRY, FRAMES, contact=law, bones=(plate,))
     built = AssembledBody(body, BodySettings(element="P2/P1", first_step=1.0, residual=1e-12, reuse=False))
     states, there = [], []
     for frame in FRAMES[1:]:
@@ -65,9 +65,9 @@ def activated(ramp: list[tuple[float, float]] | None) -> tuple[list[np.ndarray],
         effects += (make("active_tension", tension=0.002, ramp=knots),)
     mesh = shapes.box((1, 1, 1), (1.0, 1.0, 1.0), "tetrahedron")
     fibre = ByCell(np.tile([1.0, 0.0, 0.0], (len(mesh.cells), 1)))
-    plate = Obstruction("plate", Box((0.5, 0.5, 1.05), (4.0, 4.0, 0.2), 0.0), down_and_up)
-    law = Contact("z1", 1.0, 0.01)
-    body = Body(mesh, effects, parts.SYMMETRY, FRAMES, fibre, contact=law, obstructions=(plate,))
+    plate = ContactBone("plate", Box((0.5, 0.5, 1.05), (4.0, 4.0, 0.2), 0.0), down_and_up)
+    law = ContactLaw("z1", 1.0, 0.01)
+    body = Body(mesh, effects, parts.SYMMETRY, FRAMES, fibre, contact=law, bones=(plate,))
     built = AssembledBody(body, BodySettings(element="P2/P1", first_step=1.0, residual=1e-12, reuse=False))
     states, summed = [], []
     for frame in FRAMES[1:]:

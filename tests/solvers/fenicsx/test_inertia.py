@@ -17,7 +17,7 @@ from fem_reference.effects import make as made
 from fem_reference.geometry.rigid_bodies import HalfSpace
 from fem_reference.problems import shapes
 from fem_reference.problems.body import Body
-from fem_reference.problems.contact import Contact, Obstruction
+from fem_reference.problems.contact import ContactBone, ContactLaw
 from fem_reference.runs.key import PACKAGE
 from fem_reference.solvers.fenicsx import BodySettings
 from fem_reference.verification.contact import Slide
@@ -61,19 +61,17 @@ def test_constant_acceleration_is_exact(radius: float) -> None:
     )
 
 
-# Contact
+# ContactLaw
 
 
 def dropped(acting: tuple[Effect, ...]) -> Body:
     """A cube of 10 mm that falls 2 mm onto a fixed plane, and bounces."""
     mesh = shapes.box((2, 2, 2), (10.0, 10.0, 10.0), "tetrahedron")
-    plane = Obstruction("plane", HalfSpace((0.0, 0.0, -2.0), (0.0, 0.0, 1.0)), Slide((0.0, 0.0, 0.0)))
+    plane = ContactBone("plane", HalfSpace((0.0, 0.0, -2.0), (0.0, 0.0, 1.0)), Slide((0.0, 0.0, 0.0)))
     weight = made("gravity", density=1e-9, acceleration="0, 0, -9810 mm/s^2", ramp=[{"frame": 0.0, "amount": 1.0}])
     frames = tuple(float(i) for i in range(151))
-    contact = Contact("z0", 0.01, 0.2)
-    return Body(
-        mesh, (*flesh("P2/P1"), weight, *acting), (), frames, contact=contact, obstructions=(plane,), interval=4e-4
-    )
+    contact = ContactLaw("z0", 0.01, 0.2)
+    return Body(mesh, (*flesh("P2/P1"), weight, *acting), (), frames, contact=contact, bones=(plane,), interval=4e-4)
 
 
 @pytest.mark.slow

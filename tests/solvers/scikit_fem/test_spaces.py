@@ -15,7 +15,7 @@ def test_normals_and_weights_satisfy_the_divergence_theorem(element, degree) -> 
         return unit * [2.0, 3.0, 4.0] + 0.4 * np.roll(unit, 1, axis=1) ** 2
 
     kind, faces = ELEMENTS[element][0], {face: face for face in FACES}
-    space = Space(shapes.mapped([shapes.Block(bent, (2, 1, 2), faces)], kind, degree), element, 8)
+    space = Space(shapes.mapped([shapes.Brick(bent, (2, 1, 2), faces)], kind, degree), element, 8)
     # The map of a cell is of degree 6 at most in all, along each axis of degree 2 at most: 8 is exact.
     closed, flux = np.zeros(3), 0.0
     for face in FACES:
