@@ -124,18 +124,11 @@ def _greatest(comparison: Comparison, run: Run) -> str:
 
 
 def _sentence(comparison: Comparison) -> str:
+    """The comparison in a sentence: who was compared, over which frames, and the number of expectations that are met."""
     numbers, names = comparison.reference.numbers, [run.name for run in comparison.candidates]
-    over = f"over {len(numbers)} frames ({numbers[0]} to {numbers[-1]})"
-    outcomes = [verdict.word for verdict in comparison.verdicts]
-    judged = f"{outcomes.count('pass')} of {len(outcomes)} expectations met"
-    if names and all(verdict.expectation.of == "reference" for verdict in comparison.verdicts):
-        solver = comparison.reference.solver
-        what = f"{listed(names)} compared with the reference computed by {solver}, {over}"
-        return f"{what}. The verdict is on the reference ({judged}): what candidates do is measured, not judged."
-    unjudged = [name for name in names if all(verdict.expectation.of != name for verdict in comparison.verdicts)]
-    those = "a candidate" if len(unjudged) == len(names) else listed(unjudged)
-    judged += f"; none concerns {those}: measured, not judged." if unjudged else "."
+    compared = f"{listed(names)} compared with the reference" if names else "The reference"
+    words = [verdict.word for verdict in comparison.verdicts]
+    met = f"{words.count('pass')} of {len(words)} expectations met"
+    alone = "" if names else ", without a candidate"
     solver = comparison.reference.solver
-    if not names:
-        return f"The reference computed by {solver}, {over}, without a candidate: {judged}"
-    return f"{listed(names)} compared with the reference computed by {solver}, {over}: {judged}"
+    return f"{compared} computed by {solver}, over {len(numbers)} frames ({numbers[0]} to {numbers[-1]}){alone}: {met}."

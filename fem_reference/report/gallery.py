@@ -14,11 +14,12 @@ import numpy as np
 from matplotlib.colors import to_hex
 
 from fem_reference.assessment.comparison import Comparison
+from fem_reference.assessment.local_fields import to_same_vertex
 from fem_reference.foundations import scratch
 from fem_reference.foundations.errors import MissingSoftware
 from fem_reference.foundations.mesh import Floats, Surface
 from fem_reference.foundations.subprocesses import command, environment
-from fem_reference.metrics import find
+from fem_reference.metrics import at_rest, find
 from fem_reference.problems.setup import Bone, Setup
 from fem_reference.report import pictures
 from fem_reference.report.drawings import picture_source
@@ -60,7 +61,7 @@ class Figure:
 def shots(comparison: Comparison) -> list[Shot]:
     """The reference at rest and where it moved furthest, and each candidate at its worst frame that can be drawn."""
     reference = comparison.reference
-    travel = _apart(reference.positions, reference.surface.points).max(axis=1)
+    travel = to_same_vertex(reference, at_rest(reference)).max(axis=1)
     furthest = int(np.argmax(np.where(np.isfinite(travel), travel, -1.0)))
     numbers = sorted({0, furthest})
     chosen = [Shot(reference.name, reference.numbers[i], reference.positions[i]) for i in numbers]
@@ -74,14 +75,10 @@ def figures(setup: Setup, surface: Surface, wanted: list[Shot]) -> tuple[list[Fi
     except MissingSoftware as error:
         return [], str(error)
     end = top(wanted)
+    sources = [(picture_source(first), picture_source(second)) for first, second in drawn]
     return [
-        Figure(
-            shot.name,
-            shot.number,
-            (picture_source(first), picture_source(second)),
-            end if shot.distances is not None else None,
-        )
-        for shot, (first, second) in zip(wanted, drawn, strict=True)
+        Figure(shot.name, shot.number, pair, None if shot.distances is None else end)
+        for shot, pair in zip(wanted, sources, strict=True)
     ], ""
 
 
@@ -150,22 +147,14 @@ def _hidden(points: Floats, view: Floats, bones: tuple[Bone, ...]) -> bool:
 
 def _worst(comparison: Comparison, run: Run) -> Iterator[Shot]:
     """The shot of a candidate, none where no frame is finite."""
-    reference = comparison.reference
-    same = [reference.numbers.index(number) for number in run.numbers]
-    distances = _apart(run.positions, reference.positions[same])
+    distances = to_same_vertex(run, comparison.reference)
     drawable = np.isfinite(distances).all(axis=1)
     if not drawable.any():
         return
     deviation = find(comparison.deviations[run.name], "surface_deviation", "rms")
     badness = distances.max(axis=1) if deviation is None else np.abs(deviation.values)
     i = int(np.argmax(np.where(drawable, badness, -1.0)))
-    yield Shot(run.name, run.numbers[i], run.positions[i], distances[i], reference.positions[same[i]])
-
-
-def _apart(positions: Floats, others: Floats) -> Floats:
-    """Distance of the same vertices (f, n) [mm], not finite where either is not."""
-    with np.errstate(invalid="ignore", over="ignore"):
-        return np.asarray(np.linalg.norm(positions - others, axis=2))
+    yield Shot(run.name, run.numbers[i], run.positions[i], distances[i], comparison.reference.positions[i])
 
 
 def _job(setup: Setup, surface: Surface, wanted: list[Shot]) -> dict[str, Any]:

@@ -82,7 +82,7 @@ def written(folder, scene, setup, tets: TetMesh, fibres: Polylines) -> store.Run
         moved = stretched(nodes.reshape(-1, 3), number).reshape(nodes.shape)
         J = np.linalg.det(stretched(np.eye(3), number))
         state = NodalState(moved - nodes, np.full((len(nodes), 4), BULK * (J - 1)), np.zeros((0, 0, 3)))
-        inside = {"fibres": stretched(fibres.points, number), "tets": stretched(tets.points, number)}
+        inside = {"fibres": stretched(fibres.points, number), "points": stretched(tets.points, number)}
         scalars = {"min_det_F_vertices": J}
         writer.add(Frame(number, stretched(setup.surface.points, number), state=state, scalars=scalars, **inside))
     writer.close(Outcome("converged", ""))
