@@ -142,14 +142,17 @@ def build(case: MuscleCase, rest: Setup) -> MuscleProblem:
         seconds=time.perf_counter() - begin,
         fibre=fibre if any("fibre" in effect.needs for effect in asked) else None,
         skin=None if contact is None else free_skin(rest.exempt, mesh, apart),
-        attached_skins={
-            attached.attachment: attached_skin(
-                rest.surface, attached_shares(rest.surface, attached.vertices), mesh, apart
-            )
-            for attached in rest.attached
-            if attached.stiffness is not None
-        },
+        attached_skins=spring_skins(rest, mesh, apart),
     )
+
+
+def spring_skins(rest: Setup, mesh: TetMesh, apart: float) -> dict[str, Skin]:
+    """The points that springs pull at, ``apart`` [mm] from each other, by attachment."""
+    return {
+        one.attachment: attached_skin(rest.surface, attached_shares(rest.surface, one.vertices), mesh, apart)
+        for one in rest.attached
+        if one.stiffness is not None
+    }
 
 
 def _distances(case: MuscleCase, rest: Setup, contact: ContactEffect) -> dict[str, float | str]:

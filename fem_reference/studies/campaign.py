@@ -82,7 +82,7 @@ def solve(trial: Trial, store: Path) -> Run:
     bench = shared_bench(trial.scene, store)
     folder = bench.folder(trial.choice, trial.name)
     if runs.status(folder) in _LASTING:
-        return replace(runs.load(folder), name=trial.name)
+        return _loaded(folder, trial)
     return bench.obtain(trial.name, without_states(trial.choice), trial.name)
 
 

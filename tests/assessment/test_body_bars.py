@@ -14,7 +14,6 @@ from fem_reference.problems.paths import Rest, Turn
 from fem_reference.runs.store import Frame, Outcome, collected
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx.processes import installed
-from fem_reference.studies import body_refinement
 from fem_reference.verification.cook import RESIDUAL, SMALL, Panel
 from fem_reference.verification.parts import resistance
 from validation import cook
@@ -117,19 +116,3 @@ def test_a_solution_of_something_else_is_refused() -> None:
         fr.error_bars("hip_flexion", solved)
     failed = replace(solved, outcome=Outcome("diverged", "no"))
     assert fr.error_bars(body, failed) is None
-
-
-def test_load_steps_are_halved_where_time_matters() -> None:
-    body = square_bar("Q2/Q1", 1)
-    settings = fenicsx.BodySettings(element="Q2/Q1", first_step=0.5, store_state=True)
-    assert body_refinement.sharper_problem(body, settings)[2] == {"store_state": False}
-    timed = replace(body, effects=(*body.effects, fr.make_effect("viscosity", eta=1.0)), interval=1.0)
-    *_, changes, said = body_refinement.sharper_problem(timed, settings)
-    assert changes == {"store_state": False, "first_step": 0.25, "largest_step": 0.5}
-    assert said == "Q2/Q1 on cells of half the size and load steps of half the length"
-    coarse = settings.model_copy(update={"element": "P1/P1", "quadrature_degree": 2})
-    assert body_refinement.sharper_problem(timed, coarse)[2] | changes == {
-        **changes,
-        "element": "P2/P1",
-        "quadrature_degree": None,
-    }

@@ -176,7 +176,40 @@ print("share of a pressure [MPa]:", fr.make_effect("neo_hooke", mu="5 kPa").mu *
 # Ends in 0.5 within 1e-12: the unit of pressure is 1 MPa.
 '''.lstrip()
 
+VERB = '''
+"""The verb ``own_verb``: how many cases there are."""
+
+import argparse
+
+from fem_reference.cli._printing import DONE, write_output
+from fem_reference.scenes import casefile
+
+HELP = "how many cases there are"
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """The option to name them."""
+    parser.add_argument("--names", action="store_true", help="name them too")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Count them."""
+    found = casefile.cases()
+    write_output({"cases": len(found)}, " ".join(found) if options.names else f"{len(found)} cases", options)
+    return DONE
+'''.lstrip()
+
 KINDS = {
+    "verb": New(
+        {"fem_reference/cli/own_verb.py": VERB},
+        {
+            "fem_reference --help": "how many cases there are",
+            "fem_reference own_verb": " cases",
+            "fem_reference own_verb --names --quiet": "hip_flexion",
+            "!fem_reference own_verb --no-such-option": "--no-such-option",
+            "pytest -q tests/cli/test_verbs.py -k own_verb": "3 passed",
+        },
+    ),
     "effect": New(
         {"fem_reference/effects/own_effect.py": EFFECT},
         {

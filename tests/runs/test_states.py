@@ -8,11 +8,8 @@ import numpy as np
 import pytest
 import shapes
 import small
-from stand_ins import solve_by
 
 import fem_reference as fr
-from fem_reference import cli
-from fem_reference.export import paraview
 from fem_reference.foundations.mesh import Polylines
 from fem_reference.problems.body import ELEMENTS, Cells
 from fem_reference.problems.problem import AtRest
@@ -30,40 +27,7 @@ from fem_reference.studies.execution import Bench
 SECONDS = 1320.0  # that the stored run took: 22 minutes
 
 
-@pytest.fixture
-def solved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Writes the small scene's reference into a store, with states or without; nothing may be solved again meanwhile."""
-    folder = small.write(tmp_path / "bar")
-    text = (folder / "case.toml").read_text()
-    (folder / "case.toml").write_text(
-        text.replace("0.4 rad", "0 rad")
-    )  # nothing moves, so that a body at rest is its solution
-    scene = casefile.read_muscle(folder)
-
-    def refuse(*_: object) -> None:
-        raise AssertionError("it is solved again")
-
-    solve_by(monkeypatch, fenicsx, refuse)
-
-    def write(*, kept: tuple[int, ...]) -> list[str]:
-        bench = Bench(scene, tmp_path / "out" / "runs")
-        place = bench.folder(scene.reference, "reference")
-        _write(place, bench, scene.numbers, kept)
-        return [
-            "export",
-            str(folder),
-            "--to",
-            str(tmp_path / "paraview"),
-            "--out",
-            str(tmp_path / "out"),
-            "--format",
-            "paraview",
-        ]
-
-    return write
-
-
-def _write(place: Path, bench: Bench, numbers: tuple[int, ...], kept: tuple[int, ...]) -> None:
+def store_run(place: Path, bench: Bench, numbers: tuple[int, ...], kept: tuple[int, ...]) -> None:
     """The run of a reference that does not move, with the states of the frames ``kept``."""
     rest, mesh = bench.setup().surface, shapes.box((2, 2, 4), (10, 10, 40))
     fibres = Polylines(np.column_stack([np.full((8, 2), 5.0), [1, 5, 10, 20, 2, 3, 4, 8]]), [0, 4, 8])
@@ -75,41 +39,6 @@ def _write(place: Path, bench: Bench, numbers: tuple[int, ...], kept: tuple[int,
         frame = Frame(number, rest.points, fibres.points, mesh.points)
         writer.add(replace(frame, state=state) if number in kept else frame)
     writer.close(Outcome("converged", "", {"seconds": SECONDS}))
-
-
-def test_a_run_without_states_is_not_solved_again_unless_asked(solved, capsys, tmp_path: Path) -> None:
-    words = solved(kept=())
-    assert cli.main(words) == cli.BAD_INPUT
-    said = capsys.readouterr().err
-    assert "a reference that was solved before without its states" in said
-    assert "want --solve, which solves it again (that took 22 min)" in said
-    assert not (tmp_path / "paraview").exists()
-    assert cli.main([*words, "--solve"]) == cli.BROKEN  # it begins to, which the fixture forbids
-    assert "it is solved again" in capsys.readouterr().err
-
-
-def test_states_of_some_frames_are_not_taken_for_those_of_all(solved, capsys) -> None:
-    assert cli.main(solved(kept=(0, 5))) == cli.BAD_INPUT
-    assert "without its states" in capsys.readouterr().err
-
-
-def test_a_run_with_states_is_taken_as_it_is(solved, tmp_path: Path) -> None:
-    assert cli.main(solved(kept=(0, 5, 10, 15, 20))) == cli.DONE
-    assert (tmp_path / "paraview" / paraview.INDEX).is_file()
-
-
-def test_asking_for_states_changes_no_key_and_solves_only_what_has_none(solved, tmp_path: Path) -> None:
-    solved(kept=())
-    case = fr.load_case(tmp_path / "bar", {"reference.store_state": True})
-    plain = fr.load_case(tmp_path / "bar")
-    assert fr.solve(plain, store=tmp_path / "out" / "runs").outcome.cost["seconds"] == SECONDS
-    said = list[str]()
-    with pytest.raises(AssertionError, match="it is solved again"):
-        fr.solve(case, store=tmp_path / "out" / "runs", progress=said.append)
-    assert any("solved before without its states; solving again" in line for line in said)
-    solved(kept=(0, 5, 10, 15, 20))
-    for one in (case, plain, fr.load_case(tmp_path / "bar", {"reference.store_state": False})):
-        assert fr.solve(one, store=tmp_path / "out" / "runs").outcome.status == "converged"
 
 
 @pytest.mark.parametrize("element", [name for name, (kind, _, _) in ELEMENTS.items() if kind == "tetrahedron"])
@@ -158,7 +87,7 @@ KEYFRAMES = [{"frame": 0, "angle": "0 rad"}, {"frame": 5, "angle": "0.1 rad"}]
 def test_a_run_that_was_cut_off_without_states_does_not_go_on_with_them(tmp_path: Path) -> None:
     scene = casefile.read_muscle(small.write(tmp_path / "bar"))
     bench, place = Bench(scene, tmp_path / "runs"), tmp_path / "runs" / "cut"
-    _write(place, bench, scene.numbers, ())
+    store_run(place, bench, scene.numbers, ())
     facts = json.loads((place / "run.json").read_text())
     (place / "restart").mkdir()
     (place / "run.json").write_text(json.dumps(facts | {"status": "running"}))

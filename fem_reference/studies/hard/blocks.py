@@ -14,11 +14,10 @@ from fem_reference.foundations.records import join
 from fem_reference.geometry.block import kuhn, lattice_skin
 from fem_reference.geometry.exemption import free_skin
 from fem_reference.geometry.rigid_bodies import Sphere
-from fem_reference.geometry.sectors import attached_shares
-from fem_reference.geometry.skins import attached_skin, spacing
+from fem_reference.geometry.skins import spacing
 from fem_reference.geometry.tessellation import tessellated
 from fem_reference.problems.contact import check_exempt
-from fem_reference.problems.muscle import MuscleProblem, solid
+from fem_reference.problems.muscle import MuscleProblem, solid, spring_skins
 from fem_reference.problems.paths import Along
 from fem_reference.problems.setup import AttachedVertices, Bone, Setup
 from fem_reference.scenes.bones import CaseBone
@@ -53,7 +52,9 @@ def problem(hard: Hard) -> MuscleProblem:
     for end, hold in zip(ends, hard.hold, strict=True):
         if hold.middle:
             facets[end.attachment] = index[triangles[np.isin(triangles, end.vertices).any(axis=1)]]
-    mesh = TetMesh(points, _upright(points, tets), facets, maker="lattice")
+    if not tet_volumes(points, tets).min() > 0:
+        raise InputError("block.jitter", "a tetrahedron turned inside out", "less")
+    mesh = TetMesh(points, tets, facets, maker="lattice")
     return _problem(block, setup, mesh, hard.effect or MATERIAL)
 
 
@@ -106,11 +107,7 @@ def _problem(block: Lattice, setup: Setup, mesh: TetMesh, acting: tuple[effects.
         fibre=fibre,
         start=setup.start,
         skin=None if among(acting) is None else free_skin(setup.exempt, mesh, apart),
-        attached_skins={
-            end.attachment: attached_skin(setup.surface, attached_shares(setup.surface, end.vertices), mesh, apart)
-            for end in setup.attached
-            if end.stiffness is not None
-        },
+        attached_skins=spring_skins(setup, mesh, apart),
     )
 
 
@@ -129,13 +126,6 @@ def _ticks(count: int, ratio: float) -> Floats:
     """Shares from 0 to 1 in ``count`` cells, the last of them ``ratio`` times as long as the first."""
     lengths = ratio ** (np.arange(count) / max(count - 1, 1))
     return np.concatenate([[0.0], np.cumsum(lengths) / lengths.sum()])
-
-
-def _upright(points: Floats, tets: Ints) -> Ints:
-    """``tets`` (k, 4) of positive volume; InputError where jitter has turned one."""
-    if not tet_volumes(points, tets).min() > 0:
-        raise InputError("block.jitter", "a tetrahedron turned inside out", "less")
-    return tets
 
 
 def _on(block: Lattice, nodes: Ints, face: Face) -> Ints:
