@@ -6,11 +6,12 @@ docs/speed.md has the commands and what was measured.
 from collections.abc import Callable, Iterable
 
 
-def over[F: Callable[..., object]](**parameters: Iterable[object]) -> Callable[[F], F]:
-    """Mark a benchmark as one that asv makes for all combinations of named ``parameters``."""
+def over[F: Callable[..., object]](unit: str, /, **parameters: Iterable[object]) -> Callable[[F], F]:
+    """Mark a benchmark in a ``unit`` as one that asv makes for all combinations of named ``parameters``."""
 
     def mark(function: F) -> F:
-        vars(function).update(params=tuple(map(list, parameters.values())), param_names=tuple(parameters))
+        names, values = tuple(parameters), tuple(map(list, parameters.values()))
+        vars(function).update(unit=unit, params=values, param_names=names)
         return function
 
     return mark

@@ -67,14 +67,14 @@ class Iteration:
         self.made = made
         spent(self.solver, self.settings, made, WARM_UP)
 
-    @over(case=CASES, solver=SOLVERS)
+    @over("s", case=CASES, solver=SOLVERS)
     def track_seconds(self, case: str, solver: str) -> float:  # noqa: ARG002
         """Processor time [s]."""
         frames = self.bench.scene.frames
         counts = (WARM_UP, min(ITERATIONS, frames.last - frames.first))
         return per_iteration(self.solver, self.settings, self.made, counts, REPEATS)
 
-    @over(case=[case for case in CASES if case in report_speeds()], solver=SOLVERS)
+    @over("times as fast", case=[case for case in CASES if case in report_speeds()], solver=SOLVERS)
     def track_times_as_fast_as_the_report(self, case: str, solver: str) -> float:
         """Iterations in a second over those of the report's program, on cases where the report says them."""
         return 1 / (self.track_seconds(case, solver) * report_speeds()[case].per_second)

@@ -90,18 +90,17 @@ class Reference:
     """The growth of the reference, and the costs to which it is fitted."""
 
     timeout = 7200
-    unit = "s, MB or 1"
 
     def setup_cache(self) -> list[Point]:
         """The costs at all sizes."""
         return of_reference()
 
-    @over(cost=OF_REFERENCE, number=NUMBERS)
+    @over("s, MB or 1", cost=OF_REFERENCE, number=NUMBERS)
     def track_growth(self, points: list[Point], cost: str, number: str) -> float:
         """A number of the fit of a cost."""
         return shown(law(points, cost), number)
 
-    @over(body=range(len(BODIES)), cost=("size", *OF_REFERENCE))
+    @over("s, MB or 1", body=range(len(BODIES)), cost=("size", *OF_REFERENCE))
     def track_cost(self, points: list[Point], body: int, cost: str) -> float:
         """A cost of a body."""
         return points[body][cost]
@@ -111,18 +110,17 @@ class Candidates:
     """The growth of the fast solvers, and the costs to which it is fitted."""
 
     timeout = 7200
-    unit = "s, MB or 1"
 
     def setup_cache(self) -> dict[str, list[Point]]:
         """The costs of each at all sizes."""
         return {name: of_candidate(name) for name in SOLVERS}
 
-    @over(solver=SOLVERS, cost=OF_CANDIDATES, number=NUMBERS)
+    @over("s, MB or 1", solver=SOLVERS, cost=OF_CANDIDATES, number=NUMBERS)
     def track_growth(self, points: dict[str, list[Point]], solver: str, cost: str, number: str) -> float:
         """A number of the fit of a cost."""
         return shown(law(points[solver], cost), number)
 
-    @over(solver=SOLVERS, body=range(len(SUBDIVISIONS)), cost=("size", *OF_CANDIDATES))
+    @over("s, MB or 1", solver=SOLVERS, body=range(len(SUBDIVISIONS)), cost=("size", *OF_CANDIDATES))
     def track_cost(self, points: dict[str, list[Point]], solver: str, body: int, cost: str) -> float:
         """A cost of a body."""
         return points[solver][body][cost]

@@ -94,7 +94,6 @@ class Fusiform:
     """The reference on fusiform bodies."""
 
     timeout = 3600
-    unit = "s, MB, mm or 1"
 
     def setup_cache(self) -> dict[str, Costs]:
         """The costs by element, medians over repeats."""
@@ -104,7 +103,7 @@ class Fusiform:
                 found[element] = median([solve() for _ in range(REPEATS)])
         return found
 
-    @over(element=BODIES, cost=COSTS)
+    @over("s, MB, mm or 1", element=BODIES, cost=COSTS)
     def track_cost(self, found: dict[str, Costs], element: str, cost: str) -> float:
         """A cost."""
         return found[element].get(cost, nan)
@@ -114,7 +113,6 @@ class Muscle:
     """The reference on muscles among bones, each solved once; not a number where the data of one is not here."""
 
     timeout = 7200
-    unit = "s, MB, mm or 1"
 
     def setup_cache(self) -> dict[str, Costs]:
         """The costs by muscle; what is compiled is made before, for the first two frames."""
@@ -127,7 +125,7 @@ class Muscle:
                 found[name] = {}
         return found
 
-    @over(muscle=MUSCLES, cost=COSTS)
+    @over("s, MB, mm or 1", muscle=MUSCLES, cost=COSTS)
     def track_cost(self, found: dict[str, Costs], muscle: str, cost: str) -> float:
         """A cost."""
         return found[muscle].get(cost, nan)
@@ -145,7 +143,7 @@ class Interleaved:
         self.stack = ExitStack()
         self.solve = self.stack.enter_context(prepared(element))
 
-    @over(element=BODIES)
+    @over("seconds", element=BODIES)
     def time_solve(self, element: str) -> None:  # noqa: ARG002
         """Processor time [s] of a solution."""
         self.solve()

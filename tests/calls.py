@@ -229,7 +229,7 @@ def denied(body: fr.Body, solved: Run) -> None:
     """AssertionError where what is said to be converged is not: it is finite, of the frames that were wanted, in their order, and
     where it is prescribed.
     """
-    numbers = [state.frame for state in solved.states]
+    numbers = [state.number for state in solved.states]
     assert solved.outcome.message
     assert numbers == list(body.frames)[: len(numbers)], numbers
     if solved.outcome.status != "converged":
@@ -243,7 +243,7 @@ def denied(body: fr.Body, solved: Run) -> None:
         for entry in body.prescribed if state is not solved.states[0] else ():
             if entry.stiffness is None:
                 at = np.unique(body.mesh.facets[entry.on])
-                wanted = entry.path(body.mesh.points[at], state.frame)
+                wanted = entry.path(body.mesh.points[at], state.number)
                 off = (state.points - body.mesh.points)[at] - wanted
                 assert np.abs(off[:, list(entry.components)]).max() < 1e-9 * (1 + np.abs(wanted).max()), entry.name
 

@@ -25,11 +25,11 @@ def scene_of(options: argparse.Namespace) -> Case:
     return of_case.chosen(casefile.read(options.case, with_negative_control=options.negative_control, changes=changes))
 
 
-def with_limits(scene: Case, limits: list[str]) -> Case:
-    """The scene, expecting of every candidate too that statistics deviate no more than ``limits``, METRIC.STATISTIC=VALUE each."""
-    units = metrics.units(against=scene.standards("candidates"))
+def with_limits(case: Case, limits: list[str]) -> Case:
+    """The case, expecting of every candidate too that statistics deviate no more than ``limits``, METRIC.STATISTIC=VALUE each."""
+    units = metrics.units(against=case.standards("candidates"))
     asked = (_expectation(text, units) for text in limits)
-    return scene.model_copy(update={"expect": (*scene.expect, *asked)})
+    return case.model_copy(update={"expect": (*case.expect, *asked)})
 
 
 def _expectation(text: str, units: Mapping[str, str]) -> Expectation:

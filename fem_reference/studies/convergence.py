@@ -59,10 +59,10 @@ def _ladders(coarse: FieldProblem, case: ScalarCase) -> Iterator[Convergence]:
         yield Convergence(f"P{order}", tuple(len(built.mesh.cells) for built, _ in steps), errors, measured, against)
 
 
-def _error(scene: ScalarCase, finest: Callable[[], Floats]) -> tuple[Callable[[FieldProblem, Floats], float], str]:
+def _error(case: ScalarCase, finest: Callable[[], Floats]) -> tuple[Callable[[FieldProblem, Floats], float], str]:
     """The error of a solution as a function of it, and the truth that this is measured against, in words."""
-    if scene.exact is not None:
-        exact = partial(scalar.at, scene.exact)
+    if case.exact is not None:
+        exact = partial(scalar.at, case.exact)
         return (lambda built, values: l2_distance(built.mesh, values, exact)), "the exact solution (L2)"
     # The vertices of a mesh come first in every finer one. All of them count: where the coarsest mesh is irregular its
     # own vertices alone converge with h^2 log h, and not with h^2.

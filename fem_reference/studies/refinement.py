@@ -59,10 +59,10 @@ def variations(case: MuscleCase, settings: Record, *, pressed: bool = True) -> d
     return found
 
 
-def half_steps(scene: MuscleCase, settings: Record) -> Vary:
+def half_steps(case: MuscleCase, settings: Record) -> Vary:
     """Load steps of at most half the length: no step goes beyond a frame, so that ``frames.every`` bounds it as well."""
     own = settings.model_dump()
-    largest = min(scene.frames.every, own["largest_step"] or math.inf) / 2
+    largest = min(case.frames.every, own["largest_step"] or math.inf) / 2
     return partial(with_reference, first_step=own["first_step"] / 2, largest_step=largest)
 
 

@@ -56,17 +56,14 @@ class Panel:
         )
         return Body(mesh, acting, (*clamped("x0"), *sliding("z0", "z1")), (0.0, 1.0))
 
-    def tip(self, lab: Lab, n: int) -> float:
-        """The displacement of the corner (48, 60) along y in n by n cells [mm], over ``share``."""
-        body, first = self.body(n), 0.25 if self.share == 1 else 1.0
-        state = lab.solve(body, self.element, first_step=first, residual=RESIDUAL * self.share).last
-        corner = nearest(body.mesh.points, (48.0, 60.0, 0.0))
-        return float(state.points[corner, 1] - body.mesh.points[corner, 1]) / self.share
-
 
 def tip(lab: Lab, n: int, **panel: Any) -> float:
-    """The displacement of the corner of a :class:`Panel` [mm]."""
-    return Panel(**panel).tip(lab, n)
+    """The displacement of the corner (48, 60) of a :class:`Panel` along y in n by n cells [mm], over its share of the load."""
+    made = Panel(**panel)
+    body, first = made.body(n), 0.25 if made.share == 1 else 1.0
+    state = lab.solve(body, made.element, first_step=first, residual=RESIDUAL * made.share).last
+    corner = nearest(body.mesh.points, (48.0, 60.0, 0.0))
+    return float(state.points[corner, 1] - body.mesh.points[corner, 1]) / made.share
 
 
 def ratio(lab: Lab, n: int, **panel: Any) -> float:

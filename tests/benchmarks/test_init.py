@@ -13,11 +13,11 @@ ROOT = Path(__file__).parents[2]
 
 
 def test_parameters_are_where_asv_looks_for_them() -> None:
-    @over(size=(1, 2), name="ab")
+    @over("mm", size=(1, 2), name="ab")
     def track() -> float:
         return 1.0
 
-    assert (track.params, track.param_names) == (([1, 2], ["a", "b"]), ("size", "name"))
+    assert (track.unit, track.params, track.param_names) == ("mm", ([1, 2], ["a", "b"]), ("size", "name"))
     assert track() == 1.0
 
 

@@ -120,7 +120,7 @@ def test_cells_are_between_points(changes, message) -> None:
         ({"interval": NAN}, "interval: got float nan"),
         ({"fibre": 3}, "fibre: got int 3, want a function, or None"),
         ({"start": 3}, "start: got int 3, want a function, or None"),
-        ({"contact": 3}, "contact: got int 3, want a Contact, or None"),
+        ({"contact": 3}, "contact: got int 3, want a ContactLaw, or None"),
     ],
 )
 def test_parts_are_what_they_should_be(changes, message) -> None:

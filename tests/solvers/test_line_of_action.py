@@ -245,7 +245,7 @@ def compared(tmp_path_factory) -> tuple[dict, Path]:
     printed = folder / "printed.json"
     case = scene(folder / "bar")
     with pytest.MonkeyPatch.context() as patch:  # pictures take seconds, and lines are in none
-        patch.setattr(gallery, "_command", lambda _job, _folder: [sys.executable, "-c", "raise SystemExit(3)"])
+        patch.setattr(gallery, "program", lambda _job, _folder: [sys.executable, "-c", "raise SystemExit(3)"])
         assert main(["compare", str(case), "--out", str(folder / "out"), "--json", str(printed), "--quiet"]) == 0
     return json.loads(printed.read_text()), folder / "out"
 

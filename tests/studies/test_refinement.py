@@ -80,7 +80,7 @@ def scene_of(case: Path, more: str = "") -> MuscleCase:
 def test_the_bar_covers_an_error_that_is_known(case, capsys, monkeypatch) -> None:
     monkeypatch.setattr(report, "of_comparison", PAGE)
     monkeypatch.setattr(pages, "write", WRITE)
-    monkeypatch.setattr(gallery, "_command", lambda _job, _folder: ["/nowhere/python"])
+    monkeypatch.setattr(gallery, "program", lambda _job, _folder: ["/nowhere/python"])
     path = case / "case.toml"
     path.write_text(path.read_text() + CONTACT)
     status, facts = call(case, "run")

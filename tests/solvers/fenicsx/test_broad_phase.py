@@ -43,9 +43,9 @@ def passage(ball: Obstacle, every: bool) -> list[tuple[list[float], str | None, 
     """
     heights = [*np.linspace(60, 3.6, 20), *[3.6] * 5, -40, *np.linspace(-40, -3.7, 12), *np.linspace(-4, -60, 8)]
     own, unknowns = sheet(), nodes_of(13**2)
-    obstruction = ContactBone("ball", ball, lambda frame: Slide((0, 0, 0), (0, 0, heights[int(frame)]), (0, 0.1, 0))(0))
+    bone = ContactBone("ball", ball, lambda frame: Slide((0, 0, 0), (0, 0, heights[int(frame)]), (0, 0.1, 0))(0))
     forces, random, found = (
-        ContactForces(ContactLaw("skin", 3.0, SMOOTHING), (obstruction,), own, unknowns, 0.0, Spent()),
+        ContactForces(ContactLaw("skin", 3.0, SMOOTHING), (bone,), own, unknowns, 0.0, Spent()),
         rng(),
         [],
     )
