@@ -214,7 +214,7 @@ KINDS = {
         {"fem_reference/effects/own_effect.py": EFFECT},
         {
             "pytest -q tests/contracts/test_every_effect.py -k own_effect": "8 passed",
-            "pytest -q tests/export/test_init.py -k own_effect": "1 passed",
+            "pytest -q tests/export/test_open_formats.py -k own_effect": "1 passed",
         },
     ),
     "metric": New(
