@@ -12,6 +12,7 @@ from fem_reference import cli, export, report
 from fem_reference.foundations.motion import apply
 from fem_reference.problems import muscle
 from fem_reference.problems.muscle import MuscleProblem
+from fem_reference.report import pages
 from fem_reference.runs.cost import seconds_per_frame
 from fem_reference.runs.store import Outcome, Run
 from fem_reference.scenes import casefile
@@ -46,7 +47,8 @@ def test_a_foreign_solver_is_judged(
 
     drawn = []
     monkeypatch.setattr(Bench, "obtain", obtain)
-    monkeypatch.setattr(report, "write", lambda result, folder, _: drawn.append(result) or folder / "report.html")
+    monkeypatch.setattr(report, "of_comparison", drawn.append)
+    monkeypatch.setattr(pages, "write", lambda _, folder, *__: folder / "report.html")
     words = ["compare", scene.place, "--candidate", str(foreign), "--out", str(tmp_path), "--quiet"]
     assert cli.main([*words, "--json", str(tmp_path / "facts.json")]) == cli.DONE
     facts = json.loads((tmp_path / "facts.json").read_text())
