@@ -51,8 +51,8 @@ def test_the_key_changes_with_every_file_that_the_solver_reaches(tmp_path) -> No
     shutil.copytree(key.PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
     (copy / "solvers" / "far.py").write_text("VALUE = 1\n")
     text = (copy / "solvers" / "pbd.py").read_text()
-    several_lines = "import time\nfrom fem_reference.solvers import (\n    far,\n)\n"
-    (copy / "solvers" / "pbd.py").write_text(text.replace("import time\n", several_lines, 1))
+    several_lines = "import numpy as np\nfrom fem_reference.solvers import (\n    far,\n)\n"
+    (copy / "solvers" / "pbd.py").write_text(text.replace("import numpy as np\n", several_lines, 1))
 
     def hashed(solver: str) -> str:
         return key.code_hash.__wrapped__(solver, copy)
