@@ -44,7 +44,7 @@ def test_springs_and_their_stiffness_are_said(bar) -> None:
 
 
 def test_a_field_has_its_size_its_nodes_and_its_form(tmp_path) -> None:
-    """A rod of 2 mm in 4 cells of order 2, fixed at one end; the flow of 3 is ``3 * 0.5 / (2 * 1)`` for the cells."""
+    """A rod of 2 mm in 4 cells, fixed at one end; its mesh Peclet number is ``3 * 0.5 / (2 * 1)``."""
     case = fields.scene(
         tmp_path,
         domain={"interval": {"start": 0.0, "end": 2.0, "count": 5}},

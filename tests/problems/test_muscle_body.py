@@ -1,4 +1,4 @@
-"""Scene -> problem: what is attached, what the mesh is like, and fibres that stay where the solution is."""
+"""Case -> problem: what is attached, what the mesh is like, and what does not depend on it."""
 
 from dataclasses import replace
 

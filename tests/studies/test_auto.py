@@ -1,4 +1,4 @@
-"""``effects = "auto"``: which effects a scene needs is found out before it is solved, and looked at again after."""
+"""``effects = "auto"``: indicators of effects, and runs to which what turns out to matter is added while they are made."""
 
 import importlib.util
 from dataclasses import replace

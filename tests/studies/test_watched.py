@@ -1,4 +1,4 @@
-"""``effects = "auto"`` keeps what makes a force and moves little, and finds out what only a solution shows."""
+"""``effects = "auto"``: runs are those of the listed effects, and what only tetrahedra show is found out."""
 
 import importlib.util
 from collections.abc import Iterator
