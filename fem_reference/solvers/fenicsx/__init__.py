@@ -107,9 +107,7 @@ def _solve(problem: MuscleProblem, settings: Settings, sink: Sink, folder: Path,
             "while what overlaps bones at rest was relaxed, before the first frame (which is shown as it was given): "
         )
         outcome = replace(outcome, message=begin + outcome.message)
-    key = (
-        " (muscle.tet_size)" if outcome.message.endswith("smaller cells") else ""
-    )  # the name that a scene has for them
+    key = " (muscle.tet_size)" if outcome.message.endswith("smaller cells") else ""  # a scene's name of them
     return replace(outcome, message=outcome.message + key, cost={"seconds_mesh": problem.seconds} | outcome.cost)
 
 

@@ -56,9 +56,7 @@ class AssembledBody:
         self.comm, self.reuse = MPI.COMM_WORLD, settings.reuse
         self.effects = body.effects
         self.conserves = not any(map(_is_changed_from_outside, self.effects))
-        self.judged = (
-            False  # True once its energy gap counts: then a halfway state is worth its time where work is not resolved
-        )
+        self.judged = False  # True once its energy gap counts: a halfway state then pays where work is not resolved
         self.mesh = meshes.distribute(self.comm, body.mesh)
         self.cells = meshes.own_cells(self.mesh)
         self.local = {int(cell): i for i, cell in enumerate(self.cells)}
