@@ -30,12 +30,10 @@ def cases() -> list[str]:
 
 
 def read(case: str | Path, *, with_negative_control: bool = False, changes: dict[str, Any] | None = None) -> Case:
-    """A shipped case (by name), that of a folder with a ``case.toml``, or that of a scene file: with a ``domain`` of a scalar
-    field, else of a muscle.
+    """A shipped case by name, or the case of a folder or of a file; one with a ``domain`` is of a scalar field.
 
-    ``changes`` maps keys such as ``"frames.last"`` or ``"effect[1].bulk"`` to other values; ``with_negative_control`` applies the
-    case's negative control. That the negative control can be applied is checked too, except after changes of other keys: they may
-    take away what it changes.
+    ``changes`` maps keys such as ``"frames.last"`` or ``"effect[1].bulk"`` to other values. ``with_negative_control`` applies the
+    negative control, which is checked in any case, except after changes of other keys.
     """
     path = _scene_file(case)
     table = texts.toml(path)

@@ -79,7 +79,7 @@ def test_a_denied_run_is_no_truth_anywhere(tmp_path, monkeypatch, capsys) -> Non
         assert "off lid" in facts["message"]
     assert store.load(folder).outcome.status == "denied"
     (page,) = (path for path in out.rglob("report*.html"))
-    assert "denies what the solver calls converged" in page.read_text()
+    assert "which uses positions and forces alone, denies it" in page.read_text()
     case = casefile.read(scene)
     bench = Bench(case, out / "runs")
     run = bench.obtain("reference", case.reference, "reference")
