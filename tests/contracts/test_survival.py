@@ -23,18 +23,16 @@ from fem_reference.assessment.stress import Stress
 from fem_reference.export.folders import new_folder
 from fem_reference.foundations import subprocesses
 from fem_reference.io import files
-from fem_reference.problems.problem import AtRest
 from fem_reference.report import stress_page
-from fem_reference.runs import cut_off, store
+from fem_reference.runs import cut_off
 from fem_reference.runs.states import write_arrays
-from fem_reference.runs.store import Frame, Outcome, Run
+from fem_reference.runs.store import Frame, Run
 from fem_reference.runs.writer import Writer
 from fem_reference.scenes import casefile
 from fem_reference.solvers.fenicsx import jobs
 from fem_reference.studies.execution import Bench
 
 SURFACE = shapes.sphere(1, 10.0)
-IDENTITY = {"name": "one", "solver": "test", "origin": {"versions": {"numpy": "2"}}, "frames": (0, 5, 10)}
 MOVING = """
 [[effect]]
 name = "inertia"
@@ -112,55 +110,6 @@ def test_a_command_that_is_killed_ends_as_if_it_had_not_been(tmp_path: Path) -> 
     assert subject.compare(subject.finish()) == []
 
 
-def begun(folder: Path, frames: int = 2, status: str | None = None) -> Writer:
-    """A run of which some frames are stored, and something is kept to go on from."""
-    writer = Writer(folder, IDENTITY, AtRest(SURFACE))
-    for number in IDENTITY["frames"][:frames]:  # type: ignore[index]
-        writer.add(Frame(number, SURFACE.points + number, scalars={"energy": 1.0 * number}))
-    writer.cut_off.folder.mkdir()
-    (writer.cut_off.folder / "kept.npz").touch()
-    if status is not None:
-        writer.close(Outcome(status, "so"))  # type: ignore[arg-type]
-    return writer
-
-
-@pytest.mark.parametrize("status", [None, "crashed"])
-def test_a_writer_goes_on_where_a_run_was_cut_off(status: str | None, tmp_path: Path) -> None:
-    begun(tmp_path / "run", status=status)
-    (tmp_path / "run" / "surface" / ".frame_0010-1.vtp").touch()
-    writer = Writer(tmp_path / "run", IDENTITY | {"name": "other"}, AtRest(SURFACE))
-    assert writer.cut_off == cut_off.CutOff(tmp_path / "run" / "restart", (0, 5))
-    writer.add(Frame(5, SURFACE.points + 6, scalars={"energy": 6.0}))  # one that is there already
-    assert writer.frames == (0, 5)
-    writer.add(Frame(10, SURFACE.points + 10, scalars={"energy": 10.0}))
-    writer.close(Outcome("converged", "done"))
-    run = store.load(tmp_path / "run")
-    assert (run.name, run.numbers, run.scalars["energy"].tolist()) == ("other", (0, 5, 10), [0, 6, 10])
-    assert np.array_equal(run.positions[1], SURFACE.points + 6)
-    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == ["run.json", "surface", "surface.pvd"]
-    assert len(list((tmp_path / "run" / "surface").iterdir())) == 3
-
-
-@pytest.mark.parametrize(
-    "change", ["converged", "diverged", "no folder", "other frames", "other solver", "other versions", "damaged"]
-)
-def test_a_run_that_cannot_go_on_begins_anew(change: str, tmp_path: Path) -> None:
-    identity = dict(IDENTITY)
-    begun(tmp_path / "run", status=change if change in ("converged", "diverged") else None)
-    assert (tmp_path / "run" / "restart").exists() == (change not in ("converged", "diverged"))
-    if change == "no folder":
-        cut_off.clear(tmp_path / "run")
-    elif change == "damaged":
-        text = (tmp_path / "run" / "run.json").read_text(encoding="utf-8")
-        (tmp_path / "run" / "run.json").write_text(text.replace('"energy"', '"energy": 1, "x"'), encoding="utf-8")
-    elif change.startswith("other"):
-        others = {"frames": (0, 5), "solver": "another", "versions": {"versions": {"numpy": "3"}}}
-        key = change.removeprefix("other ")
-        identity[{"versions": "origin"}.get(key, key)] = others[key]
-    assert Writer(tmp_path / "run", identity, AtRest(SURFACE)).frames == ()
-    assert not (tmp_path / "run" / "surface").exists()
-
-
 # What a process does that may write no file beyond so many bytes: as on a disk that is full.
 _SMALL_DISK = """
 import resource, sys
@@ -233,18 +182,6 @@ def test_a_folder_that_is_read_only_is_one_sentence(words: list[str], tmp_path: 
     said = capsys.readouterr().err
     assert re.fullmatch(r"fem-reference: \S*not_ours\S*: cannot be written: [\w ]+\n", said), said
     assert sorted(tmp_path.rglob("*")) == before
-
-
-def test_a_run_whose_folder_cannot_be_written_into_any_more_keeps_what_it_has(tmp_path: Path) -> None:
-    writer = begun(tmp_path / "run")
-    surfaces = (tmp_path / "run" / "surface").rename(tmp_path / "kept")
-    (tmp_path / "run" / "surface").touch()  # no folder any more
-    with pytest.raises(OSError, match="surface"):
-        writer.add(Frame(10, SURFACE.points + 10, scalars={"energy": 10.0}))
-    (tmp_path / "run" / "surface").unlink()
-    surfaces.rename(tmp_path / "run" / "surface")
-    assert Writer(tmp_path / "run", IDENTITY, AtRest(SURFACE)).frames == (0, 5)
-    assert len(list((tmp_path / "run" / "surface").iterdir())) == 2
 
 
 def write_both(folder: Path, word: str) -> None:

@@ -10,35 +10,11 @@ import shapes
 import small
 
 import fem_reference as fr
-from fem_reference.foundations.mesh import Polylines
 from fem_reference.problems.body import ELEMENTS, Cells
-from fem_reference.problems.problem import AtRest
 from fem_reference.runs import states
-from fem_reference.runs.key import versions
 from fem_reference.runs.states import NodalState
-from fem_reference.runs.store import Frame, Outcome
-from fem_reference.runs.writer import Writer
-from fem_reference.scenes import casefile
 from fem_reference.solvers import fenicsx
 from fem_reference.solvers.fenicsx import resources
-from fem_reference.solvers.fenicsx.settings import Settings
-from fem_reference.studies.execution import Bench
-
-SECONDS = 1320.0  # that the stored run took: 22 minutes
-
-
-def store_run(place: Path, bench: Bench, numbers: tuple[int, ...], kept: tuple[int, ...]) -> None:
-    """The run of a reference that does not move, with the states of the frames ``kept``."""
-    rest, mesh = bench.setup().surface, shapes.box((2, 2, 4), (10, 10, 40))
-    fibres = Polylines(np.column_stack([np.full((8, 2), 5.0), [1, 5, 10, 20, 2, 3, 4, 8]]), [0, 4, 8])
-    origin = {"scene": bench.scene.key, "versions": versions()}
-    identity = {"name": "reference", "solver": "fenicsx", "frames": numbers, "origin": origin}
-    writer = Writer(place, identity, AtRest(rest, fibres, mesh, np.tile([0.0, 0, 1], (len(mesh.tets), 1))))
-    state = NodalState(np.zeros((len(mesh.tets), 10, 3)), np.zeros((len(mesh.tets), 4)), np.zeros((0, 0, 3)))
-    for number in numbers:
-        frame = Frame(number, rest.points, fibres.points, mesh.points)
-        writer.add(replace(frame, state=state) if number in kept else frame)
-    writer.close(Outcome("converged", "", {"seconds": SECONDS}))
 
 
 @pytest.mark.parametrize("element", [name for name, (kind, _, _) in ELEMENTS.items() if kind == "tetrahedron"])
@@ -82,20 +58,6 @@ def test_small_states_are_kept_by_default_and_large_ones_are_not(
 
 
 KEYFRAMES = [{"frame": 0, "angle": "0 rad"}, {"frame": 5, "angle": "0.1 rad"}]
-
-
-def test_a_run_that_was_cut_off_without_states_does_not_go_on_with_them(tmp_path: Path) -> None:
-    scene = casefile.read_muscle(small.write(tmp_path / "bar"))
-    bench, place = Bench(scene, tmp_path / "runs"), tmp_path / "runs" / "cut"
-    store_run(place, bench, scene.numbers, ())
-    facts = json.loads((place / "run.json").read_text())
-    (place / "restart").mkdir()
-    (place / "run.json").write_text(json.dumps(facts | {"status": "running"}))
-    identity = {"name": "reference", "solver": "fenicsx", "frames": scene.numbers}
-    origin = {"scene": scene.key, "versions": versions()}
-    assert Writer(place, identity | {"origin": origin}, bench.setup().rest).frames == scene.numbers
-    origin["settings"] = Settings(store_state=True).model_dump(mode="json")
-    assert Writer(place, identity | {"origin": origin}, bench.setup().rest).frames == ()
 
 
 def test_bodies_carry_no_states_by_default() -> None:

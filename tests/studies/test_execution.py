@@ -1,19 +1,12 @@
-"""Runs are named by all that determines them, made once even when asked for twice at a time, and complete over the frames."""
+"""Runs are named by all that determines them, and taken up where they were made before."""
 
 import logging
-import shutil
-import threading
 from pathlib import Path
 
-import numpy as np
 import pytest
-import shapes
 import small
 
 from fem_reference.foundations.errors import InputError
-from fem_reference.runs import key
-from fem_reference.runs.complete import complete
-from fem_reference.runs.store import Outcome, Run
 from fem_reference.scenes import casefile
 from fem_reference.scenes.case import SolverChoice
 from fem_reference.studies import execution
@@ -46,39 +39,6 @@ def test_the_key_names_what_determines_a_run(tmp_path) -> None:
     assert key_of(Bench(bench(tmp_path).scene, tmp_path, ranks=1)) == base
 
 
-def test_the_key_changes_with_every_file_that_the_solver_reaches(tmp_path) -> None:
-    copy = tmp_path / "fem_reference"
-    shutil.copytree(key.PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
-    (copy / "solvers" / "far.py").write_text("VALUE = 1\n")
-    text = (copy / "solvers" / "pbd.py").read_text()
-    several_lines = "import numpy as np\nfrom fem_reference.solvers import (\n    far,\n)\n"
-    (copy / "solvers" / "pbd.py").write_text(text.replace("import numpy as np\n", several_lines, 1))
-
-    def hashed(solver: str) -> str:
-        return key.code_hash.__wrapped__(solver, copy)
-
-    before = {solver: hashed(solver) for solver in ("pbd", "fenicsx")}
-    reached = {
-        "pbd": {"solvers/pbd.py", "solvers/pbd_kernels.py", "solvers/far.py", "solvers/collision_kernels.py"},
-        "fenicsx": {"solvers/fenicsx/worker.py", "solvers/fenicsx/cells.c", "solvers/common/load_steps.py"},
-    }
-    both = {
-        "problems/muscle.py",
-        "solvers/common/state_checks.py",
-        "effects/neo_hooke.py",
-        "runs/store.py",
-        "solvers/__init__.py",
-        "geometry/skins.py",
-    }
-    neither = {"metrics/volume.py", "cli/run.py", "assessment/judge.py", "solvers/listing.py"}
-    for name in sorted(set.union(both, neither, *reached.values())):
-        text = (copy / name).read_bytes()
-        (copy / name).write_bytes(text + b"\n")
-        for solver, own in reached.items():
-            assert (hashed(solver) != before[solver]) == (name in own | both), (solver, name)
-        (copy / name).write_bytes(text)
-
-
 def test_a_copied_case_finds_what_was_solved_before(tmp_path, caplog) -> None:
     caplog.set_level(logging.INFO, logger="fem_reference")
     one = casefile.read(small.write(tmp_path / "bar"))
@@ -102,39 +62,6 @@ def test_a_run_made_with_other_packages_is_made_again(tmp_path, monkeypatch, cap
     caplog.clear()
     made.obtain("pbd", made.scene.candidate[0], "candidate[0]")
     assert "solved before, taken from" in caplog.text
-
-
-def test_a_run_asked_for_twice_at_a_time_is_made_once(tmp_path, caplog) -> None:
-    caplog.set_level(logging.INFO, logger="fem_reference")
-    scene = bench(tmp_path).scene
-    made = []
-
-    def ask() -> None:
-        made.append(Bench(scene, tmp_path / "runs").obtain("pbd", scene.candidate[0], "candidate[0]"))
-
-    threads = [threading.Thread(target=ask) for _ in range(2)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert len(made) == 2
-    assert np.array_equal(made[0].positions, made[1].positions)
-    assert caplog.text.count("solved before") == 1
-
-
-def test_frames_that_were_not_reached_are_not_numbers() -> None:
-    rest = shapes.sphere(0)
-    positions = np.stack([rest.points, rest.points + 1])
-    run = Run(
-        "one", "test", Outcome("diverged", "no"), (0, 10), rest, positions, scalars={"energy": np.array([1.0, 2.0])}
-    )
-    whole = complete(run, (0, 5, 10))
-    assert whole.numbers == (0, 5, 10)
-    assert np.array_equal(whole.positions[[0, 2]], positions)
-    assert np.isnan(whole.positions[1]).all()
-    assert whole.fibre_positions is None
-    assert np.array_equal(whole.scalars["energy"], [1, np.nan, 2], equal_nan=True)
-    assert complete(run, (0, 10)) is run
 
 
 def test_an_element_that_does_not_suit_the_effects_is_named(tmp_path) -> None:

@@ -12,7 +12,7 @@ from fem_reference.export import paraview
 from fem_reference.scenes import casefile
 from fem_reference.solvers import fenicsx
 from fem_reference.studies.execution import Bench
-from tests.runs.test_states import SECONDS, store_run
+from tests.runs.stored import SECONDS, store_run
 
 
 @pytest.fixture

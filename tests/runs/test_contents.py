@@ -1,0 +1,53 @@
+"""The contents of run.json: read strictly, so that each damage is named."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from fem_reference.foundations.errors import InputError
+from fem_reference.runs import store
+from fem_reference.runs.contents import amend
+from tests.runs.stored import write
+
+
+def test_damage_is_named(tmp_path) -> None:
+    with pytest.raises(InputError, match=r"run\.json: got no file, want the run\.json of a stored run"):
+        store.load(tmp_path)
+    folder = write(tmp_path / "run")
+    state = json.loads((folder / "run.json").read_text())
+    (folder / "run.json").write_text(json.dumps(state | {"format": 99}))
+    with pytest.raises(InputError, match="format: got 99, want 1"):
+        store.load(folder)
+    (folder / "run.json").write_text(json.dumps(state | {"numbers": []}))
+    with pytest.raises(InputError, match=r"run.numbers: got \[\], want .* at least 1 item"):
+        store.load(folder)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"numbers": [0, 0]}, r"numbers: got \[0, 0\], want frame numbers that increase"),
+        ({"numbers": [5, 0]}, r"numbers: got \[5, 0\], want frame numbers that increase"),
+        ({"numbers": [-5, 0]}, r"numbers\[0\]: got -5, want greater than or equal to 0"),
+        ({"numbers": [0]}, r"want as many values of each of the scalars as there are numbers of frames"),
+        ({"scalars": {"energy": [1.0]}}, r"want as many values of each of the scalars as there are numbers of frames"),
+        ({"status": "fine"}, r'status: got "fine", want'),
+        ({"colour": "red"}, r"colour: got an unknown key, want one of"),
+    ],
+)
+def test_contents_that_contradict_themselves_are_named(
+    changes: dict[str, object], message: str, tmp_path: Path
+) -> None:
+    folder = write(tmp_path / "run")
+    amend(folder, **changes)
+    with pytest.raises(InputError, match=message):
+        store.load(folder)
+
+
+def test_what_is_amended_leaves_the_rest(tmp_path: Path) -> None:
+    folder = write(tmp_path / "run")
+    before = json.loads((folder / "run.json").read_text())
+    amend(folder, message="another", name="other")
+    assert json.loads((folder / "run.json").read_text()) == before | {"message": "another", "name": "other"}
+    assert store.load(folder).name == "other"

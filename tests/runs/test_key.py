@@ -1,0 +1,63 @@
+"""Keys of runs: of the scene, the solver, its settings and the source files that it reaches."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+from fem_reference.foundations import version
+from fem_reference.runs import key
+
+
+@pytest.mark.slow
+def test_the_key_changes_with_every_file_that_the_solver_reaches(tmp_path) -> None:
+    copy = tmp_path / "fem_reference"
+    shutil.copytree(key.PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    (copy / "solvers" / "far.py").write_text("VALUE = 1\n")
+    text = (copy / "solvers" / "pbd.py").read_text()
+    several_lines = "\nfrom fem_reference.solvers import (\n    far,\n)\n"
+    (copy / "solvers" / "pbd.py").write_text(text + several_lines)
+
+    def hashed(solver: str) -> str:
+        return key.code_hash.__wrapped__(solver, copy)
+
+    before = {solver: hashed(solver) for solver in ("pbd", "fenicsx")}
+    reached = {
+        "pbd": {"solvers/pbd.py", "solvers/pbd_kernels.py", "solvers/far.py", "solvers/common/frame_loop.py"},
+        "fenicsx": {"solvers/fenicsx/worker.py", "solvers/fenicsx/cells.c", "solvers/common/load_steps.py"},
+    }
+    both = {
+        "problems/muscle.py",
+        "solvers/common/state_checks.py",
+        "effects/neo_hooke.py",
+        "runs/store.py",
+        "solvers/__init__.py",
+        "geometry/skins.py",
+    }
+    both |= {"solvers/common/state_checks.py"}
+    neither = {"metrics/volume.py", "cli/run.py", "assessment/judge.py", "solvers/listing.py"}
+    for name in sorted(set.union(both, neither, *reached.values())):
+        text = (copy / name).read_bytes()
+        (copy / name).write_bytes(text + b"\n")
+        for solver, own in reached.items():
+            assert (hashed(solver) != before[solver]) == (name in own | both), (solver, name)
+        (copy / name).write_bytes(text)
+
+
+@pytest.mark.slow
+def test_a_key_differs_with_each_of_its_parts() -> None:
+    """Of all that determines a run: its scene, its solver and the settings, in whatever order they stand."""
+    settings = {"damping": 0.05, "stretch": 1.0}
+    first = key.key("scene", "pbd", settings)
+    assert len(first) == 16
+    assert key.key("scene", "pbd", dict(reversed(settings.items()))) == first
+    others = [("other", "pbd", settings), ("scene", "xpbd", settings), ("scene", "pbd", settings | {"stretch": 0.5})]
+    assert len({first, *(key.key(*parts) for parts in others)}) == 4
+
+
+def test_provenance_names_the_machine_how_it_was_used_and_the_packages() -> None:
+    found = key.made_with("one run at a time")
+    assert found["machine"] == f"{key.machine()}, one run at a time"
+    assert found["fem_reference"] == version.__version__
+    assert found["numpy"] == np.__version__
+    assert key.made_with()["machine"] == key.machine()
