@@ -14,9 +14,7 @@ Arrays = dict[str, Any]
 
 
 def kept[T](path: Path, make: Callable[[], T], to_arrays: Callable[[T], Arrays], of_arrays: Callable[[Arrays], T]) -> T:
-    """The value that ``of_arrays`` reads from the file at ``path``; without one, the value of ``make``, stored by
-    ``to_arrays``.
-    """
+    """The value that ``of_arrays`` reads from the file at ``path``; without one that of ``make``, stored by ``to_arrays``."""
     found = _read(path, of_arrays)
     if found is None:
         found = make()

@@ -139,9 +139,7 @@ class ContactForces:
                 yield self.points.cells[touched], self.points.basis[touched], -areas * one.slope
 
     def forces(self) -> dict[str, tuple[Floats, Floats]]:
-        """By name of a bone, the force (3,) [N] that it exerts on this rank's points, and its moment (3,) [N mm] about the
-        origin.
-        """
+        """The force (3,) [N] of each bone, by name, on this rank's points, and its moment (3,) [N mm] about the origin."""
         found = {}
         for entry, one in zip(self.bones, self.now, strict=True):
             forces = self.points.areas[one.pressed, None] * one.traction

@@ -12,7 +12,7 @@ Forces = dict[str, Floats]
 
 
 def reactions(system: System, contact: ContactForces | None, *, divided: bool) -> tuple[Forces, Forces]:
-    """By name of each constraint in a ``system`` and of each bone in ``contact``, the force (3,) [N] on the body and its moment
+    """The force (3,) [N] of each constraint in a ``system`` and of each bone in ``contact``, by name, on the body, and its moment
     (3,) [N mm] about the origin. The force at an unknown of several regions is ``divided`` between them, so that all forces
     balance, or counts in each.
     """

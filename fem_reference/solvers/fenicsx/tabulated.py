@@ -39,9 +39,7 @@ class Tabulated:
 
 
 def tabulate(space: fem.FunctionSpace, unknowns: Ints, points: Floats) -> Tabulated:
-    """A part of the unknowns at reference ``points`` (q, 3), from its ``space`` and the ``unknowns`` (m, k, c) of the cells'
-    nodes.
-    """
+    """A part of the unknowns at reference ``points`` (q, 3): its ``space``, and the ``unknowns`` (m, k, c) of the cells' nodes."""
     element: Any = space.element.basix_element
     values, *slopes = element.tabulate(1, points)[..., 0]
     return Tabulated(values, np.stack(slopes), unknowns)
