@@ -21,7 +21,6 @@ from fem_reference.cli._printing import (
     out,
 )
 from fem_reference.foundations.errors import InputError, MissingSoftware
-from fem_reference.report.asked import LONGEST
 
 __all__ = [
     "BAD_INPUT",
@@ -113,6 +112,8 @@ def _check_outputs(options: argparse.Namespace) -> None:
 
 def _check_name(name: str | None) -> None:
     """InputError where ``--name`` is none that a page can have: what else lies beside pages has its own."""
+    from fem_reference.report.asked import LONGEST  # what it needs may be missing, which is said below
+
     if name is not None and (
         name in ("runs", "docs", "index") or not re.fullmatch(rf"\w[\w.=+-]{{0,{LONGEST - 1}}}", name)
     ):

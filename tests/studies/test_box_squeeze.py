@@ -45,7 +45,7 @@ def run(bench):
 
 def test_its_expectations_are_met(bench, run) -> None:
     result = judging.compare(bench, run, [])
-    assert result.word == "pass"
+    assert result.word == "doubtful pass", "its equilibrium is unstable"
     assert len([verdict for verdict in result.verdicts if verdict.word == "pass"]) >= len(bench.scene.expect)
 
 

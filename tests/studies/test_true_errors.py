@@ -58,7 +58,7 @@ def test_it_is_asked_for_by_the_command_line(tmp_path, monkeypatch) -> None:
     assert 1.5 < numbers["median_ratio"] < 12
     assert numbers["sizes_mm"] == {"bar": [6.0, pytest.approx(4.8)]}
     monkeypatch.setattr(refinement, "stored", lambda _: None)
-    monkeypatch.setattr(refinement, "obtain", lambda _bench, _run: None)
+    monkeypatch.setattr(refinement, "obtain", lambda *_, **__: None)
     found = true_errors.stake([casefile.read_muscle(case)], out / "runs")
     assert list(found.missing) == ["bar"]
 

@@ -72,7 +72,7 @@ def test_det_F_is_what_the_run_recorded_at_the_vertices(turned) -> None:
         corners = made.evaluate_in(tets, np.tile(CORNERS, (len(problem.mesh.tets), 1)), frame.number)
         assert corners["det_F"].min() == pytest.approx(frame.scalars["min_det_F_vertices"], rel=1e-12)
         places = problem.mesh.points[problem.mesh.tets].reshape(-1, 3) + corners["displacement"]
-        assert places == pytest.approx(frame.tets[problem.mesh.tets].reshape(-1, 3), abs=1e-12)
+        assert places == pytest.approx(frame.points[problem.mesh.tets].reshape(-1, 3), abs=1e-12)
 
 
 @pytest.fixture(scope="module")

@@ -109,8 +109,7 @@ class Springs:
         values = SimpleNamespace(array=np.array(unknowns))
         self.unknowns = SimpleNamespace(x=values, function_space=SimpleNamespace(mesh=world))
         self.owned = len(unknowns)
-        self.work = SimpleNamespace(array=np.zeros(self.owned), scatter_reverse=lambda _: None)
-        self.cells = SimpleNamespace(add_residual=lambda out: np.add(out, slope(*values.array), out=out))
+        self.reactions = lambda **_: np.array(slope(*values.array))
 
 
 def gap(energy, slope, states: list[list[float]], *, looked: bool = True) -> float:
